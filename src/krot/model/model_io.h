@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+enum class ModelFormat { kBinary, kText };
+
+// The format that ReadModel takes in this folder: binary if all of
+// cameras.bin, images.bin and points3D.bin exist, otherwise text if all three
+// .txt files exist. Throws ModelError, naming what is missing; if a
+// subfolder "0" holds a model, the message says so.
+ModelFormat DetectModelFormat(const std::filesystem::path& folder);
+
+// Reads cameras, rigs, frames (both optional, but only together), images and
+// points3D. Every count is checked against the file's size before memory is
+// reserved. Throws ModelError. The result is syntactically complete;
+// ValidateModel says whether it is consistent.
+Model ReadModel(const std::filesystem::path& folder, ModelFormat format);
+
+struct WriteModelOptions {
+  ModelFormat format = ModelFormat::kBinary;
+  // A folder that already holds a model is replaced only if this is set.
+  bool overwrite = false;
+  // Files beside the model (project.ini) are copied from this folder.
+  std::filesystem::path copy_project_from;  // empty: nothing is copied
+};
+
+// Throws ModelError if WriteModel would refuse this folder (it holds a model
+// and options.overwrite is false; it cannot be created; it is not writable).
+// Changes nothing.
+void CheckWritable(const std::filesystem::path& folder,
+                   const WriteModelOptions& options);
+
+// Writes the model into a new sibling folder and swaps that in, so that an
+// interruption leaves the old model or the new one and never a mix; foreign
+// files already in `folder` are carried over, model files of the other format
+// are not. Throws ModelError; nothing has changed then.
+void WriteModel(const Model& model, const std::filesystem::path& folder,
+                const WriteModelOptions& options);
+
+}  // namespace krot

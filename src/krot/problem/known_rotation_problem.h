@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace krot {
+
+// The known rotation problem in pixels [Zhang18, (KRot)], for frames with
+// any number of cameras:
+//
+//   min over t_f, s_k   max_i  ||v_i||_p / w_i    subject to  w_i > 0,
+//   (w_i; v_i) = [e3'; J_i (I2 | -u_i)] x_cam,
+//   x_cam = R_sr (R_rw s_k + t_f) + t_sr.
+//
+// w is the depth; the ratio is the reprojection error in pixels, linearised
+// at the observation (docs/method.md).
+
+// One image: how its camera sits in its frame.
+struct View {
+  Eigen::Matrix3d cam_from_world_rotation;  // R_sr R_rw
+  Eigen::Matrix3d cam_from_rig_rotation;    // R_sr
+  Eigen::Vector3d cam_from_rig_translation; // t_sr, scene units
+  int32_t frame = 0;
+};
+
+// One 2D observation of one point.
+struct Observation {
+  Eigen::Vector2d u;  // on the plane z = 1
+  Eigen::Matrix2d J;  // d pixel / d u at u, pixels
+  int32_t view = 0;
+  int32_t point = 0;
+};
+
+// Observations stand in the order of their points; an index lists them by
+// frame.
+struct KnownRotationProblem {
+  int32_t num_frames = 0;
+  int32_t num_points = 0;
+  std::vector<View> views;
+  std::vector<Observation> observations;
+  // Point k's observations: [point_begin[k], point_begin[k + 1]).
+  std::vector<int64_t> point_begin;
+  // Frame f's observations: observations[frame_observations[n]] for n in
+  // [frame_begin[f], frame_begin[f + 1]).
+  std::vector<int64_t> frame_begin;
+  std::vector<int32_t> frame_observations;
+};
+
+// The unknowns.
+struct Estimate {
+  std::vector<Eigen::Vector3d> translations;  // t_f, per frame
+  std::vector<Eigen::Vector3d> points;        // s_k
+};
+
+// Builds the indices from views and observations, which must already be
+// sorted by point. Throws std::invalid_argument where an index is out of
+// range or the order is broken.
+void IndexObservations(KnownRotationProblem* problem);
+
+}  // namespace krot
