@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+// True reprojection errors of a model: through the full camera, in pixels, in
+// the order of Model::track_elements. NaN where a point is not in front of
+// its camera, has no pose, or projects to no finite pixel. O(observations).
+std::vector<double> PixelErrors(const Model& model, int num_threads = -1);
+
+// Over the finite errors.
+struct PixelErrorStatistics {
+  double max = 0;
+  double p99 = 0;  // nearest rank
+  double mean = 0;
+  double rms = 0;
+  int64_t count = 0;       // finite errors
+  int64_t not_finite = 0;  // behind, without pose, or not projectable
+};
+PixelErrorStatistics Summarize(const std::vector<double>& errors_px);
+
+// Sets every point's stored error to the mean of its finite errors (-1 if it
+// has none): what COLMAP's model_analyzer averages and its GUI colours by.
+void UpdatePointErrors(const std::vector<double>& errors_px, Model* model);
+
+}  // namespace krot

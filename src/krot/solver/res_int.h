@@ -1,0 +1,55 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "krot/base/progress.h"
+#include "krot/minimax/fast_descent.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// Resection-Intersection [Zhang18, Alg. 1]: sweeps that minimise every
+// point's own maximum residual with the frames fixed, then every frame's with
+// the points fixed.
+
+struct Sweep {
+  double cost = 0;     // pixels, after the sweep
+  double seconds = 0;  // wall clock since the start
+};
+
+struct ResIntOptions {
+  Norm norm;
+  // Literally as in the paper, or the same sub-problem optima by better means.
+  FastDescentOptions fast_descent;
+  int max_sweeps = 1000;  // >= 0
+  // Stop when a sweep lowers the cost by less than this, relative; >= 0.
+  double sweep_tolerance = 1e-6;
+  int num_threads = -1;  // -1: all; the result does not depend on it
+  bool update_frames = true;  // false: points only (triangulation)
+  const CancelFlag* cancel = nullptr;                  // may be null
+  std::function<void(int sweep, const Sweep&)> callback;  // may be empty
+};
+
+enum class ResIntTermination {
+  kNotRun,
+  kStalled,      // the last sweep lowered the cost by less than the tolerance
+  kMaxSweeps,
+  kInterrupted,
+};
+
+struct ResIntSummary {
+  ResIntTermination termination = ResIntTermination::kNotRun;
+  double cost_initial = 0;  // pixels
+  double cost_final = 0;    // <= cost_initial
+  std::vector<Sweep> sweeps;
+};
+
+// Improves `estimate`, all of whose depths must be positive (throws
+// std::invalid_argument otherwise). The cost never rises. Needs about 160
+// bytes per observation.
+ResIntSummary SolveResInt(const KnownRotationProblem& problem,
+                          const ResIntOptions& options, Estimate* estimate);
+
+}  // namespace krot
