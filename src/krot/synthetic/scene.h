@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Synthetic COLMAP models with ground truth, for tests, benchmarks and demos.
+
+enum class SceneLayout {
+  kOrbit,  // frames around a cloud of points, looking in
+  kStreet  // frames along a path, looking sideways; a point is seen by
+           // neighbouring frames only
+};
+
+// Lengths are in viewing distances: the distance between the frames and the
+// middle of what they look at is 1.
+struct SceneOptions {
+  SceneLayout layout = SceneLayout::kOrbit;
+  int num_frames = 20;    // >= 2
+  int num_points = 1000;  // >= 1
+  // Mean number of images that see a point; in [2, number of images]. A
+  // target: it is missed where fewer images have the point in view.
+  double track_length = 6;
+
+  int camera_model_id = 2;  // any model with an image plane: 0 to 16
+  int image_width = 1024;   // pixels; in [64, 65536]
+  int image_height = 768;   // pixels; in [64, 65536]
+  // Focal length / larger side of the image; in [0.5, 10].
+  double focal_length_factor = 1.0;
+
+  // False writes a legacy model, without rigs and frames; requires
+  // sensors_per_rig = 1.
+  bool has_rigs = true;
+  int sensors_per_rig = 1;       // cameras in the one rig; in [1, 64]
+  double rig_baseline = 0.02;    // between neighbouring sensors; in [0, 0.2]
+  double rig_rotation_deg = 10;  // between neighbouring sensors; in [0, 180]
+
+  double pixel_noise = 0;      // Gaussian sigma per axis, pixels; in [0, 10]
+  double outlier_ratio = 0;    // of the observations moved to a uniformly
+                               // random pixel of their image; in [0, 0.9]
+  double duplicate_ratio = 0;  // of the observations that have a twin: a second
+                               // 2D point of their image in the same track, up
+                               // to 2 pixels away per axis; in [0, 1]
+
+  // How far the model to solve starts from the truth: Gaussian sigma per axis
+  // of frame centres and points, in [0, 1]. A displacement is shortened where
+  // it would take a point behind a camera that sees it.
+  double start_translation_noise = 0;
+  double start_point_noise = 0;
+  // Sigma of the angle, cut at 3 sigma, of a rotation about a random axis
+  // per frame. A known rotation problem keeps this error: in [0, 2].
+  double rotation_noise_deg = 0;
+
+  uint64_t random_seed = 0;
+};
+
+struct SyntheticScene {
+  // The model to solve: perturbed poses and points.
+  Model model;
+  // The same observations with the exact poses and points.
+  Model ground_truth;
+  // The observations moved by outlier_ratio: ascending indices into
+  // Model::track_elements, which both models share.
+  std::vector<int64_t> outliers;
+};
+
+// Throws std::invalid_argument naming the first option out of its range.
+void Check(const SceneOptions& options);
+
+// Every image gets its share of points, every point is in front of the images
+// in its track and projects into them, every track holds two images or more.
+// Both models pass ValidateModel; stored point errors are -1 (none).
+//
+// Equal options give equal models: the random numbers are the same on every
+// platform, results differ in the last bits of the mathematics library only.
+//
+// Throws std::invalid_argument where Check does, and where no two images have
+// points in common (sensors turned too far apart). O(observations); about a
+// microsecond each.
+SyntheticScene SynthesizeScene(const SceneOptions& options);
+
+}  // namespace krot
