@@ -4,22 +4,22 @@
 
 namespace krot {
 
-// Moves `estimate` onto the coordinate frame of `reference`, one connected
-// component of frames and points at a time: a translation and, where every
-// baseline t_sr of the component is zero, a scale, so that the camera centres
-// (the points, where all centres coincide) keep the centroid and the RMS
-// distance to it that they have in `reference`. The cost does not change.
-// O(observations).
+// The freedom that the known rotation problem leaves: every connected
+// component may be translated and, unless a baseline fixes its size, scaled
+// about any point.
+//
+// Frame f moves as a whole: if its projection centre C_f shifts by d, then
+// t_f' = t_f - R_rw d. A component's scale is fixed as soon as one of its
+// frames sees points through two different projection centres.
+
+// Moves `estimate` onto the coordinate frame of `reference`, one component at
+// a time, so that the projection centres keep the centroid that they have in
+// `reference` and, where the scale is free, the RMS distance to it. Every view
+// of a frame counts once, with the centre through which its frame sees points.
+// Where all centres of a component coincide (in either estimate), its points
+// take their place. The cost does not change. Frames and points without an
+// observation stay. O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate);
-
-// Connected components of the graph of frames and points that the
-// observations span.
-struct Components {
-  int count = 0;
-  std::vector<int32_t> of_frame;  // -1: the frame has no observation
-  std::vector<int32_t> of_point;
-};
-Components FindComponents(const KnownRotationProblem& problem);
 
 }  // namespace krot

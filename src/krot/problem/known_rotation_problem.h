@@ -19,13 +19,13 @@ namespace krot {
 
 // One image: how its camera sits in its frame.
 struct View {
-  Eigen::Matrix3d cam_from_world_rotation;  // R_sr R_rw
-  Eigen::Matrix3d cam_from_rig_rotation;    // R_sr
-  Eigen::Vector3d cam_from_rig_translation; // t_sr, scene units
+  Eigen::Matrix3d cam_from_world_rotation;   // R_sr R_rw
+  Eigen::Matrix3d cam_from_rig_rotation;     // R_sr
+  Eigen::Vector3d cam_from_rig_translation;  // t_sr, scene units
   int32_t frame = 0;
 };
 
-// One 2D observation of one point.
+// One 2D observation of one point. 64 bytes.
 struct Observation {
   Eigen::Vector2d u;  // on the plane z = 1
   Eigen::Matrix2d J;  // d pixel / d u at u, pixels
@@ -55,8 +55,9 @@ struct Estimate {
 };
 
 // Builds the indices from views and observations, which must already be
-// sorted by point. Throws std::invalid_argument where an index is out of
-// range or the order is broken.
+// sorted by point; a frame's observations are listed in that order too.
+// Throws std::invalid_argument where an index is out of range or the order is
+// broken. O(observations); 4 bytes per observation and 8 per point and frame.
 void IndexObservations(KnownRotationProblem* problem);
 
 }  // namespace krot

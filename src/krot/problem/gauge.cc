@@ -1,0 +1,197 @@
+#include "krot/problem/gauge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "krot/problem/components.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Centres closer than this, relative to the size of their coordinates and of
+// the component, coincide: rounding is a thousand times smaller.
+constexpr double kCoincident = 1e-12;
+
+// Where a frame's camera sits, once for all its views.
+struct FrameGeometry {
+  Matrix3d world_from_rig = Matrix3d::Identity();  // R_rw'
+  Vector3d centre_in_rig = Vector3d::Zero();       // -R_sr' t_sr
+  int num_views = 0;
+  bool is_seen_through = false;  // it has an observation
+  bool has_two_centres = false;  // its observations fix the scale
+};
+
+std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem) {
+  std::vector<FrameGeometry> frames(problem.num_frames);
+  for (const View& view : problem.views) ++frames[view.frame].num_views;
+
+  for (const Observation& observation : problem.observations) {
+    const View& view = problem.views[observation.view];
+    FrameGeometry& frame = frames[view.frame];
+    const Vector3d centre_in_rig =
+        -view.cam_from_rig_rotation.transpose() * view.cam_from_rig_translation;
+    if (!frame.is_seen_through) {
+      frame.is_seen_through = true;
+      frame.centre_in_rig = centre_in_rig;
+      frame.world_from_rig =
+          view.cam_from_world_rotation.transpose() * view.cam_from_rig_rotation;
+    } else if ((centre_in_rig - frame.centre_in_rig).norm() >
+               kCoincident * frame.centre_in_rig.norm()) {
+      frame.has_two_centres = true;
+    }
+  }
+  return frames;
+}
+
+// C_f = R_rw' (centre_in_rig - t_f).
+Vector3d ProjectionCentre(const FrameGeometry& frame, const Vector3d& t) {
+  return frame.world_from_rig * (frame.centre_in_rig - t);
+}
+
+// Where a component's centres or points lie, and how far apart.
+struct Spread {
+  Vector3d centroid = Vector3d::Zero();
+  double rms = 0;  // distance to the centroid
+};
+
+// One per component; position n counts weights[n] times.
+std::vector<Spread> MeasureSpreads(const std::vector<Vector3d>& positions,
+                                   const std::vector<int>& weights,
+                                   const std::vector<int32_t>& component_of,
+                                   int32_t num_components) {
+  std::vector<Spread> spreads(num_components);
+  std::vector<double> sum_of_weights(num_components, 0);
+  for (size_t n = 0; n < positions.size(); ++n) {
+    const int32_t component = component_of[n];
+    if (component < 0) continue;
+    spreads[component].centroid += weights[n] * positions[n];
+    sum_of_weights[component] += weights[n];
+  }
+  for (int32_t c = 0; c < num_components; ++c) {
+    spreads[c].centroid /= sum_of_weights[c];
+  }
+  for (size_t n = 0; n < positions.size(); ++n) {
+    const int32_t component = component_of[n];
+    if (component < 0) continue;
+    Spread& spread = spreads[component];
+    spread.rms += weights[n] * (positions[n] - spread.centroid).squaredNorm();
+  }
+  for (int32_t c = 0; c < num_components; ++c) {
+    spreads[c].rms = std::sqrt(spreads[c].rms / sum_of_weights[c]);
+  }
+  return spreads;
+}
+
+// How large one component is in one estimate.
+struct Extent {
+  Spread centres;
+  Spread points;
+  // From the centroid of the centres; unlike the RMS of the points it means
+  // something when one of them lies nearly at infinity.
+  double nearest_point = std::numeric_limits<double>::infinity();
+
+  bool CentresCoincide() const {
+    return centres.rms <=
+           kCoincident * (centres.centroid.norm() + nearest_point);
+  }
+};
+
+std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
+                                   const Components& components,
+                                   const Estimate& estimate) {
+  std::vector<Vector3d> centres;
+  std::vector<int> num_views;
+  for (size_t f = 0; f < frames.size(); ++f) {
+    centres.push_back(ProjectionCentre(frames[f], estimate.translations[f]));
+    num_views.push_back(frames[f].num_views);
+  }
+  const std::vector<Spread> of_centres =
+      MeasureSpreads(centres, num_views, components.of_frame, components.count);
+  const std::vector<Spread> of_points = MeasureSpreads(
+      estimate.points, std::vector<int>(estimate.points.size(), 1),
+      components.of_point, components.count);
+
+  std::vector<Extent> extents(components.count);
+  for (int32_t c = 0; c < components.count; ++c) {
+    extents[c].centres = of_centres[c];
+    extents[c].points = of_points[c];
+  }
+  for (size_t k = 0; k < estimate.points.size(); ++k) {
+    if (components.of_point[k] < 0) continue;
+    Extent& extent = extents[components.of_point[k]];
+    extent.nearest_point =
+        std::min(extent.nearest_point,
+                 (estimate.points[k] - extent.centres.centroid).norm());
+  }
+  return extents;
+}
+
+// x -> to + scale (x - from).
+struct Move {
+  Vector3d from = Vector3d::Zero();
+  Vector3d to = Vector3d::Zero();
+  double scale = 1;
+
+  Vector3d Shift(const Vector3d& x) const {
+    return to + scale * (x - from) - x;
+  }
+};
+
+Move MoveOnto(const Extent& reference, const Extent& estimate,
+              bool scale_is_free) {
+  const bool use_points =
+      reference.CentresCoincide() || estimate.CentresCoincide();
+  const Spread& to = use_points ? reference.points : reference.centres;
+  const Spread& from = use_points ? estimate.points : estimate.centres;
+
+  Move move{from.centroid, to.centroid, 1};
+  if (scale_is_free && from.rms > 0 && to.rms > 0) {
+    move.scale = to.rms / from.rms;
+  }
+  return move;
+}
+
+}  // namespace
+
+void RestoreGauge(const KnownRotationProblem& problem,
+                  const Estimate& reference, Estimate* estimate) {
+  const Components components = FindComponents(problem);
+  const std::vector<FrameGeometry> frames = DescribeFrames(problem);
+  const std::vector<Extent> wanted =
+      MeasureExtents(frames, components, reference);
+  const std::vector<Extent> found =
+      MeasureExtents(frames, components, *estimate);
+
+  std::vector<char> scale_is_free(components.count, true);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    if (frames[f].has_two_centres) {
+      scale_is_free[components.of_frame[f]] = false;
+    }
+  }
+  std::vector<Move> moves(components.count);
+  for (int32_t c = 0; c < components.count; ++c) {
+    moves[c] = MoveOnto(wanted[c], found[c], scale_is_free[c]);
+  }
+
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    const int32_t component = components.of_frame[f];
+    if (component < 0) continue;
+    Vector3d& t = estimate->translations[f];
+    const Vector3d shift =
+        moves[component].Shift(ProjectionCentre(frames[f], t));
+    t -= frames[f].world_from_rig.transpose() * shift;
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    const int32_t component = components.of_point[k];
+    if (component < 0) continue;
+    estimate->points[k] += moves[component].Shift(estimate->points[k]);
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,77 @@
+#include "krot/problem/known_rotation_problem.h"
+
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "krot/base/check.h"
+
+namespace krot {
+namespace {
+
+void CheckIndex(int32_t index, int64_t count, const char* list, int64_t element,
+                const char* field) {
+  if (index >= 0 && index < count) return;
+  CheckArgument(
+      false, std::string(list) + "[" + std::to_string(element) + "]." + field,
+      index, ">= 0 and < " + std::to_string(count));
+}
+
+void CheckIndices(const KnownRotationProblem& problem) {
+  CheckArgument(problem.num_frames >= 0, "num_frames", problem.num_frames,
+                ">= 0");
+  CheckArgument(problem.num_points >= 0, "num_points", problem.num_points,
+                ">= 0");
+  const int64_t num_views = static_cast<int64_t>(problem.views.size());
+  const int64_t num_observations =
+      static_cast<int64_t>(problem.observations.size());
+  CheckArgument(num_observations <= std::numeric_limits<int32_t>::max(),
+                "observations.size()", num_observations, "< 2^31");
+
+  for (int64_t j = 0; j < num_views; ++j) {
+    CheckIndex(problem.views[j].frame, problem.num_frames, "views", j, "frame");
+  }
+  int32_t previous_point = 0;
+  for (int64_t i = 0; i < num_observations; ++i) {
+    const Observation& observation = problem.observations[i];
+    CheckIndex(observation.view, num_views, "observations", i, "view");
+    CheckIndex(observation.point, problem.num_points, "observations", i,
+               "point");
+    if (observation.point < previous_point) {
+      CheckArgument(false, "observations[" + std::to_string(i) + "].point",
+                    observation.point,
+                    ">= " + std::to_string(previous_point) +
+                        ", the point of the observation before it");
+    }
+    previous_point = observation.point;
+  }
+}
+
+}  // namespace
+
+void IndexObservations(KnownRotationProblem* problem) {
+  CheckIndices(*problem);
+  const std::vector<Observation>& observations = problem->observations;
+
+  // Counts, one place late; their prefix sums are the ranges.
+  problem->point_begin.assign(problem->num_points + 1, 0);
+  problem->frame_begin.assign(problem->num_frames + 1, 0);
+  for (const Observation& observation : observations) {
+    ++problem->point_begin[observation.point + 1];
+    ++problem->frame_begin[problem->views[observation.view].frame + 1];
+  }
+  std::partial_sum(problem->point_begin.begin(), problem->point_begin.end(),
+                   problem->point_begin.begin());
+  std::partial_sum(problem->frame_begin.begin(), problem->frame_begin.end(),
+                   problem->frame_begin.begin());
+
+  problem->frame_observations.resize(observations.size());
+  std::vector<int64_t> next(problem->frame_begin.begin(),
+                            problem->frame_begin.end() - 1);
+  for (size_t i = 0; i < observations.size(); ++i) {
+    const int32_t frame = problem->views[observations[i].view].frame;
+    problem->frame_observations[next[frame]++] = static_cast<int32_t>(i);
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// One observation as a residual of problem (1) of [Zhang18]: in the unknown x
+// (a point or a frame's translation, the other one held fixed) its
+//
+//   v = A x + b,   w = c'x + d                              [Zhang18, (2), (3)]
+//
+// are affine. With x_cam = R x + o and E = [e3'; J (I2 | -u)],
+//
+//   A = J (I2 | -u) R,   b = J (I2 | -u) o,   c' = e3' R,   d = e3' o.
+//
+// Rows are plain doubles, so that the kernels' vector flags meet no Eigen
+// type: {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
+inline constexpr int kRowSize = 12;
+
+namespace internal {
+
+inline void AffineRow(const Observation& observation, const Eigen::Matrix3d& R,
+                      const Eigen::Vector3d& o, double row[kRowSize]) {
+  Eigen::Matrix<double, 3, 4> x_cam;  // columns: of x and of 1
+  x_cam << R, o;
+  const Eigen::Matrix<double, 2, 4> v =
+      observation.J *
+      (x_cam.topRows<2>() - observation.u * x_cam.bottomRows<1>());
+  Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> rows(row);
+  rows << v, x_cam.bottomRows<1>();
+}
+
+}  // namespace internal
+
+// Int_k: the unknown is the point s, its frame at `translation`;
+// R = R_sr R_rw, o = R_sr t_f + t_sr.
+inline void IntersectionRow(const View& view, const Observation& observation,
+                            const Eigen::Vector3d& translation,
+                            double row[kRowSize]) {
+  internal::AffineRow(
+      observation, view.cam_from_world_rotation,
+      view.cam_from_rig_rotation * translation + view.cam_from_rig_translation,
+      row);
+}
+
+// Res_j: the unknown is the frame's translation t_f, its point at `point`;
+// R = R_sr, o = R_sr R_rw s + t_sr.
+inline void ResectionRow(const View& view, const Observation& observation,
+                         const Eigen::Vector3d& point, double row[kRowSize]) {
+  internal::AffineRow(
+      observation, view.cam_from_rig_rotation,
+      view.cam_from_world_rotation * point + view.cam_from_rig_translation,
+      row);
+}
+
+}  // namespace krot

@@ -1,0 +1,70 @@
+#include "krot/problem/components.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+namespace krot {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+
+// One view per frame; pairs are (frame, point), ordered by point.
+KnownRotationProblem MakeGraph(int32_t num_frames, int32_t num_points,
+                               std::vector<std::pair<int, int>> edges) {
+  KnownRotationProblem problem;
+  problem.num_frames = num_frames;
+  problem.num_points = num_points;
+  problem.views.resize(num_frames);
+  for (int32_t f = 0; f < num_frames; ++f) problem.views[f].frame = f;
+  for (const auto& [frame, point] : edges) {
+    problem.observations.push_back(
+        {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity(), frame, point});
+  }
+  IndexObservations(&problem);
+  return problem;
+}
+
+TEST(FindComponents, NumbersThemByTheirFirstFrame) {
+  const Components components =
+      FindComponents(MakeGraph(4, 3, {{3, 0}, {1, 0}, {2, 1}, {0, 1}, {3, 2}}));
+  EXPECT_EQ(components.count, 2);
+  EXPECT_THAT(components.of_frame, ElementsAre(0, 1, 0, 1));
+  EXPECT_THAT(components.of_point, ElementsAre(1, 0, 1));
+}
+
+TEST(FindComponents, GivesNoneToFramesAndPointsWithoutObservations) {
+  const Components components = FindComponents(MakeGraph(3, 2, {{1, 1}}));
+  EXPECT_EQ(components.count, 1);
+  EXPECT_THAT(components.of_frame, ElementsAre(-1, 0, -1));
+  EXPECT_THAT(components.of_point, ElementsAre(-1, 0));
+}
+
+TEST(FindComponents, FollowsALongChain) {
+  const int length = 1000;
+  std::vector<std::pair<int, int>> edges;
+  for (int k = 0; k + 1 < length; ++k) {
+    edges.emplace_back(length - 1 - k, k);
+    edges.emplace_back(length - 2 - k, k);
+  }
+  const Components components =
+      FindComponents(MakeGraph(length, length - 1, edges));
+  EXPECT_EQ(components.count, 1);
+  EXPECT_THAT(components.of_frame, Each(0));
+  EXPECT_THAT(components.of_point, Each(0));
+}
+
+TEST(FindComponents, JoinsTheViewsOfOneFrame) {
+  KnownRotationProblem problem = MakeGraph(2, 2, {{0, 0}, {1, 1}});
+  EXPECT_EQ(FindComponents(problem).count, 2);
+  problem.num_frames = 1;
+  problem.views[1].frame = 0;
+  IndexObservations(&problem);
+  EXPECT_EQ(FindComponents(problem).count, 1);
+}
+
+}  // namespace
+}  // namespace krot
