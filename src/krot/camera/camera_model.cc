@@ -2,33 +2,32 @@
 
 #include <algorithm>
 
+#include "krot/camera/models.h"
+#include "krot/camera/undistort.h"
+
 namespace krot {
+namespace {
+
+template <typename Model>
+CameraModelInfo Info(bool has_image_plane) {
+  return {Model::kId, Model::kName, Model::kParamNames, Model::kNumParams,
+          has_image_plane};
+}
+
+std::vector<CameraModelInfo> ListCameraModels() {
+  std::vector<CameraModelInfo> models;
+  for (int id = 0; id < Equirectangular::kId; ++id) {
+    models.push_back(VisitCameraModel(
+        id, [](auto model) { return Info<decltype(model)>(true); }));
+  }
+  models.push_back(Info<Equirectangular>(false));
+  return models;
+}
+
+}  // namespace
 
 const std::vector<CameraModelInfo>& CameraModels() {
-  static const std::vector<CameraModelInfo> models = {
-      {0, "SIMPLE_PINHOLE", "f, cx, cy", 3, true},
-      {1, "PINHOLE", "fx, fy, cx, cy", 4, true},
-      {2, "SIMPLE_RADIAL", "f, cx, cy, k", 4, true},
-      {3, "RADIAL", "f, cx, cy, k1, k2", 5, true},
-      {4, "OPENCV", "fx, fy, cx, cy, k1, k2, p1, p2", 8, true},
-      {5, "OPENCV_FISHEYE", "fx, fy, cx, cy, k1, k2, k3, k4", 8, true},
-      {6, "FULL_OPENCV", "fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6", 12,
-       true},
-      {7, "FOV", "fx, fy, cx, cy, omega", 5, true},
-      {8, "SIMPLE_RADIAL_FISHEYE", "f, cx, cy, k", 4, true},
-      {9, "RADIAL_FISHEYE", "f, cx, cy, k1, k2", 5, true},
-      {10, "THIN_PRISM_FISHEYE",
-       "fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1", 12, true},
-      {11, "RAD_TAN_THIN_PRISM_FISHEYE",
-       "fx, fy, cx, cy, k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3", 16,
-       true},
-      {12, "SIMPLE_DIVISION", "f, cx, cy, k", 4, true},
-      {13, "DIVISION", "fx, fy, cx, cy, k", 5, true},
-      {14, "SIMPLE_FISHEYE", "f, cx, cy", 3, true},
-      {15, "FISHEYE", "fx, fy, cx, cy", 4, true},
-      {16, "EUCM", "fx, fy, cx, cy, alpha, beta", 6, true},
-      {17, "EQUIRECTANGULAR", "w, h", 2, false},
-  };
+  static const std::vector<CameraModelInfo> models = ListCameraModels();
   return models;
 }
 
@@ -44,6 +43,33 @@ const CameraModelInfo* FindCameraModel(std::string_view name) {
       models.begin(), models.end(),
       [&](const CameraModelInfo& info) { return info.name == name; });
   return model == models.end() ? nullptr : &*model;
+}
+
+Eigen::Vector2d ProjectRay(int model_id, const double* params,
+                           const Eigen::Vector2d& u) {
+  return VisitCameraModel(model_id, [&](auto model) {
+    Eigen::Vector2d pixel;
+    model.Project(params, u.x(), u.y(), &pixel.x(), &pixel.y());
+    return pixel;
+  });
+}
+
+Eigen::Matrix2d ProjectionJacobian(int model_id, const double* params,
+                                   const Eigen::Vector2d& u) {
+  return VisitCameraModel(model_id, [&](auto model) {
+    return Differentiate(u, [&](const auto& a, const auto& b, auto* x,
+                                auto* y) { model.Project(params, a, b, x, y); })
+        .derivative;
+  });
+}
+
+UndistortStatus UndistortPixel(int model_id, const double* params,
+                               const Eigen::Vector2d& pixel,
+                               const std::optional<Eigen::Vector2d>& u_start,
+                               UndistortedObservation* result) {
+  return VisitCameraModel(model_id, [&](auto model) {
+    return Undistort<decltype(model)>(params, pixel, u_start, result);
+  });
 }
 
 }  // namespace krot
