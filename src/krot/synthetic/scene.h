@@ -34,9 +34,11 @@ struct SceneOptions {
   // False writes a legacy model, without rigs and frames; requires
   // sensors_per_rig = 1.
   bool has_rigs = true;
-  int sensors_per_rig = 1;       // cameras in the one rig; in [1, 64]
-  double rig_baseline = 0.02;    // between neighbouring sensors; in [0, 0.2]
-  double rig_rotation_deg = 10;  // between neighbouring sensors; in [0, 180]
+  int sensors_per_rig = 1;  // cameras in the one rig; in [1, 16]
+  // Distance of every sensor from the reference sensor; in [0, 0.2].
+  double rig_baseline = 0.02;
+  // Yaw between neighbouring sensors; in [0, 180].
+  double rig_rotation_deg = 10;
 
   double pixel_noise = 0;      // Gaussian sigma per axis, pixels; in [0, 10]
   double outlier_ratio = 0;    // of the observations moved to a uniformly

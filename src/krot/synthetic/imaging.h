@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+// The nearest that a point may be to an image that sees it, in viewing
+// distances.
+inline constexpr double kMinDepth = 0.2;
+
+// Which points the images of a scene see, and where: all images are taken
+// with copies of one camera.
+class Imaging {
+ public:
+  // A point is in view if it is `margin_px` or more inside the image's
+  // border, at least kMinDepth away and less than 80 degrees off the axis.
+  // Throws std::invalid_argument if the camera has no ray for a pixel of the
+  // border.
+  Imaging(const Camera& camera, double margin_px,
+          const std::vector<Pose>& cam_from_world);
+
+  int num_images() const { return static_cast<int>(rotations_.size()); }
+
+  // The exact pixel of the point if it is in view.
+  std::optional<Eigen::Vector2d> Project(int image,
+                                         const Eigen::Vector3d& x_world) const;
+
+  // The point on the ray of (a x width, b y height), fractions in [0, 1], at
+  // the given depth, if it is in view.
+  std::optional<Eigen::Vector3d> PointAt(int image,
+                                         const Eigen::Vector2d& fraction,
+                                         double depth) const;
+
+ private:
+  Camera camera_;
+  Eigen::Vector2d lower_;  // pixels in view
+  Eigen::Vector2d upper_;
+  double max_ray_radius_ = 0;  // ||u|| on z = 1
+  std::vector<Eigen::Matrix3d> rotations_;
+  std::vector<Eigen::Vector3d> translations_;
+};
+
+}  // namespace krot
