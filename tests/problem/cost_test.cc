@@ -27,7 +27,7 @@ Eigen::Vector2d PinholeError(const View& view, const Eigen::Vector2d& pixel,
           fy * x_cam.y() / x_cam.z() + cy - pixel.y()};
 }
 
-TEST(Residual, IsThePixelErrorOfAPinholeCameraExactly) {
+TEST(ResidualOf, IsThePixelErrorOfAPinholeCameraExactly) {
   const double fx = 1200, fy = 1150, cx = 640, cy = 480;
   RandomScene scene = MakeRandomScene({/*num_frames=*/4, /*num_points=*/30,
                                        /*views_per_frame=*/2,
@@ -45,31 +45,31 @@ TEST(Residual, IsThePixelErrorOfAPinholeCameraExactly) {
     // Rounding of pixels near 1000, 1.1e-13 each.
     EXPECT_NEAR(viewed.v.x() / viewed.depth, error.x(), 1e-12);
     EXPECT_NEAR(viewed.v.y() / viewed.depth, error.y(), 1e-12);
-    EXPECT_NEAR(Residual(viewed, Norm::L2()), error.norm(), 1e-12);
+    EXPECT_NEAR(ResidualOf(viewed, Norm::L2()), error.norm(), 1e-12);
   }
 }
 
-TEST(Residual, TakesAnyNorm) {
+TEST(ResidualOf, TakesAnyNorm) {
   const ViewedPoint viewed{2, {-6, 8}};
-  EXPECT_DOUBLE_EQ(Residual(viewed, Norm::L1()), 7);
-  EXPECT_DOUBLE_EQ(Residual(viewed, Norm::L2()), 5);
-  EXPECT_DOUBLE_EQ(Residual(viewed, Norm::LInf()), 4);
-  EXPECT_DOUBLE_EQ(Residual(viewed, Norm{3}), std::cbrt(27.0 + 64.0));
-  EXPECT_DOUBLE_EQ(Residual(viewed, Norm{1.5}),
+  EXPECT_DOUBLE_EQ(ResidualOf(viewed, Norm::L1()), 7);
+  EXPECT_DOUBLE_EQ(ResidualOf(viewed, Norm::L2()), 5);
+  EXPECT_DOUBLE_EQ(ResidualOf(viewed, Norm::LInf()), 4);
+  EXPECT_DOUBLE_EQ(ResidualOf(viewed, Norm{3}), std::cbrt(27.0 + 64.0));
+  EXPECT_DOUBLE_EQ(ResidualOf(viewed, Norm{1.5}),
                    std::pow(std::pow(3, 1.5) + std::pow(4, 1.5), 1 / 1.5));
 }
 
-TEST(Residual, OfALargePowerNeitherOverflowsNorVanishes) {
-  EXPECT_NEAR(Residual({1, {3e5, 4e5}}, Norm{100}), 4e5, 1e-6);
-  EXPECT_NEAR(Residual({1, {3e-5, 4e-5}}, Norm{100}), 4e-5, 1e-16);
-  EXPECT_EQ(Residual({1, {0, 0}}, Norm{100}), 0);
+TEST(ResidualOf, OfALargePowerNeitherOverflowsNorVanishes) {
+  EXPECT_NEAR(ResidualOf({1, {3e5, 4e5}}, Norm{100}), 4e5, 1e-6);
+  EXPECT_NEAR(ResidualOf({1, {3e-5, 4e-5}}, Norm{100}), 4e-5, 1e-16);
+  EXPECT_EQ(ResidualOf({1, {0, 0}}, Norm{100}), 0);
 }
 
-TEST(Residual, IsInfiniteUnlessTheDepthIsPositive) {
-  EXPECT_EQ(Residual({0, {1, 0}}, Norm::L2()), kInfinity);
-  EXPECT_EQ(Residual({-1, {1, 0}}, Norm::L2()), kInfinity);
-  EXPECT_EQ(Residual({std::nan(""), {1, 0}}, Norm::L2()), kInfinity);
-  EXPECT_EQ(Residual({1, {std::nan(""), 0}}, Norm::L2()), kInfinity);
+TEST(ResidualOf, IsInfiniteUnlessTheDepthIsPositive) {
+  EXPECT_EQ(ResidualOf({0, {1, 0}}, Norm::L2()), kInfinity);
+  EXPECT_EQ(ResidualOf({-1, {1, 0}}, Norm::L2()), kInfinity);
+  EXPECT_EQ(ResidualOf({std::nan(""), {1, 0}}, Norm::L2()), kInfinity);
+  EXPECT_EQ(ResidualOf({1, {std::nan(""), 0}}, Norm::L2()), kInfinity);
 }
 
 TEST(Cost, IsTheLargestResidual) {
@@ -77,9 +77,10 @@ TEST(Cost, IsTheLargestResidual) {
   for (const double p : {1.0, 1.5, 2.0, 3.0, kInfinity}) {
     double largest = 0;
     for (const Observation& observation : scene.problem.observations) {
-      largest = std::max(largest, Residual(ViewPoint(scene.problem, observation,
-                                                     scene.estimate),
-                                           Norm{p}));
+      largest = std::max(
+          largest,
+          ResidualOf(ViewPoint(scene.problem, observation, scene.estimate),
+                     Norm{p}));
     }
     EXPECT_GT(largest, 0);
     EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm{p}, 1), largest);

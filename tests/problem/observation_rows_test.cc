@@ -9,7 +9,7 @@ namespace krot {
 namespace {
 
 // A x + b and c'x + d of a row.
-ViewedPoint Evaluate(const double row[kRowSize], const Eigen::Vector3d& x) {
+ViewedPoint Evaluate(const double row[kResidualRow], const Eigen::Vector3d& x) {
   const auto affine = [&](const double* r) {
     return r[0] * x[0] + r[1] * x[1] + r[2] * x[2] + r[3];
   };
@@ -35,7 +35,7 @@ class ObservationRows : public ::testing::Test {
 TEST_F(ObservationRows, OfAnIntersectionAreAffineInThePoint) {
   for (const Observation& observation : scene_.problem.observations) {
     const View& view = scene_.problem.views[observation.view];
-    double row[kRowSize];
+    double row[kResidualRow];
     IntersectionRow(view, observation, scene_.estimate.translations[view.frame],
                     row);
     ExpectSame(Evaluate(row, scene_.estimate.points[observation.point]),
@@ -46,7 +46,7 @@ TEST_F(ObservationRows, OfAnIntersectionAreAffineInThePoint) {
 TEST_F(ObservationRows, OfAResectionAreAffineInTheTranslation) {
   for (const Observation& observation : scene_.problem.observations) {
     const View& view = scene_.problem.views[observation.view];
-    double row[kRowSize];
+    double row[kResidualRow];
     ResectionRow(view, observation, scene_.estimate.points[observation.point],
                  row);
     ExpectSame(Evaluate(row, scene_.estimate.translations[view.frame]),

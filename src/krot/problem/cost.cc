@@ -8,23 +8,12 @@
 
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
+#include "krot/minimax/residual.h"
 
 namespace krot {
 namespace {
 
 constexpr int64_t kObservationsPerChunk = 16384;
-
-double VectorNorm(const Eigen::Vector2d& v, double p) {
-  if (p == 2) return v.norm();
-  if (p == 1) return v.lpNorm<1>();
-  const double largest = v.lpNorm<Eigen::Infinity>();
-  if (std::isinf(p) || largest == 0) return largest;
-  // Scaled, so that no power over- or underflows.
-  const Eigen::Vector2d unit = v / largest;
-  return largest * std::pow(std::pow(std::abs(unit.x()), p) +
-                                std::pow(std::abs(unit.y()), p),
-                            1 / p);
-}
 
 }  // namespace
 
@@ -40,10 +29,10 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
           observation.J * (x_cam.head<2>() - observation.u * x_cam.z())};
 }
 
-double Residual(const ViewedPoint& viewed, Norm norm) {
+double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (!(viewed.depth > 0)) return kInfinity;
-  const double residual = VectorNorm(viewed.v, norm.p) / viewed.depth;
+  const double residual = NormOf(viewed.v, norm) / viewed.depth;
   return std::isfinite(residual) ? residual : kInfinity;
 }
 
@@ -68,7 +57,7 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
           const Observation& observation = problem.observations[i];
           largest = std::max(
               largest,
-              Residual(ViewPoint(problem, observation, estimate), norm));
+              ResidualOf(ViewPoint(problem, observation, estimate), norm));
         }
         chunk_max[begin / kObservationsPerChunk] = largest;
       });

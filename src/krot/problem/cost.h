@@ -18,7 +18,7 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
                       const Observation& observation, const Estimate& estimate);
 
 // r = ||v||_p / w in pixels; infinity unless w > 0 and r is finite.
-double Residual(const ViewedPoint& viewed, Norm norm);
+double ResidualOf(const ViewedPoint& viewed, Norm norm);
 
 // max_i r_i in pixels [Zhang18, (KRot)]; 0 if there are no observations.
 // Throws std::invalid_argument unless p >= 1 and the estimate has one

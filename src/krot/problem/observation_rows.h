@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/minimax/residual_kernel.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -15,14 +16,13 @@ namespace krot {
 //
 //   A = J (I2 | -u) R,   b = J (I2 | -u) o,   c' = e3' R,   d = e3' o.
 //
-// Rows are plain doubles, so that the kernels' vector flags meet no Eigen
-// type: {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
-inline constexpr int kRowSize = 12;
+// In the layout of residual_kernel.h:
+//   {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
 
 namespace internal {
 
 inline void AffineRow(const Observation& observation, const Eigen::Matrix3d& R,
-                      const Eigen::Vector3d& o, double row[kRowSize]) {
+                      const Eigen::Vector3d& o, double row[kResidualRow]) {
   Eigen::Matrix<double, 3, 4> x_cam;  // columns: of x and of 1
   x_cam << R, o;
   const Eigen::Matrix<double, 2, 4> v =
@@ -38,7 +38,7 @@ inline void AffineRow(const Observation& observation, const Eigen::Matrix3d& R,
 // R = R_sr R_rw, o = R_sr t_f + t_sr.
 inline void IntersectionRow(const View& view, const Observation& observation,
                             const Eigen::Vector3d& translation,
-                            double row[kRowSize]) {
+                            double row[kResidualRow]) {
   internal::AffineRow(
       observation, view.cam_from_world_rotation,
       view.cam_from_rig_rotation * translation + view.cam_from_rig_translation,
@@ -48,7 +48,8 @@ inline void IntersectionRow(const View& view, const Observation& observation,
 // Res_j: the unknown is the frame's translation t_f, its point at `point`;
 // R = R_sr, o = R_sr R_rw s + t_sr.
 inline void ResectionRow(const View& view, const Observation& observation,
-                         const Eigen::Vector3d& point, double row[kRowSize]) {
+                         const Eigen::Vector3d& point,
+                         double row[kResidualRow]) {
   internal::AffineRow(
       observation, view.cam_from_rig_rotation,
       view.cam_from_world_rotation * point + view.cam_from_rig_translation,
