@@ -1,0 +1,152 @@
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "tests/architecture/source_tree.h"
+
+namespace krot {
+namespace {
+
+// What each folder of src/krot may include besides itself, base, and what
+// those folders may include. docs/architecture.md says why.
+const std::map<std::string, std::set<std::string>>& DirectDependencies() {
+  static const std::map<std::string, std::set<std::string>> kDependencies = {
+      {"base", {}},
+      {"math", {}},
+      {"minimax", {"math"}},
+      {"problem", {"minimax"}},
+      {"conic", {"problem"}},
+      {"solver", {"conic"}},
+      {"camera", {}},
+      {"model", {"camera"}},
+      {"analysis", {"model"}},
+      {"synthetic", {"model"}},
+      {"adjust", {"model"}},
+      {"bridge", {"model", "solver"}},
+      {"pipeline", {"bridge", "adjust"}},
+      {"report", {"pipeline", "analysis"}},
+  };
+  return kDependencies;
+}
+
+// All that `folder` may include, itself and base with it.
+std::set<std::string> AllowedFolders(const std::string& folder) {
+  std::set<std::string> allowed = {folder, "base"};
+  for (const std::string& dependency : DirectDependencies().at(folder)) {
+    allowed.merge(AllowedFolders(dependency));
+  }
+  return allowed;
+}
+
+// The places where `pattern` occurs in the code of `folder`, one per line.
+std::string Occurrences(const std::string& folder, const std::string& pattern,
+                        const std::set<std::string>& exempt_folders = {}) {
+  const std::regex regex(pattern);
+  std::ostringstream places;
+  for (const SourceLine& line : CodeLines(folder)) {
+    if (!std::regex_search(line.text, regex)) continue;
+    if (exempt_folders.count(LibraryFolder(line.file)) > 0) continue;
+    places << line.Place() << ": " << line.text << "\n";
+  }
+  return places.str();
+}
+
+TEST(IncludeRule, EveryFolderOfTheLibraryHasItsPlace) {
+  for (const SourceLine& line : SourceLines("src/krot")) {
+    if (line.number > 1) continue;
+    EXPECT_EQ(DirectDependencies().count(LibraryFolder(line.file)), 1u)
+        << line.file << " stands in a folder that the rule does not know";
+  }
+}
+
+TEST(IncludeRule, AFolderIncludesOnlyWhatStandsBelowIt) {
+  const std::regex own_include(R"(^\s*#\s*include\s*["<]krot/([a-z]+)/)");
+  int num_includes = 0;
+  for (const SourceLine& line : SourceLines("src/krot")) {
+    std::smatch match;
+    if (!std::regex_search(line.text, match, own_include)) continue;
+    ++num_includes;
+    const std::string folder = LibraryFolder(line.file);
+    EXPECT_EQ(AllowedFolders(folder).count(match[1]), 1u)
+        << line.Place() << ": " << folder << " must not include " << match[1];
+  }
+  EXPECT_GT(num_includes, 0);
+}
+
+TEST(IncludeRule, TheLibraryNamesItsHeadersFromTheSourceRoot) {
+  EXPECT_EQ(Occurrences("src/krot", R"(#\s*include\s*"(?!krot/))"), "");
+}
+
+TEST(IncludeRule, TheLibraryIncludesNeitherTestsNorTools) {
+  EXPECT_EQ(Occurrences("src/krot", R"(#\s*include\s*["<](tests|tools)/)"), "");
+}
+
+TEST(IncludeRule, OnlyToolsSeeProgramOptions) {
+  EXPECT_EQ(Occurrences("src/krot", R"(program_options)"), "");
+}
+
+TEST(IncludeRule, OnlyAdjustSeesCeres) {
+  EXPECT_EQ(Occurrences("src/krot", R"(#\s*include\s*["<]ceres/)", {"adjust"}),
+            "");
+}
+
+TEST(LibraryCode, DoesNotPrint) {
+  EXPECT_EQ(Occurrences("src/krot",
+                        R"(\bstd::(cout|cerr|clog)\b|<iostream>|)"
+                        R"(\b(printf|fprintf|puts|putchar|fputs|perror)\s*\()"),
+            "");
+}
+
+TEST(LibraryCode, DoesNotEndTheProcess) {
+  EXPECT_EQ(Occurrences("src/krot",
+                        R"(\b(exit|_exit|quick_exit|abort|terminate)\s*\()"),
+            "");
+}
+
+TEST(LibraryCode, StaysInTheFlatNamespace) {
+  EXPECT_EQ(Occurrences("src/krot", R"(^\s*using\s+namespace\b)"), "");
+  EXPECT_EQ(Occurrences("src/krot", R"(\bnamespace\s+krot\s*::)"), "");
+}
+
+TEST(SourceFiles, AreShortEnoughToReadInOneGo) {
+  constexpr int kMaxLines = 350;
+  for (const char* folder : {"src/krot", "tools"}) {
+    for (const SourceLine& line : SourceLines(folder)) {
+      EXPECT_NE(line.number, kMaxLines + 1)
+          << line.file << " has more than " << kMaxLines << " lines";
+    }
+  }
+}
+
+TEST(SourceFiles, AreHeadersIncludedOnce) {
+  std::map<std::string, bool> has_pragma_once;
+  for (const SourceLine& line : SourceLines("src/krot")) {
+    if (line.file.extension() != ".h") continue;
+    bool& found = has_pragma_once[line.file.generic_string()];
+    found = found || line.text == "#pragma once";
+  }
+  for (const auto& [file, found] : has_pragma_once) {
+    EXPECT_TRUE(found) << file;
+  }
+}
+
+// Absolute paths of one machine work on that machine only.
+TEST(ProjectText, HoldsNoPathOfSomebodysMachine) {
+  const std::regex machine_path(R"((^|[\s"'=(:])/(home|root|work|Users)/\w)");
+  for (const std::filesystem::path& file : ProjectFiles()) {
+    std::ifstream stream(std::filesystem::path(KROT_SOURCE_DIR) / file);
+    std::string text;
+    for (int number = 1; std::getline(stream, text); ++number) {
+      EXPECT_FALSE(std::regex_search(text, machine_path))
+          << file << ":" << number << ": " << text;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace krot

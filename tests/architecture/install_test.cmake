@@ -1,0 +1,37 @@
+# cmake -DBUILD_DIR= -DSCRATCH_DIR= -DCONSUMER_DIR= -DGENERATOR=
+#       -DCXX_COMPILER= -DCXX_FLAGS= -P install_test.cmake
+#
+# Installs BUILD_DIR below SCRATCH_DIR, moves the prefix (packages are
+# relocatable), builds and runs CONSUMER_DIR against it, then checks that
+# the files the uninstall target would remove are those that were installed.
+
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE status
+                  OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT status EQUAL 0)
+    list(JOIN ARGN " " command)
+    message(FATAL_ERROR "${command}\nended with ${status}:\n${output}")
+  endif()
+endfunction()
+
+set(prefix ${SCRATCH_DIR}/prefix)
+set(moved ${SCRATCH_DIR}/moved)
+file(REMOVE_RECURSE ${SCRATCH_DIR})
+file(MAKE_DIRECTORY ${SCRATCH_DIR})
+
+run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${prefix})
+file(RENAME ${prefix} ${moved})
+run(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${SCRATCH_DIR}/build
+    -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=${moved}
+    -DCMAKE_CXX_COMPILER=${CXX_COMPILER} -DCMAKE_CXX_FLAGS=${CXX_FLAGS})
+run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
+run(${SCRATCH_DIR}/build/consumer)
+
+# Uninstalling leaves no file behind.
+file(RENAME ${moved} ${prefix})
+run(${CMAKE_COMMAND} -DMANIFEST=${BUILD_DIR}/install_manifest.txt
+    -P ${CMAKE_CURRENT_LIST_DIR}/../../cmake/Uninstall.cmake)
+file(GLOB_RECURSE left ${prefix}/*)
+if(left)
+  message(FATAL_ERROR "uninstalling left behind: ${left}")
+endif()
