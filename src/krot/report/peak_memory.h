@@ -1,0 +1,10 @@
+#pragma once
+
+#include <cstdint>
+
+namespace krot {
+
+// The largest resident set of this process so far, in bytes.
+int64_t PeakMemoryBytes();
+
+}  // namespace krot

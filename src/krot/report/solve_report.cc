@@ -1,0 +1,202 @@
+#include "krot/report/solve_report.h"
+
+#include <cmath>
+#include <numeric>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* TerminationName(SolveTermination termination) {
+  switch (termination) {
+    case SolveTermination::kStalled:
+      return "stalled";
+    case SolveTermination::kMaxSweeps:
+      return "max_sweeps";
+    case SolveTermination::kInterrupted:
+      return "interrupted";
+    case SolveTermination::kNothingToSolve:
+      return "nothing_to_solve";
+    case SolveTermination::kNotRun:
+      break;
+  }
+  return "not_run";
+}
+
+std::string TerminationSentence(const SolveSummary& summary) {
+  const std::string after = " after " + std::to_string(summary.sweeps.size()) +
+                            " sweep" + (summary.sweeps.size() == 1 ? "" : "s");
+  switch (summary.termination) {
+    case SolveTermination::kStalled:
+      return "Stalled" + after +
+             ": the last one gained less than the tolerance; whether a lower "
+             "cost exists is not known.";
+    case SolveTermination::kMaxSweeps:
+      return "Ended" + after + ", as many as were allowed.";
+    case SolveTermination::kInterrupted:
+      return "Interrupted" + after + ".";
+    case SolveTermination::kNothingToSolve:
+      return NothingToSolveSentence(summary) + ".";
+    case SolveTermination::kNotRun:
+      break;
+  }
+  return "Not run.";
+}
+
+int64_t NumLeftOut(const SolveSummary& summary) {
+  return std::accumulate(summary.left_out.begin(), summary.left_out.end(),
+                         int64_t{0});
+}
+
+// "short_track 12, behind 3"; empty if nothing was left out.
+std::string LeftOutList(const SolveSummary& summary) {
+  std::string list;
+  for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
+    if (summary.left_out[reason] == 0) continue;
+    if (!list.empty()) list += ", ";
+    list += std::string(LeftOutName(static_cast<LeftOut>(reason))) + " " +
+            std::to_string(summary.left_out[reason]);
+  }
+  return list;
+}
+
+std::string CountsSentence(const SolveSummary& summary) {
+  std::ostringstream text;
+  text << summary.num_frames << " frames, " << summary.num_images << " images, "
+       << summary.num_points << " points, " << summary.num_observations
+       << " observations in the optimisation; " << NumLeftOut(summary)
+       << " observations left out";
+  const std::string list = LeftOutList(summary);
+  if (!list.empty()) text << " (" << list << ")";
+  if (summary.num_retriangulated_points > 0) {
+    text << "; " << summary.num_retriangulated_points
+         << " points re-triangulated at the start";
+  }
+  return text.str() + ".";
+}
+
+Json ErrorJson(const PixelErrorStatistics& statistics) {
+  if (statistics.count == 0) {
+    return {{"max", nullptr},
+            {"p99", nullptr},
+            {"mean", nullptr},
+            {"rms", nullptr}};
+  }
+  return {{"max", statistics.max},
+          {"p99", statistics.p99},
+          {"mean", statistics.mean},
+          {"rms", statistics.rms}};
+}
+
+}  // namespace
+
+std::string NormName(Norm norm) {
+  if (std::isinf(norm.p)) return "inf";
+  return Json(norm.p == std::floor(norm.p) && norm.p < 1e9
+                  ? Json(static_cast<int64_t>(norm.p))
+                  : Json(norm.p))
+      .dump();
+}
+
+std::string NothingToSolveSentence(const SolveSummary& summary) {
+  const int64_t num_left_out = NumLeftOut(summary);
+  if (num_left_out == 0) {
+    return "nothing to solve: the model has no observations";
+  }
+  return "nothing to solve: " + std::to_string(num_left_out) +
+         " observations left out (" + LeftOutList(summary) + ")";
+}
+
+std::string SolveTable(const SolveReport& report) {
+  const SolveSummary& summary = report.summary;
+  const PixelErrorStatistics& before = summary.pixel_error_before;
+  const PixelErrorStatistics& after = summary.pixel_error_after;
+  const auto row = [](const char* name, double from, double to) {
+    return std::vector<std::string>{name, FormatNumber(from, 4),
+                                    FormatNumber(to, 4)};
+  };
+  TextTable table;
+  table.AddRow({"pixels", "before", "after"});
+  table.AddRow(row("max error", before.max, after.max));
+  table.AddRow(row("P99 error", before.p99, after.p99));
+  table.AddRow(row("mean error", before.mean, after.mean));
+  table.AddRow(row("RMS error", before.rms, after.rms));
+  table.AddRow(
+      row("cost (max, linearised)", summary.cost_initial, summary.cost_final));
+
+  std::ostringstream text;
+  text << "\nReprojection errors, p = " << NormName(summary.norm)
+       << " for the cost, Euclidean for the rest\n"
+       << table.ToString() << CountsSentence(summary) << '\n';
+  if (after.not_finite > 0) {
+    text << after.not_finite
+         << " observations have no finite error (behind their camera, without "
+            "pose, or not projectable) and are in no row above but the cost's "
+            "left-out count.\n";
+  }
+  text << TerminationSentence(summary) << '\n'
+       << "Read " << FormatNumber(report.seconds_read, 2) << " s, built "
+       << FormatNumber(summary.seconds_build, 2) << " s, solved "
+       << FormatNumber(summary.seconds_solve, 2) << " s, wrote "
+       << FormatNumber(report.seconds_write, 2) << " s; "
+       << FormatNumber(report.seconds_total, 2) << " s in all on "
+       << report.threads << " threads, "
+       << FormatBytes(report.peak_memory_bytes) << " at most.\n";
+  return text.str();
+}
+
+std::string SolveJson(const SolveReport& report) {
+  const SolveSummary& summary = report.summary;
+  Json left_out = Json::object();
+  for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
+    left_out[LeftOutName(static_cast<LeftOut>(reason))] =
+        summary.left_out[reason];
+  }
+  Json sweeps = Json::array();
+  for (const Sweep& sweep : summary.sweeps) {
+    sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
+  }
+  const Json json = {
+      {"version", report.version},
+      {"command", report.command},
+      {"method", report.method},
+      {"norm", NormName(summary.norm)},
+      {"termination", TerminationName(summary.termination)},
+      {"num_frames", summary.num_frames},
+      {"num_images", summary.num_images},
+      {"num_points", summary.num_points},
+      {"num_observations", summary.num_observations},
+      {"left_out", left_out},
+      {"cost_initial", summary.cost_initial},
+      {"cost_final", summary.cost_final},
+      // No method of this version bounds the cost from below.
+      {"lower_bound", nullptr},
+      {"relative_gap", nullptr},
+      {"certified", false},
+      {"pixel_error",
+       {{"before", ErrorJson(summary.pixel_error_before)},
+        {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"sweeps", sweeps},
+      {"iterations", Json::array()},
+      {"support", Json::array()},
+      {"seconds",
+       {{"read", report.seconds_read},
+        {"build", summary.seconds_build},
+        {"solve", summary.seconds_solve},
+        {"certify", nullptr},
+        {"write", report.seconds_write},
+        {"total", report.seconds_total}}},
+      {"peak_memory_bytes", report.peak_memory_bytes},
+      {"threads", report.threads},
+      {"seed", report.seed},
+  };
+  return json.dump(2) + "\n";
+}
+
+}  // namespace krot

@@ -1,0 +1,58 @@
+#include "krot/report/text_table.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+#include <utility>
+
+namespace krot {
+
+void TextTable::AddRow(std::vector<std::string> cells) {
+  rows_.push_back(std::move(cells));
+}
+
+std::string TextTable::ToString(const std::string& indent) const {
+  std::vector<size_t> widths;
+  for (const std::vector<std::string>& row : rows_) {
+    widths.resize(std::max(widths.size(), row.size()), 0);
+    for (size_t column = 0; column < row.size(); ++column) {
+      widths[column] = std::max(widths[column], row[column].size());
+    }
+  }
+  std::string text;
+  for (const std::vector<std::string>& row : rows_) {
+    text += indent;
+    for (size_t column = 0; column < row.size(); ++column) {
+      const std::string padding(widths[column] - row[column].size(), ' ');
+      const bool is_last = column + 1 == row.size();
+      if (column == 0) {
+        text += row[column] + (is_last ? "" : padding);
+      } else {
+        text += "  " + padding + row[column];
+      }
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string FormatNumber(double value, int decimals) {
+  if (!std::isfinite(value)) return "-";
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(decimals) << value;
+  return text.str();
+}
+
+std::string FormatBytes(int64_t bytes) {
+  static const char* const kUnits[] = {"B", "kB", "MB", "GB", "TB"};
+  double value = static_cast<double>(bytes);
+  int unit = 0;
+  while (value >= 1000 && unit < 4) {
+    value /= 1000;
+    ++unit;
+  }
+  return FormatNumber(value, unit == 0 ? 0 : 1) + " " + kUnits[unit];
+}
+
+}  // namespace krot

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace krot {
+
+// A table for a terminal: the first column is flush left, the others flush
+// right, two spaces between columns, one line per row.
+class TextTable {
+ public:
+  // Rows may have different lengths.
+  void AddRow(std::vector<std::string> cells);
+
+  // Every line ends in '\n' and begins with `indent`.
+  std::string ToString(const std::string& indent = "  ") const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+// With `decimals` digits after the point; "-" if not finite.
+std::string FormatNumber(double value, int decimals);
+
+// With the unit that leaves one to three digits before the point: "1.5 MB".
+std::string FormatBytes(int64_t bytes);
+
+}  // namespace krot

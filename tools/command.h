@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace krot {
+
+// The commands of `krot`, one .cc file each. They return an exit code or
+// throw what tools/krot.cc turns into one.
+int RunSolver(const std::vector<std::string>& arguments);
+int RunPointTriangulator(const std::vector<std::string>& arguments);
+int RunModelAnalyzer(const std::vector<std::string>& arguments);
+int RunModelSynthesizer(const std::vector<std::string>& arguments);
+
+}  // namespace krot

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace krot {
+
+// What `krot` returns; the table stands in docs/cli.md and in `krot help`.
+enum ExitCode {
+  kExitDone = 0,
+  kExitOptions = 1,
+  kExitModel = 2,
+  kExitNothingToSolve = 3,
+  // 4: a certificate was refused; no command of this version checks one.
+  kExitNotWritten = 5,
+  kExitInternal = 6,
+  kExitInterrupted = 130,
+};
+
+// Ends a command; what() is one sentence for the user.
+class CommandError : public std::runtime_error {
+ public:
+  CommandError(ExitCode exit_code, const std::string& message)
+      : std::runtime_error(message), exit_code_(exit_code) {}
+
+  ExitCode exit_code() const { return exit_code_; }
+
+ private:
+  ExitCode exit_code_;
+};
+
+// A command line that cannot be obeyed.
+class OptionError : public CommandError {
+ public:
+  explicit OptionError(const std::string& message)
+      : CommandError(kExitOptions, message) {}
+};
+
+}  // namespace krot

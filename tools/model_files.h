@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+
+#include "krot/model/model.h"
+#include "krot/model/model_io.h"
+#include "tools/option_parser.h"
+
+namespace krot {
+
+// The paths of a command that reads a model and writes one.
+struct ModelPaths {
+  std::string input_path;
+  std::string output_path;
+  std::string output_type = "auto";
+  bool overwrite = false;
+  std::string report_path;
+};
+
+void AddModelPaths(ModelPaths* paths, OptionParser* parser);
+void AddOverwrite(bool* overwrite, OptionParser* parser);
+
+// Throws OptionError where the paths contradict each other, ModelError where
+// no model lies at input_path, CommandError (kExitNotWritten) where the output
+// or the report could not be written. Changes nothing and reads no model.
+// Returns how to write.
+WriteModelOptions CheckModelPaths(const ModelPaths& paths);
+
+// A report may not take the place of one of COLMAP's files. Throws OptionError.
+void CheckReportName(const std::string& report_path);
+
+// Reads and validates. Throws ModelError.
+Model ReadValidModel(const std::string& path);
+
+// As in model_io.h, but what they throw is a CommandError (kExitNotWritten).
+void CheckModelWritable(const std::string& path,
+                        const WriteModelOptions& options);
+void WriteModelTo(const Model& model, const std::string& path,
+                  const WriteModelOptions& options);
+
+}  // namespace krot
