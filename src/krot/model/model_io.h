@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "krot/model/model.h"
 
@@ -15,30 +17,38 @@ enum class ModelFormat { kBinary, kText };
 ModelFormat DetectModelFormat(const std::filesystem::path& folder);
 
 // Reads cameras, rigs, frames (both optional, but only together), images and
-// points3D. Every count is checked against the file's size before memory is
-// reserved. Throws ModelError. The result is syntactically complete;
-// ValidateModel says whether it is consistent.
+// points3D, each file in one read. Every count is checked against the file's
+// size before memory is reserved. Throws ModelError. The result is
+// syntactically complete; ValidateModel says whether it is consistent.
+// Rigs and frames that are both empty mean a legacy model, as for COLMAP.
 Model ReadModel(const std::filesystem::path& folder, ModelFormat format);
 
 struct WriteModelOptions {
   ModelFormat format = ModelFormat::kBinary;
-  // A folder that already holds a model is replaced only if this is set.
+  // A folder that already holds files with a model's names (any of them, in
+  // either format) is replaced only if this is set.
   bool overwrite = false;
-  // Files beside the model (project.ini) are copied from this folder.
+  // project.ini is copied from this folder, if there is one.
   std::filesystem::path copy_project_from;  // empty: nothing is copied
 };
 
-// Throws ModelError if WriteModel would refuse this folder (it holds a model
-// and options.overwrite is false; it cannot be created; it is not writable).
-// Changes nothing.
+// Throws ModelError if WriteModel would refuse this folder: it holds a model
+// and options.overwrite is false, it is a file, a mount point or the working
+// directory, or it cannot be created or is not writable. Changes nothing.
 void CheckWritable(const std::filesystem::path& folder,
                    const WriteModelOptions& options);
 
 // Writes the model into a new sibling folder and swaps that in, so that an
 // interruption leaves the old model or the new one and never a mix; foreign
 // files already in `folder` are carried over, model files of the other format
-// are not. Throws ModelError; nothing has changed then.
+// are not. Throws ModelError; nothing has changed then. Requires a valid model
+// (ValidateModel).
 void WriteModel(const Model& model, const std::filesystem::path& folder,
                 const WriteModelOptions& options);
+
+// The image names that COLMAP's text reader would cut at their first white
+// space, in the order of the images. KROT reads them whole; warn before
+// writing them as text.
+std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model);
 
 }  // namespace krot

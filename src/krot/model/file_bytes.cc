@@ -1,0 +1,106 @@
+#include "krot/model/file_bytes.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+[[noreturn]] void FailWithErrno(const std::string& path, const char* action) {
+  const std::string reason = std::generic_category().message(errno);
+  throw ModelError(path + ": cannot be " + action + ": " + reason);
+}
+
+// An open file that closes itself when an exception passes by.
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  ~Descriptor() {
+    if (is_open()) ::close(value_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+
+  bool is_open() const { return value_ >= 0; }
+  int get() const { return value_; }
+  // False, with errno, if what was written before did not arrive.
+  bool Close() {
+    const int value = value_;
+    value_ = -1;
+    return ::close(value) == 0;
+  }
+
+ private:
+  int value_;
+};
+
+bool IsLfsPointer(std::string_view bytes) {
+  constexpr std::string_view kSignature =
+      "version https://git-lfs.github.com/spec/";
+  return bytes.substr(0, kSignature.size()) == kSignature;
+}
+
+}  // namespace
+
+FileBytes ReadFileBytes(const std::filesystem::path& path) {
+  FileBytes file;
+  file.path = path.string();
+  const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!descriptor.is_open()) FailWithErrno(file.path, "opened");
+
+  struct stat status;
+  if (::fstat(descriptor.get(), &status) != 0) {
+    FailWithErrno(file.path, "read");
+  }
+  if (!S_ISREG(status.st_mode)) {
+    throw ModelError(file.path + ": not a regular file, expected a model file");
+  }
+
+  file.bytes.resize(static_cast<size_t>(status.st_size));
+  size_t num_read = 0;
+  while (num_read < file.bytes.size()) {
+    const ssize_t result =
+        ::read(descriptor.get(), file.bytes.data() + num_read,
+               file.bytes.size() - num_read);
+    if (result < 0 && errno == EINTR) continue;
+    if (result < 0) FailWithErrno(file.path, "read");
+    if (result == 0) break;  // it shrank since fstat
+    num_read += static_cast<size_t>(result);
+  }
+  file.bytes.resize(num_read);
+
+  if (IsLfsPointer(file.bytes)) {
+    throw ModelError(file.path +
+                     ": is a Git LFS pointer, not a model; run `git lfs pull` "
+                     "where it was cloned");
+  }
+  return file;
+}
+
+void WriteFileBytes(const std::filesystem::path& path, std::string_view bytes) {
+  const std::string name = path.string();
+  Descriptor descriptor(::open(
+      path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode_t{0666}));
+  if (!descriptor.is_open()) FailWithErrno(name, "created");
+  while (!bytes.empty()) {
+    const ssize_t result =
+        ::write(descriptor.get(), bytes.data(), bytes.size());
+    if (result < 0 && errno == EINTR) continue;
+    if (result < 0) FailWithErrno(name, "written");
+    bytes.remove_prefix(static_cast<size_t>(result));
+  }
+  // Some file systems know only now that there is no space. Those without
+  // fsync answer EINVAL.
+  if (::fsync(descriptor.get()) != 0 && errno != EINVAL) {
+    FailWithErrno(name, "written");
+  }
+  if (!descriptor.Close()) FailWithErrno(name, "written");
+}
+
+}  // namespace krot

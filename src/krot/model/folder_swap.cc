@@ -1,0 +1,163 @@
+#include "krot/model/folder_swap.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <string>
+#include <system_error>
+
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Without symbolic links, dots and a trailing slash: what rename acts on.
+fs::path Resolve(const fs::path& target) {
+  if (target.empty()) throw ModelError("found no name of an output folder");
+  const fs::path resolved = fs::weakly_canonical(fs::absolute(target));
+  return resolved.has_filename() ? resolved : resolved.parent_path();
+}
+
+std::string Reason(int error) { return std::generic_category().message(error); }
+
+bool IsMountPoint(const fs::path& folder) {
+  struct statx status;
+  return ::statx(AT_FDCWD, folder.c_str(), 0, 0, &status) == 0 &&
+         (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0;
+}
+
+// `path`, or its nearest parent that exists.
+fs::path ExistingPart(fs::path path) {
+  while (!fs::exists(path)) path = path.parent_path();
+  return path;
+}
+
+bool HoldsWorkingDirectory(const fs::path& folder) {
+  const fs::path inside = fs::current_path().lexically_relative(folder);
+  return !inside.empty() && *inside.begin() != "..";
+}
+
+void CheckFolderIsWritable(const fs::path& folder) {
+  if (!fs::is_directory(folder)) {
+    throw ModelError(folder.string() + ": is a file, expected a folder");
+  }
+  if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
+    throw ModelError(folder.string() +
+                     ": cannot be written to: " + Reason(errno));
+  }
+}
+
+// A new folder beside `target`, with the permissions that mkdir gives.
+fs::path CreateSibling(const fs::path& target) {
+  for (int i = 0;; ++i) {
+    const std::string name = "." + target.filename().string() + ".krot-" +
+                             std::to_string(::getpid()) + "-" +
+                             std::to_string(i);
+    fs::path sibling = target.parent_path() / name;
+    if (fs::create_directory(sibling)) return sibling;
+  }
+}
+
+// Puts `from` into place as `to`: the same file by a hard link, a copy where
+// the file system has none, a folder entry by entry.
+void Carry(const fs::path& from, const fs::path& to) {
+  const fs::file_status status = fs::symlink_status(from);
+  if (fs::is_directory(status)) {
+    // Removing the old folder would empty what is mounted there.
+    if (IsMountPoint(from)) {
+      throw ModelError(from.string() +
+                       ": is a mount point inside the folder to be replaced; "
+                       "choose another folder");
+    }
+    fs::create_directory(to, from);  // with its permissions
+    for (const auto& entry : fs::directory_iterator(from)) {
+      Carry(entry.path(), to / entry.path().filename());
+    }
+    return;
+  }
+  std::error_code no_link;
+  fs::create_hard_link(from, to, no_link);
+  if (!no_link) return;
+  fs::copy(from, to, fs::copy_options::copy_symlinks);
+}
+
+// Exchanges two folders. File systems without RENAME_EXCHANGE need two
+// renames; between them the old folder bears a name of its own.
+void Exchange(const fs::path& staging, const fs::path& target) {
+  if (::renameat2(AT_FDCWD, staging.c_str(), AT_FDCWD, target.c_str(),
+                  RENAME_EXCHANGE) == 0) {
+    return;
+  }
+  if (errno != EINVAL && errno != ENOSYS) {
+    throw ModelError(target.string() +
+                     ": cannot be replaced: " + Reason(errno));
+  }
+  const fs::path old = staging.string() + "-old";
+  fs::rename(target, old);
+  std::error_code error;
+  fs::rename(staging, target, error);
+  if (error) {
+    fs::rename(old, target);
+    throw ModelError(target.string() +
+                     ": cannot be replaced: " + error.message());
+  }
+  fs::rename(old, staging);
+}
+
+}  // namespace
+
+void CheckSwappable(const fs::path& target) {
+  const fs::path resolved = Resolve(target);
+  const fs::path existing = ExistingPart(resolved);
+  CheckFolderIsWritable(existing);
+  if (existing != resolved) return;
+  if (IsMountPoint(resolved)) {
+    throw ModelError(resolved.string() +
+                     ": is a mount point, which cannot be replaced; choose a "
+                     "folder inside it");
+  }
+  if (HoldsWorkingDirectory(resolved)) {
+    throw ModelError(resolved.string() +
+                     ": is or holds the working directory, which cannot be "
+                     "replaced; choose another folder or start elsewhere");
+  }
+  CheckFolderIsWritable(resolved.parent_path());
+}
+
+FolderSwap::FolderSwap(const fs::path& target) : FolderSwap() {
+  CheckSwappable(target);
+  const fs::path resolved = Resolve(target);
+  target_ = resolved;
+  while (!fs::exists(target_.parent_path())) target_ = target_.parent_path();
+  sibling_ = CreateSibling(target_);
+  staging_ = sibling_;
+  if (target_ != resolved) staging_ /= resolved.lexically_relative(target_);
+  fs::create_directories(staging_);
+}
+
+FolderSwap::~FolderSwap() {
+  std::error_code ignored;
+  if (!sibling_.empty()) fs::remove_all(sibling_, ignored);
+}
+
+void FolderSwap::Commit(
+    const std::function<bool(const fs::path& file_name)>& is_replaced) {
+  if (!fs::exists(target_)) {
+    fs::rename(sibling_, target_);
+    return;
+  }
+  for (const auto& entry : fs::directory_iterator(target_)) {
+    const fs::path name = entry.path().filename();
+    if (is_replaced(name) || fs::exists(staging_ / name)) continue;
+    Carry(entry.path(), staging_ / name);
+  }
+  fs::permissions(staging_, fs::status(target_).permissions());
+  Exchange(staging_, target_);
+}
+
+}  // namespace krot

@@ -1,0 +1,204 @@
+#include "krot/model/model_io.h"
+
+#include <string>
+#include <vector>
+
+#include "krot/model/binary_io.h"
+#include "krot/model/file_bytes.h"
+#include "krot/model/folder_swap.h"
+#include "krot/model/model_error.h"
+#include "krot/model/text_io.h"
+
+namespace krot {
+namespace {
+
+namespace fs = std::filesystem;
+
+// One file of a model, in both formats.
+struct ModelPart {
+  const char* name;
+  bool is_optional;  // rigs and frames
+  void (*parse_binary)(const FileBytes& file, Model* model);
+  void (*parse_text)(const FileBytes& file, Model* model);
+  std::string (*format_binary)(const Model& model);
+  std::string (*format_text)(const Model& model);
+
+  std::string FileName(ModelFormat format) const {
+    return std::string(name) +
+           (format == ModelFormat::kBinary ? ".bin" : ".txt");
+  }
+};
+
+// In the order in which COLMAP reads them.
+const ModelPart kParts[] = {
+    {"cameras", false, ParseCamerasBinary, ParseCamerasText,
+     FormatCamerasBinary, FormatCamerasText},
+    {"rigs", true, ParseRigsBinary, ParseRigsText, FormatRigsBinary,
+     FormatRigsText},
+    {"frames", true, ParseFramesBinary, ParseFramesText, FormatFramesBinary,
+     FormatFramesText},
+    {"images", false, ParseImagesBinary, ParseImagesText, FormatImagesBinary,
+     FormatImagesText},
+    {"points3D", false, ParsePoints3DBinary, ParsePoints3DText,
+     FormatPoints3DBinary, FormatPoints3DText},
+};
+constexpr const char* kProjectFile = "project.ini";
+
+constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
+
+bool IsModelFile(const fs::path& file_name) {
+  for (const ModelPart& part : kParts) {
+    for (const ModelFormat format : kFormats) {
+      if (file_name == part.FileName(format)) return true;
+    }
+  }
+  return false;
+}
+
+// Names of the core files of this format that the folder lacks, or holds.
+std::vector<std::string> CoreFiles(const fs::path& folder, ModelFormat format,
+                                   bool present) {
+  std::vector<std::string> names;
+  for (const ModelPart& part : kParts) {
+    const std::string name = part.FileName(format);
+    if (!part.is_optional && fs::exists(folder / name) == present) {
+      names.push_back(name);
+    }
+  }
+  return names;
+}
+
+bool HoldsModel(const fs::path& folder) {
+  return CoreFiles(folder, ModelFormat::kBinary, false).empty() ||
+         CoreFiles(folder, ModelFormat::kText, false).empty();
+}
+
+std::string Join(const std::vector<std::string>& names) {
+  std::string joined;
+  for (const std::string& name : names) {
+    joined += (joined.empty() ? "" : ", ") + name;
+  }
+  return joined;
+}
+
+[[noreturn]] void FailWithoutModel(const fs::path& folder) {
+  std::string found = "no model file";
+  std::string expected = "cameras, images and points3D, all .bin or all .txt";
+  for (const ModelFormat format : kFormats) {
+    const std::vector<std::string> names = CoreFiles(folder, format, true);
+    if (names.empty()) continue;
+    found = Join(names);
+    expected = Join(CoreFiles(folder, format, false)) + " too";
+    break;
+  }
+  std::string hint;
+  for (const char* subfolder : {"0", "sparse/0", "sparse"}) {
+    if (!HoldsModel(folder / subfolder)) continue;
+    hint = "; " + (folder / subfolder).string() + " holds a model";
+    break;
+  }
+  throw ModelError(folder.string() + ": found " + found + ", expected " +
+                   expected + hint);
+}
+
+// Whether the folder holds rigs and frames; throws if it holds only one.
+bool HasRigs(const fs::path& folder, ModelFormat format) {
+  std::vector<std::string> present;
+  std::vector<std::string> missing;
+  for (const ModelPart& part : kParts) {
+    if (!part.is_optional) continue;
+    const std::string name = part.FileName(format);
+    (fs::exists(folder / name) ? present : missing).push_back(name);
+  }
+  if (!present.empty() && !missing.empty()) {
+    throw ModelError(folder.string() + ": found " + present[0] + " without " +
+                     missing[0] + ", expected both or neither");
+  }
+  return missing.empty();
+}
+
+void WriteModelFiles(const Model& model, ModelFormat format,
+                     const fs::path& folder) {
+  for (const ModelPart& part : kParts) {
+    if (part.is_optional && !model.has_rigs) continue;
+    const auto format_part =
+        format == ModelFormat::kBinary ? part.format_binary : part.format_text;
+    WriteFileBytes(folder / part.FileName(format), format_part(model));
+  }
+}
+
+}  // namespace
+
+ModelFormat DetectModelFormat(const fs::path& folder) {
+  if (!fs::exists(folder)) {
+    throw ModelError(folder.string() + ": no such folder");
+  }
+  if (!fs::is_directory(folder)) {
+    throw ModelError(folder.string() +
+                     ": is a file, expected the folder of a model");
+  }
+  for (const ModelFormat format : kFormats) {
+    if (CoreFiles(folder, format, false).empty()) return format;
+  }
+  FailWithoutModel(folder);
+}
+
+Model ReadModel(const fs::path& folder, ModelFormat format) {
+  Model model;
+  const bool has_rigs = HasRigs(folder, format);
+  for (const ModelPart& part : kParts) {
+    if (part.is_optional && !has_rigs) continue;
+    const auto parse_part =
+        format == ModelFormat::kBinary ? part.parse_binary : part.parse_text;
+    parse_part(ReadFileBytes(folder / part.FileName(format)), &model);
+  }
+  // COLMAP takes a model whose rigs and frames are both empty for a legacy
+  // one.
+  model.has_rigs = !model.rigs.empty() || !model.frames.empty();
+  return model;
+}
+
+void CheckWritable(const fs::path& folder, const WriteModelOptions& options) {
+  try {
+    CheckSwappable(folder);
+    if (options.overwrite || !fs::exists(folder)) return;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (!IsModelFile(entry.path().filename())) continue;
+      throw ModelError(folder.string() + ": already holds a model (" +
+                       entry.path().filename().string() +
+                       "); set overwrite to replace it");
+    }
+  } catch (const fs::filesystem_error& error) {
+    throw ModelError(folder.string() +
+                     ": cannot be written to: " + error.code().message());
+  }
+}
+
+void WriteModel(const Model& model, const fs::path& folder,
+                const WriteModelOptions& options) {
+  CheckWritable(folder, options);
+  try {
+    FolderSwap swap(folder);
+    WriteModelFiles(model, options.format, swap.staging());
+    const fs::path project = options.copy_project_from / kProjectFile;
+    if (!options.copy_project_from.empty() && fs::exists(project)) {
+      fs::copy_file(project, swap.staging() / kProjectFile);
+    }
+    swap.Commit(IsModelFile);
+  } catch (const fs::filesystem_error& error) {
+    throw ModelError(folder.string() +
+                     ": cannot be written: " + error.code().message());
+  }
+}
+
+std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model) {
+  std::vector<std::string> names;
+  for (const Image& image : model.images) {
+    if (image.name.find_first_of(" \t\r\n\v\f") != std::string::npos) {
+      names.push_back(image.name);
+    }
+  }
+  return names;
+}
+
+}  // namespace krot

@@ -1,0 +1,186 @@
+#include <optional>
+#include <string_view>
+
+#include "krot/camera/camera_model.h"
+#include "krot/model/sensor_type.h"
+#include "krot/model/text_io.h"
+#include "krot/model/text_reader.h"
+
+namespace krot {
+namespace {
+
+SensorId ReadSensorId(TextReader* reader) {
+  const std::string_view name = reader->Word("a sensor type");
+  const std::optional<int32_t> type = SensorTypeFromName(name);
+  if (!type) {
+    reader->Fail("\"" + std::string(name) + "\"",
+                 "a sensor type: CAMERA, IMU or INVALID");
+  }
+  return {*type, reader->Number<uint32_t>("a sensor id")};
+}
+
+Pose ReadPose(TextReader* reader) {
+  Pose pose;
+  for (double& value : pose.quaternion_wxyz) {
+    value = reader->Number<double>("a number: QW, QX, QY, QZ of a pose");
+  }
+  for (int i = 0; i < 3; ++i) {
+    pose.translation[i] =
+        reader->Number<double>("a number: TX, TY, TZ of a pose");
+  }
+  return pose;
+}
+
+Camera ReadCamera(TextReader* reader) {
+  Camera camera;
+  camera.id = reader->Number<uint32_t>("a camera id");
+  const std::string_view model_name = reader->Word("a camera model's name");
+  const CameraModelInfo* info = FindCameraModel(model_name);
+  if (info == nullptr) {
+    reader->Fail("\"" + std::string(model_name) + "\"",
+                 "the name of a camera model, such as PINHOLE");
+  }
+  camera.model_id = info->id;
+  camera.width = reader->Number<uint64_t>("the width of a camera");
+  camera.height = reader->Number<uint64_t>("the height of a camera");
+  camera.params.resize(static_cast<size_t>(info->num_params));
+  const std::string expected = "a number: the parameters " +
+                               std::string(info->param_names) + " of " +
+                               std::string(info->name);
+  for (double& param : camera.params) {
+    param = reader->Number<double>(expected.c_str());
+  }
+  reader->ExpectEndOfLine("the parameters of a camera");
+  return camera;
+}
+
+Rig ReadRig(TextReader* reader) {
+  Rig rig;
+  rig.id = reader->Number<uint32_t>("a rig id");
+  const auto num_sensors = reader->Number<uint32_t>("the number of sensors");
+  if (num_sensors > 0) rig.ref_sensor_id = ReadSensorId(reader);
+  for (uint32_t i = 1; i < num_sensors; ++i) {
+    RigSensor sensor;
+    sensor.sensor_id = ReadSensorId(reader);
+    const std::string_view has_pose =
+        reader->Word("0 or 1: whether a sensor has a pose");
+    if (has_pose != "0" && has_pose != "1") {
+      reader->Fail("\"" + std::string(has_pose) + "\"",
+                   "0 or 1: whether a sensor has a pose");
+    }
+    if (has_pose == "1") sensor.sensor_from_rig = ReadPose(reader);
+    rig.sensors.push_back(sensor);
+  }
+  reader->ExpectEndOfLine("the sensors of a rig");
+  return rig;
+}
+
+Frame ReadFrame(TextReader* reader) {
+  Frame frame;
+  frame.id = reader->Number<uint32_t>("a frame id");
+  frame.rig_id = reader->Number<uint32_t>("a rig id");
+  frame.rig_from_world = ReadPose(reader);
+  const auto num_data = reader->Number<uint32_t>("the number of data ids");
+  for (uint32_t i = 0; i < num_data; ++i) {
+    FrameData data;
+    data.sensor_id = ReadSensorId(reader);
+    data.data_id = reader->Number<uint64_t>("a data id");
+    frame.data.push_back(data);
+  }
+  reader->ExpectEndOfLine("the data ids of a frame");
+  return frame;
+}
+
+Point2D ReadPoint2D(TextReader* reader) {
+  Point2D point;
+  point.x = reader->Number<double>("a number: X of a 2D point");
+  point.y = reader->Number<double>("a number: Y of a 2D point");
+  const std::string_view id = reader->Word("the POINT3D_ID of a 2D point");
+  if (id == "-1") return point;
+  const auto value = TextReader::ParseNumber<uint64_t>(id);
+  if (!value) {
+    reader->Fail("\"" + std::string(id) + "\"",
+                 "the POINT3D_ID of a 2D point, or -1");
+  }
+  point.point3D_id = *value;
+  return point;
+}
+
+// The image's own line, then the line of its 2D points, which may be empty
+// or, at the end of the file, absent. `points2D` is scratch memory.
+Image ReadImage(TextReader* reader, std::vector<Point2D>* points2D) {
+  Image image;
+  image.id = reader->Number<uint32_t>("an image id");
+  image.cam_from_world = ReadPose(reader);
+  image.camera_id = reader->Number<uint32_t>("a camera id");
+  image.name = reader->Rest();
+  points2D->clear();
+  if (reader->NextLine()) {
+    while (!reader->AtEnd()) points2D->push_back(ReadPoint2D(reader));
+  }
+  image.points2D = *points2D;
+  return image;
+}
+
+Point3D ReadPoint3D(TextReader* reader,
+                    std::vector<TrackElement>* track_elements) {
+  Point3D point;
+  point.id = reader->Number<uint64_t>("a 3D point id");
+  for (int i = 0; i < 3; ++i) {
+    point.xyz[i] = reader->Number<double>("a number: X, Y, Z of a 3D point");
+  }
+  for (uint8_t& channel : point.color) {
+    channel = reader->Number<uint8_t>("0 to 255: R, G, B of a 3D point");
+  }
+  point.error = reader->Number<double>("a number: ERROR of a 3D point");
+  point.track_begin = track_elements->size();
+  while (!reader->AtEnd()) {
+    TrackElement element;
+    element.image_id = reader->Number<uint32_t>("the IMAGE_ID of a track");
+    element.point2D_idx =
+        reader->Number<uint32_t>("the POINT2D_IDX of a track");
+    track_elements->push_back(element);
+  }
+  point.track_end = track_elements->size();
+  return point;
+}
+
+}  // namespace
+
+void ParseCamerasText(const FileBytes& file, Model* model) {
+  model->cameras.clear();
+  TextReader reader(file);
+  while (reader.NextRecord()) model->cameras.push_back(ReadCamera(&reader));
+}
+
+void ParseRigsText(const FileBytes& file, Model* model) {
+  model->rigs.clear();
+  TextReader reader(file);
+  while (reader.NextRecord()) model->rigs.push_back(ReadRig(&reader));
+}
+
+void ParseFramesText(const FileBytes& file, Model* model) {
+  model->frames.clear();
+  TextReader reader(file);
+  while (reader.NextRecord()) model->frames.push_back(ReadFrame(&reader));
+}
+
+void ParseImagesText(const FileBytes& file, Model* model) {
+  model->images.clear();
+  std::vector<Point2D> points2D;
+  TextReader reader(file);
+  while (reader.NextRecord()) {
+    model->images.push_back(ReadImage(&reader, &points2D));
+  }
+}
+
+void ParsePoints3DText(const FileBytes& file, Model* model) {
+  model->points3D.clear();
+  model->track_elements.clear();
+  TextReader reader(file);
+  while (reader.NextRecord()) {
+    model->points3D.push_back(ReadPoint3D(&reader, &model->track_elements));
+  }
+}
+
+}  // namespace krot
