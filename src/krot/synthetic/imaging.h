@@ -30,7 +30,7 @@ class Imaging {
   std::optional<Eigen::Vector2d> Project(int image,
                                          const Eigen::Vector3d& x_world) const;
 
-  // The point on the ray of (a x width, b y height), fractions in [0, 1], at
+  // The point on the ray of the pixel at a fraction of width and height, at
   // the given depth, if it is in view.
   std::optional<Eigen::Vector3d> PointAt(int image,
                                          const Eigen::Vector2d& fraction,

@@ -24,11 +24,12 @@ class StructureSampler {
   // other image sees it.
   bool SamplePoint(int anchor) {
     track_.clear();
-    const Eigen::Vector2d fraction(random_->Uniform(), random_->Uniform());
+    const double across = random_->Uniform();
+    const double down = random_->Uniform();
     const double depth =
         random_->Uniform(trajectory_.min_depth, trajectory_.max_depth);
     const std::optional<Eigen::Vector3d> point =
-        imaging_.PointAt(anchor, fraction, depth);
+        imaging_.PointAt(anchor, {across, down}, depth);
     if (!point) return false;
     point_ = *point;
     CollectTrack(anchor, SampleTrackLength());

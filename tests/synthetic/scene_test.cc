@@ -1,0 +1,206 @@
+#include "krot/synthetic/scene.h"
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "krot/camera/camera_model.h"
+#include "krot/model/validate.h"
+#include "tests/synthetic/scene_geometry.h"
+
+namespace krot {
+namespace {
+
+// Number of sets that the frames fall into when those that share a point are
+// joined.
+int NumComponents(const Model& model, int sensors_per_rig) {
+  std::vector<size_t> parent(model.images.size() / sensors_per_rig);
+  std::iota(parent.begin(), parent.end(), size_t{0});
+  const auto root = [&parent](size_t f) {
+    while (parent[f] != f) f = parent[f] = parent[parent[f]];
+    return f;
+  };
+  for (const Point3D& point : model.points3D) {
+    const auto frame = [&](uint64_t n) {
+      return (model.track_elements[n].image_id - 1) / sensors_per_rig;
+    };
+    for (uint64_t n = point.track_begin + 1; n < point.track_end; ++n) {
+      parent[root(frame(n))] = root(frame(point.track_begin));
+    }
+  }
+  std::set<size_t> roots;
+  for (size_t f = 0; f < parent.size(); ++f) roots.insert(root(f));
+  return static_cast<int>(roots.size());
+}
+
+// The largest difference of frame numbers within one track.
+int MaxTrackSpan(const Model& model) {
+  int span = 0;
+  for (const Point3D& point : model.points3D) {
+    int first = std::numeric_limits<int>::max();
+    int last = 0;
+    for (uint64_t n = point.track_begin; n < point.track_end; ++n) {
+      const int frame = static_cast<int>(model.track_elements[n].image_id);
+      first = std::min(first, frame);
+      last = std::max(last, frame);
+    }
+    span = std::max(span, last - first);
+  }
+  return span;
+}
+
+class SceneOfCamera : public testing::TestWithParam<int> {};
+
+TEST_P(SceneOfCamera, IsValidAndItsTruthReproducesEveryPixel) {
+  for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
+    SceneOptions options;
+    options.layout = layout;
+    options.camera_model_id = GetParam();
+    options.num_points = 200;
+    const SyntheticScene scene = SynthesizeScene(options);
+    EXPECT_NO_THROW(ValidateModel(scene.model));
+    EXPECT_NO_THROW(ValidateModel(scene.ground_truth));
+    EXPECT_LT(MaxErrorPx(scene.ground_truth), 1e-9);
+    EXPECT_GT(MinDepth(scene.ground_truth), 0.1);
+    EXPECT_LT(MaxErrorPx(scene.model), 1e-9) << "no noise was asked for";
+  }
+}
+
+TEST_P(SceneOfCamera, HasAllPixelsInsideItsImagesAndUndistortable) {
+  SceneOptions options;
+  options.camera_model_id = GetParam();
+  options.focal_length_factor = 0.5;
+  options.num_points = 200;
+  const SyntheticScene scene = SynthesizeScene(options);
+  const Camera& camera = scene.model.cameras.front();
+  for (const SceneObservation& o : RecomputeObservations(scene.model)) {
+    EXPECT_GE(o.measured.minCoeff(), 0);
+    EXPECT_LE(o.measured.x(), options.image_width);
+    EXPECT_LE(o.measured.y(), options.image_height);
+    UndistortedObservation ray;
+    EXPECT_EQ(UndistortPixel(camera.model_id, camera.params.data(), o.measured,
+                             std::nullopt, &ray),
+              UndistortStatus::kOk);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SceneOfCamera, testing::Range(0, 17));
+
+TEST(Scene, HasTheNumbersOfFramesImagesAndPointsAskedFor) {
+  SceneOptions options;
+  options.num_frames = 12;
+  options.num_points = 321;
+  options.sensors_per_rig = 3;
+  const Model model = SynthesizeScene(options).model;
+  EXPECT_EQ(model.frames.size(), 12u);
+  EXPECT_EQ(model.images.size(), 36u);
+  EXPECT_EQ(model.cameras.size(), 3u);
+  EXPECT_EQ(model.rigs.size(), 1u);
+  EXPECT_EQ(model.points3D.size(), 321u);
+}
+
+TEST(Scene, HasTracksOfTheMeanLengthAskedForAndNoneBelowTwo) {
+  for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
+    for (const double track_length : {2.0, 3.5, 10.0, 20.0}) {
+      SceneOptions options;
+      options.layout = layout;
+      options.num_frames = 100;
+      options.num_points = 2000;
+      options.track_length = track_length;
+      const Model model = SynthesizeScene(options).ground_truth;
+      const double mean = static_cast<double>(model.track_elements.size()) /
+                          static_cast<double>(model.points3D.size());
+      EXPECT_NEAR(mean, track_length, 0.1 * track_length);
+      for (const Point3D& point : model.points3D) {
+        EXPECT_GE(point.track_end - point.track_begin, 2u);
+      }
+    }
+  }
+}
+
+TEST(Scene, OfAStreetIsConnectedThroughNeighbouringFramesOnly) {
+  SceneOptions options;
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 1000;
+  options.num_points = 20000;
+  const Model model = SynthesizeScene(options).model;
+  EXPECT_EQ(NumComponents(model, 1), 1);
+  EXPECT_LE(MaxTrackSpan(model), 4 * 6);
+}
+
+TEST(Scene, OfAnOrbitIsConnected) {
+  SceneOptions options;
+  options.sensors_per_rig = 2;
+  EXPECT_EQ(NumComponents(SynthesizeScene(options).model, 2), 1);
+}
+
+TEST(Scene, GivesEveryImagePoints) {
+  SceneOptions options;
+  options.layout = SceneLayout::kStreet;
+  options.sensors_per_rig = 4;
+  options.rig_rotation_deg = 90;
+  options.num_points = 800;
+  for (const Image& image : SynthesizeScene(options).model.images) {
+    EXPECT_GE(image.points2D.size(), 10u) << image.name;
+  }
+}
+
+TEST(Scene, OfALegacyModelHasNeitherRigsNorFrames) {
+  SceneOptions options;
+  options.has_rigs = false;
+  const SyntheticScene scene = SynthesizeScene(options);
+  EXPECT_FALSE(scene.model.has_rigs);
+  EXPECT_TRUE(scene.model.rigs.empty());
+  EXPECT_TRUE(scene.model.frames.empty());
+  EXPECT_NO_THROW(ValidateModel(scene.model));
+  EXPECT_LT(MaxErrorPx(scene.ground_truth), 1e-9);
+}
+
+TEST(Scene, OfARigKeepsSensorPosesAndImagePosesConsistent) {
+  SceneOptions options;
+  options.sensors_per_rig = 3;
+  options.rig_baseline = 0.1;
+  options.rig_rotation_deg = 15;
+  options.start_translation_noise = 0.05;
+  options.rotation_noise_deg = 0.5;
+  const Model model = SynthesizeScene(options).model;
+  for (size_t j = 0; j < model.images.size(); ++j) {
+    const Frame& frame = model.frames[j / 3];
+    const Pose& rig_from_world = frame.rig_from_world;
+    const Pose sensor_from_rig =
+        j % 3 == 0 ? Pose() : *model.rigs[0].sensors[j % 3 - 1].sensor_from_rig;
+    const Eigen::Matrix3d R_sr = sensor_from_rig.Rotation();
+    const Pose& cam_from_world = model.images[j].cam_from_world;
+    EXPECT_LT((cam_from_world.Rotation() - R_sr * rig_from_world.Rotation())
+                  .cwiseAbs()
+                  .maxCoeff(),
+              1e-14);
+    EXPECT_LT((cam_from_world.translation - R_sr * rig_from_world.translation -
+               sensor_from_rig.translation)
+                  .norm(),
+              1e-14);
+    EXPECT_EQ(frame.data[j % 3].data_id, model.images[j].id);
+  }
+}
+
+TEST(Scene, OfARigHasTheBaselineAndTheAngleAskedFor) {
+  SceneOptions options;
+  options.sensors_per_rig = 2;
+  options.rig_baseline = 0.15;
+  options.rig_rotation_deg = 20;
+  const Rig rig = SynthesizeScene(options).model.rigs.front();
+  ASSERT_EQ(rig.sensors.size(), 1u);
+  const Pose& pose = *rig.sensors.front().sensor_from_rig;
+  EXPECT_NEAR(pose.translation.norm(), 0.15, 1e-14);
+  const double angle = Eigen::AngleAxisd(pose.Rotation()).angle();
+  EXPECT_NEAR(angle, 20 * 3.14159265358979323846 / 180, 1e-14);
+
+  options.rig_baseline = 0;
+  const Rig no_baseline = SynthesizeScene(options).model.rigs.front();
+  EXPECT_EQ(no_baseline.sensors.front().sensor_from_rig->translation.norm(), 0);
+}
+
+}  // namespace
+}  // namespace krot
