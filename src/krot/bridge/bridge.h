@@ -17,8 +17,10 @@ enum class LeftOut {
   kUndistortion,  // no trustworthy ray for this pixel
   kOffAxis,       // 90 degrees or more off the optical axis
   kShortTrack,    // fewer than min_track_length usable observations
-  kNoPose,        // the image's translation is not finite
-  kSingleRay,     // all rays of the point leave one camera centre in parallel
+  kNoPose,        // the image has no frame or no finite translation
+  // Never used: a point seen along a single ray is solved like any other, as
+  // its residuals bound the cost from below wherever it lies on that ray.
+  kSingleRay,
 };
 inline constexpr int kNumLeftOutReasons = 6;
 // "behind", "undistortion", "off_axis", "short_track", "no_pose",
@@ -26,32 +28,51 @@ inline constexpr int kNumLeftOutReasons = 6;
 const char* LeftOutName(LeftOut reason);
 
 struct BuildProblemOptions {
-  int min_track_length = 2;  // >= 1, observations
-  // Observations whose linearised residual exceeds this are left out... of no
-  // use for res_int; reserved: see docs/cli.md, --Problem.max_error.
-  int num_threads = -1;
+  // Usable observations that a point needs to be optimised; >= 1. Two of one
+  // image are two.
+  int min_track_length = 2;
+  int num_threads = -1;  // -1: all; the result does not depend on it
 };
 
-// The problem, its start, and where each unknown lives in the model.
+// The problem, its start, and where each unknown lives in the model. All
+// indices ascend with those of the model.
 struct BuiltProblem {
   KnownRotationProblem problem;
-  Estimate start;  // the model's own, with re-triangulated points
-  std::vector<int32_t> frame_of;  // problem frame -> index in model.frames
-                                  // (model.images if !model.has_rigs)
-  std::vector<int32_t> image_of;  // problem view -> index in model.images
-  std::vector<int32_t> point_of;  // problem point -> index in model.points3D
+  // The model's own translations and points, with the points re-triangulated
+  // that were behind a camera. All depths are positive.
+  Estimate start;
+  std::vector<int32_t> frame_of;    // problem frame -> index in model.frames
+                                    // (model.images if !model.has_rigs)
+  std::vector<int32_t> image_of;    // problem view -> index in model.images
+  std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
 };
 
-// Requires a valid model (ValidateModel). Throws ModelError for cameras
-// without an image plane. O(observations).
+// The problem of all observations that can be used: the unknowns are the
+// frames and points that have any. Every image of such a frame is a view,
+// whether or not it sees a point, so that the gauge knows all cameras.
+//
+// An observation is left out for the first of these reasons: its image has no
+// pose; its pixel has no trustworthy ray (UndistortPixel, starting at the
+// model's own projection); it is behind its camera, and re-triangulating the
+// point from all its rays does not bring all of them in front (then the fewest
+// are left out); its point has too few usable observations.
+//
+// Requires a valid model (ValidateModel). Throws ModelError for an observing
+// camera without an image plane, std::invalid_argument for bad options. A
+// problem without observations is no error. O(observations); 72 bytes each.
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 
-// A copy of `model` with the estimate's translations (frames and images both,
-// consistent) and points. Everything else is unchanged.
+// A copy of `model` with the estimate's translations and points; rotations and
+// everything else are unchanged. In a model with rigs an image's pose becomes
+// that of its sensor in its frame, as COLMAP reads it: translations are
+// composed anew, and the quaternion of an image is replaced only if it is
+// another rotation than its frame and rig imply. What the estimate leaves
+// where it is keeps its bits. Throws std::invalid_argument where the estimate
+// does not have the size of the problem.
 Model ApplyEstimate(const Model& model, const BuiltProblem& built,
                     const Estimate& estimate);
 

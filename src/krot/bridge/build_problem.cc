@@ -1,0 +1,274 @@
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "krot/base/check.h"
+#include "krot/base/parallel_for.h"
+#include "krot/bridge/bridge.h"
+#include "krot/bridge/point_repair.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Vector3d;
+using LeftOutCounts = std::array<int64_t, kNumLeftOutReasons>;
+
+constexpr int64_t kPointsPerChunk = 256;
+
+// What is looked up for every observation.
+struct Sources {
+  const Model& model;
+  std::vector<ImageGeometry> geometries;
+  std::unordered_map<ImageId, int32_t> image_indices;
+};
+
+// What becomes of one point of the model.
+struct PointOutcome {
+  RepairedPoint point;
+  int num_kept = 0;
+};
+
+// Where a point's usable observations are written, in the track's order. As
+// many places as the track has elements; `view` is the index of the image and
+// `point` that of the point in the model until Compact renumbers them.
+struct Slots {
+  Observation* observations;
+  int32_t* point2D;
+};
+
+void CheckImagePlanes(const Model& model) {
+  std::unordered_map<CameraId, const CameraModelInfo*> without_plane;
+  for (const Camera& camera : model.cameras) {
+    const CameraModelInfo* info = FindCameraModel(camera.model_id);
+    if (!info->has_image_plane) without_plane.emplace(camera.id, info);
+  }
+  if (without_plane.empty()) return;
+  for (const Image& image : model.images) {
+    const auto found = without_plane.find(image.camera_id);
+    if (found == without_plane.end()) continue;
+    for (const Point2D& point2D : image.points2D) {
+      if (point2D.point3D_id == kInvalidPoint3DId) continue;
+      throw ModelError("camera " + std::to_string(image.camera_id) +
+                       " of image \"" + image.name + "\" is " +
+                       std::string(found->second->name) +
+                       ", which has no image plane: expected a model that "
+                       "projects onto a plane");
+    }
+  }
+}
+
+std::optional<LeftOut> Undistort(const Sources& sources,
+                                 const ImageGeometry& geometry,
+                                 const Point2D& point2D, const Vector3d& xyz,
+                                 Observation* observation) {
+  const Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
+                         geometry.cam_from_world_translation;
+  std::optional<Eigen::Vector2d> own_projection;
+  if (x_cam.z() > 0) own_projection = x_cam.hnormalized();
+
+  const Camera& camera = sources.model.cameras[geometry.camera];
+  UndistortedObservation undistorted;
+  switch (UndistortPixel(camera.model_id, camera.params.data(),
+                         {point2D.x, point2D.y}, own_projection,
+                         &undistorted)) {
+    case UndistortStatus::kOk:
+      observation->u = undistorted.u;
+      observation->J = undistorted.J;
+      return std::nullopt;
+    case UndistortStatus::kNotConverged:
+      return LeftOut::kUndistortion;
+    case UndistortStatus::kOffAxis:
+      return LeftOut::kOffAxis;
+  }
+  return LeftOut::kUndistortion;
+}
+
+// Fills the slots with the observations that have a pose and a ray.
+int CollectRays(const Sources& sources, int32_t point, Slots slots,
+                LeftOutCounts* left_out) {
+  const Point3D& point3D = sources.model.points3D[point];
+  int num_kept = 0;
+  for (uint64_t e = point3D.track_begin; e < point3D.track_end; ++e) {
+    const TrackElement& element = sources.model.track_elements[e];
+    const int32_t image = sources.image_indices.at(element.image_id);
+    const ImageGeometry& geometry = sources.geometries[image];
+
+    Observation& observation = slots.observations[num_kept];
+    observation.view = image;
+    observation.point = point;
+    const std::optional<LeftOut> reason =
+        geometry.has_pose
+            ? Undistort(
+                  sources, geometry,
+                  sources.model.images[image].points2D[element.point2D_idx],
+                  point3D.xyz, &observation)
+            : LeftOut::kNoPose;
+    if (reason) {
+      ++(*left_out)[static_cast<size_t>(*reason)];
+    } else {
+      slots.point2D[num_kept++] = static_cast<int32_t>(element.point2D_idx);
+    }
+  }
+  return num_kept;
+}
+
+// Removes the observations that the point is behind of.
+int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
+                 Slots slots) {
+  int num_kept = 0;
+  for (int i = 0; i < count; ++i) {
+    const Observation& observation = slots.observations[i];
+    if (!IsInFront(sources.geometries[observation.view], xyz)) continue;
+    slots.point2D[num_kept] = slots.point2D[i];
+    slots.observations[num_kept++] = observation;
+  }
+  return num_kept;
+}
+
+PointOutcome ProcessPoint(const Sources& sources, int32_t point,
+                          int min_track_length, Slots slots,
+                          LeftOutCounts* left_out) {
+  const int num_rays = CollectRays(sources, point, slots, left_out);
+  PointOutcome outcome;
+  outcome.point = RepairPoint(sources.geometries, slots.observations, num_rays,
+                              sources.model.points3D[point].xyz);
+  outcome.num_kept = RemoveBehind(sources, outcome.point.xyz, num_rays, slots);
+  (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
+      num_rays - outcome.num_kept;
+  if (outcome.num_kept < min_track_length) {
+    (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome.num_kept;
+    outcome.num_kept = 0;
+  }
+  return outcome;
+}
+
+// Processes all points in parallel, each in the slots of its track.
+std::vector<PointOutcome> ProcessPoints(const Sources& sources,
+                                        const BuildProblemOptions& options,
+                                        BuiltProblem* built) {
+  const Model& model = sources.model;
+  built->problem.observations.resize(model.track_elements.size());
+  built->point2D_of.resize(model.track_elements.size());
+
+  const int64_t count = static_cast<int64_t>(model.points3D.size());
+  std::vector<PointOutcome> outcomes(count);
+  std::vector<LeftOutCounts> chunk_left_out(NumChunks(count, kPointsPerChunk),
+                                            LeftOutCounts{});
+  ParallelFor(count, kPointsPerChunk, options.num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                for (int64_t k = begin; k < end; ++k) {
+                  const uint64_t first = model.points3D[k].track_begin;
+                  outcomes[k] =
+                      ProcessPoint(sources, static_cast<int32_t>(k),
+                                   options.min_track_length,
+                                   {built->problem.observations.data() + first,
+                                    built->point2D_of.data() + first},
+                                   &chunk_left_out[begin / kPointsPerChunk]);
+                }
+              });
+  for (const LeftOutCounts& counts : chunk_left_out) {
+    for (int r = 0; r < kNumLeftOutReasons; ++r)
+      built->left_out[r] += counts[r];
+  }
+  return outcomes;
+}
+
+// Moves the kept observations together and numbers the points that have any.
+void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
+             BuiltProblem* built) {
+  std::vector<Observation>& observations = built->problem.observations;
+  size_t num_kept = 0;
+  for (size_t k = 0; k < outcomes.size(); ++k) {
+    if (outcomes[k].num_kept == 0) continue;
+    const int32_t point = static_cast<int32_t>(built->point_of.size());
+    built->point_of.push_back(static_cast<int32_t>(k));
+    built->start.points.push_back(outcomes[k].point.xyz);
+    built->num_retriangulated_points += outcomes[k].point.is_retriangulated;
+
+    const size_t first = model.points3D[k].track_begin;
+    for (size_t i = first; i < first + outcomes[k].num_kept; ++i, ++num_kept) {
+      observations[num_kept] = observations[i];
+      observations[num_kept].point = point;
+      built->point2D_of[num_kept] = built->point2D_of[i];
+    }
+  }
+  observations.resize(num_kept);
+  built->point2D_of.resize(num_kept);
+  built->problem.num_points = static_cast<int32_t>(built->point_of.size());
+}
+
+// Numbers the frames that have observations, and their images as views.
+void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
+  const std::vector<ImageGeometry>& geometries = sources.geometries;
+  KnownRotationProblem& problem = built->problem;
+  const size_t num_model_frames = sources.model.has_rigs
+                                      ? sources.model.frames.size()
+                                      : sources.model.images.size();
+  std::vector<int32_t> frame_index(num_model_frames, -1);
+  for (const Observation& observation : problem.observations) {
+    frame_index[geometries[observation.view].frame] = 0;
+  }
+  for (size_t f = 0; f < num_model_frames; ++f) {
+    if (frame_index[f] < 0) continue;
+    frame_index[f] = problem.num_frames++;
+    built->frame_of.push_back(static_cast<int32_t>(f));
+  }
+  built->start.translations.resize(problem.num_frames);
+
+  std::vector<int32_t> view_index(geometries.size(), -1);
+  for (size_t n = 0; n < geometries.size(); ++n) {
+    const ImageGeometry& image = geometries[n];
+    if (!image.has_pose || frame_index[image.frame] < 0) continue;
+    view_index[n] = static_cast<int32_t>(problem.views.size());
+    built->image_of.push_back(static_cast<int32_t>(n));
+    const int32_t frame = frame_index[image.frame];
+    problem.views.push_back({image.cam_from_world_rotation,
+                             image.cam_from_rig_rotation,
+                             image.cam_from_rig_translation, frame});
+    built->start.translations[frame] = image.rig_from_world_translation;
+  }
+  for (Observation& observation : problem.observations) {
+    observation.view = view_index[observation.view];
+  }
+}
+
+}  // namespace
+
+const char* LeftOutName(LeftOut reason) {
+  switch (reason) {
+    case LeftOut::kBehind:
+      return "behind";
+    case LeftOut::kUndistortion:
+      return "undistortion";
+    case LeftOut::kOffAxis:
+      return "off_axis";
+    case LeftOut::kShortTrack:
+      return "short_track";
+    case LeftOut::kNoPose:
+      return "no_pose";
+    case LeftOut::kSingleRay:
+      return "single_ray";
+  }
+  return "unknown";
+}
+
+BuiltProblem BuildProblem(const Model& model,
+                          const BuildProblemOptions& options) {
+  CheckArgument(options.min_track_length >= 1, "options.min_track_length",
+                options.min_track_length, ">= 1");
+  CheckImagePlanes(model);
+  const Sources sources{model, ImageGeometries(model), ImageIndices(model)};
+  BuiltProblem built;
+  Compact(model, ProcessPoints(sources, options, &built), &built);
+  AddFramesAndViews(sources, &built);
+  IndexObservations(&built.problem);
+  return built;
+}
+
+}  // namespace krot
