@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// What a model's errors look like. Everything here is plain data; printing is
+// the tools' business.
+
+// The figures of COLMAP's model_analyzer, computed as COLMAP 3.8 does.
+struct ColmapStatistics {
+  int64_t num_rigs = 0;
+  int64_t num_cameras = 0;
+  int64_t num_frames = 0;
+  int64_t num_images = 0;
+  int64_t num_registered_images = 0;  // those with a finite pose
+  int64_t num_points = 0;
+  int64_t num_observations = 0;  // 2D points that have a 3D point
+  double mean_track_length = 0;
+  double mean_observations_per_image = 0;  // per registered image
+  // The mean of the *stored* point errors, each point once, pixels.
+  double mean_reprojection_error = 0;
+};
+// Requires a valid model. O(observations).
+ColmapStatistics ComputeColmapStatistics(const Model& model);
+
+// True errors of one image or camera.
+struct ImageErrors {
+  ImageId image_id = 0;
+  std::string image_name;
+  PixelErrorStatistics errors;
+};
+struct CameraErrors {
+  CameraId camera_id = 0;
+  int64_t num_images = 0;
+  PixelErrorStatistics errors;
+};
+
+// In the order of Model::images and Model::cameras, those without observations
+// included. `errors_px` as PixelErrors gives them; throws
+// std::invalid_argument if their number is not that of the track elements.
+// O(observations).
+std::vector<ImageErrors> ErrorsByImage(const Model& model,
+                                       const std::vector<double>& errors_px);
+std::vector<CameraErrors> ErrorsByCamera(const Model& model,
+                                         const std::vector<double>& errors_px);
+
+struct WorstObservation {
+  ImageId image_id = 0;
+  std::string image_name;
+  uint32_t point2D_idx = 0;
+  Point3DId point3D_id = 0;
+  double error_px = 0;
+};
+// The `count` largest finite errors, descending; equal ones in the order of
+// the tracks. Requires count >= 0 and errors as above. O(observations).
+std::vector<WorstObservation> WorstObservations(
+    const Model& model, const std::vector<double>& errors_px, int count);
+
+}  // namespace krot

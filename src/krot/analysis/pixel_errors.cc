@@ -1,0 +1,100 @@
+#include "krot/analysis/pixel_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include "krot/base/check.h"
+#include "krot/base/parallel_for.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/image_geometry.h"
+
+namespace krot {
+namespace {
+
+constexpr int64_t kPointsPerChunk = 1024;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+double PixelError(const ImageGeometry& geometry, const Camera& camera,
+                  const Point2D& point2D, const Eigen::Vector3d& xyz) {
+  if (!geometry.has_pose) return kNaN;
+  const Eigen::Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
+                                geometry.cam_from_world_translation;
+  if (!(x_cam.z() > 0)) return kNaN;
+  if (!FindCameraModel(camera.model_id)->has_image_plane) return kNaN;
+  const Eigen::Vector2d pixel =
+      ProjectRay(camera.model_id, camera.params.data(), x_cam.hnormalized());
+  const double error = (pixel - Eigen::Vector2d(point2D.x, point2D.y)).norm();
+  return std::isfinite(error) ? error : kNaN;
+}
+
+}  // namespace
+
+std::vector<double> PixelErrors(const Model& model, int num_threads) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const std::unordered_map<ImageId, int32_t> image_indices =
+      ImageIndices(model);
+  std::vector<double> errors_px(model.track_elements.size(), kNaN);
+  ParallelFor(
+      static_cast<int64_t>(model.points3D.size()), kPointsPerChunk, num_threads,
+      [&](int64_t begin, int64_t end, int) {
+        for (int64_t k = begin; k < end; ++k) {
+          const Point3D& point = model.points3D[k];
+          for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+            const TrackElement& element = model.track_elements[e];
+            const int32_t n = image_indices.at(element.image_id);
+            errors_px[e] = PixelError(
+                geometries[n], model.cameras[geometries[n].camera],
+                model.images[n].points2D[element.point2D_idx], point.xyz);
+          }
+        }
+      });
+  return errors_px;
+}
+
+PixelErrorStatistics Summarize(const std::vector<double>& errors_px) {
+  std::vector<double> finite;
+  finite.reserve(errors_px.size());
+  double sum = 0;
+  double sum_of_squares = 0;
+  for (const double error : errors_px) {
+    if (!std::isfinite(error)) continue;
+    finite.push_back(error);
+    sum += error;
+    sum_of_squares += error * error;
+  }
+
+  PixelErrorStatistics statistics;
+  statistics.count = static_cast<int64_t>(finite.size());
+  statistics.not_finite =
+      static_cast<int64_t>(errors_px.size()) - statistics.count;
+  if (finite.empty()) return statistics;
+  const double count = static_cast<double>(finite.size());
+  statistics.mean = sum / count;
+  statistics.rms = std::sqrt(sum_of_squares / count);
+  // ceil(0.99 n)-th smallest, in integers.
+  const auto rank = finite.begin() + ((99 * statistics.count + 99) / 100 - 1);
+  std::nth_element(finite.begin(), rank, finite.end());
+  statistics.p99 = *rank;
+  statistics.max = *std::max_element(rank, finite.end());
+  return statistics;
+}
+
+void UpdatePointErrors(const std::vector<double>& errors_px, Model* model) {
+  CheckArgument(errors_px.size() == model->track_elements.size(),
+                "errors_px.size()", errors_px.size(),
+                "the number of track elements");
+  for (Point3D& point : model->points3D) {
+    double sum = 0;
+    int64_t count = 0;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (!std::isfinite(errors_px[e])) continue;
+      sum += errors_px[e];
+      ++count;
+    }
+    point.error = count > 0 ? sum / static_cast<double>(count) : -1;
+  }
+}
+
+}  // namespace krot
