@@ -1,24 +1,56 @@
 #pragma once
 
-#include "krot/minimax/norm.h"
+#include <vector>
+
+#include "krot/minimax/newton_descent.h"
+#include "krot/minimax/residual_set.h"
+#include "krot/minimax/step_size.h"
 
 namespace krot {
 
 // Which means the Fast Descent Method uses; the optimum sought is the same.
 enum class FastDescentSettings {
   kPaper,  // Algorithms 2-4 to the letter
-  kFast,
+  kFast,   // Newton steps on the active residuals, see newton_descent.h
 };
 
 struct FastDescentOptions {
   FastDescentSettings settings = FastDescentSettings::kFast;
-  // The paper's thresholds; `kPaper` only, see docs/cli.md.
+  int max_iterations = 100;  // >= 1
+  // The paper's thresholds; without effect on kFast.
   double stationarity_tolerance = 1e-8;  // eps_0 >= 0, norm of the MEB centre
   double step_tolerance = 1e-6;          // eps_1 > 0, units of x
   double slope_probe = 1e-8;             // eps_2 > 0, units of x
-  double active_tolerance = 1e-2;        // >= 0, relative to the cost
+  double active_tolerance = 1e-2;        // in [0, 1), relative to the cost
   double max_step = 10;                  // > 0, units of x
-  int max_iterations = 100;              // >= 1
+};
+
+// Throws std::invalid_argument naming the first field out of range.
+void CheckOptions(const FastDescentOptions& options);
+
+// Solves problems (1), min over x in R^3 of max_i r_i(x), one after another
+// [Zhang18, Alg. 2]. Owns their residuals and the scratch memory: refilling
+// and solving do not allocate once warm. Not thread-safe: one per thread.
+class FastDescent {
+ public:
+  // Throws std::invalid_argument for options or a p out of range.
+  FastDescent(const FastDescentOptions& options, Norm norm);
+
+  ResidualSet& residuals() { return residuals_; }
+
+  // Lowers the cost from *x, where all depths must be positive (throws
+  // std::invalid_argument otherwise). Never raises it.
+  DescentSummary Minimize(Eigen::Vector3d* x);
+
+ private:
+  DescentSummary MinimizeAsInPaper(Eigen::Vector3d* x);
+
+  FastDescentOptions options_;
+  Norm norm_;
+  ResidualSet residuals_;
+  NewtonDescent newton_;
+  std::vector<Eigen::Vector3d> descent_normals_;
+  std::vector<LineResidual> line_;
 };
 
 }  // namespace krot

@@ -1,0 +1,54 @@
+#include "krot/minimax/step_size.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace krot {
+namespace {
+
+// f(alpha) = max_i r_i(alpha)  [Zhang18, Alg. 4, line 2]
+double Evaluate(const std::vector<LineResidual>& line, double alpha,
+                Norm norm) {
+  double largest = 0;
+  for (const LineResidual& r : line) {
+    const double depth = r.w * alpha + r.z;
+    if (!(depth > 0)) return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, NormOf(r.u * alpha + r.v, norm) / depth);
+  }
+  return largest;
+}
+
+}  // namespace
+
+double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
+                    const Eigen::Vector3d& direction, Norm norm,
+                    const StepSizeOptions& options,
+                    std::vector<LineResidual>* scratch) {
+  std::vector<LineResidual>& line = *scratch;
+  line.clear();
+  double lb = 0;
+  double ub = options.max_step;
+  for (int i = 0; i < residuals.size(); ++i) {
+    const Residual r = residuals[i];
+    line.push_back({r.A * direction, r.Numerator(x), r.c.dot(direction),
+                    r.Depth(x)});
+    // The supremum of alpha with w alpha + z > 0 (Sec. 3.2).
+    if (line.back().w < 0) ub = std::min(ub, -line.back().z / line.back().w);
+  }
+  while (ub - lb > options.step_tolerance) {
+    const double alpha = (ub + lb) / 2;
+    const double r_left = Evaluate(line, alpha - options.slope_probe, norm);
+    const double r = Evaluate(line, alpha, norm);
+    const double r_right = Evaluate(line, alpha + options.slope_probe, norm);
+    if (r_left > r && r > r_right) {
+      lb = alpha;  // on the decreasing part of f
+    } else if (r_left < r && r < r_right) {
+      ub = alpha;  // on the increasing part of f
+    } else {
+      break;  // stationary up to the probe
+    }
+  }
+  return (ub + lb) / 2;
+}
+
+}  // namespace krot
