@@ -100,15 +100,17 @@ struct BrownDistortion {
 
 // A rational radial term and the tangential one:
 //   (a, b) (1 + k1 s + k2 s^2 + k3 s^3) / (1 + k4 s + k5 s^2 + k6 s^3)
+// computed as 1 + (numerator - denominator) / denominator, which loses fewer
+// digits, and less width on intervals, where both are large.
 struct RationalDistortion {
   static constexpr int kNumParams = 8;  // k1 k2 p1 p2 k3 k4 k5 k6
 
   template <typename P, typename T>
   static void Apply(const P* k, const T& a, const T& b, T* x, T* y) {
     const T s = a * a + b * b;
-    const P numerator[3] = {k[0], k[1], k[4]};
-    const T scale = (1.0 + RadialSeries<3>(numerator, s)) /
-                    (1.0 + RadialSeries<3>(k + 5, s));
+    const P excess[3] = {k[0] - k[5], k[1] - k[6], k[4] - k[7]};
+    const T scale =
+        1.0 + RadialSeries<3>(excess, s) / (1.0 + RadialSeries<3>(k + 5, s));
     *x = a * scale;
     *y = b * scale;
     AddTangential(k[2], k[3], a, b, x, y);
@@ -119,11 +121,11 @@ struct RationalDistortion {
   // of the radial part minus 1 are (N - M)/M and that plus
   // 2 s ((N' - M') M - (N - M) M') / M^2.
   static double DeviationBound(const double* k, double r) {
-    const double difference[3] = {k[0] - k[5], k[1] - k[6], k[4] - k[7]};
+    const double excess[3] = {k[0] - k[5], k[1] - k[6], k[4] - k[7]};
     double n = 0, m = 0, n_slope = 0, m_slope = 0, power = 1;
     for (int i = 0; i < 3; ++i) {
       power *= r * r;
-      const double n_term = std::abs(difference[i]) * power;
+      const double n_term = std::abs(excess[i]) * power;
       const double m_term = std::abs(k[5 + i]) * power;
       n += n_term;
       m += m_term;
