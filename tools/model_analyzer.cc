@@ -61,13 +61,12 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
     CheckReportName(options.report_path);
     CheckFileWritable(options.report_path);
   }
-  const ModelStatistics statistics =
+  const ModelReport report =
       AnalyzeModel(ReadValidModel(path), options.num_worst);
   if (!options.report_path.empty()) {
-    WriteFileAtomically(options.report_path,
-                        ModelJson(statistics, KROT_VERSION));
+    WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));
   }
-  PrintTable(options.common.log, ModelTable(statistics, options.num_worst));
+  PrintTable(options.common.log, ModelTable(report, options.num_worst));
   return kExitDone;
 }
 

@@ -38,6 +38,19 @@ std::string Wrap(const std::string& text, const std::string& indent) {
   return wrapped + line + '\n';
 }
 
+OptionAssignment ToAssignment(const po::option& option) {
+  const std::string text = option.value.empty() ? "" : option.value.front();
+  if (option.position_key >= 0) {
+    throw OptionError("unexpected argument '" + text +
+                      "'; options read --name value");
+  }
+  const bool is_separate = option.original_tokens.size() > 1;
+  if (is_separate && text.rfind("--", 0) == 0) {
+    throw OptionError("--" + option.string_key + " has no value");
+  }
+  return {option.string_key, text, "--" + option.string_key};
+}
+
 }  // namespace
 
 OptionParser::OptionParser(std::string command, std::string summary)
@@ -94,9 +107,9 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) {
     if (argument == "-h" || argument == "--help") return false;
   }
-  const std::vector<Assignment> assignments = ReadArguments(arguments);
+  const std::vector<OptionAssignment> assignments = ReadArguments(arguments);
   Assign(assignments);
-  for (const Assignment& assignment : assignments) {
+  for (const OptionAssignment& assignment : assignments) {
     if (assignment.name == kProjectPath) {
       Assign(ReadProjectFile(assignment.text));
     }
@@ -110,10 +123,10 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   return true;
 }
 
-std::vector<OptionParser::Assignment> OptionParser::ReadArguments(
+std::vector<OptionAssignment> OptionParser::ReadArguments(
     const std::vector<std::string>& arguments) const {
   const po::options_description description = Describe(options_);
-  std::vector<Assignment> assignments;
+  std::vector<OptionAssignment> assignments;
   try {
     const po::parsed_options parsed =
         po::command_line_parser(arguments)
@@ -124,13 +137,8 @@ std::vector<OptionParser::Assignment> OptionParser::ReadArguments(
             .allow_unregistered()
             .run();
     for (const po::option& option : parsed.options) {
-      if (option.position_key >= 0) {
-        throw OptionError("unexpected argument '" + option.value.front() +
-                          "'; options read --name value");
-      }
-      assignments.push_back({option.string_key,
-                             option.value.empty() ? "" : option.value.front(),
-                             "--" + option.string_key});
+      assignments.push_back(ToAssignment(option));
+      Find(assignments.back());
     }
   } catch (const po::error& error) {
     throw OptionError(error.what());
@@ -138,7 +146,7 @@ std::vector<OptionParser::Assignment> OptionParser::ReadArguments(
   return assignments;
 }
 
-std::vector<OptionParser::Assignment> OptionParser::ReadProjectFile(
+std::vector<OptionAssignment> OptionParser::ReadProjectFile(
     const std::string& path) const {
   std::ifstream stream(path);
   std::error_code ignored;
@@ -147,7 +155,7 @@ std::vector<OptionParser::Assignment> OptionParser::ReadProjectFile(
                       ", must be a file that can be read");
   }
   const po::options_description description = Describe(options_);
-  std::vector<Assignment> assignments;
+  std::vector<OptionAssignment> assignments;
   try {
     const po::parsed_options parsed =
         po::parse_config_file(stream, description, true);
@@ -162,9 +170,9 @@ std::vector<OptionParser::Assignment> OptionParser::ReadProjectFile(
   return assignments;
 }
 
-void OptionParser::Assign(const std::vector<Assignment>& assignments) {
+void OptionParser::Assign(const std::vector<OptionAssignment>& assignments) {
   std::set<std::string> names;
-  for (const Assignment& assignment : assignments) {
+  for (const OptionAssignment& assignment : assignments) {
     const Option& option = Find(assignment);
     if (!names.insert(option.name).second) {
       throw OptionError(assignment.source + " is given twice");
@@ -183,7 +191,7 @@ bool OptionParser::IsGiven(const std::string& name) const {
   return given_.count(name) > 0;
 }
 
-const Option& OptionParser::Find(const Assignment& assignment) const {
+const Option& OptionParser::Find(const OptionAssignment& assignment) const {
   std::vector<std::string> names;
   for (const Option& option : options_) {
     if (option.name == assignment.name) return option;
@@ -204,12 +212,13 @@ std::string OptionParser::Help() const {
   text += " [options]\n\nOptions:\n";
   for (const Option& option : options_) {
     text += "  --" + option.name + '\n';
-    std::string domain = "[" + option.range;
-    if (option.required) domain += "; required";
+    text += Wrap(option.description + ".", "      ");
+    std::string value = "Value: " + option.range + ".";
+    if (option.required) value += " Required.";
     if (!option.default_text.empty()) {
-      domain += "; default " + option.default_text;
+      value += " Default: " + option.default_text + ".";
     }
-    text += Wrap(option.description + " " + domain + "]", "      ");
+    text += Wrap(value, "      ");
   }
   return text + "  -h, --help\n      Print this text\n";
 }

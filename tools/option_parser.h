@@ -21,6 +21,13 @@ struct Option {
   std::function<bool(const std::string& text)> parse;
 };
 
+// What one argument, or one line of a project file, says.
+struct OptionAssignment {
+  std::string name;
+  std::string text;
+  std::string source;  // "--name", or "name in file.ini"
+};
+
 // COLMAP's manner of options: --name value, --name=value, and
 // --project_path FILE.ini, whose [Group] sections hold the same names;
 // explicit flags win over the file.
@@ -53,17 +60,12 @@ class OptionParser {
   std::string Help() const;
 
  private:
-  struct Assignment {
-    std::string name;
-    std::string text;
-    std::string source;  // "--name", or "name in file.ini"
-  };
-  std::vector<Assignment> ReadArguments(
+  std::vector<OptionAssignment> ReadArguments(
       const std::vector<std::string>& arguments) const;
-  std::vector<Assignment> ReadProjectFile(const std::string& path) const;
-  void Assign(const std::vector<Assignment>& assignments);
+  std::vector<OptionAssignment> ReadProjectFile(const std::string& path) const;
+  void Assign(const std::vector<OptionAssignment>& assignments);
   // Throws OptionError, naming the nearest option, if there is none.
-  const Option& Find(const Assignment& assignment) const;
+  const Option& Find(const OptionAssignment& assignment) const;
 
   std::string command_;
   std::string summary_;

@@ -13,8 +13,7 @@ constexpr double kPaperSweepTolerance = 1e-3;
 
 void AddMethod(std::string* method, OptionParser* parser) {
   parser->Add({"Solver.method",
-               "Resection-Intersection sweeps; this version has no other "
-               "method",
+               "res_int: Resection-Intersection sweeps [Zhang18, Alg. 1]",
                "one of {res_int}; no other method exists in this version",
                *method, false, [method](const std::string& text) {
                  *method = text;

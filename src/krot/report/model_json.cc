@@ -1,0 +1,103 @@
+#include <nlohmann/json.hpp>
+
+#include "krot/report/model_report.h"
+
+namespace krot {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ErrorJson(const PixelErrorStatistics& errors) {
+  const auto known = [&errors](double value) {
+    return errors.count > 0 ? Json(value) : Json();
+  };
+  return {{"count", errors.count},      {"not_finite", errors.not_finite},
+          {"max", known(errors.max)},   {"p99", known(errors.p99)},
+          {"mean", known(errors.mean)}, {"rms", known(errors.rms)}};
+}
+
+Json ColmapJson(const ColmapStatistics& colmap) {
+  return {{"num_rigs", colmap.num_rigs},
+          {"num_cameras", colmap.num_cameras},
+          {"num_frames", colmap.num_frames},
+          {"num_images", colmap.num_images},
+          {"num_registered_images", colmap.num_registered_images},
+          {"num_points", colmap.num_points},
+          {"num_observations", colmap.num_observations},
+          {"mean_track_length", colmap.mean_track_length},
+          {"mean_observations_per_image", colmap.mean_observations_per_image},
+          {"mean_reprojection_error", colmap.mean_reprojection_error}};
+}
+
+Json ImagesJson(const std::vector<ImageErrors>& images) {
+  Json json = Json::array();
+  for (const ImageErrors& image : images) {
+    json.push_back({{"image_id", image.image_id},
+                    {"image_name", image.image_name},
+                    {"pixel_error", ErrorJson(image.errors)}});
+  }
+  return json;
+}
+
+Json CamerasJson(const std::vector<CameraErrors>& cameras) {
+  Json json = Json::array();
+  for (const CameraErrors& camera : cameras) {
+    json.push_back({{"camera_id", camera.camera_id},
+                    {"num_images", camera.num_images},
+                    {"pixel_error", ErrorJson(camera.errors)}});
+  }
+  return json;
+}
+
+Json WorstJson(const std::vector<WorstObservation>& worst) {
+  Json json = Json::array();
+  for (const WorstObservation& observation : worst) {
+    json.push_back({{"image_id", observation.image_id},
+                    {"image_name", observation.image_name},
+                    {"point2D_idx", observation.point2D_idx},
+                    {"point3D_id", observation.point3D_id},
+                    {"error_px", observation.error_px}});
+  }
+  return json;
+}
+
+Json TrackLengthsJson(const std::map<int64_t, int64_t>& track_lengths) {
+  Json json = Json::array();
+  for (const auto& [length, num_points] : track_lengths) {
+    json.push_back({{"length", length}, {"num_points", num_points}});
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string ModelJson(const ModelReport& report, const std::string& version) {
+  const DepthStatistics& depth = report.depth;
+  const TriangulationAngleStatistics& angle = report.triangulation_angle;
+  const Json json = {
+      {"version", version},
+      {"command", "model_analyzer"},
+      {"colmap", ColmapJson(report.colmap)},
+      {"pixel_error", ErrorJson(report.pixel_error)},
+      {"cameras", CamerasJson(report.cameras)},
+      {"images", ImagesJson(report.images)},
+      {"worst", WorstJson(report.worst)},
+      {"track_lengths", TrackLengthsJson(report.track_lengths)},
+      {"num_tracks_with_repeated_image", report.num_tracks_with_repeated_image},
+      {"depth",
+       {{"count", depth.count},
+        {"not_positive", depth.not_positive},
+        {"min", depth.min},
+        {"median", depth.median},
+        {"max", depth.max}}},
+      {"triangulation_angle_deg",
+       {{"count", angle.count},
+        {"min", angle.min_deg},
+        {"median", angle.median_deg},
+        {"max", angle.max_deg}}},
+  };
+  // Image names are bytes, not always UTF-8.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace krot

@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <sstream>
+
+#include "krot/report/model_report.h"
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+std::string ColmapFigures(const ColmapStatistics& colmap) {
+  std::ostringstream text;
+  if (colmap.num_rigs > 0) {
+    text << "Rigs: " << colmap.num_rigs << '\n'
+         << "Frames: " << colmap.num_frames << '\n';
+  }
+  text << "Cameras: " << colmap.num_cameras << '\n'
+       << "Images: " << colmap.num_images << '\n'
+       << "Registered images: " << colmap.num_registered_images << '\n'
+       << "Points: " << colmap.num_points << '\n'
+       << "Observations: " << colmap.num_observations << '\n'
+       << "Mean track length: " << FormatNumber(colmap.mean_track_length, 6)
+       << '\n'
+       << "Mean observations per image: "
+       << FormatNumber(colmap.mean_observations_per_image, 6) << '\n'
+       << "Mean reprojection error: "
+       << FormatNumber(colmap.mean_reprojection_error, 6) << "px\n";
+  return text.str();
+}
+
+void AddErrorHead(const std::string& name, TextTable* table) {
+  table->AddRow({name, "observations", "max", "P99", "mean", "RMS"});
+}
+
+void AddErrorRow(const std::string& name, const PixelErrorStatistics& errors,
+                 TextTable* table) {
+  if (errors.count == 0) {
+    table->AddRow({name, "0", "-", "-", "-", "-"});
+    return;
+  }
+  table->AddRow({name, std::to_string(errors.count),
+                 FormatNumber(errors.max, 4), FormatNumber(errors.p99, 4),
+                 FormatNumber(errors.mean, 4), FormatNumber(errors.rms, 4)});
+}
+
+std::string OverallErrors(const ModelReport& report) {
+  TextTable table;
+  AddErrorHead("", &table);
+  AddErrorRow("all", report.pixel_error, &table);
+  std::string text = "\nTrue reprojection errors, pixels\n" + table.ToString();
+  if (report.pixel_error.not_finite > 0) {
+    text += std::to_string(report.pixel_error.not_finite) +
+            " more observations have no finite error.\n";
+  }
+  return text;
+}
+
+std::string CameraErrorTable(const std::vector<CameraErrors>& cameras) {
+  TextTable table;
+  AddErrorHead("camera", &table);
+  for (const CameraErrors& camera : cameras) {
+    AddErrorRow(std::to_string(camera.camera_id) + ", " +
+                    std::to_string(camera.num_images) + " images",
+                camera.errors, &table);
+  }
+  return "\nBy camera, pixels\n" + table.ToString();
+}
+
+std::string ImageErrorTable(std::vector<ImageErrors> images,
+                            size_t max_images) {
+  const std::string total = std::to_string(images.size());
+  std::stable_sort(images.begin(), images.end(),
+                   [](const ImageErrors& a, const ImageErrors& b) {
+                     return a.errors.max > b.errors.max;
+                   });
+  images.resize(std::min(images.size(), max_images));
+  TextTable table;
+  AddErrorHead("image", &table);
+  for (const ImageErrors& image : images) {
+    AddErrorRow(std::to_string(image.image_id) + " " + image.image_name,
+                image.errors, &table);
+  }
+  return "\nBy image, pixels; the " + std::to_string(images.size()) + " of " +
+         total + " with the largest errors\n" + table.ToString();
+}
+
+std::string WorstTable(const std::vector<WorstObservation>& worst) {
+  TextTable table;
+  table.AddRow({"image", "point2D_idx", "point3D_id", "error"});
+  for (const WorstObservation& observation : worst) {
+    table.AddRow(
+        {std::to_string(observation.image_id) + " " + observation.image_name,
+         std::to_string(observation.point2D_idx),
+         std::to_string(observation.point3D_id),
+         FormatNumber(observation.error_px, 4)});
+  }
+  return "\nWorst observations, pixels\n" + table.ToString();
+}
+
+// The lengths up to kLongest one by one, the rest together.
+std::string TrackTable(const ModelReport& report) {
+  constexpr int64_t kLongest = 10;
+  TextTable table;
+  table.AddRow({"track length", "points"});
+  int64_t num_longer = 0;
+  for (const auto& [length, num_points] : report.track_lengths) {
+    if (length > kLongest) {
+      num_longer += num_points;
+    } else {
+      table.AddRow({std::to_string(length), std::to_string(num_points)});
+    }
+  }
+  if (num_longer > 0) {
+    const int64_t longest = report.track_lengths.rbegin()->first;
+    table.AddRow(
+        {std::to_string(kLongest + 1) + " to " + std::to_string(longest),
+         std::to_string(num_longer)});
+  }
+  return "\nTracks\n" + table.ToString() +
+         std::to_string(report.num_tracks_with_repeated_image) +
+         " tracks hold two or more observations of one image.\n";
+}
+
+std::string GeometryTable(const ModelReport& report) {
+  const DepthStatistics& depth = report.depth;
+  const TriangulationAngleStatistics& angle = report.triangulation_angle;
+  TextTable table;
+  table.AddRow({"", "min", "median", "max"});
+  table.AddRow({"depth, scene units", FormatNumber(depth.min, 4),
+                FormatNumber(depth.median, 4), FormatNumber(depth.max, 4)});
+  table.AddRow({"triangulation angle, degrees", FormatNumber(angle.min_deg, 4),
+                FormatNumber(angle.median_deg, 4),
+                FormatNumber(angle.max_deg, 4)});
+  return "\nGeometry\n" + table.ToString() +
+         std::to_string(depth.not_positive) +
+         " observations lie in or behind the plane of their camera.\n";
+}
+
+}  // namespace
+
+std::string ModelTable(const ModelReport& report, int max_images) {
+  return ColmapFigures(report.colmap) + OverallErrors(report) +
+         CameraErrorTable(report.cameras) +
+         ImageErrorTable(report.images, static_cast<size_t>(max_images)) +
+         WorstTable(report.worst) + TrackTable(report) + GeometryTable(report);
+}
+
+}  // namespace krot
