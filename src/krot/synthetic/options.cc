@@ -19,10 +19,8 @@ void CheckRange(const char* name, Value value, Value low, Value high) {
 }  // namespace
 
 void Check(const SceneOptions& options) {
-  CheckArgument(options.num_frames >= 2, "num_frames", options.num_frames,
-                ">= 2");
-  CheckArgument(options.num_points >= 1, "num_points", options.num_points,
-                ">= 1");
+  CheckRange("num_frames", options.num_frames, 2, 10'000'000);
+  CheckRange("num_points", options.num_points, 1, 1'000'000'000);
   const CameraModelInfo* camera = FindCameraModel(options.camera_model_id);
   CheckArgument(camera != nullptr && camera->has_image_plane, "camera_model_id",
                 options.camera_model_id,

@@ -28,12 +28,16 @@ SensorId CameraSensor(int sensor) {
   return {kSensorTypeCamera, static_cast<uint32_t>(sensor + 1)};
 }
 
+ImageId ImageIdOf(int frame, int sensor, int num_sensors) {
+  return static_cast<ImageId>(frame * num_sensors + sensor + 1);
+}
+
 // As COLMAP lays out the images of a rig: one folder per camera.
 std::string ImageName(int frame, int sensor, int num_sensors) {
   constexpr size_t kDigits = 6;
   std::string number = std::to_string(frame + 1);
   if (number.size() < kDigits) number.insert(0, kDigits - number.size(), '0');
-  const std::string name = "frame" + number + ".jpg";
+  std::string name = "frame" + number + ".jpg";
   if (num_sensors == 1) return name;
   return "camera" + std::to_string(sensor + 1) + "/" + name;
 }
@@ -60,7 +64,7 @@ Model MakeSkeleton(const SceneOptions& options, const SceneGeometry& geometry) {
   for (int f = 0; f < options.num_frames; ++f) {
     for (int s = 0; s < num_sensors; ++s) {
       Image image;
-      image.id = static_cast<ImageId>(f * num_sensors + s + 1);
+      image.id = ImageIdOf(f, s, num_sensors);
       image.camera_id = model.cameras[static_cast<size_t>(s)].id;
       image.name = ImageName(f, s, num_sensors);
       model.images.push_back(std::move(image));
@@ -74,8 +78,7 @@ Model MakeSkeleton(const SceneOptions& options, const SceneGeometry& geometry) {
     frame.id = static_cast<FrameId>(f + 1);
     frame.rig_id = model.rigs.front().id;
     for (int s = 0; s < num_sensors; ++s) {
-      const uint64_t image_id = static_cast<uint64_t>(f * num_sensors + s + 1);
-      frame.data.push_back({CameraSensor(s), image_id});
+      frame.data.push_back({CameraSensor(s), ImageIdOf(f, s, num_sensors)});
     }
     model.frames.push_back(std::move(frame));
   }

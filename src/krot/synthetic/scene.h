@@ -19,8 +19,8 @@ enum class SceneLayout {
 // middle of what they look at is 1.
 struct SceneOptions {
   SceneLayout layout = SceneLayout::kOrbit;
-  int num_frames = 20;    // >= 2
-  int num_points = 1000;  // >= 1
+  int num_frames = 20;    // in [2, 10^7]
+  int num_points = 1000;  // in [1, 10^9]
   // Mean number of images that see a point; in [2, number of images]. A
   // target: it is missed where fewer images have the point in view.
   double track_length = 6;

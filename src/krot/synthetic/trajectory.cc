@@ -105,8 +105,9 @@ Trajectory MakeTrajectory(const SceneOptions& options, Random* random) {
 std::vector<Pose> MakeRigSensors(const SceneOptions& options) {
   std::vector<Pose> sensor_from_rig = {Pose()};
   for (int s = 1; s < options.sensors_per_rig; ++s) {
-    const double side = (s % 2 == 1 ? 1 : -1) * ((s + 1) / 2);
-    const double yaw = side * options.rig_rotation_deg * kPi / 180;
+    const int steps = (s + 1) / 2;
+    const int side = s % 2 == 1 ? 1 : -1;
+    const double yaw = side * steps * options.rig_rotation_deg * kPi / 180;
     const double angle = 2 * kPi * (s - 1) / (options.sensors_per_rig - 1);
     const Eigen::Vector3d center =
         options.rig_baseline *
