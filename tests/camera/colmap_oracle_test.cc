@@ -1,3 +1,5 @@
+#include <stdlib.h>
+
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -5,6 +7,7 @@
 #include <iomanip>
 #include <map>
 #include <random>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -120,8 +123,9 @@ TEST(ColmapOracle, AgreesOnThePixelErrorsOfModelsZeroToTen) {
   const int fov = FindCameraModel("FOV")->id;
   model.AddCamera(fov, {1500, 1600, 2000, 1500, 5e-3});  // small omega
 
-  const fs::path folder = fs::path(testing::TempDir()) / "krot_colmap_oracle";
-  fs::remove_all(folder);
+  std::string name = testing::TempDir() + "/krot_colmap_oracle_XXXXXX";
+  ASSERT_NE(mkdtemp(name.data()), nullptr);
+  const fs::path folder = name;
   model.Write(folder / "input");
   fs::create_directories(folder / "output");
   const std::string command =
