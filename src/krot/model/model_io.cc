@@ -161,12 +161,14 @@ Model ReadModel(const fs::path& folder, ModelFormat format) {
 void CheckWritable(const fs::path& folder, const WriteModelOptions& options) {
   try {
     CheckSwappable(folder);
-    if (options.overwrite || !fs::exists(folder)) return;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      if (!IsModelFile(entry.path().filename())) continue;
-      throw ModelError(folder.string() + ": already holds a model (" +
-                       entry.path().filename().string() +
-                       "); set overwrite to replace it");
+    if (options.overwrite) return;
+    for (const ModelPart& part : kParts) {
+      for (const ModelFormat format : kFormats) {
+        const std::string name = part.FileName(format);
+        if (!fs::exists(folder / name)) continue;
+        throw ModelError(folder.string() + ": already holds a model (" + name +
+                         "); set overwrite to replace it");
+      }
     }
   } catch (const fs::filesystem_error& error) {
     throw ModelError(folder.string() +

@@ -1,0 +1,233 @@
+#include "krot/model/validate.h"
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/model/tiny_model.h"
+#include "tests/testing/model_matchers.h"
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// What ValidateModel says after this change to a valid model with rigs.
+std::string ErrorAfter(const std::function<void(Model*)>& change) {
+  Model model = TinyRigModel();
+  change(&model);
+  return ModelErrorOf([&] { ValidateModel(model); });
+}
+
+TEST(ValidateModel, AcceptsTinyModels) {
+  EXPECT_NO_THROW(ValidateModel(TinyModel()));
+  EXPECT_NO_THROW(ValidateModel(TinyRigModel()));
+  EXPECT_NO_THROW(ValidateModel(Model()));
+}
+
+TEST(ValidateModel, RefusesDuplicateIds) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->cameras[1].id = 7; }),
+            "cameras: found id 7 twice, expected unique ids");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->rigs[1].id = 5; }),
+            "rigs: found id 5 twice, expected unique ids");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[1].id = 11; }),
+            "frames: found id 11 twice, expected unique ids");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->images[1].id = 9; }),
+            "images: found id 9 twice, expected unique ids");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->points3D[1].id = 12; }),
+            "points3D: found id 12 twice, expected unique ids");
+}
+
+TEST(ValidateModel, RefusesUnknownCameraModelsAndWrongParameterCounts) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->cameras[0].model_id = 18; }),
+            "camera 7: found camera model id 18, expected 0 to 17");
+  EXPECT_THAT(ErrorAfter([](Model* m) { m->cameras[0].params.pop_back(); }),
+              HasSubstr("camera 7: found 3 parameters, expected 4 for "
+                        "SIMPLE_RADIAL"));
+}
+
+TEST(ValidateModel, AcceptsEveryKnownCameraModel) {
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->cameras[1].model_id = 17;  // EQUIRECTANGULAR
+              m->cameras[1].params = {4000, 2000};
+            }),
+            "");
+}
+
+TEST(ValidateModel, RefusesReferencesToRecordsThatDoNotExist) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->images[2].camera_id = 8; }),
+            "image 9 (\"c.jpg\"): found camera id 8, expected one that exists "
+            "in cameras");
+  EXPECT_EQ(
+      ErrorAfter([](Model* m) { m->rigs[0].sensors[1].sensor_id.id = 8; }),
+      "rig 5: found camera 8 as a sensor, expected one that exists in "
+      "cameras");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[0].rig_id = 6; }),
+            "frame 11: found rig id 6, expected one that exists in rigs");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[0].data[1].data_id = 8; }),
+            "frame 11: found image id 8, expected one that exists in images");
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->frames[0].data[1].data_id = (uint64_t{1} << 32) + 9;
+            }),
+            "frame 11: found image id 4294967305, expected one that exists in "
+            "images");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements[0].image_id = 8; }),
+            "3D point 5000000000: found image id 8 in its track, expected one "
+            "that exists in images");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements[0].point2D_idx = 2; }),
+            "3D point 5000000000: found 2D point 2 of image 9 (\"c.jpg\") in "
+            "its track, but that image has only 2 2D points");
+  EXPECT_EQ(
+      ErrorAfter([](Model* m) { m->images[0].points2D[1].point3D_id = 99; }),
+      "image 4000000000 (\"left/a b.jpg\"): found 3D point id 99 at 2D "
+      "point 1, expected one that exists in points3D");
+}
+
+TEST(ValidateModel, RefusesTracksAndImagesThatContradictEachOther) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements[2].point2D_idx = 0; }),
+            "3D point 12: found 2D point 0 of image 9 (\"c.jpg\") in its "
+            "track, but that 2D point names 3D point 5000000000");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements[3].point2D_idx = 1; }),
+            "3D point 12: found 2D point 1 of image 4000000000 (\"left/a "
+            "b.jpg\") in its track, but that 2D point names no 3D point");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements[4].point2D_idx = 0; }),
+            "3D point 12: found 2D point 0 of image 4000000000 (\"left/a "
+            "b.jpg\") twice in its track, expected once");
+  EXPECT_EQ(
+      ErrorAfter([](Model* m) { m->images[0].points2D[1].point3D_id = 1; }),
+      "image 4000000000 (\"left/a b.jpg\"): found 3D point 1 at 2D point "
+      "1, but the track of that 3D point does not name this 2D point");
+}
+
+TEST(ValidateModel, AsksNoAgreementOfTracksThatSetNothing) {
+  Model model = TinyModel();
+  model.points3D[0].track_end = 1;
+  model.points3D[1].track_begin = model.points3D[1].track_end = 1;
+  model.points3D[2].track_begin = 1;
+  model.points3D[2].track_end = 2;
+  model.track_elements = {{9, 1}, {9, 0}};  // the wrong way round
+  EXPECT_NO_THROW(ValidateModel(model));
+  model.track_elements[1].point2D_idx = 2;
+  EXPECT_THAT(ModelErrorOf([&] { ValidateModel(model); }),
+              HasSubstr("has only 2 2D points"));
+}
+
+TEST(ValidateModel, RefusesTracksThatAreNotConsecutive) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->points3D[2].track_begin = 1; }),
+            "3D point 12: found the track [1, 5), expected one that begins at "
+            "2");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->points3D[1].track_end = 1; }),
+            "3D point 1: found the track [2, 1), expected one that begins at "
+            "2");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements.pop_back(); }),
+            "found 4 track elements, expected the tracks' total of 5");
+}
+
+TEST(ValidateModel, RefusesPointsThatBearTheInvalidId) {
+  EXPECT_THAT(
+      ErrorAfter([](Model* m) { m->points3D[1].id = kInvalidPoint3DId; }),
+      HasSubstr("found the id that stands for no 3D point"));
+}
+
+TEST(ValidateModel, RefusesNamesWithAZeroByte) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->images[2].name[1] = '\0'; }),
+            "image 9: found a zero byte in its name, expected none");
+}
+
+TEST(ValidateModel, RefusesSensorsThatARigCannotHave) {
+  EXPECT_EQ(
+      ErrorAfter([](Model* m) { m->rigs[0].sensors[1].sensor_id.id = 7; }),
+      "rig 5: found the sensor CAMERA 7 twice, expected different sensors");
+  EXPECT_THAT(
+      ErrorAfter([](Model* m) { m->rigs[0].sensors[1].sensor_id.type = 9; }),
+      HasSubstr("rig 5: found the sensor type 9 3, expected type -1"));
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->rigs[0].ref_sensor_id.reset(); }),
+            "rig 5: found 2 sensors and no reference sensor, expected one");
+}
+
+TEST(ValidateModel, RefusesFramesThatDoNotFitTheirImagesAndRigs) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[0].data[1].sensor_id.id = 3; }),
+            "frame 11: found image 9 (\"c.jpg\") as data of camera 3, expected "
+            "its camera 7");
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->frames[0].data[1].sensor_id.type = kSensorTypeInvalid;
+            }),
+            "frame 11: found data of the sensor INVALID 7, expected a camera "
+            "or an IMU");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[0].rig_id = 1; }),
+            "image 9 (\"c.jpg\"): found its frame in rig 1, expected a rig "
+            "with its camera 7");
+  EXPECT_EQ(
+      ErrorAfter([](Model* m) { m->rigs[0].sensors[0].sensor_from_rig = {}; }),
+      "image 9 (\"c.jpg\"): found its camera 7 without a pose in rig 5, "
+      "expected one");
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[1].data[0].data_id = 9; }),
+            "image 9 (\"c.jpg\"): found in frame 11 and again in frame 10, "
+            "expected once");
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->frames.pop_back(), m->frames[1].data.clear();
+            }),
+            "image 4000000000 (\"left/a b.jpg\"): found in no frame, expected "
+            "one: the model has rigs and frames");
+}
+
+TEST(ValidateModel, RefusesNumbersThatAreNotFinite) {
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    EXPECT_THAT(ErrorAfter([&](Model* m) { m->cameras[1].params[3] = bad; }),
+                HasSubstr("camera 3: found the parameter"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) { m->points3D[2].xyz[1] = bad; }),
+                HasSubstr("3D point 12: found a coordinate"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) { m->images[0].points2D[1].x = bad; }),
+                HasSubstr("found the x of a 2D point"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) { m->images[0].points2D[1].y = bad; }),
+                HasSubstr("found the y of a 2D point"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) {
+                  m->images[2].cam_from_world.quaternion_wxyz[2] = bad;
+                }),
+                HasSubstr("image 9 (\"c.jpg\"): found a quaternion's"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) {
+                  m->frames[2].rig_from_world.quaternion_wxyz[0] = bad;
+                }),
+                HasSubstr("frame 12: found a quaternion's"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) {
+                  m->rigs[0].sensors[0].sensor_from_rig->translation[0] = bad;
+                }),
+                HasSubstr("rig 5: found a sensor's translation"));
+  }
+}
+
+TEST(ValidateModel, AcceptsAbsentTranslationsAndAnyStoredError) {
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->images[0].cam_from_world.translation.setConstant(kNaN);
+              m->frames[0].rig_from_world.translation.setConstant(kInfinity);
+              m->points3D[0].error = kNaN;
+            }),
+            "");
+}
+
+TEST(ValidateModel, RefusesQuaternionsThatCannotBeNormalised) {
+  for (const double bad : {0.0, 1e-200, 1e200}) {
+    EXPECT_THAT(ErrorAfter([&](Model* m) {
+                  m->images[2].cam_from_world.quaternion_wxyz = {bad, 0, 0, 0};
+                }),
+                HasSubstr("image 9 (\"c.jpg\"): found a quaternion of length"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) {
+                  m->frames[0].rig_from_world.quaternion_wxyz = {0, 0, 0, bad};
+                }),
+                HasSubstr("frame 11: found a quaternion of length"));
+    EXPECT_THAT(ErrorAfter([&](Model* m) {
+                  m->rigs[0].sensors[0].sensor_from_rig->quaternion_wxyz = {
+                      0, 0, bad, 0};
+                }),
+                HasSubstr("rig 5: found a quaternion of length"));
+  }
+}
+
+}  // namespace
+}  // namespace krot
