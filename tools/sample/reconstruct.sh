@@ -2,7 +2,7 @@
 # Reconstructs a folder of images with COLMAP 3.8 on the CPU: one camera of
 # COLMAP's default model, one thread and fixed seeds throughout, so that a
 # second run repeats the first. Writes WORK/database.db and the model WORK/0.
-# Needs colmap. About six minutes for the sample's 24 views.
+# Needs colmap. About two minutes for the sample's 24 views.
 #
 # Usage: tools/sample/reconstruct.sh IMAGES WORK
 set -euo pipefail
