@@ -2,8 +2,8 @@
 #       -DCXX_COMPILER= -DCXX_FLAGS= -P install_test.cmake
 #
 # Installs BUILD_DIR below SCRATCH_DIR, moves the prefix (packages are
-# relocatable), builds and runs CONSUMER_DIR against it, then checks that
-# the files the uninstall target would remove are those that were installed.
+# relocatable), builds and runs CONSUMER_DIR against it, then uninstalls and
+# checks that no file is left.
 
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status
@@ -19,7 +19,16 @@ set(moved ${SCRATCH_DIR}/moved)
 file(REMOVE_RECURSE ${SCRATCH_DIR})
 file(MAKE_DIRECTORY ${SCRATCH_DIR})
 
+# The build's own manifest, if any, belongs to somebody's real installation.
+set(manifest ${BUILD_DIR}/install_manifest.txt)
+if(EXISTS ${manifest})
+  file(RENAME ${manifest} ${SCRATCH_DIR}/kept_manifest.txt)
+endif()
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${prefix})
+file(RENAME ${manifest} ${SCRATCH_DIR}/manifest.txt)
+if(EXISTS ${SCRATCH_DIR}/kept_manifest.txt)
+  file(RENAME ${SCRATCH_DIR}/kept_manifest.txt ${manifest})
+endif()
 file(RENAME ${prefix} ${moved})
 run(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${SCRATCH_DIR}/build
     -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=${moved}
@@ -29,7 +38,7 @@ run(${SCRATCH_DIR}/build/consumer)
 
 # Uninstalling leaves no file behind.
 file(RENAME ${moved} ${prefix})
-run(${CMAKE_COMMAND} -DMANIFEST=${BUILD_DIR}/install_manifest.txt
+run(${CMAKE_COMMAND} -DMANIFEST=${SCRATCH_DIR}/manifest.txt
     -P ${CMAKE_CURRENT_LIST_DIR}/../../cmake/Uninstall.cmake)
 file(GLOB_RECURSE left ${prefix}/*)
 if(left)
