@@ -1,0 +1,145 @@
+#include "krot/analysis/pixel_errors.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "krot/camera/camera_model.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+SceneOptions SmallScene() {
+  SceneOptions options;
+  options.num_frames = 6;
+  options.num_points = 100;
+  return options;
+}
+
+// Two images one unit apart along x look along z at a point 10 away; camera
+// f = 100, centre (50, 40).
+Model TwoImages() {
+  Model model;
+  model.cameras = {
+      {1, FindCameraModel("SIMPLE_PINHOLE")->id, 100, 80, {100, 50, 40}}};
+  model.images.resize(2);
+  for (uint32_t n = 0; n < 2; ++n) {
+    model.images[n].id = n + 1;
+    model.images[n].camera_id = 1;
+    model.images[n].name = n == 0 ? "left" : "right";
+  }
+  model.images[1].cam_from_world.translation = {-1, 0, 0};
+  model.images[0].points2D = {{53, 44, 7}};  // projected to (50, 40): 5 px
+  model.images[1].points2D = {{39, 40, 7}};  // projected to (40, 40): 1 px
+  model.track_elements = {{1, 0}, {2, 0}};
+  Point3D point;
+  point.id = 7;
+  point.xyz = {0, 0, 10};
+  point.track_end = 2;
+  model.points3D = {point};
+  return model;
+}
+
+TEST(PixelErrors, AreDistancesInTheImage) {
+  const std::vector<double> errors = PixelErrors(TwoImages());
+  ASSERT_EQ(errors.size(), 2u);
+  EXPECT_NEAR(errors[0], 5, 1e-13);
+  EXPECT_NEAR(errors[1], 1, 1e-13);
+}
+
+TEST(PixelErrors, OfExactObservationsVanishWhateverTheCamera) {
+  for (const CameraModelInfo& camera : CameraModels()) {
+    if (!camera.has_image_plane) continue;
+    SceneOptions options = SmallScene();
+    options.camera_model_id = camera.id;
+    options.sensors_per_rig = 2;
+    const PixelErrorStatistics statistics =
+        Summarize(PixelErrors(SynthesizeScene(options).ground_truth));
+    EXPECT_LE(statistics.max, 1e-8) << camera.name;
+    EXPECT_EQ(statistics.not_finite, 0) << camera.name;
+  }
+}
+
+TEST(PixelErrors, AreNotNumbersBehindTheCamera) {
+  Model model = TwoImages();
+  model.points3D[0].xyz.z() = -10;
+  EXPECT_TRUE(std::isnan(PixelErrors(model)[0]));
+  model.points3D[0].xyz.z() = 0;
+  EXPECT_TRUE(std::isnan(PixelErrors(model)[0]));
+}
+
+TEST(PixelErrors, AreNotNumbersWithoutAPose) {
+  Model model = TwoImages();
+  model.images[1].cam_from_world.translation.y() = kNaN;
+  const std::vector<double> errors = PixelErrors(model);
+  EXPECT_FALSE(std::isnan(errors[0]));
+  EXPECT_TRUE(std::isnan(errors[1]));
+}
+
+TEST(PixelErrors, AreNotNumbersWithoutAnImagePlane) {
+  Model model = TwoImages();
+  model.cameras[0].model_id = FindCameraModel("EQUIRECTANGULAR")->id;
+  model.cameras[0].params = {100, 80};
+  EXPECT_TRUE(std::isnan(PixelErrors(model)[0]));
+}
+
+TEST(PixelErrors, HaveTheSameBitsAtAnyNumberOfThreads) {
+  SceneOptions options = SmallScene();
+  options.num_points = 5000;
+  options.pixel_noise = 1;
+  const Model model = SynthesizeScene(options).model;
+  const std::vector<double> errors = PixelErrors(model, 1);
+  EXPECT_EQ(PixelErrors(model, 2), errors);
+  EXPECT_EQ(PixelErrors(model, 7), errors);
+}
+
+TEST(Summarize, TakesTheNearestRankForThePercentile) {
+  std::vector<double> errors;
+  for (int n = 100; n >= 1; --n) errors.push_back(n);
+  EXPECT_EQ(Summarize(errors).p99, 99);
+  errors.push_back(101);
+  EXPECT_EQ(Summarize(errors).p99, 100);  // ceil(0.99 * 101) = 100
+  EXPECT_EQ(Summarize({5}).p99, 5);
+}
+
+TEST(Summarize, CountsWhatIsNotFiniteAndIgnoresIt) {
+  const PixelErrorStatistics statistics = Summarize({3, kNaN, 4});
+  EXPECT_EQ(statistics.count, 2);
+  EXPECT_EQ(statistics.not_finite, 1);
+  EXPECT_EQ(statistics.max, 4);
+  EXPECT_DOUBLE_EQ(statistics.mean, 3.5);
+  EXPECT_DOUBLE_EQ(statistics.rms, std::sqrt(12.5));
+}
+
+TEST(Summarize, OfNothingIsZero) {
+  const PixelErrorStatistics statistics = Summarize({kNaN});
+  EXPECT_EQ(statistics.count, 0);
+  EXPECT_EQ(statistics.not_finite, 1);
+  EXPECT_EQ(statistics.max, 0);
+  EXPECT_EQ(statistics.p99, 0);
+  EXPECT_EQ(statistics.mean, 0);
+  EXPECT_EQ(statistics.rms, 0);
+}
+
+TEST(UpdatePointErrors, StoresTheMeanOfTheFiniteErrors) {
+  Model model = TwoImages();
+  UpdatePointErrors({5, 1}, &model);
+  EXPECT_EQ(model.points3D[0].error, 3);
+  UpdatePointErrors({5, kNaN}, &model);
+  EXPECT_EQ(model.points3D[0].error, 5);
+  UpdatePointErrors({kNaN, kNaN}, &model);
+  EXPECT_EQ(model.points3D[0].error, -1);
+}
+
+TEST(UpdatePointErrors, RefusesErrorsOfAnotherModel) {
+  Model model = TwoImages();
+  EXPECT_THROW(UpdatePointErrors({1}, &model), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace krot

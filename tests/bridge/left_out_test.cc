@@ -1,0 +1,209 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "krot/bridge/bridge.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/model_error.h"
+#include "krot/problem/cost.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// Legacy, every point in all eight images of a distorting camera.
+Model EightImages(const char* camera_model = "SIMPLE_RADIAL") {
+  SceneOptions options;
+  options.num_frames = 8;
+  options.num_points = 50;
+  options.track_length = 8;
+  options.camera_model_id = FindCameraModel(camera_model)->id;
+  options.has_rigs = false;
+  return SynthesizeScene(options).model;
+}
+
+int64_t Count(const BuiltProblem& built, LeftOut reason) {
+  return built.left_out[static_cast<size_t>(reason)];
+}
+
+// Nothing is lost: kept and left out add up.
+void ExpectBooksBalance(const Model& model, const BuiltProblem& built) {
+  int64_t sum = static_cast<int64_t>(built.problem.observations.size());
+  for (const int64_t count : built.left_out) sum += count;
+  EXPECT_EQ(sum, static_cast<int64_t>(model.track_elements.size()));
+  EXPECT_LT(Cost(built.problem, built.start, Norm::L2(), 1),
+            std::numeric_limits<double>::infinity());
+}
+
+// The 2D point of the first element of a point's track.
+Point2D& FirstPoint2D(Model* model, size_t point) {
+  const TrackElement& element =
+      model->track_elements[model->points3D[point].track_begin];
+  return model->images[element.image_id - 1].points2D[element.point2D_idx];
+}
+
+const Camera& FirstCamera(const Model& model, size_t point) {
+  const TrackElement& element =
+      model.track_elements[model.points3D[point].track_begin];
+  return model.cameras[model.images[element.image_id - 1].camera_id - 1];
+}
+
+int64_t TrackLength(const Model& model, size_t point) {
+  return static_cast<int64_t>(model.points3D[point].track_end -
+                              model.points3D[point].track_begin);
+}
+
+TEST(LeftOutName, IsTheKeyOfTheReport) {
+  std::vector<std::string> names;
+  for (int r = 0; r < kNumLeftOutReasons; ++r) {
+    names.push_back(LeftOutName(static_cast<LeftOut>(r)));
+  }
+  EXPECT_THAT(names, ElementsAre("behind", "undistortion", "off_axis",
+                                 "short_track", "no_pose", "single_ray"));
+}
+
+TEST(LeftOut, AnImageWithoutFiniteTranslationHasNoPose) {
+  Model model = EightImages();
+  int64_t num_observations = 0;
+  for (const TrackElement& element : model.track_elements) {
+    num_observations += element.image_id == model.images[3].id;
+  }
+  ASSERT_GT(num_observations, 0);
+  model.images[3].cam_from_world.translation.x() = std::nan("");
+  const BuiltProblem built = BuildProblem(model, {});
+  EXPECT_EQ(Count(built, LeftOut::kNoPose), num_observations);
+  EXPECT_THAT(built.frame_of, ElementsAre(0, 1, 2, 4, 5, 6, 7));
+  ExpectBooksBalance(model, built);
+}
+
+TEST(LeftOut, APixelBeyondTheFoldOfItsPolynomialHasNoRay) {
+  Model model = EightImages();
+  // f (r + k r^3) with k < 0 never exceeds 2/3 f / sqrt(-3 k).
+  Camera& camera = model.cameras[0];
+  camera.params[3] = -0.1;
+  FirstPoint2D(&model, 7).x =
+      camera.params[1] + 2 * camera.params[0] / std::sqrt(0.3);
+  const BuiltProblem built = BuildProblem(model, {});
+  EXPECT_EQ(Count(built, LeftOut::kUndistortion), 1);
+  EXPECT_EQ(built.problem.point_begin[8] - built.problem.point_begin[7],
+            TrackLength(model, 7) - 1);
+  ExpectBooksBalance(model, built);
+}
+
+TEST(LeftOut, AFisheyePixelBeyondTheHalfSphereIsOffAxis) {
+  Model model = EightImages("SIMPLE_FISHEYE");
+  // theta = r / f.
+  const Camera& camera = FirstCamera(model, 7);
+  FirstPoint2D(&model, 7).x = camera.params[1] + 1.6 * camera.params[0];
+  FirstPoint2D(&model, 7).y = camera.params[2];
+  const BuiltProblem built = BuildProblem(model, {});
+  EXPECT_EQ(Count(built, LeftOut::kOffAxis), 1);
+  ExpectBooksBalance(model, built);
+}
+
+TEST(LeftOut, APointBehindItsCamerasIsRetriangulated) {
+  Model model = EightImages();
+  const Eigen::Vector3d truth = model.points3D[5].xyz;
+  model.points3D[5].xyz *= -100;
+  const BuiltProblem built = BuildProblem(model, {});
+  EXPECT_EQ(built.num_retriangulated_points, 1);
+  EXPECT_EQ(Count(built, LeftOut::kBehind), 0);
+  EXPECT_NEAR((built.start.points[5] - truth).norm(), 0, 1e-9);
+  ExpectBooksBalance(model, built);
+}
+
+TEST(LeftOut, OnlyAnObservationThatStaysBehindIsLeftOut) {
+  Model model = EightImages();
+  // One camera looks the other way: turned by 180 degrees about its y axis.
+  const Image turned = model.images[2];
+  const Eigen::Quaterniond q(turned.cam_from_world.quaternion_wxyz[0],
+                             turned.cam_from_world.quaternion_wxyz[1],
+                             turned.cam_from_world.quaternion_wxyz[2],
+                             turned.cam_from_world.quaternion_wxyz[3]);
+  const Eigen::Quaterniond half_turn(0, 0, 1, 0);
+  const Eigen::Quaterniond r = half_turn * q;
+  model.images[2].cam_from_world.quaternion_wxyz = {r.w(), r.x(), r.y(), r.z()};
+  model.images[2].cam_from_world.translation =
+      half_turn * turned.cam_from_world.translation;
+
+  const BuiltProblem built = BuildProblem(model, {});
+  int64_t num_observations = 0;
+  for (const TrackElement& element : model.track_elements) {
+    num_observations += element.image_id == model.images[2].id;
+  }
+  // Its rays still pass near the points, so some may be repaired by a point
+  // behind all others; that would leave out more and is not done.
+  EXPECT_EQ(Count(built, LeftOut::kBehind), num_observations);
+  EXPECT_EQ(built.num_retriangulated_points, 0);
+  for (size_t k = 0; k < built.point_of.size(); ++k) {
+    EXPECT_EQ(built.start.points[k], model.points3D[built.point_of[k]].xyz);
+  }
+  ExpectBooksBalance(model, built);
+}
+
+TEST(LeftOut, WhatRemainsOfATrackMayBeTooShort) {
+  Model model = EightImages();
+  const BuiltProblem all = BuildProblem(model, {/*min_track_length=*/8, 1});
+  int64_t num_short = 0;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    if (TrackLength(model, k) < 8) num_short += TrackLength(model, k);
+  }
+  EXPECT_EQ(Count(all, LeftOut::kShortTrack), num_short);
+
+  model.images[3].cam_from_world.translation.x() = std::nan("");
+  const BuiltProblem none = BuildProblem(model, {/*min_track_length=*/8, 1});
+  EXPECT_EQ(none.problem.num_points, 0);
+  EXPECT_EQ(none.problem.num_frames, 0);
+  EXPECT_TRUE(none.problem.views.empty());
+  EXPECT_TRUE(none.problem.observations.empty());
+  EXPECT_GT(Count(none, LeftOut::kNoPose), 0);
+  ExpectBooksBalance(model, none);
+}
+
+TEST(LeftOut, AnImageOfNoFrameHasNoPose) {
+  SceneOptions options;
+  options.num_frames = 6;
+  options.num_points = 50;
+  options.sensors_per_rig = 2;
+  Model model = SynthesizeScene(options).model;
+  const ImageId lost = static_cast<ImageId>(model.frames[1].data[0].data_id);
+  model.frames[1].data.erase(model.frames[1].data.begin());
+  int64_t num_observations = 0;
+  for (const TrackElement& element : model.track_elements) {
+    num_observations += element.image_id == lost;
+  }
+  const BuiltProblem built = BuildProblem(model, {});
+  EXPECT_EQ(Count(built, LeftOut::kNoPose), num_observations);
+  ExpectBooksBalance(model, built);
+}
+
+TEST(BuildProblem, RefusesAnEquirectangularCameraThatObserves) {
+  Model model = EightImages();
+  Camera unused = model.cameras[0];
+  unused.id = 77;
+  unused.model_id = FindCameraModel("EQUIRECTANGULAR")->id;
+  unused.params = {1024, 512};
+  model.cameras.push_back(unused);
+  EXPECT_NO_THROW(BuildProblem(model, {}));
+
+  model.images[4].camera_id = 77;
+  try {
+    BuildProblem(model, {});
+    FAIL() << "nothing thrown";
+  } catch (const ModelError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("camera 77"));
+    EXPECT_THAT(error.what(), HasSubstr("EQUIRECTANGULAR"));
+    EXPECT_THAT(error.what(), HasSubstr(model.images[4].name));
+  }
+}
+
+}  // namespace
+}  // namespace krot
