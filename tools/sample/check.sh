@@ -2,7 +2,7 @@
 # Shows that a model and its ground truth are the same cameras: one similarity
 # takes the model's camera centres onto the true ones and its rotations with
 # them. Prints the residuals; fails above 1e-3 of the scene's size (the RMS
-# distance of the centres to their mean), 0.1 degrees, or 0.1 % of the focal
+# distance of the centres to their mean), 0.1 degrees, or 0.5 % of the focal
 # length. Needs colmap (to read the binary model).
 #
 # Usage: tools/sample/check.sh [MODEL]   (MODEL also holds ground_truth.txt)

@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
 # Reconstructs a folder of images with COLMAP 3.8 on the CPU: one camera of
-# COLMAP's default model, one thread and fixed seeds throughout, so that a
-# second run repeats the first. Writes WORK/database.db and the model WORK/0.
+# COLMAP's default model, one thread and fixed seeds. The features repeat
+# exactly, the matches nearly: their verifier reseeds rand(), on which the
+# matcher's search trees draw, at its own time. Writes WORK/database.db and the
+# model WORK/0.
 # Needs colmap. About two minutes for the sample's 24 views.
 #
 # Usage: tools/sample/reconstruct.sh IMAGES WORK
