@@ -118,7 +118,7 @@ file == 1 {
   known[$1] = 1
   ++num_true
 }
-file == 2 { model_focal = $5; cx = $6; cy = $7; distortion = $8 }
+file == 2 { model_focal = $5 }
 # Every image has two lines; the second lists its 2D points and may be empty.
 file == 3 && ++line % 2 == 1 && ($10 in known) {
   store(model_rotation, model_centre, $10, $2, $3, $4, $5, $6, $7, $8)
