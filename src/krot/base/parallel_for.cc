@@ -16,14 +16,13 @@ int ResolveNumThreads(int requested) {
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-void ParallelFor(
-    int64_t count, int64_t chunk_size, int num_threads,
-    const std::function<void(int64_t, int64_t, int)>& body) {
+void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
+                 const std::function<void(int64_t, int64_t, int)>& body) {
   CheckArgument(chunk_size >= 1, "chunk_size", chunk_size, ">= 1");
   if (count <= 0) return;
   const int64_t num_chunks = NumChunks(count, chunk_size);
-  const int num_workers = static_cast<int>(std::min<int64_t>(
-      ResolveNumThreads(num_threads), num_chunks));
+  const int num_workers = static_cast<int>(
+      std::min<int64_t>(ResolveNumThreads(num_threads), num_chunks));
 
   // Chunks are fixed; which thread takes which is not, and must not matter.
   std::atomic<int64_t> next_chunk{0};

@@ -21,9 +21,9 @@ int ResolveNumThreads(int requested);
 //
 // The first exception (by chunk order) is rethrown here after all threads
 // have stopped.
-void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
-                 const std::function<void(int64_t begin, int64_t end,
-                                          int worker)>& body);
+void ParallelFor(
+    int64_t count, int64_t chunk_size, int num_threads,
+    const std::function<void(int64_t begin, int64_t end, int worker)>& body);
 
 // How many chunks ParallelFor makes.
 inline int64_t NumChunks(int64_t count, int64_t chunk_size) {

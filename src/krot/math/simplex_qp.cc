@@ -160,8 +160,8 @@ bool AddToActive(const LinearPiece* pieces, int j, double scale,
   }
   double direction[4] = {};
   for (int k = 0; k < active->size; ++k) direction[k] = -barycentric[k];
-  const double step = MoveWeights(
-      direction, std::numeric_limits<double>::infinity(), active);
+  const double step =
+      MoveWeights(direction, std::numeric_limits<double>::infinity(), active);
   if (!std::isfinite(step) || active->size == 4) return false;
   active->index[active->size] = j;
   active->weight[active->size] = step;
@@ -172,14 +172,13 @@ bool AddToActive(const LinearPiece* pieces, int j, double scale,
 void SetStepAndLevel(const LinearPiece* pieces, SimplexQpSolution* solution) {
   solution->step.setZero();
   for (int k = 0; k < solution->size; ++k) {
-    solution->step -=
-        solution->weight[k] * pieces[solution->index[k]].gradient;
+    solution->step -= solution->weight[k] * pieces[solution->index[k]].gradient;
   }
   solution->level = 0;  // the mean: all agree at the minimiser
   for (int k = 0; k < solution->size; ++k) {
     const LinearPiece& piece = pieces[solution->index[k]];
-    solution->level +=
-        solution->weight[k] * (piece.value + piece.gradient.dot(solution->step));
+    solution->level += solution->weight[k] *
+                       (piece.value + piece.gradient.dot(solution->step));
   }
 }
 

@@ -14,7 +14,8 @@ struct LinearPiece {
 // R^3, found in its dual
 //
 //   min over mu >= 0, sum mu = 1   1/2 |sum mu_i gradient_i|^2
-//                                  - sum mu_i value_i,     d = -sum mu gradient.
+//                                  - sum mu_i value_i,     d = -sum mu
+//                                  gradient.
 //
 // With all values equal, -d is the point of least norm of the convex hull of
 // the gradients.

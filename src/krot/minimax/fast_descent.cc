@@ -53,15 +53,15 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
   while (summary.iterations < options_.max_iterations) {
     FindDescentNormals(residuals_, *x, norm_, options_.active_tolerance,
                        &descent_normals_);
-    const std::optional<Eigen::Vector3d> direction = FindDescentDirection(
-        descent_normals_, options_.stationarity_tolerance);
+    const std::optional<Eigen::Vector3d> direction =
+        FindDescentDirection(descent_normals_, options_.stationarity_tolerance);
     if (!direction) {
       summary.termination = DescentTermination::kStationary;
       break;
     }
     ++summary.iterations;
-    const double step = FindStepSize(residuals_, *x, *direction, norm_,
-                                     step_options, &line_);
+    const double step =
+        FindStepSize(residuals_, *x, *direction, norm_, step_options, &line_);
     const Eigen::Vector3d x_next = *x + step * *direction;
     const double cost = residuals_.Evaluate(x_next, norm_);
     if (!(cost < summary.cost)) {

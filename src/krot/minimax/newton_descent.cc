@@ -107,8 +107,8 @@ Vector3d NewtonDescent::SolveStep(double cost, double kappa, double* level) {
   }
   scaled_pieces_.back() = {};  // no residual falls below zero
   solution_.size = 0;
-  SolveSimplexQp(scaled_pieces_.data(),
-                 static_cast<int>(scaled_pieces_.size()), &solution_);
+  SolveSimplexQp(scaled_pieces_.data(), static_cast<int>(scaled_pieces_.size()),
+                 &solution_);
   *level = solution_.level;
   return llt.matrixU().solve(solution_.step);
 }
@@ -150,7 +150,8 @@ double NewtonDescent::DepthLimit(const ResidualSet& residuals,
     const Residual r = residuals[member.residual];
     const double growth = r.c.dot(step);
     const double room = kMaxDepthGrowth * member.start_depth - r.Depth(x);
-    if (growth > 0 && room < share * growth) share = std::max(0.0, room / growth);
+    if (growth > 0 && room < share * growth)
+      share = std::max(0.0, room / growth);
   }
   return share;
 }
@@ -207,8 +208,9 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       cost = cost_trial;
       UpdateMultipliers(false);
       Linearize(*residuals, *x, norm);
-      kappa = kept > 0.5 ? std::max(kappa * 0.01, kSmallestKappa)
-                         : kept < 0.1 ? kappa * 4 : kappa;
+      kappa = kept > 0.5   ? std::max(kappa * 0.01, kSmallestKappa)
+              : kept < 0.1 ? kappa * 4
+                           : kappa;
     } else if (has_violators) {
       Linearize(*residuals, *x, norm);
     } else if (!UpdateMultipliers(true)) {

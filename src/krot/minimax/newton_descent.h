@@ -11,18 +11,18 @@ namespace krot {
 
 enum class DescentTermination {
   kNotRun,
-  kStationary,     // no direction lowers the maximum, up to the tolerance
-  kZeroCost,       // all residuals vanish
-  kFarAway,        // a depth reached its limit: the infimum lies at infinity
-  kNoDecrease,     // the best step does not lower the cost: rounding
+  kStationary,  // no direction lowers the maximum, up to the tolerance
+  kZeroCost,    // all residuals vanish
+  kFarAway,     // a depth reached its limit: the infimum lies at infinity
+  kNoDecrease,  // the best step does not lower the cost: rounding
   kMaxIterations,
 };
 
 struct DescentSummary {
   DescentTermination termination = DescentTermination::kNotRun;
   double cost_initial = 0;
-  double cost = 0;      // <= cost_initial
-  int iterations = 0;   // steps tried
+  double cost = 0;     // <= cost_initial
+  int iterations = 0;  // steps tried
 };
 
 // Minimises max_i r_i(x) by sequential quadratic programming. With the pieces
@@ -42,8 +42,8 @@ struct DescentSummary {
 class NewtonDescent {
  public:
   // See FastDescent::Minimize.
-  DescentSummary Minimize(ResidualSet* residuals, Norm norm,
-                          int max_iterations, Eigen::Vector3d* x);
+  DescentSummary Minimize(ResidualSet* residuals, Norm norm, int max_iterations,
+                          Eigen::Vector3d* x);
 
  private:
   // A residual of the working set and the depth that it started with.

@@ -80,8 +80,7 @@ int ResidualPieces(const Residual& residual, const Vector3d& x, Norm norm,
     piece.gradient =
         (residual.A.transpose() * s - piece.value * residual.c) / w;
     piece.curvature = trace / w;
-    piece.bend =
-        residual.A.transpose() * Vector2d(-v[1], v[0]) / v.norm();
+    piece.bend = residual.A.transpose() * Vector2d(-v[1], v[0]) / v.norm();
     return 1;
   }
   Vector2d signs[4];

@@ -31,8 +31,8 @@ double ResidualValue(const Residual& residual, const Eigen::Vector3d& x,
 // curvature. For 1 < p < infinity there is one piece, r itself; for p = 1 and
 // infinity ||v||_p = max s'v over the signs s, and each gives a piece.
 struct ResidualPiece {
-  double value = 0;                                      // s'v / w
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();    // (A's - value c) / w
+  double value = 0;                                    // s'v / w
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  // (A's - value c) / w
   // The Hessian of ||A x + b||_p / w with w held fixed is of rank one:
   // curvature * bend * bend', bend = A'v_perp / |v|_2.
   double curvature = 0;

@@ -30,8 +30,8 @@ double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
   double ub = options.max_step;
   for (int i = 0; i < residuals.size(); ++i) {
     const Residual r = residuals[i];
-    line.push_back({r.A * direction, r.Numerator(x), r.c.dot(direction),
-                    r.Depth(x)});
+    line.push_back(
+        {r.A * direction, r.Numerator(x), r.c.dot(direction), r.Depth(x)});
     // The supremum of alpha with w alpha + z > 0 (Sec. 3.2).
     if (line.back().w < 0) ub = std::min(ub, -line.back().z / line.back().w);
   }

@@ -12,10 +12,14 @@ namespace krot {
 
 // Resection-Intersection [Zhang18, Alg. 1]: sweeps that minimise every
 // point's own maximum residual with the frames fixed, then every frame's with
-// the points fixed.
+// the points fixed. With `paper` settings of the descent the sweeps are the
+// paper's; with `fast` ones they have momentum (momentum.h).
+//
+// The result is a fixed point of such sweeps at best. That need not be the
+// optimum, whatever the paper says (docs/method.md).
 
 struct Sweep {
-  double cost = 0;     // pixels, after the sweep
+  double cost = 0;     // pixels, the best after the sweep
   double seconds = 0;  // wall clock since the start
 };
 
@@ -24,17 +28,19 @@ struct ResIntOptions {
   // Literally as in the paper, or the same sub-problem optima by better means.
   FastDescentOptions fast_descent;
   int max_sweeps = 1000;  // >= 0
-  // Stop when a sweep lowers the cost by less than this, relative; >= 0.
+  // Stop when sweeps lower the cost by less than this, relative; >= 0. One
+  // such sweep with paper settings, three in a row with fast ones.
   double sweep_tolerance = 1e-6;
-  int num_threads = -1;  // -1: all; the result does not depend on it
+  int num_threads = -1;       // -1: all; the result does not depend on it
   bool update_frames = true;  // false: points only (triangulation)
-  const CancelFlag* cancel = nullptr;                  // may be null
-  std::function<void(int sweep, const Sweep&)> callback;  // may be empty
+  const CancelFlag* cancel = nullptr;  // may be null
+  // After every sweep, counted from 1; may be empty.
+  std::function<void(int sweep, const Sweep&)> callback;
 };
 
 enum class ResIntTermination {
   kNotRun,
-  kStalled,      // the last sweep lowered the cost by less than the tolerance
+  kStalled,  // sweeps lower the cost by less than the tolerance
   kMaxSweeps,
   kInterrupted,
 };
@@ -47,8 +53,8 @@ struct ResIntSummary {
 };
 
 // Improves `estimate`, all of whose depths must be positive (throws
-// std::invalid_argument otherwise). The cost never rises. Needs about 160
-// bytes per observation.
+// std::invalid_argument otherwise). The cost never rises. Beyond the problem
+// it needs about 200 bytes per point and per frame.
 ResIntSummary SolveResInt(const KnownRotationProblem& problem,
                           const ResIntOptions& options, Estimate* estimate);
 

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/base/progress.h"
+#include "krot/minimax/fast_descent.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
+// other and spread over threads; the result does not depend on how many. Each
+// thread keeps one FastDescent, so that sweeps do not allocate once warm.
+// Once `cancel` is set, the blocks that are left are skipped.
+class BlockSweep {
+ public:
+  // Keeps a reference to `problem`. `cancel` may be null.
+  BlockSweep(const KnownRotationProblem& problem,
+             const FastDescentOptions& options, Norm norm, int num_threads,
+             const CancelFlag* cancel);
+
+  // Line 3: every point's own optimum, the frames fixed: (Int_k) for all k.
+  void IntersectPoints(Estimate* estimate);
+
+  // Line 4: every frame's own optimum, the points fixed: (Res_j) for all j.
+  void ResectFrames(Estimate* estimate);
+
+ private:
+  void IntersectPoint(int64_t k, FastDescent* descent, Estimate* estimate);
+  void ResectFrame(int64_t f, FastDescent* descent, Estimate* estimate);
+
+  const KnownRotationProblem& problem_;
+  const CancelFlag* cancel_;
+  int num_threads_;
+  std::vector<FastDescent> descents_;  // one per thread
+};
+
+}  // namespace krot
