@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <unordered_map>
+
+#include <Eigen/Geometry>
 
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
@@ -16,11 +19,41 @@ namespace {
 constexpr int64_t kPointsPerChunk = 1024;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-double PixelError(const ImageGeometry& geometry, const Camera& camera,
+// x_cam = q x q^-1 + t.
+struct CameraPose {
+  Eigen::Quaterniond rotation;
+  Eigen::Vector3d translation;
+};
+
+// Normalised when read and when used, and applied to points as a quaternion:
+// operation by operation what COLMAP 3.8 does. Where a point all but coincides
+// with a camera centre, rounding decides its error, and shall decide alike.
+Eigen::Quaterniond NormalizedTwice(const Pose& pose) {
+  Eigen::Vector4d q(pose.quaternion_wxyz.data());
+  q /= q.norm();
+  q /= q.norm();
+  return {q[0], q[1], q[2], q[3]};
+}
+
+std::optional<CameraPose> CameraPoseOf(const Model& model,
+                                       const ImageGeometry& geometry) {
+  if (!geometry.has_pose) return std::nullopt;
+  const bool is_frame_pose =
+      geometry.cam_from_rig_rotation == Eigen::Matrix3d::Identity() &&
+      geometry.cam_from_rig_translation == Eigen::Vector3d::Zero();
+  if (!is_frame_pose) {
+    return CameraPose{Eigen::Quaterniond(geometry.cam_from_world_rotation),
+                      geometry.cam_from_world_translation};
+  }
+  const Pose& pose = model.has_rigs
+                         ? model.frames[geometry.frame].rig_from_world
+                         : model.images[geometry.frame].cam_from_world;
+  return CameraPose{NormalizedTwice(pose), pose.translation};
+}
+
+double PixelError(const CameraPose& pose, const Camera& camera,
                   const Point2D& point2D, const Eigen::Vector3d& xyz) {
-  if (!geometry.has_pose) return kNaN;
-  const Eigen::Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
-                                geometry.cam_from_world_translation;
+  const Eigen::Vector3d x_cam = pose.rotation * xyz + pose.translation;
   if (!(x_cam.z() > 0)) return kNaN;
   if (!FindCameraModel(camera.model_id)->has_image_plane) return kNaN;
   const Eigen::Vector2d pixel =
@@ -32,9 +65,15 @@ double PixelError(const ImageGeometry& geometry, const Camera& camera,
 }  // namespace
 
 std::vector<double> PixelErrors(const Model& model, int num_threads) {
-  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const std::unordered_map<ImageId, int32_t> image_indices =
       ImageIndices(model);
+  std::vector<std::optional<CameraPose>> poses;
+  std::vector<const Camera*> cameras;
+  for (const ImageGeometry& geometry : ImageGeometries(model)) {
+    poses.push_back(CameraPoseOf(model, geometry));
+    cameras.push_back(&model.cameras[geometry.camera]);
+  }
+
   std::vector<double> errors_px(model.track_elements.size(), kNaN);
   ParallelFor(
       static_cast<int64_t>(model.points3D.size()), kPointsPerChunk, num_threads,
@@ -44,8 +83,9 @@ std::vector<double> PixelErrors(const Model& model, int num_threads) {
           for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
             const TrackElement& element = model.track_elements[e];
             const int32_t n = image_indices.at(element.image_id);
+            if (!poses[n]) continue;
             errors_px[e] = PixelError(
-                geometries[n], model.cameras[geometries[n].camera],
+                *poses[n], *cameras[n],
                 model.images[n].points2D[element.point2D_idx], point.xyz);
           }
         }
