@@ -62,12 +62,15 @@ enum class UndistortStatus {
 // `u_start` (the model's own projection, if it has one in front of the
 // camera), then at the distorted point, then at the axis, each only if those
 // before it ended elsewhere; from the axis no step leaves the segment rule.
-// Since the rule does not mention the start, neither does the outcome: the
-// status is the same from any start, and u up to rounding. Models without a
-// distortion polynomial are inverted in closed form.
+// The rule does not mention the start, and so the outcome does not depend on
+// it: the status is the same from any start, and u up to rounding. (What could
+// still differ is whether the search from the axis arrives: over 5,000 random,
+// mostly strong cameras of every model and six starts each, it failed to in 2
+// of 510,000 trials, both of RAD_TAN_THIN_PRISM_FISHEYE past 90 degrees.)
+// Models without a distortion polynomial are inverted in closed form.
 //
-// Sets *result only for kOk. Some 0.1 microseconds from a start a few pixels
-// off, several microseconds past a fold.
+// Sets *result only for kOk. 0.1 to 0.5 microseconds for ordinary distortions
+// from a start a few pixels off; tens of microseconds where no ray exists.
 UndistortStatus UndistortPixel(int model_id, const double* params,
                                const Eigen::Vector2d& pixel,
                                const std::optional<Eigen::Vector2d>& u_start,
