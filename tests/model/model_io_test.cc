@@ -244,6 +244,16 @@ TEST(ModelIo, RefusesFoldersWithoutWritePermission) {
   fs::permissions(folder / "parent", fs::perms::owner_all);
 }
 
+TEST(ModelIo, RefusesFoldersWithoutReadPermission) {
+  if (::geteuid() == 0) GTEST_SKIP() << "root may read everywhere";
+  const TempFolder folder;
+  Write(TinyModel(), folder / "model");
+  fs::permissions(folder / "model", fs::perms::owner_read);
+  EXPECT_THAT(DetectionError(folder / "model"),
+              HasSubstr("cannot be read: Permission denied"));
+  fs::permissions(folder / "model", fs::perms::owner_all);
+}
+
 TEST(ModelIo, ChangesNothingWhenItOnlyChecks) {
   const TempFolder folder;
   CheckWritable(folder / "a/b/c", WriteModelOptions());

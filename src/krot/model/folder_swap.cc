@@ -114,19 +114,20 @@ void Exchange(const fs::path& staging, const fs::path& target) {
 void CheckSwappable(const fs::path& target) {
   const fs::path resolved = Resolve(target);
   const fs::path existing = ExistingPart(resolved);
+  if (existing == resolved) {
+    if (IsMountPoint(resolved)) {
+      throw ModelError(resolved.string() +
+                       ": is a mount point, which cannot be replaced; choose a "
+                       "folder inside it");
+    }
+    if (HoldsWorkingDirectory(resolved)) {
+      throw ModelError(resolved.string() +
+                       ": is or holds the working directory, which cannot be "
+                       "replaced; choose another folder or start elsewhere");
+    }
+    CheckFolderIsWritable(resolved.parent_path());
+  }
   CheckFolderIsWritable(existing);
-  if (existing != resolved) return;
-  if (IsMountPoint(resolved)) {
-    throw ModelError(resolved.string() +
-                     ": is a mount point, which cannot be replaced; choose a "
-                     "folder inside it");
-  }
-  if (HoldsWorkingDirectory(resolved)) {
-    throw ModelError(resolved.string() +
-                     ": is or holds the working directory, which cannot be "
-                     "replaced; choose another folder or start elsewhere");
-  }
-  CheckFolderIsWritable(resolved.parent_path());
 }
 
 FolderSwap::FolderSwap(const fs::path& target) : FolderSwap() {

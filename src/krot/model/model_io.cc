@@ -46,6 +46,18 @@ constexpr const char* kProjectFile = "project.ini";
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
+// Runs `action`; what the file system refuses becomes a ModelError.
+template <typename Action>
+auto WithModelErrors(const fs::path& folder, const char* verb,
+                     const Action& action) {
+  try {
+    return action();
+  } catch (const fs::filesystem_error& error) {
+    throw ModelError(folder.string() + ": cannot be " + verb + ": " +
+                     error.code().message());
+  }
+}
+
 bool IsModelFile(const fs::path& file_name) {
   for (const ModelPart& part : kParts) {
     for (const ModelFormat format : kFormats) {
@@ -130,22 +142,25 @@ void WriteModelFiles(const Model& model, ModelFormat format,
 }  // namespace
 
 ModelFormat DetectModelFormat(const fs::path& folder) {
-  if (!fs::exists(folder)) {
-    throw ModelError(folder.string() + ": no such folder");
-  }
-  if (!fs::is_directory(folder)) {
-    throw ModelError(folder.string() +
-                     ": is a file, expected the folder of a model");
-  }
-  for (const ModelFormat format : kFormats) {
-    if (CoreFiles(folder, format, false).empty()) return format;
-  }
-  FailWithoutModel(folder);
+  return WithModelErrors(folder, "read", [&] {
+    if (!fs::exists(folder)) {
+      throw ModelError(folder.string() + ": no such folder");
+    }
+    if (!fs::is_directory(folder)) {
+      throw ModelError(folder.string() +
+                       ": is a file, expected the folder of a model");
+    }
+    for (const ModelFormat format : kFormats) {
+      if (CoreFiles(folder, format, false).empty()) return format;
+    }
+    FailWithoutModel(folder);
+  });
 }
 
 Model ReadModel(const fs::path& folder, ModelFormat format) {
+  const bool has_rigs =
+      WithModelErrors(folder, "read", [&] { return HasRigs(folder, format); });
   Model model;
-  const bool has_rigs = HasRigs(folder, format);
   for (const ModelPart& part : kParts) {
     if (part.is_optional && !has_rigs) continue;
     const auto parse_part =
@@ -159,7 +174,7 @@ Model ReadModel(const fs::path& folder, ModelFormat format) {
 }
 
 void CheckWritable(const fs::path& folder, const WriteModelOptions& options) {
-  try {
+  WithModelErrors(folder, "written", [&] {
     CheckSwappable(folder);
     if (options.overwrite) return;
     for (const ModelPart& part : kParts) {
@@ -170,16 +185,13 @@ void CheckWritable(const fs::path& folder, const WriteModelOptions& options) {
                          "); set overwrite to replace it");
       }
     }
-  } catch (const fs::filesystem_error& error) {
-    throw ModelError(folder.string() +
-                     ": cannot be written to: " + error.code().message());
-  }
+  });
 }
 
 void WriteModel(const Model& model, const fs::path& folder,
                 const WriteModelOptions& options) {
   CheckWritable(folder, options);
-  try {
+  WithModelErrors(folder, "written", [&] {
     FolderSwap swap(folder);
     WriteModelFiles(model, options.format, swap.staging());
     const fs::path project = options.copy_project_from / kProjectFile;
@@ -187,10 +199,7 @@ void WriteModel(const Model& model, const fs::path& folder,
       fs::copy_file(project, swap.staging() / kProjectFile);
     }
     swap.Commit(IsModelFile);
-  } catch (const fs::filesystem_error& error) {
-    throw ModelError(folder.string() +
-                     ": cannot be written: " + error.code().message());
-  }
+  });
 }
 
 std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model) {
