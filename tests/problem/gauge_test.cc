@@ -92,6 +92,14 @@ TEST(RestoreGauge, UndoesAMove) {
   }
 }
 
+TEST(RestoreGauge, OfTheReferenceChangesNoBit) {
+  const RandomScene scene = MakeRandomScene({});
+  Estimate restored = scene.estimate;
+  RestoreGauge(scene.problem, scene.estimate, &restored);
+  EXPECT_EQ(restored.translations, scene.estimate.translations);
+  EXPECT_EQ(restored.points, scene.estimate.points);
+}
+
 TEST(RestoreGauge, KeepsCentroidAndSpreadOfTheCentresAndTheCost) {
   const RandomScene scene = MakeRandomScene({});
   const Estimate solved =

@@ -138,8 +138,9 @@ struct Move {
   Vector3d to = Vector3d::Zero();
   double scale = 1;
 
+  // Exactly zero if nothing needs to move.
   Vector3d Shift(const Vector3d& x) const {
-    return to + scale * (x - from) - x;
+    return (to - from) + (scale - 1) * (x - from);
   }
 };
 

@@ -18,7 +18,8 @@ namespace krot {
 // of a frame counts once, with the centre through which its frame sees points.
 // Where all centres of a component coincide (in either estimate), its points
 // take their place. The cost does not change. Frames and points without an
-// observation stay. O(observations).
+// observation stay, and an estimate in the right place keeps its bits.
+// O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate);
 
