@@ -43,10 +43,10 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
       throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
     }
     LogLine(log, 1,
-            std::to_string(summary.num_images) + " images, " +
-                std::to_string(summary.num_points) + " points, " +
-                std::to_string(summary.num_observations) +
-                " observations; the solve needs about " +
+            Counted(summary.num_images, "image") + ", " +
+                Counted(summary.num_points, "point") + ", " +
+                Counted(summary.num_observations, "observation") +
+                "; the solve needs about " +
                 FormatBytes(EstimateSolveBytes(model)));
   };
   SolveModelResult result = command.solve(model, options);
@@ -58,11 +58,12 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
 void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
   const std::vector<std::string> names = ImageNamesWithWhiteSpace(model);
   if (names.empty()) return;
-  LogLine(log, 1,
-          "warning: " + std::to_string(names.size()) +
-              " image names hold white space, at which COLMAP cuts them when "
-              "it reads text, '" +
-              names.front() + "' for one; --output_type BIN avoids that");
+  LogLine(
+      log, 1,
+      "warning: " + Counted(static_cast<int64_t>(names.size()), "image name") +
+          " with white space, at which COLMAP ends a name when it reads "
+          "text: '" +
+          names.front() + "' for one; --output_type BIN avoids that");
 }
 
 }  // namespace

@@ -11,19 +11,23 @@
 
 namespace krot {
 
+SweepProgress::Style SweepProgress::StyleOfStderr() {
+  return isatty(STDERR_FILENO) == 1 ? Style::kBar : Style::kLines;
+}
+
 SweepProgress::SweepProgress(const LogOptions& log, double sweep_tolerance,
-                             int max_sweeps)
+                             int max_sweeps, Style style)
     : log_(log),
       sweep_tolerance_(sweep_tolerance),
       max_sweeps_(max_sweeps),
-      is_terminal_(isatty(STDERR_FILENO) == 1) {}
+      style_(style) {}
 
 void SweepProgress::Update(int sweep, const Sweep& state) {
   if (log_.level < 1) return;
   const std::string words = "sweep " + std::to_string(sweep) + ": cost " +
                             FormatNumber(state.cost, 6) + " px, " +
                             FormatNumber(state.seconds, 2) + " s";
-  if (!is_terminal_) {
+  if (style_ == Style::kLines) {
     LogLine(log_, 1, words);
     return;
   }

@@ -7,13 +7,23 @@
 
 namespace krot {
 
-// Tells the user that a solve is alive: on a terminal one line with a bar
-// that rewrites itself, otherwise one line per sweep.
+// Tells the user on stderr that a solve is alive.
 class SweepProgress {
  public:
+  enum class Style {
+    kBar,   // one line with a bar that rewrites itself
+    kLines  // one line per sweep
+  };
+  // kBar where stderr is a terminal.
+  static Style StyleOfStderr();
+
   // `sweep_tolerance` and `max_sweeps` as in ResIntOptions: the bar fills as
   // the gain of a sweep falls to the one or the count rises to the other.
-  SweepProgress(const LogOptions& log, double sweep_tolerance, int max_sweeps);
+  SweepProgress(const LogOptions& log, double sweep_tolerance, int max_sweeps,
+                Style style = StyleOfStderr());
+  ~SweepProgress() { Finish(); }
+  SweepProgress(const SweepProgress&) = delete;
+  SweepProgress& operator=(const SweepProgress&) = delete;
 
   void Update(int sweep, const Sweep& state);
 
@@ -26,7 +36,7 @@ class SweepProgress {
   LogOptions log_;
   double sweep_tolerance_;
   int max_sweeps_;
-  bool is_terminal_;
+  Style style_;
   bool line_is_open_ = false;
   std::optional<double> last_cost_;
   double fraction_ = 0;  // of the bar; never falls

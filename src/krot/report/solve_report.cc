@@ -30,8 +30,8 @@ const char* TerminationName(SolveTermination termination) {
 }
 
 std::string TerminationSentence(const SolveSummary& summary) {
-  const std::string after = " after " + std::to_string(summary.sweeps.size()) +
-                            " sweep" + (summary.sweeps.size() == 1 ? "" : "s");
+  const std::string after =
+      " after " + Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
   switch (summary.termination) {
     case SolveTermination::kStalled:
       return "Stalled" + after +
@@ -68,15 +68,17 @@ std::string LeftOutList(const SolveSummary& summary) {
 
 std::string CountsSentence(const SolveSummary& summary) {
   std::ostringstream text;
-  text << summary.num_frames << " frames, " << summary.num_images << " images, "
-       << summary.num_points << " points, " << summary.num_observations
-       << " observations in the optimisation; " << NumLeftOut(summary)
-       << " observations left out";
+  text << Counted(summary.num_frames, "frame") << ", "
+       << Counted(summary.num_images, "image") << ", "
+       << Counted(summary.num_points, "point") << ", "
+       << Counted(summary.num_observations, "observation")
+       << " in the optimisation; "
+       << Counted(NumLeftOut(summary), "observation") << " left out";
   const std::string list = LeftOutList(summary);
   if (!list.empty()) text << " (" << list << ")";
   if (summary.num_retriangulated_points > 0) {
-    text << "; " << summary.num_retriangulated_points
-         << " points re-triangulated at the start";
+    text << "; " << Counted(summary.num_retriangulated_points, "point")
+         << " re-triangulated at the start";
   }
   return text.str() + ".";
 }
@@ -109,8 +111,8 @@ std::string NothingToSolveSentence(const SolveSummary& summary) {
   if (num_left_out == 0) {
     return "nothing to solve: the model has no observations";
   }
-  return "nothing to solve: " + std::to_string(num_left_out) +
-         " observations left out (" + LeftOutList(summary) + ")";
+  return "nothing to solve: " + Counted(num_left_out, "observation") +
+         " left out (" + LeftOutList(summary) + ")";
 }
 
 std::string SolveTable(const SolveReport& report) {
@@ -135,10 +137,9 @@ std::string SolveTable(const SolveReport& report) {
        << " for the cost, Euclidean for the rest\n"
        << table.ToString() << CountsSentence(summary) << '\n';
   if (after.not_finite > 0) {
-    text << after.not_finite
-         << " observations have no finite error (behind their camera, without "
-            "pose, or not projectable) and are in no row above but the cost's "
-            "left-out count.\n";
+    text << Counted(after.not_finite, "observation")
+         << " without a finite error (behind the camera, no pose, or not "
+            "projectable), in no row above.\n";
   }
   text << TerminationSentence(summary) << '\n'
        << "Read " << FormatNumber(report.seconds_read, 2) << " s, built "
@@ -146,7 +147,7 @@ std::string SolveTable(const SolveReport& report) {
        << FormatNumber(summary.seconds_solve, 2) << " s, wrote "
        << FormatNumber(report.seconds_write, 2) << " s; "
        << FormatNumber(report.seconds_total, 2) << " s in all on "
-       << report.threads << " threads, "
+       << Counted(report.threads, "thread") << ", "
        << FormatBytes(report.peak_memory_bytes) << " at most.\n";
   return text.str();
 }

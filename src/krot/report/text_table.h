@@ -23,6 +23,9 @@ class TextTable {
 // With `decimals` digits after the point; "-" if not finite.
 std::string FormatNumber(double value, int decimals);
 
+// "1 point", "2 points".
+std::string Counted(int64_t count, const std::string& noun);
+
 // With the unit that leaves one to three digits before the point: "1.5 MB".
 std::string FormatBytes(int64_t bytes);
 

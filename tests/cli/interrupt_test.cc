@@ -1,0 +1,80 @@
+#include <signal.h>
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+namespace krot {
+namespace {
+
+// A solve that would take far longer than the test.
+class Interrupt : public ::testing::Test {
+ protected:
+  Interrupt() {
+    SceneOptions options = SmallScene();
+    options.num_frames = 30;
+    options.num_points = 5000;
+    Save(SynthesizeScene(options).model, folder_ / "model");
+    before_ = Load(folder_ / "model");
+  }
+
+  // In place, so that a mix of old and new would show.
+  std::vector<std::string> Arguments() const {
+    return {"solver",
+            "--input_path",
+            folder_ / "model",
+            "--output_path",
+            folder_ / "model",
+            "--overwrite",
+            "1",
+            "--ResInt.sweep_tolerance",
+            "0",
+            "--report_path",
+            folder_ / "report.json",
+            "--ResInt.max_sweeps",
+            "1000000",
+            "--Solver.settings",
+            "paper"};
+  }
+
+  KrotResult SignalAfterFirstSweep(int signal) const {
+    KrotProcess process(Arguments());
+    process.WaitForErrorText("sweep 1:");
+    process.Signal(signal);
+    return process.Wait();
+  }
+
+  void ExpectNothingChanged() const {
+    EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"model"});
+    EXPECT_THAT(Load(folder_ / "model"), IsModel(before_));
+  }
+
+  TempFolder folder_;
+  Model before_;
+};
+
+TEST_F(Interrupt, FromTheKeyboardEndsWith130AndWritesNothing) {
+  const KrotResult result = SignalAfterFirstSweep(SIGINT);
+  EXPECT_EQ(result.exit_code, 130);
+  EXPECT_THAT(result.err, ::testing::EndsWith("krot solver: interrupted, "
+                                              "nothing was written\n"));
+  EXPECT_EQ(result.out, "");
+  ExpectNothingChanged();
+}
+
+TEST_F(Interrupt, ByTerminationDoesTheSame) {
+  EXPECT_EQ(SignalAfterFirstSweep(SIGTERM).exit_code, 130);
+  ExpectNothingChanged();
+}
+
+TEST_F(Interrupt, ByKillLeavesTheOldModel) {
+  EXPECT_EQ(SignalAfterFirstSweep(SIGKILL).exit_code, -SIGKILL);
+  ExpectNothingChanged();
+}
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,213 @@
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+// Every option: a value it takes, one it does not take, and the pairs that
+// contradict each other.
+
+namespace krot {
+namespace {
+
+using Words = std::vector<std::string>;
+
+Words operator+(Words words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+class Options : public ::testing::Test {
+ protected:
+  Options() { Save(SmallLegacyModel(), folder_ / "input"); }
+
+  Words Paths() const {
+    return {"--input_path", folder_ / "input", "--output_path",
+            folder_ / "output"};
+  }
+
+  KrotResult Solve(const Words& more) const {
+    return RunKrot(Words{"solver"} + Paths() + more);
+  }
+
+  // No option that is refused may have changed anything.
+  void ExpectRefused(const std::string& command, const Words& arguments,
+                     const std::string& part) const {
+    const Words before = FileNames(folder_.path());
+    const KrotResult result = RunKrot(Words{command} + arguments);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, IsOneSentence("krot " + command, part));
+    EXPECT_EQ(FileNames(folder_.path()), before);
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(Options, OfTheSolverAreCheckedAgainstTheirRanges) {
+  const std::vector<Words> wrong = {
+      {"--Solver.method", "joint", "one of {res_int}"},
+      {"--Solver.norm", "0.5", "1, 2, inf or a number >= 1"},
+      {"--Solver.norm", "nan", "1, 2, inf or a number >= 1"},
+      {"--Solver.norm", "two", "1, 2, inf or a number >= 1"},
+      {"--Solver.num_threads", "0", "-1 or an integer in [1, 1024]"},
+      {"--Solver.num_threads", "1.5", "-1 or an integer in [1, 1024]"},
+      {"--Solver.settings", "slow", "one of {fast, paper}"},
+      {"--ResInt.max_sweeps", "-1", "an integer >= 0"},
+      {"--ResInt.max_sweeps", "9999999999", "an integer >= 0"},
+      {"--ResInt.sweep_tolerance", "-1e-3", "a number >= 0"},
+      {"--ResInt.sweep_tolerance", "inf", "a number >= 0"},
+      {"--FastDescent.stationarity_tolerance", "-1", "a number >= 0"},
+      {"--FastDescent.step_tolerance", "0", "a number > 0"},
+      {"--FastDescent.slope_probe", "0", "a number > 0"},
+      {"--FastDescent.active_tolerance", "1", "a number in [0, 1)"},
+      {"--FastDescent.max_step", "0", "a number > 0"},
+      {"--FastDescent.max_iterations", "0", "an integer >= 1"},
+      {"--Problem.min_track_length", "0", "an integer >= 1"},
+      {"--output_type", "PLY", "one of {auto, BIN, TXT}"},
+      {"--overwrite", "yes", "{0, 1}"},
+      {"--random_seed", "-1", "an integer >= 0"},
+      {"--log_level", "3", "an integer in [0, 2]"},
+      {"--log_to_stderr", "2", "{0, 1}"},
+      {"--project_path", "nowhere.ini", "a file that can be read"},
+  };
+  for (const Words& option : wrong) {
+    SCOPED_TRACE(option[0] + " " + option[1]);
+    ExpectRefused("solver", Paths() + Words{option[0], option[1]},
+                  option[0] + " = " + option[1] + ", must be " + option[2]);
+  }
+}
+
+TEST_F(Options, OfTheSynthesizerAreCheckedAgainstTheirRanges) {
+  const std::vector<Words> wrong = {
+      {"--Scene.layout", "spiral"},
+      {"--Scene.num_frames", "1"},
+      {"--Scene.num_points", "0"},
+      {"--Scene.track_length", "1.9"},
+      {"--Scene.camera_model", "EQUIRECTANGULAR"},
+      {"--Scene.image_width", "63"},
+      {"--Scene.image_height", "70000"},
+      {"--Scene.focal_length_factor", "0.1"},
+      {"--Scene.has_rigs", "maybe"},
+      {"--Scene.sensors_per_rig", "0"},
+      {"--Scene.rig_baseline", "-0.1"},
+      {"--Scene.rig_rotation_deg", "200"},
+      {"--Scene.pixel_noise", "-1"},
+      {"--Scene.outlier_ratio", "1"},
+      {"--Scene.duplicate_ratio", "2"},
+      {"--Scene.start_translation_noise", "2"},
+      {"--Scene.start_point_noise", "-1"},
+      {"--Scene.rotation_noise_deg", "3"},
+      {"--output_type", "auto"},
+  };
+  for (const Words& option : wrong) {
+    SCOPED_TRACE(option[0] + " " + option[1]);
+    ExpectRefused("model_synthesizer",
+                  Words{"--output_path", folder_ / "scene"} + option,
+                  option[0] + " = " + option[1] + ", must be ");
+  }
+}
+
+TEST_F(Options, ThatContradictEachOtherAreRefused) {
+  for (const char* name : {"stationarity_tolerance", "step_tolerance",
+                           "slope_probe", "active_tolerance", "max_step"}) {
+    const std::string option = std::string("--FastDescent.") + name;
+    for (const char* command : {"solver", "point_triangulator"}) {
+      ExpectRefused(command, Paths() + Words{option, "0.5"},
+                    option + " has no effect with --Solver.settings fast");
+    }
+  }
+  ExpectRefused("solver",
+                {"--input_path", folder_ / "input", "--output_path",
+                 folder_ / "input/../input/"},
+                "--output_path is --input_path; add --overwrite 1");
+  ExpectRefused("solver",
+                Paths() + Words{"--report_path", folder_ / "output/images.bin"},
+                "must not bear the name of a model's file");
+  ExpectRefused("model_analyzer",
+                {"--path", folder_ / "input", "--input_path", "elsewhere"},
+                "--path and --input_path are the same; give one");
+  ExpectRefused(
+      "model_synthesizer",
+      {"--output_path", folder_ / "a", "--ground_truth_path", folder_ / "a/"},
+      "--ground_truth_path is --output_path");
+  ExpectRefused("model_synthesizer",
+                {"--output_path", folder_ / "a", "--Scene.has_rigs", "0",
+                 "--Scene.sensors_per_rig", "2"},
+                "needs --Scene.has_rigs 1");
+  ExpectRefused("model_synthesizer",
+                {"--output_path", folder_ / "a", "--Scene.num_frames", "3",
+                 "--Scene.track_length", "4"},
+                "must be at most the number of images, 3");
+}
+
+TEST_F(Options, ThatAreUnknownComeWithTheNearestKnownOne) {
+  ExpectRefused("solver", Paths() + Words{"--Solver.nrom", "1"},
+                "--Solver.nrom is no option of krot solver; did you mean "
+                "--Solver.norm?");
+  ExpectRefused("solver", Paths() + Words{"--max_sweeps=3"},
+                "did you mean --ResInt.max_sweeps?");
+  ExpectRefused("solver", Paths() + Words{"--BundleAdjustment.refine", "1"},
+                "krot solver -h lists them");
+}
+
+TEST_F(Options, MustBeCompleteAndUnique) {
+  ExpectRefused("solver", {}, "--input_path is required");
+  ExpectRefused("solver", {"--input_path", "a"}, "--output_path is required");
+  ExpectRefused("model_analyzer", {}, "--path is required");
+  ExpectRefused("solver", {"--input_path", "--output_path", "a"},
+                "--input_path has no value");
+  ExpectRefused("solver", Paths() + Words{"--Solver.norm"}, "--Solver.norm");
+  ExpectRefused("solver", Paths() + Words{"--input_path", "b"},
+                "--input_path is given twice");
+  ExpectRefused("solver", Paths() + Words{"stray"},
+                "unexpected argument 'stray'");
+}
+
+TEST_F(Options, OfThePaperAreTakenWithItsSettings) {
+  const KrotResult result = Solve(
+      {"--Solver.settings", "paper", "--FastDescent.stationarity_tolerance",
+       "1e-7", "--FastDescent.step_tolerance", "1e-5",
+       "--FastDescent.slope_probe=1e-7", "--FastDescent.active_tolerance",
+       "1e-3", "--FastDescent.max_step", "5", "--FastDescent.max_iterations",
+       "20", "--ResInt.max_sweeps", "2"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+TEST_F(Options, ComeFromAProjectFileUnlessGivenExplicitly) {
+  WriteBytes(folder_ / "project.ini",
+             "log_level=0\noutput_type=TXT\noverwrite=false\n"
+             "[ResInt]\nmax_sweeps=1\n[Solver]\nnorm=inf\n");
+  const KrotResult result =
+      Solve({"--project_path", folder_ / "project.ini", "--Solver.norm", "1"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out, ::testing::HasSubstr("p = 1 "));
+  EXPECT_THAT(result.out, ::testing::HasSubstr("after 1 sweep"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.txt"));
+}
+
+TEST_F(Options, InAProjectFileAreChecked) {
+  const std::string file = folder_ / "project.ini";
+  const Words arguments = Paths() + Words{"--project_path", file};
+  WriteBytes(file, "[Solver]\nnorm=0\n");
+  ExpectRefused("solver", arguments, "Solver.norm in " + file + " = 0, must");
+  WriteBytes(file, "[Mapper]\nba_refine_focal_length=true\n");
+  ExpectRefused("solver", arguments,
+                "Mapper.ba_refine_focal_length in " + file +
+                    " is no option of krot solver");
+  WriteBytes(file, "[Solver]\nnorm=1\nnorm=2\n");
+  ExpectRefused("solver", arguments, "is given twice");
+  WriteBytes(file, "[Solver\nnorm\n");
+  ExpectRefused("solver", arguments, file);
+}
+
+TEST_F(Options, ForNewPointsAreRefusedByThePointTriangulator) {
+  ExpectRefused("point_triangulator",
+                Paths() + Words{"--database_path", "database.db"},
+                "only re-estimates the points that the model has");
+}
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,135 @@
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+// Where things are written, and where they are not.
+
+namespace krot {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Output : public ::testing::Test {
+ protected:
+  Output() { Save(SmallLegacyModel(), folder_ / "input"); }
+
+  KrotResult Solve(const fs::path& output,
+                   const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"solver",
+                                          "--input_path",
+                                          folder_ / "input",
+                                          "--output_path",
+                                          output,
+                                          "--ResInt.max_sweeps",
+                                          "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  }
+
+  void ExpectNotWritten(const KrotResult& result,
+                        const std::vector<std::string>& names,
+                        const std::string& part) const {
+    EXPECT_EQ(result.exit_code, 5);
+    EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
+    EXPECT_EQ(FileNames(folder_.path()), names);
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
+  WriteBytes(folder_ / "file", "");
+  const std::vector<std::string> names = FileNames(folder_.path());
+  ExpectNotWritten(Solve(folder_ / "file"), names, "file");
+  ExpectNotWritten(Solve(folder_ / "file/model"), names, "file");
+  const auto report = [&](const fs::path& path) {
+    return Solve(folder_ / "output", {"--report_path", path});
+  };
+  ExpectNotWritten(report(folder_ / "missing/r.json"), names, "no folder");
+  ExpectNotWritten(report(folder_ / "input"), names, "is a folder");
+  ExpectNotWritten(report("/dev/null"), names, "not a regular file");
+}
+
+TEST_F(Output, ReplacesAModelOnlyIfTold) {
+  Save(SmallLegacyModel(), folder_ / "output", ModelFormat::kText);
+  WriteBytes(folder_ / "output/notes.md", "mine");
+  const std::string before = ReadBytes(folder_ / "output/images.txt");
+  const KrotResult refused = Solve(folder_ / "output");
+  EXPECT_EQ(refused.exit_code, 5);
+  EXPECT_THAT(refused.err, IsOneSentence("krot solver", "overwrite"));
+  EXPECT_EQ(ReadBytes(folder_ / "output/images.txt"), before);
+
+  EXPECT_EQ(Solve(folder_ / "output", {"--overwrite", "1"}).exit_code, 0);
+  EXPECT_EQ(FileNames(folder_ / "output"),
+            (std::vector<std::string>{"cameras.bin", "images.bin", "notes.md",
+                                      "points3D.bin"}));
+  EXPECT_EQ(ReadBytes(folder_ / "output/notes.md"), "mine");
+  EXPECT_EQ(FileNames(folder_.path()),
+            (std::vector<std::string>{"input", "output"}));
+}
+
+TEST_F(Output, MayBeTheInput) {
+  const Model before = Load(folder_ / "input");
+  EXPECT_EQ(Solve(folder_ / "input", {"--overwrite", "true"}).exit_code, 0);
+  EXPECT_THAT(Load(folder_ / "input"), ::testing::Not(IsModel(before)));
+}
+
+TEST_F(Output, TakesTheInputsFormatUnlessTold) {
+  WriteBytes(folder_ / "input/project.ini", "image_path=images\n");
+  ASSERT_EQ(Solve(folder_ / "auto").exit_code, 0);
+  ASSERT_EQ(Solve(folder_ / "text", {"--output_type", "TXT"}).exit_code, 0);
+  EXPECT_EQ(FileNames(folder_ / "auto"),
+            (std::vector<std::string>{"cameras.bin", "images.bin",
+                                      "points3D.bin", "project.ini"}));
+  EXPECT_EQ(FileNames(folder_ / "text"),
+            (std::vector<std::string>{"cameras.txt", "images.txt",
+                                      "points3D.txt", "project.ini"}));
+  EXPECT_THAT(Load(folder_ / "text"), IsModel(Load(folder_ / "auto")));
+}
+
+TEST_F(Output, AsTextWarnsOfNamesThatColmapWouldCut) {
+  Model model = Load(folder_ / "input");
+  model.images[0].name = "a photo.jpg";
+  Save(model, folder_ / "input");
+  EXPECT_THAT(Solve(folder_ / "text", {"--output_type", "TXT"}).err,
+              ::testing::HasSubstr("warning: 1 image name with white space"));
+  EXPECT_EQ(Load(folder_ / "text").images[0].name, "a photo.jpg");
+}
+
+TEST_F(Output, HoldsTheReportIfToldSo) {
+  const fs::path report = folder_ / "output/report.json";
+  ASSERT_EQ(Solve(folder_ / "output", {"--report_path", report}).exit_code, 0);
+  EXPECT_THAT(ReadBytes(report), ::testing::HasSubstr("\"cost_final\""));
+  // And replaces it next time, with nothing left beside it.
+  ASSERT_EQ(
+      Solve(folder_ / "output", {"--report_path", report, "--overwrite", "1"})
+          .exit_code,
+      0);
+  EXPECT_EQ(FileNames(folder_ / "output"),
+            (std::vector<std::string>{"cameras.bin", "images.bin",
+                                      "points3D.bin", "report.json"}));
+}
+
+TEST_F(Output, SplitsTablesFromProgress) {
+  const KrotResult usual = Solve(folder_ / "a");
+  EXPECT_THAT(usual.out, ::testing::HasSubstr("max error"));
+  EXPECT_THAT(usual.out, ::testing::Not(::testing::HasSubstr("sweep 1:")));
+  EXPECT_THAT(usual.err, ::testing::HasSubstr("sweep 1: cost "));
+  EXPECT_THAT(usual.err, ::testing::HasSubstr("the solve needs about "));
+
+  const KrotResult to_stderr = Solve(folder_ / "b", {"--log_to_stderr", "1"});
+  EXPECT_EQ(to_stderr.out, "");
+  EXPECT_THAT(to_stderr.err, ::testing::HasSubstr("max error"));
+
+  EXPECT_EQ(Solve(folder_ / "c", {"--log_level", "0"}).err, "");
+  EXPECT_THAT(Solve(folder_ / "d", {"--log_level", "2"}).err,
+              ::testing::HasSubstr("writing " + (folder_ / "d").string()));
+}
+
+}  // namespace
+}  // namespace krot

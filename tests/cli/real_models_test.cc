@@ -1,0 +1,176 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/model/image_geometry.h"
+#include "tests/cli/colmap.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+// `krot solver` on models that COLMAP and others made, with COLMAP as judge.
+
+namespace krot {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Eigen::Vector3d;
+
+struct CentreStatistics {
+  Vector3d centroid = Vector3d::Zero();
+  double rms_distance = 0;  // to the centroid
+};
+
+CentreStatistics Centres(const Model& model) {
+  std::vector<Vector3d> centres;
+  for (const ImageGeometry& geometry : ImageGeometries(model)) {
+    centres.push_back(-geometry.cam_from_world_rotation.transpose() *
+                      geometry.cam_from_world_translation);
+  }
+  CentreStatistics statistics;
+  for (const Vector3d& centre : centres) statistics.centroid += centre;
+  const double count = static_cast<double>(centres.size());
+  statistics.centroid /= count;
+  for (const Vector3d& centre : centres) {
+    statistics.rms_distance += (centre - statistics.centroid).squaredNorm();
+  }
+  statistics.rms_distance = std::sqrt(statistics.rms_distance / count);
+  return statistics;
+}
+
+std::map<Point3DId, double> StoredErrors(const Model& model) {
+  std::map<Point3DId, double> errors;
+  for (const Point3D& point : model.points3D) errors[point.id] = point.error;
+  return errors;
+}
+
+class SolverOnRealModel : public ::testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+    input_ = *RealModels() / GetParam();
+    const KrotResult result =
+        RunKrot({"solver", "--input_path", input_, "--output_path", output_,
+                 "--report_path", folder_ / "report.json",
+                 "--ResInt.sweep_tolerance", "1e-3"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    before_ = Load(input_);
+    after_ = Load(output_);
+  }
+
+  void ExpectLowerCostAndSameContents();
+  void ExpectColmapReadsConvertsAndAdjusts();
+  void ExpectColmapComputesTheStoredErrors();
+
+  bool Colmap(const std::vector<std::string>& arguments) {
+    return RunColmap(arguments, folder_ / "colmap.log");
+  }
+
+  TempFolder folder_;
+  fs::path input_;
+  fs::path output_ = folder_ / "output";
+  Model before_;
+  Model after_;
+};
+
+// The three in one test: the solve is what takes the time.
+TEST_P(SolverOnRealModel, LowersTheCostAndPleasesColmap) {
+  ExpectLowerCostAndSameContents();
+  if (!HasColmap()) GTEST_SKIP() << "COLMAP is not installed";
+  ExpectColmapReadsConvertsAndAdjusts();
+  ExpectColmapComputesTheStoredErrors();
+}
+
+void SolverOnRealModel::ExpectLowerCostAndSameContents() {
+  const auto report = nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
+  EXPECT_LE(report["cost_final"], report["cost_initial"]);
+  EXPECT_EQ(report["termination"], "stalled");
+  EXPECT_THAT(after_, IsModel(before_, Ignoring{true, true, true}));
+
+  const CentreStatistics before = Centres(before_);
+  const CentreStatistics after = Centres(after_);
+  const double tolerance = 1e-9 * before.rms_distance;
+  EXPECT_LT((after.centroid - before.centroid).norm(), tolerance);
+  EXPECT_NEAR(after.rms_distance, before.rms_distance, tolerance);
+}
+
+void SolverOnRealModel::ExpectColmapReadsConvertsAndAdjusts() {
+  EXPECT_TRUE(Colmap({"model_analyzer", "--path", output_}));
+  for (const char* name : {"text", "binary", "adjusted"}) {
+    fs::create_directory(folder_ / name);
+  }
+  EXPECT_TRUE(
+      Colmap({"model_converter", "--input_path", output_, "--output_path",
+              folder_ / "text", "--output_type", "TXT"}));
+  EXPECT_TRUE(
+      Colmap({"model_converter", "--input_path", folder_ / "text",
+              "--output_path", folder_ / "binary", "--output_type", "BIN"}));
+  EXPECT_TRUE(Colmap({"bundle_adjuster", "--input_path", output_,
+                      "--output_path", folder_ / "adjusted",
+                      "--BundleAdjustment.max_num_iterations", "2"}));
+}
+
+void SolverOnRealModel::ExpectColmapComputesTheStoredErrors() {
+  fs::create_directory(folder_ / "filtered");
+  ASSERT_TRUE(Colmap({"point_filtering", "--input_path", output_,
+                      "--output_path", folder_ / "filtered",
+                      "--max_reproj_error", "1e6", "--min_tri_angle", "0"}));
+  const std::map<Point3DId, double> colmap =
+      StoredErrors(Load(folder_ / "filtered"));
+  const std::map<Point3DId, double> ours = StoredErrors(after_);
+  ASSERT_EQ(colmap.size(), ours.size());
+  double largest_difference = 0;
+  for (const auto& [id, error_px] : ours) {
+    largest_difference =
+        std::max(largest_difference, std::abs(error_px - colmap.at(id)));
+  }
+  EXPECT_LT(largest_difference, 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Local, SolverOnRealModel,
+    ::testing::Values("crane8_txt", "door", "door_colmap", "edge_one_point",
+                      "fountain11", "longtracks92", "maupertuis4_txt",
+                      "outliers12", "room50_opencv", "south128",
+                      "south128_full", "task41_rigs_frames", "tower",
+                      "two_cameras44"),
+    [](const auto& test) { return std::string(test.param); });
+
+struct WrongRealModel {
+  const char* folder;
+  int exit_code;
+  const char* part_of_sentence;
+};
+
+class SolverOnWrongRealModel : public ::testing::TestWithParam<WrongRealModel> {
+};
+
+TEST_P(SolverOnWrongRealModel, SaysSoInOneSentence) {
+  if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+  TempFolder folder;
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", *RealModels() / GetParam().folder,
+               "--output_path", folder / "output"});
+  EXPECT_EQ(result.exit_code, GetParam().exit_code);
+  EXPECT_THAT(result.err,
+              IsOneSentence("krot solver", GetParam().part_of_sentence));
+  EXPECT_TRUE(FileNames(folder.path()).empty());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Local, SolverOnWrongRealModel,
+    ::testing::Values(
+        WrongRealModel{"edge_tracks_of_one_txt", 3,
+                       "1000 observations left out (short_track 1000)"},
+        WrongRealModel{"edge_bad_point2d_idx_txt", 2, "points3D.txt"},
+        WrongRealModel{"edge_lfs_pointers", 2, "Git LFS"}),
+    [](const auto& test) { return std::string(test.param.folder); });
+
+}  // namespace
+}  // namespace krot

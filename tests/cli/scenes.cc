@@ -1,0 +1,66 @@
+#include "tests/cli/scenes.h"
+
+#include "krot/model/validate.h"
+
+namespace krot {
+
+SceneOptions SmallScene() {
+  SceneOptions options;
+  options.num_frames = 6;
+  options.num_points = 60;
+  options.track_length = 4;
+  options.pixel_noise = 0.5;
+  options.start_translation_noise = 0.003;
+  options.start_point_noise = 0.003;
+  options.random_seed = 3;
+  return options;
+}
+
+Model SmallLegacyModel() {
+  SceneOptions options = SmallScene();
+  options.has_rigs = false;
+  return SynthesizeScene(options).model;
+}
+
+void Save(const Model& model, const std::filesystem::path& folder,
+          ModelFormat format) {
+  WriteModelOptions options;
+  options.format = format;
+  options.overwrite = true;
+  WriteModel(model, folder, options);
+}
+
+Model Load(const std::filesystem::path& folder) {
+  Model model = ReadModel(folder, DetectModelFormat(folder));
+  ValidateModel(model);
+  return model;
+}
+
+Model WithShortTracks(const Model& model, uint64_t length) {
+  Model result = model;
+  result.points3D.clear();
+  result.track_elements.clear();
+  for (Image& image : result.images) {
+    for (Point2D& point2D : image.points2D) {
+      point2D.point3D_id = kInvalidPoint3DId;
+    }
+  }
+  for (Point3D point : model.points3D) {
+    const uint64_t begin = point.track_begin;
+    if (length == 0) break;
+    point.track_begin = result.track_elements.size();
+    for (uint64_t n = begin; n < point.track_end && n < begin + length; ++n) {
+      const TrackElement& element = model.track_elements[n];
+      result.track_elements.push_back(element);
+      for (Image& image : result.images) {
+        if (image.id != element.image_id) continue;
+        image.points2D[element.point2D_idx].point3D_id = point.id;
+      }
+    }
+    point.track_end = result.track_elements.size();
+    result.points3D.push_back(point);
+  }
+  return result;
+}
+
+}  // namespace krot

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+
+#include "krot/model/model.h"
+#include "krot/model/model_io.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+
+// Models for the tests of the command line.
+
+// A few hundred observations, noisy, off their optimum.
+SceneOptions SmallScene();
+
+// SmallScene without rigs and frames.
+Model SmallLegacyModel();
+
+void Save(const Model& model, const std::filesystem::path& folder,
+          ModelFormat format = ModelFormat::kBinary);
+Model Load(const std::filesystem::path& folder);
+
+// With the first `length` observations of every track only; 0: no points.
+Model WithShortTracks(const Model& model, uint64_t length);
+
+}  // namespace krot

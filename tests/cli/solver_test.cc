@@ -1,0 +1,341 @@
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+// The commands on models that they can solve.
+
+namespace krot {
+namespace {
+
+using Json = nlohmann::json;
+
+std::vector<std::string> Keys(const Json& json) {
+  std::vector<std::string> keys;
+  for (const auto& item : json.items()) keys.push_back(item.key());
+  return keys;
+}
+
+class Commands : public ::testing::Test {
+ protected:
+  KrotResult Run(const std::string& command,
+                 std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {command,
+                                          "--input_path",
+                                          folder_ / "input",
+                                          "--output_path",
+                                          folder_ / "output",
+                                          "--report_path",
+                                          folder_ / "report.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  }
+  Json Report() const {
+    return Json::parse(ReadBytes(folder_ / "report.json"));
+  }
+
+  TempFolder folder_;
+};
+
+constexpr Ignoring kWhatASolveChanges = {true, true, true};
+
+TEST_F(Commands, SolverLowersTheCostAndKeepsEverythingElse) {
+  for (const int sensors_per_rig : {1, 2}) {
+    SceneOptions options = SmallScene();
+    options.sensors_per_rig = sensors_per_rig;
+    const Model before = SynthesizeScene(options).model;
+    Save(before, folder_ / "input");
+    const KrotResult result = Run("solver", {"--overwrite", "1"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+
+    const Model after = Load(folder_ / "output");
+    EXPECT_THAT(after, IsModel(before, kWhatASolveChanges));
+    const Json report = Report();
+    EXPECT_LT(report["cost_final"], 0.9 * report["cost_initial"].get<double>());
+    EXPECT_EQ(report["termination"], "stalled");
+    EXPECT_EQ(report["pixel_error"]["before"]["max"],
+              Summarize(PixelErrors(before)).max);
+    EXPECT_EQ(report["pixel_error"]["after"]["max"],
+              Summarize(PixelErrors(after)).max);
+  }
+}
+
+TEST_F(Commands, SolverStoresTheMeanPixelErrorOfEveryPoint) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  ASSERT_EQ(Run("solver").exit_code, 0);
+  const Model after = Load(folder_ / "output");
+  const std::vector<double> errors_px = PixelErrors(after);
+  for (const Point3D& point : after.points3D) {
+    double sum = 0;
+    for (uint64_t n = point.track_begin; n < point.track_end; ++n) {
+      sum += errors_px[n];
+    }
+    const double length =
+        static_cast<double>(point.track_end - point.track_begin);
+    EXPECT_NEAR(point.error, sum / length, 1e-12);
+  }
+}
+
+TEST_F(Commands, SolverGivesTheSameBytesAtAnyNumberOfThreads) {
+  SceneOptions options = SmallScene();
+  options.num_points = 2000;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  std::vector<std::string> images;
+  std::vector<std::string> points;
+  for (const char* threads : {"1", "2", "3", "-1"}) {
+    ASSERT_EQ(Run("solver", {"--Solver.num_threads", threads, "--overwrite",
+                             "1", "--ResInt.max_sweeps", "5"})
+                  .exit_code,
+              0);
+    images.push_back(ReadBytes(folder_ / "output/images.bin"));
+    points.push_back(ReadBytes(folder_ / "output/points3D.bin"));
+  }
+  EXPECT_THAT(images, ::testing::Each(images.front()));
+  EXPECT_THAT(points, ::testing::Each(points.front()));
+}
+
+TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  ASSERT_EQ(Run("solver", {"--random_seed", "7", "--Solver.num_threads", "2",
+                           "--Solver.norm", "inf"})
+                .exit_code,
+            0);
+  const Json report = Report();
+  EXPECT_THAT(
+      Keys(report),
+      ::testing::UnorderedElementsAre(
+          "version", "command", "method", "norm", "termination", "num_frames",
+          "num_images", "num_points", "num_observations", "left_out",
+          "cost_initial", "cost_final", "lower_bound", "relative_gap",
+          "certified", "pixel_error", "sweeps", "iterations", "support",
+          "seconds", "peak_memory_bytes", "threads", "seed"));
+  EXPECT_EQ(
+      Keys(report["left_out"]),
+      (std::vector<std::string>{"behind", "no_pose", "off_axis", "short_track",
+                                "single_ray", "undistortion"}));
+  EXPECT_EQ(Keys(report["pixel_error"]),
+            (std::vector<std::string>{"after", "before"}));
+  EXPECT_EQ(Keys(report["pixel_error"]["after"]),
+            (std::vector<std::string>{"max", "mean", "p99", "rms"}));
+  EXPECT_EQ(Keys(report["seconds"]),
+            (std::vector<std::string>{"build", "certify", "read", "solve",
+                                      "total", "write"}));
+  ASSERT_FALSE(report["sweeps"].empty());
+  EXPECT_EQ(Keys(report["sweeps"][0]),
+            (std::vector<std::string>{"cost", "seconds"}));
+  EXPECT_EQ(report["sweeps"].back()["cost"], report["cost_final"]);
+  EXPECT_EQ(report["version"], KROT_VERSION);
+  EXPECT_EQ(report["command"], "solver");
+  EXPECT_EQ(report["method"], "res_int");
+  EXPECT_EQ(report["norm"], "inf");
+  EXPECT_TRUE(report["lower_bound"].is_null());
+  EXPECT_TRUE(report["relative_gap"].is_null());
+  EXPECT_EQ(report["certified"], false);
+  EXPECT_EQ(report["iterations"], Json::array());
+  EXPECT_EQ(report["support"], Json::array());
+  EXPECT_EQ(report["num_images"], 6);
+  EXPECT_EQ(report["num_points"], 60);
+  EXPECT_EQ(report["threads"], 2);
+  EXPECT_EQ(report["seed"], 7);
+  EXPECT_GT(report["peak_memory_bytes"], 1000000);
+}
+
+TEST_F(Commands, SolverCountsWhatItLeavesOut) {
+  Model model = SmallLegacyModel();
+  Save(model, folder_ / "input");
+  ASSERT_EQ(Run("solver", {"--Problem.min_track_length", "4"}).exit_code, 0);
+  int64_t num_short = 0;
+  for (const Point3D& point : model.points3D) {
+    const uint64_t length = point.track_end - point.track_begin;
+    if (length < 4) num_short += static_cast<int64_t>(length);
+  }
+  ASSERT_GT(num_short, 0);
+  EXPECT_EQ(Report()["left_out"]["short_track"], num_short);
+  EXPECT_EQ(Report()["num_observations"],
+            static_cast<int64_t>(model.track_elements.size()) - num_short);
+}
+
+TEST_F(Commands, SolverMeasuresItsCostInTheNormAskedFor) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  std::vector<double> costs;
+  for (const char* norm : {"1", "1.5", "2", "inf"}) {
+    ASSERT_EQ(
+        Run("solver", {"--overwrite", "1", "--Solver.norm", norm}).exit_code,
+        0);
+    EXPECT_EQ(Report()["norm"], norm);
+    EXPECT_LT(Report()["cost_final"], Report()["cost_initial"]);
+    costs.push_back(Report()["cost_initial"]);
+  }
+  EXPECT_TRUE(std::is_sorted(costs.rbegin(), costs.rend()));
+}
+
+TEST_F(Commands, SolverStopsWhereThePaperDoesWithItsSettings) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  ASSERT_EQ(Run("solver", {"--Solver.settings", "paper"}).exit_code, 0);
+  const Json sweeps = Report()["sweeps"];
+  ASSERT_GE(sweeps.size(), 2u);
+  double last = Report()["cost_initial"];
+  for (size_t i = 0; i < sweeps.size(); ++i) {
+    const double cost = sweeps[i]["cost"];
+    EXPECT_EQ((last - cost) < 1e-3 * last, i + 1 == sweeps.size());
+    last = cost;
+  }
+}
+
+TEST_F(Commands, SolverRunsAsManySweepsAsAllowed) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  ASSERT_EQ(Run("solver",
+                {"--ResInt.max_sweeps", "2", "--ResInt.sweep_tolerance", "0"})
+                .exit_code,
+            0);
+  EXPECT_EQ(Report()["termination"], "max_sweeps");
+  EXPECT_EQ(Report()["sweeps"].size(), 2u);
+}
+
+TEST_F(Commands, PointTriangulatorMovesPointsOnly) {
+  const Model before = SmallLegacyModel();
+  Save(before, folder_ / "input");
+  const KrotResult result = Run("point_triangulator");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  Ignoring points_only;
+  points_only.coordinates = true;
+  points_only.point_errors = true;
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(before, points_only));
+  EXPECT_EQ(Report()["command"], "point_triangulator");
+  EXPECT_EQ(Report()["method"], "intersection");
+  EXPECT_EQ(Report()["sweeps"].size(), 1u);
+  EXPECT_LT(Report()["cost_final"], Report()["cost_initial"]);
+}
+
+TEST_F(Commands, ModelAnalyzerListsTheWorstObservations) {
+  const Model model = SmallLegacyModel();
+  Save(model, folder_ / "input");
+  const KrotResult result =
+      RunKrot({"model_analyzer", "--path", folder_ / "input", "--num_worst",
+               "3", "--report_path", folder_ / "report.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("\nPoints: 60\n"));
+  EXPECT_THAT(result.out, ::testing::HasSubstr("the 3 of 6 with the largest"));
+  const Json report = Report();
+  ASSERT_EQ(report["worst"].size(), 3u);
+  EXPECT_EQ(report["worst"][0]["error_px"], Summarize(PixelErrors(model)).max);
+  EXPECT_EQ(report["worst"][0]["error_px"], report["pixel_error"]["max"]);
+  EXPECT_EQ(report["images"].size(), 6u);
+  EXPECT_EQ(report["colmap"]["num_observations"], model.track_elements.size());
+  EXPECT_EQ(RunKrot({"model_analyzer", "--input_path", folder_ / "input",
+                     "--num_worst", "3"})
+                .out,
+            result.out);
+}
+
+TEST_F(Commands, ModelAnalyzerTakesAModelWithoutPoints) {
+  Save(WithShortTracks(SmallLegacyModel(), 0), folder_ / "input");
+  const KrotResult result =
+      RunKrot({"model_analyzer", "--path", folder_ / "input"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("Points: 0\n"));
+}
+
+TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
+  const std::vector<std::string> arguments = {"model_synthesizer",
+                                              "--output_path",
+                                              folder_ / "start",
+                                              "--ground_truth_path",
+                                              folder_ / "truth",
+                                              "--output_type",
+                                              "TXT",
+                                              "--overwrite",
+                                              "1",
+                                              "--random_seed",
+                                              "5",
+                                              "--Scene.layout",
+                                              "street",
+                                              "--Scene.num_frames",
+                                              "7",
+                                              "--Scene.num_points",
+                                              "90",
+                                              "--Scene.track_length",
+                                              "3",
+                                              "--Scene.camera_model",
+                                              "OPENCV",
+                                              "--Scene.image_width",
+                                              "800",
+                                              "--Scene.image_height",
+                                              "600",
+                                              "--Scene.focal_length_factor",
+                                              "0.9",
+                                              "--Scene.has_rigs",
+                                              "1",
+                                              "--Scene.sensors_per_rig",
+                                              "2",
+                                              "--Scene.rig_baseline",
+                                              "0.05",
+                                              "--Scene.rig_rotation_deg",
+                                              "5",
+                                              "--Scene.pixel_noise",
+                                              "0.3",
+                                              "--Scene.outlier_ratio",
+                                              "0.02",
+                                              "--Scene.duplicate_ratio",
+                                              "0.01",
+                                              "--Scene.start_translation_noise",
+                                              "0.01",
+                                              "--Scene.start_point_noise",
+                                              "0.02",
+                                              "--Scene.rotation_noise_deg",
+                                              "0.1"};
+  const KrotResult result = RunKrot(arguments);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+
+  SceneOptions options;
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 7;
+  options.num_points = 90;
+  options.track_length = 3;
+  options.camera_model_id = 4;
+  options.image_width = 800;
+  options.image_height = 600;
+  options.focal_length_factor = 0.9;
+  options.sensors_per_rig = 2;
+  options.rig_baseline = 0.05;
+  options.rig_rotation_deg = 5;
+  options.pixel_noise = 0.3;
+  options.outlier_ratio = 0.02;
+  options.duplicate_ratio = 0.01;
+  options.start_translation_noise = 0.01;
+  options.start_point_noise = 0.02;
+  options.rotation_noise_deg = 0.1;
+  options.random_seed = 5;
+  const SyntheticScene scene = SynthesizeScene(options);
+  EXPECT_THAT(Load(folder_ / "start"), IsModel(scene.model));
+  EXPECT_THAT(Load(folder_ / "truth"), IsModel(scene.ground_truth));
+  EXPECT_EQ(RunKrot(arguments).exit_code, 0);  // overwrites
+}
+
+TEST_F(Commands, ModelSynthesizerWritesLegacyModels) {
+  ASSERT_EQ(RunKrot({"model_synthesizer", "--output_path", folder_ / "scene",
+                     "--Scene.has_rigs", "0"})
+                .exit_code,
+            0);
+  EXPECT_EQ(
+      FileNames(folder_ / "scene"),
+      (std::vector<std::string>{"cameras.bin", "images.bin", "points3D.bin"}));
+}
+
+TEST_F(Commands, SolverHalvesTheCostAtLeastWhereObservationsAreExact) {
+  SceneOptions options = SmallScene();
+  options.pixel_noise = 0;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  ASSERT_EQ(Run("solver", {"--ResInt.sweep_tolerance", "1e-3"}).exit_code, 0);
+  EXPECT_LT(Report()["cost_final"],
+            0.5 * Report()["cost_initial"].get<double>());
+}
+
+}  // namespace
+}  // namespace krot
