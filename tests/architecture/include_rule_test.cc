@@ -28,7 +28,7 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"synthetic", {"model"}},
       {"adjust", {"model"}},
       {"bridge", {"model", "solver"}},
-      {"pipeline", {"bridge", "adjust"}},
+      {"pipeline", {"bridge", "analysis", "adjust"}},
       {"report", {"pipeline", "analysis"}},
   };
   return kDependencies;

@@ -73,8 +73,8 @@ bool NewtonDescent::AddViolators(const ResidualSet& residuals, double level) {
 
 void NewtonDescent::Linearize(const ResidualSet& residuals, const Vector3d& x,
                               Norm norm) {
-  pieces_.clear();
-  member_of_piece_.clear();
+  pieces_.assign(1, {});  // no residual falls below zero
+  member_of_piece_.assign(1, -1);
   for (size_t m = 0; m < working_set_.size(); ++m) {
     ResidualPiece pieces[kMaxPieces];
     const int count = ResidualPieces(residuals[working_set_[m].residual], x,
@@ -89,7 +89,7 @@ void NewtonDescent::Linearize(const ResidualSet& residuals, const Vector3d& x,
 Vector3d NewtonDescent::SolveStep(double cost, double kappa, double* level) {
   Matrix3d H = Matrix3d::Zero();
   double natural = 0;
-  for (size_t k = 0; k < pieces_.size(); ++k) {
+  for (size_t k = 1; k < pieces_.size(); ++k) {
     const ResidualPiece& piece = pieces_[k];
     natural = std::max(natural, piece.gradient.squaredNorm());
     const double weight =
@@ -100,13 +100,11 @@ Vector3d NewtonDescent::SolveStep(double cost, double kappa, double* level) {
   const Eigen::LLT<Matrix3d> llt(H);
 
   // With H = L L', the step in L'd has unit curvature.
-  scaled_pieces_.resize(pieces_.size() + 1);
+  scaled_pieces_.resize(pieces_.size());
   for (size_t k = 0; k < pieces_.size(); ++k) {
     scaled_pieces_[k].value = pieces_[k].value;
     scaled_pieces_[k].gradient = llt.matrixL().solve(pieces_[k].gradient);
   }
-  scaled_pieces_.back() = {};  // no residual falls below zero
-  solution_.size = 0;
   SolveSimplexQp(scaled_pieces_.data(), static_cast<int>(scaled_pieces_.size()),
                  &solution_);
   *level = solution_.level;
@@ -117,10 +115,10 @@ Vector3d NewtonDescent::SolveStep(double cost, double kappa, double* level) {
 // sum 1: at a positive optimum the zero piece bears none. A step that failed
 // only adds to them. Returns whether they have grown anywhere.
 bool NewtonDescent::UpdateMultipliers(bool step_failed) {
-  const int zero = static_cast<int>(pieces_.size());
+  constexpr int kZeroPiece = 0;
   double sum = 0;
   for (int k = 0; k < solution_.size; ++k) {
-    if (solution_.index[k] != zero) sum += solution_.weight[k];
+    if (solution_.index[k] != kZeroPiece) sum += solution_.weight[k];
   }
   if (!(sum > kSmallestWeight)) return false;
   for (Member& member : working_set_) {
@@ -128,7 +126,7 @@ bool NewtonDescent::UpdateMultipliers(bool step_failed) {
     if (!step_failed) member.multiplier = 0;
   }
   for (int k = 0; k < solution_.size; ++k) {
-    if (solution_.index[k] == zero) continue;
+    if (solution_.index[k] == kZeroPiece) continue;
     working_set_[member_of_piece_[solution_.index[k]]].last_multiplier +=
         solution_.weight[k] / sum;
   }
@@ -164,6 +162,7 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
   CheckArgument(std::isfinite(cost), "cost at the start", cost,
                 "finite: all depths positive");
   x_start_ = *x;
+  solution_.size = 0;
   StartWorkingSet(*residuals);
   Linearize(*residuals, *x, norm);
 

@@ -70,7 +70,10 @@ int ResidualPieces(const Residual& residual, const Vector3d& x, Norm norm,
   const Vector2d v = residual.Numerator(x);
   const double w = residual.Depth(x);
   const double n = NormOf(v, norm);
-  if (!(n > 0)) return 0;
+  if (!(n > 0)) {
+    pieces[0] = {};
+    return 1;
+  }
   if (!norm.IsPolyhedral()) {
     ResidualPiece& piece = pieces[0];
     Vector2d s;

@@ -42,8 +42,8 @@ struct ResidualPiece {
 inline constexpr int kMaxPieces = 4;
 
 // Writes the pieces of r at x whose value is at least `share` of r(x), share
-// in (0, 1], and returns how many. Requires positive depth. None if r(x) = 0,
-// where r has no gradient.
+// in [-1, 1], and returns how many. Requires positive depth. Where r(x) = 0,
+// which has no gradient, one piece with gradient and curvature 0.
 int ResidualPieces(const Residual& residual, const Eigen::Vector3d& x,
                    Norm norm, double share, ResidualPiece pieces[kMaxPieces]);
 
