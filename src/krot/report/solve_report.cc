@@ -1,5 +1,7 @@
 #include "krot/report/solve_report.h"
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <sstream>
@@ -100,10 +102,10 @@ Json ErrorJson(const PixelErrorStatistics& statistics) {
 
 std::string NormName(Norm norm) {
   if (std::isinf(norm.p)) return "inf";
-  return Json(norm.p == std::floor(norm.p) && norm.p < 1e9
-                  ? Json(static_cast<int64_t>(norm.p))
-                  : Json(norm.p))
-      .dump();
+  std::array<char, 32> text;
+  const std::to_chars_result result =
+      std::to_chars(text.data(), text.data() + text.size(), norm.p);
+  return {text.data(), result.ptr};
 }
 
 std::string NothingToSolveSentence(const SolveSummary& summary) {

@@ -1,0 +1,48 @@
+#include "krot/report/write_file.h"
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/testing/model_matchers.h"
+
+namespace krot {
+namespace {
+
+TEST(WriteFile, ReplacesAFileAndLeavesNothingBesideIt) {
+  TempFolder folder;
+  WriteBytes(folder / "report.json", "old");
+  CheckFileWritable(folder / "report.json");
+  WriteFileAtomically(folder / "report.json", "new");
+  EXPECT_EQ(ReadBytes(folder / "report.json"), "new");
+  EXPECT_EQ(FileNames(folder.path()), std::vector<std::string>{"report.json"});
+}
+
+TEST(WriteFile, FailsWithoutATraceWhereThereIsNoFolder) {
+  TempFolder folder;
+  EXPECT_THROW(CheckFileWritable(folder / "a/report.json"), WriteError);
+  EXPECT_THROW(WriteFileAtomically(folder / "a/report.json", "x"), WriteError);
+  EXPECT_TRUE(FileNames(folder.path()).empty());
+}
+
+TEST(WriteFile, MayLieInAFolderThatWillExist) {
+  TempFolder folder;
+  EXPECT_NO_THROW(CheckFileWritable(folder / "a/report.json", folder / "a/"));
+  EXPECT_THROW(CheckFileWritable(folder / "a/report.json", folder / "b"),
+               WriteError);
+}
+
+TEST(WriteFile, DoesNotReplaceFoldersAndDevices) {
+  TempFolder folder;
+  EXPECT_THROW(CheckFileWritable(folder.path()), WriteError);
+  EXPECT_THROW(CheckFileWritable(folder / ""), WriteError);
+  EXPECT_THROW(CheckFileWritable("/dev/null"), WriteError);
+}
+
+TEST(WriteFile, WithoutAFolderInItsNameLiesInTheWorkingFolder) {
+  EXPECT_NO_THROW(CheckFileWritable("krot_report_that_is_not_there.json"));
+}
+
+}  // namespace
+}  // namespace krot
