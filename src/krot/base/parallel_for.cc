@@ -49,7 +49,11 @@ void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
   std::vector<std::thread> threads;
   threads.reserve(num_workers - 1);
   for (int worker = 1; worker < num_workers; ++worker) {
-    threads.emplace_back(work, worker);
+    try {
+      threads.emplace_back(work, worker);
+    } catch (const std::exception&) {
+      break;  // the system has no more threads; those there are do the work
+    }
   }
   work(0);
   for (std::thread& thread : threads) thread.join();
