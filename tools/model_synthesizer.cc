@@ -35,10 +35,10 @@ void AddContents(SynthesizerOptions* options, OptionParser* parser) {
   SceneOptions* scene = &options->scene;
   parser->AddChoice("Scene.layout", &options->layout, {"orbit", "street"},
                     "Frames around a cloud of points, or along a path");
-  parser->AddInteger("Scene.num_frames", &scene->num_frames, AtLeast(2),
-                     "Frames");
-  parser->AddInteger("Scene.num_points", &scene->num_points, AtLeast(1),
-                     "Points");
+  parser->AddInteger("Scene.num_frames", &scene->num_frames,
+                     Between(2, 10000000), "Frames");
+  parser->AddInteger("Scene.num_points", &scene->num_points,
+                     Between(1, 1000000000), "Points");
   parser->AddReal("Scene.track_length", &scene->track_length,
                   AtLeast(2.0, "at most the number of images"),
                   "Mean number of images that see a point; missed where fewer "
@@ -55,13 +55,13 @@ void AddContents(SynthesizerOptions* options, OptionParser* parser) {
   parser->AddBool("Scene.has_rigs", &scene->has_rigs,
                   "Write rigs and frames; without, as COLMAP 3.8 to 3.11 do");
   parser->AddInteger("Scene.sensors_per_rig", &scene->sensors_per_rig,
-                     Between(1, 64), "Cameras in the rig");
+                     Between(1, 16), "Cameras in the rig");
   parser->AddReal("Scene.rig_baseline", &scene->rig_baseline,
                   Between(0.0, 0.2, "viewing distances"),
-                  "Between neighbouring cameras of the rig");
+                  "Distance of every camera of the rig from its first");
   parser->AddReal("Scene.rig_rotation_deg", &scene->rig_rotation_deg,
                   Between(0.0, 180.0, "degrees"),
-                  "Between neighbouring cameras of the rig");
+                  "Yaw between neighbouring cameras of the rig");
 }
 
 void AddImperfections(SceneOptions* scene, OptionParser* parser) {

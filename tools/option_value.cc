@@ -25,17 +25,18 @@ std::string WithUnit(const std::string& text, const std::string& unit) {
   return unit.empty() ? text : text + ", " + unit;
 }
 
+std::string Text(int value) { return std::to_string(value); }
+std::string Text(double value) { return NumberText(value); }
+
 template <typename Number>
 Range<Number> MakeAtLeast(Number min, const std::string& unit) {
-  return {WithUnit(">= " + NumberText(static_cast<double>(min)), unit),
+  return {WithUnit(">= " + Text(min), unit),
           [min](Number value) { return value >= min; }};
 }
 
 template <typename Number>
 Range<Number> MakeBetween(Number min, Number max, const std::string& unit) {
-  return {WithUnit("in [" + NumberText(static_cast<double>(min)) + ", " +
-                       NumberText(static_cast<double>(max)) + "]",
-                   unit),
+  return {WithUnit("in [" + Text(min) + ", " + Text(max) + "]", unit),
           [min, max](Number value) { return value >= min && value <= max; }};
 }
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -20,7 +21,8 @@ void Redirect(int descriptor, const std::filesystem::path& file) {
 
 }  // namespace
 
-KrotProcess::KrotProcess(const std::vector<std::string>& arguments) {
+KrotProcess::KrotProcess(const std::vector<std::string>& arguments,
+                         uint64_t max_memory_bytes) {
   std::vector<std::string> words = {KROT_EXECUTABLE};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
@@ -33,6 +35,10 @@ KrotProcess::KrotProcess(const std::vector<std::string>& arguments) {
   if (pid_ > 0) return;
   Redirect(STDOUT_FILENO, folder_ / "out");
   Redirect(STDERR_FILENO, folder_ / "err");
+  if (max_memory_bytes > 0) {
+    const rlimit limit = {max_memory_bytes, max_memory_bytes};
+    if (setrlimit(RLIMIT_AS, &limit) != 0) _exit(125);
+  }
   execv(argv[0], argv.data());
   _exit(127);
 }
@@ -62,8 +68,9 @@ KrotResult KrotProcess::Wait() {
           ReadBytes(folder_ / "out"), ReadBytes(folder_ / "err")};
 }
 
-KrotResult RunKrot(const std::vector<std::string>& arguments) {
-  return KrotProcess(arguments).Wait();
+KrotResult RunKrot(const std::vector<std::string>& arguments,
+                   uint64_t max_memory_bytes) {
+  return KrotProcess(arguments, max_memory_bytes).Wait();
 }
 
 }  // namespace krot

@@ -2,6 +2,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -23,7 +24,9 @@ struct KrotResult {
 // A running `krot`, the one that this build made.
 class KrotProcess {
  public:
-  explicit KrotProcess(const std::vector<std::string>& arguments);
+  // `max_memory_bytes` bounds its address space; 0: no bound.
+  explicit KrotProcess(const std::vector<std::string>& arguments,
+                       uint64_t max_memory_bytes = 0);
   KrotProcess(const KrotProcess&) = delete;
   KrotProcess& operator=(const KrotProcess&) = delete;
   ~KrotProcess();
@@ -42,7 +45,8 @@ class KrotProcess {
   int status_ = 0;
 };
 
-KrotResult RunKrot(const std::vector<std::string>& arguments);
+KrotResult RunKrot(const std::vector<std::string>& arguments,
+                   uint64_t max_memory_bytes = 0);
 
 // As a reader sees an error: one line, from this command, saying `part`.
 MATCHER_P2(IsOneSentence, speaker, part,

@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
                       "fountain11", "longtracks92", "maupertuis4_txt",
                       "outliers12", "room50_opencv", "south128",
                       "south128_full", "task41_rigs_frames", "tower",
-                      "two_cameras44"),
+                      "tower_init", "two_cameras44"),
     [](const auto& test) { return std::string(test.param); });
 
 struct WrongRealModel {

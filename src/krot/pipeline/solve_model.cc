@@ -85,11 +85,10 @@ SolveModelResult TriangulateModel(const Model& model,
 }
 
 int64_t EstimateSolveBytes(const Model& model) {
-  // Per observation: the observation itself (Observation), its two indices,
-  // its 2D point index, the residual data of both sub-problems, two pixel
-  // errors. Per point: three estimates. And the copy of the model.
-  constexpr int64_t kBytesPerObservation = 64 + 12 + 4 + 160 + 16;
-  constexpr int64_t kBytesPerPoint = 3 * 24 + 16;
+  // Per observation: the Observation, two indices, the pixel errors before
+  // and after. Per point: start, estimate and the solver's own record.
+  constexpr int64_t kBytesPerObservation = 64 + 2 * 4 + 2 * 8;
+  constexpr int64_t kBytesPerPoint = 2 * 24 + 8 + 200;
   int64_t bytes = 0;
   for (const Image& image : model.images) {
     bytes += static_cast<int64_t>(sizeof(Image) +

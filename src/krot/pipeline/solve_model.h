@@ -79,7 +79,8 @@ SolveModelResult SolveModel(const Model& model,
 SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options);
 
-// About what SolveModel allocates on top of its input, in bytes.
+// About what SolveModel allocates on top of its input, in bytes; the copy of
+// the model that it returns is part of that.
 int64_t EstimateSolveBytes(const Model& model);
 
 }  // namespace krot

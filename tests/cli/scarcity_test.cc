@@ -1,0 +1,63 @@
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define KROT_UNDER_SANITIZER 1
+#endif
+
+namespace krot {
+namespace {
+
+constexpr uint64_t kMegabyte = 1000000;
+
+// A machine with too little of something. Sanitizers need more address space
+// than there is memory, so that it cannot be bounded.
+class Scarcity : public ::testing::Test {
+ protected:
+  void SetUp() override {
+#ifdef KROT_UNDER_SANITIZER
+    GTEST_SKIP() << "the address space cannot be bounded under a sanitizer";
+#endif
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(Scarcity, OfMemoryEndsWithASentence) {
+  SceneOptions options = SmallScene();
+  options.num_points = 200000;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
+               folder_ / "output"},
+              60 * kMegabyte);
+  EXPECT_EQ(result.exit_code, 6);
+  EXPECT_THAT(result.err, IsOneSentence("krot solver", "out of memory"));
+  EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"input"});
+}
+
+TEST_F(Scarcity, OfThreadsChangesNothing) {
+  SceneOptions options = SmallScene();
+  options.num_points = 1000;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const auto solve = [&](const std::string& output, const std::string& threads,
+                         uint64_t max_memory_bytes) {
+    const KrotResult result =
+        RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
+                 folder_ / output, "--ResInt.max_sweeps", "2",
+                 "--Solver.num_threads", threads},
+                max_memory_bytes);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ReadBytes(folder_ / output / "points3D.bin");
+  };
+  // The stacks alone of 1000 threads would take 8 GB.
+  EXPECT_EQ(solve("many", "1000", 60 * kMegabyte), solve("one", "1", 0));
+}
+
+}  // namespace
+}  // namespace krot
