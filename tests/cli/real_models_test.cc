@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -101,7 +102,12 @@ void SolverOnRealModel::ExpectLowerCostAndSameContents() {
 }
 
 void SolverOnRealModel::ExpectColmapReadsConvertsAndAdjusts() {
-  EXPECT_TRUE(Colmap({"model_analyzer", "--path", output_}));
+  ASSERT_TRUE(Colmap({"model_analyzer", "--path", output_}));
+  std::istringstream figures(ReadBytes(folder_ / "colmap.log"));
+  const std::string ours = RunKrot({"model_analyzer", "--path", output_}).out;
+  for (std::string figure; std::getline(figures, figure);) {
+    EXPECT_THAT(ours, ::testing::HasSubstr(figure + "\n"));
+  }
   for (const char* name : {"text", "binary", "adjusted"}) {
     fs::create_directory(folder_ / name);
   }
@@ -141,6 +147,32 @@ INSTANTIATE_TEST_SUITE_P(
                       "south128_full", "task41_rigs_frames", "tower",
                       "tower_init", "two_cameras44"),
     [](const auto& test) { return std::string(test.param); });
+
+class SettingsOnRealModel : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(SettingsOnRealModel, FastOnesEndNoHigherThanThePapers) {
+  if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+  TempFolder folder;
+  const auto final_cost = [&](const std::string& settings) -> double {
+    const KrotResult result = RunKrot(
+        {"solver", "--input_path", *RealModels() / GetParam(), "--output_path",
+         folder / settings, "--report_path", folder / settings / "report.json",
+         "--Solver.settings", settings});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(
+        ReadBytes(folder / settings / "report.json"))["cost_final"];
+  };
+  EXPECT_LE(final_cost("fast"), final_cost("paper"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Local, SettingsOnRealModel,
+                         ::testing::Values("crane8_txt", "longtracks92",
+                                           "maupertuis4_txt", "room50_opencv",
+                                           "south128", "task41_rigs_frames",
+                                           "two_cameras44"),
+                         [](const auto& test) {
+                           return std::string(test.param);
+                         });
 
 struct WrongRealModel {
   const char* folder;
