@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Makes docs/images/sample_result.svg: how many observations of the bundled
+# sample have an error above x pixels, before and after `krot solver`. Solves
+# the sample with build/krot, or with the executable in KROT. Needs awk.
+#
+# Usage: tools/docs/sample_result.sh
+set -euo pipefail
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+root=$(cd "$here/../.." && pwd)
+krot=${KROT:-$root/build/krot}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# errors MODEL: its pixel errors, one per line, largest first.
+errors() {
+  "$krot" model_analyzer --path "$1" --num_worst 1000000 \
+    --report_path "$work/report.json" --log_level 0 >/dev/null
+  awk -F': ' '/"error_px":/ { sub(/,$/, "", $2); print $2 }' \
+    "$work/report.json"
+}
+
+"$krot" solver --input_path "$root/tools/sample/model" \
+  --output_path "$work/solved" --log_level 0 >/dev/null
+errors "$root/tools/sample/model" >"$work/before"
+errors "$work/solved" >"$work/after"
+awk -f "$here/error_tails.awk" "$work/before" "$work/after" \
+  >"$root/docs/images/sample_result.svg"
