@@ -1,0 +1,97 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Core>
+
+namespace krot {
+
+// The symmetric cones of one observation and their Jordan algebras
+// [Alizadeh, Goldfarb 2003]: for p = 2 the second-order cone ||v|| <= gamma w
+// in R^3; for p = 1 and infinity four half-planes.
+//
+// Each offers, for vectors of kDim numbers: the identity, the product, the
+// solution y of x o y = r (Divide), the smallest eigenvalue, the longest step
+// that stays in the cone, and the map T from (gamma w; v) into the cone.
+
+struct SecondOrderCone {
+  static constexpr int kDim = 3;
+  static constexpr int kDegree =
+      1;  // of the barrier: s.z = degree * mu on the central path
+  using Vector = Eigen::Matrix<double, kDim, 1>;
+
+  static Vector Identity() { return {1, 0, 0}; }
+
+  static Vector Product(const Vector& x, const Vector& y) {
+    Vector result;
+    result << x.dot(y), x[0] * y.tail<2>() + y[0] * x.tail<2>();
+    return result;
+  }
+
+  static double Determinant(const Vector& x) {
+    const double norm = x.tail<2>().norm();
+    return (x[0] - norm) * (x[0] + norm);
+  }
+
+  static Vector Divide(const Vector& x, const Vector& r) {
+    const double det = Determinant(x);
+    const double xr = x.tail<2>().dot(r.tail<2>());
+    Vector result;
+    result[0] = (x[0] * r[0] - xr) / det;
+    result.tail<2>() = (r.tail<2>() - result[0] * x.tail<2>()) / x[0];
+    return result;
+  }
+
+  static double SmallestEigenvalue(const Vector& x) {
+    return x[0] - x.tail<2>().norm();
+  }
+
+  // The largest alpha <= limit with x + alpha d in the cone; x inside it.
+  static double MaxStep(const Vector& x, const Vector& d, double limit) {
+    // (x0 + alpha d0)^2 - |x1 + alpha d1|^2 = c + 2 b alpha + a alpha^2 >= 0
+    const double a = d[0] * d[0] - d.tail<2>().squaredNorm();
+    const double b = x[0] * d[0] - x.tail<2>().dot(d.tail<2>());
+    const double c = Determinant(x);
+    const double discriminant = b * b - a * c;
+    if (discriminant > 0) {
+      const double root = std::sqrt(discriminant);
+      // The smallest positive root, without cancellation.
+      const double q = b > 0 ? -b - root : -b + root;
+      for (const double alpha : {q / a, c / q}) {
+        if (alpha > 0 && x[0] + alpha * d[0] >= 0) {
+          limit = std::min(limit, alpha);
+        }
+      }
+    }
+    return limit;
+  }
+};
+
+struct FourHalfLines {
+  static constexpr int kDim = 4;
+  static constexpr int kDegree = 4;
+  using Vector = Eigen::Matrix<double, kDim, 1>;
+
+  static Vector Identity() { return Vector::Ones(); }
+
+  static Vector Product(const Vector& x, const Vector& y) {
+    return x.cwiseProduct(y);
+  }
+
+  static Vector Divide(const Vector& x, const Vector& r) {
+    return r.cwiseQuotient(x);
+  }
+
+  static double SmallestEigenvalue(const Vector& x) { return x.minCoeff(); }
+
+  static double MaxStep(const Vector& x, const Vector& d, double limit) {
+    for (int k = 0; k < kDim; ++k) {
+      if (d[k] < 0) limit = std::min(limit, -x[k] / d[k]);
+    }
+    return limit;
+  }
+};
+
+}  // namespace krot

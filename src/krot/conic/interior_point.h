@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "krot/base/progress.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// The multipliers of observation i: lambda of its depth, y of its v, with
+// ||y||_dual <= lambda.
+struct Multiplier {
+  double lambda = 0;
+  Eigen::Vector2d y = Eigen::Vector2d::Zero();
+};
+
+// What an iteration has reached.
+struct ConicIterate {
+  int iteration = 0;
+  double gamma = 0;  // every residual is below it, pixels
+  double cost = 0;   // the largest residual, pixels
+  // Complementarity relative to gamma. Not a bound: see certificate.h.
+  double gap = 0;
+  double step = 0;  // length of the last step, in [0, 1]
+  const Estimate* estimate = nullptr;
+  const std::vector<Multiplier>* multipliers = nullptr;
+};
+
+struct InteriorPointOptions {
+  Norm norm;                   // p = 1, 2 or infinity
+  double start_margin = 0.1;   // gamma starts at (1 + margin) cost; > 0
+  double smallest_gap = 1e-9;  // stop there, relative; > 0
+  int max_iterations = 200;    // >= 1
+  int num_threads = -1;
+  const CancelFlag* cancel = nullptr;
+  // Called after every iteration; true ends the solve.
+  std::function<bool(const ConicIterate&)> stop;
+};
+
+enum class InteriorPointTermination {
+  kNotRun,
+  kStopped,  // options.stop said so
+  kSmallestGap,
+  kMaxIterations,
+  kNoProgress,  // steps have become too short
+  kSingular,    // the linear system could not be factorised
+  kInterrupted,
+};
+
+struct InteriorPointSummary {
+  InteriorPointTermination termination = InteriorPointTermination::kNotRun;
+  int iterations = 0;
+  double gamma = 0;
+  double gap = 0;
+};
+
+// Minimises the largest residual over all frames and points together, by a
+// primal-dual interior point method on
+//
+//   min gamma   subject to   (gamma w_i, v_i) in the cone of ||v||_p <= gamma w
+//
+// in (x, gamma) at once (docs/method.md, "The joint solver"). The problem
+// must be connected and `*estimate` have positive depths; it is left at the
+// best iterate, never worse than the start.
+InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
+                                     const InteriorPointOptions& options,
+                                     Estimate* estimate,
+                                     std::vector<Multiplier>* multipliers);
+
+}  // namespace krot
