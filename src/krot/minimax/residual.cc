@@ -101,4 +101,19 @@ int ResidualPieces(const Residual& residual, const Vector3d& x, Norm norm,
   return count;
 }
 
+ResidualPiece TangentPiece(const Residual& residual, const Vector3d& x,
+                           const Vector3d& x_touch, Norm norm) {
+  const Vector2d v_touch = residual.Numerator(x_touch);
+  const double n_touch = NormOf(v_touch, norm);
+  ResidualPiece piece;
+  if (!(n_touch > 0)) return piece;
+  Vector2d s;
+  double trace;
+  DifferentiateNorm(v_touch, norm, n_touch, &s, &trace);
+  const double w = residual.Depth(x);
+  piece.value = s.dot(residual.Numerator(x)) / w;
+  piece.gradient = (residual.A.transpose() * s - piece.value * residual.c) / w;
+  return piece;
+}
+
 }  // namespace krot

@@ -47,4 +47,10 @@ inline constexpr int kMaxPieces = 4;
 int ResidualPieces(const Residual& residual, const Eigen::Vector3d& x,
                    Norm norm, double share, ResidualPiece pieces[kMaxPieces]);
 
+// s'v / w at x, s the gradient of ||v||_p at `x_touch`: below r everywhere and
+// equal to it there. Its curvature is left 0. Requires 1 < p < infinity and
+// positive depth at x.
+ResidualPiece TangentPiece(const Residual& residual, const Eigen::Vector3d& x,
+                           const Eigen::Vector3d& x_touch, Norm norm);
+
 }  // namespace krot

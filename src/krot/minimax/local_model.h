@@ -1,0 +1,88 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/math/simplex_qp.h"
+#include "krot/minimax/residual.h"
+
+namespace krot {
+
+// What max_i r_i looks like around a point x, from the residuals that matter
+// there (the members): with f_k and g_k the value and gradient of every
+// smooth piece of a member, a step d changes it to about
+//
+//   max_k (f_k + g_k'd) + 1/2 d'H d,    H = sum_i mu_i c_i b_i b_i' + kappa G.
+//
+// mu are the multipliers of the last step and c_i b_i b_i' the curvature of
+// ||A_i x + b_i||_p / w_i: on the tangent space of the active residuals that
+// is the Hessian of the Lagrangian, so that steps converge as Newton's method
+// does. kappa G makes them short, in the metric
+//
+//   G = (1/n) sum_i (A_i'A_i + cost^2 c_i c_i') / (w_i^2 cost)
+//
+// of the members' own changes, which makes the method invariant to affine
+// changes of x. With H = I, equal f_k and unit g_k, d is the MEB centre of
+// [Zhang18, Alg. 3].
+class LocalModel {
+ public:
+  // What the minimiser of the model does.
+  struct Step {
+    Eigen::Vector3d d;
+    double level;  // max_k (f_k + g_k'd)
+  };
+
+  // Forgets the members.
+  void Clear();
+
+  // Adds the residual that is number `index` of its problem; it counts from
+  // the next Linearize on. `start_depth` is its depth where the descent began.
+  void AddMember(int index, const Residual& residual, double start_depth);
+
+  // Rebuilds the pieces at x, where the maximum is `cost` > 0; all depths
+  // must be positive. Keeps the multipliers.
+  void Linearize(const Eigen::Vector3d& x, double cost, Norm norm);
+
+  // The minimiser for kappa > 0. O(members).
+  Step Minimize(double kappa);
+
+  // Makes the multipliers of the last step those of H; `RaiseMultipliers`
+  // only raises them, for another try from the same x, and returns whether
+  // any has grown much.
+  void AdoptMultipliers();
+  bool RaiseMultipliers();
+
+  // Adds, for every member above `level` at a trial that failed, the tangent
+  // plane of its ||v||_p there: what curvature at x alone cannot tell (the
+  // kinks of p < 2, the flats of p > 2, the far side of v = 0, the bend of a
+  // residual of small multiplier). `trial_values` are by index. Returns
+  // whether there were any.
+  bool AddTangents(const Eigen::Vector3d& x, const Eigen::Vector3d& x_trial,
+                   const double* trial_values, double level, Norm norm);
+
+  // The share of the step d, at most 1, that lets no depth of a member that
+  // bears it grow beyond `max_growth` times its start.
+  double DepthShare(const Eigen::Vector3d& x, const Eigen::Vector3d& d,
+                    double max_growth) const;
+
+ private:
+  struct Member {
+    int index;
+    Residual residual;
+    double start_depth;
+    double multiplier;       // mu_i
+    double last_multiplier;  // of the last step
+  };
+
+  bool UpdateLastMultipliers();
+
+  std::vector<Member> members_;
+  std::vector<ResidualPiece> pieces_;  // 0: no residual falls below zero
+  std::vector<int> member_of_piece_;
+  Eigen::Matrix3d metric_;  // G
+  std::vector<LinearPiece> scaled_pieces_;
+  SimplexQpSolution solution_;
+};
+
+}  // namespace krot
