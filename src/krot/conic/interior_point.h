@@ -43,6 +43,7 @@ enum class InteriorPointTermination {
   kNotRun,
   kStopped,  // options.stop said so
   kSmallestGap,
+  kFeasible,  // FindFeasible: every residual is below the bound
   kMaxIterations,
   kNoProgress,  // steps have become too short
   kSingular,    // the linear system could not be factorised
@@ -59,14 +60,34 @@ struct InteriorPointSummary {
 // Minimises the largest residual over all frames and points together, by a
 // primal-dual interior point method on
 //
-//   min gamma   subject to   (gamma w_i, v_i) in the cone of ||v||_p <= gamma w
+//   min gamma   subject to   (gamma w_i, v_i) in the cone ||v||_p <= gamma w
 //
 // in (x, gamma) at once (docs/method.md, "The joint solver"). The problem
-// must be connected and `*estimate` have positive depths; it is left at the
-// best iterate, never worse than the start.
+// must be connected and all depths of `*estimate` positive (throws
+// std::invalid_argument otherwise); it is left at the best iterate, never
+// worse than the start. `multipliers` are those of the last iterate.
 InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
                                      const InteriorPointOptions& options,
                                      Estimate* estimate,
                                      std::vector<Multiplier>* multipliers);
+
+// Looks for an estimate whose residuals are all below `bound` > 0, pixels, by
+//
+//   min tau   subject to   ||v_i||_p <= bound (w_i - 1 + tau),
+//
+// from scratch: `*estimate` is only written, and only if one is found
+// (kFeasible). Otherwise the multipliers converge to a proof that there is
+// none. `stop` sees tau as gamma. With metric baselines the depth of 1 is
+// replaced by `unit_depth`, scene units, which must be small against the
+// scene.
+InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
+                                  const InteriorPointOptions& options,
+                                  double bound, double unit_depth,
+                                  Estimate* estimate,
+                                  std::vector<Multiplier>* multipliers);
+
+// What MinimizeJointly will allocate beyond the problem, bytes. O(problem).
+int64_t EstimateInteriorPointMemory(const KnownRotationProblem& problem,
+                                    Norm norm);
 
 }  // namespace krot

@@ -1,0 +1,180 @@
+#include "krot/conic/frame_system.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "krot/base/parallel_for.h"
+
+namespace krot {
+namespace {
+
+// Relative to the diagonal. Refinement removes the error it causes.
+constexpr double kRegularization = 1e-14;
+constexpr double kLargestRegularization = 1e-7;
+// Up to here a dense factor is the faster one whatever the pattern, and it
+// stays so up to the second count unless few frames share points.
+constexpr int64_t kAlwaysDenseFrames = 500;
+constexpr int64_t kMaxDenseFrames = 4000;
+constexpr double kSparseShare = 0.2;
+// Parts of the sum; fewer where each is large.
+constexpr int kNumParts = 4;
+constexpr int kNumLargeParts = 2;
+constexpr int64_t kLargeFrames = 1500;
+
+}  // namespace
+
+FrameSystem::FrameSystem(const BlockStructure& structure)
+    : column_of_frame_(structure.num_frames(), -1) {
+  int64_t num_free = 0;
+  for (int64_t f = 0; f < structure.num_frames(); ++f) {
+    if (structure.frame_is_fixed[f]) continue;
+    column_of_frame_[f] = static_cast<int32_t>(3 * num_free++);
+  }
+  num_columns_ = 3 * num_free;
+  num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
+  if (num_free > kAlwaysDenseFrames) {
+    FindPattern(structure);
+    const double share = static_cast<double>(block_row_.size()) /
+                         (0.5 * static_cast<double>(num_free * num_free));
+    is_dense_ = num_free <= kMaxDenseFrames && share > kSparseShare;
+  }
+  if (is_dense_) {
+    dense_.resize(num_parts_);
+  } else {
+    blocks_.resize(num_parts_);
+  }
+}
+
+void FrameSystem::FindPattern(const BlockStructure& structure) {
+  std::vector<std::vector<int32_t>> rows(num_columns_ / 3);
+  for (int64_t k = 0; k < structure.num_points(); ++k) {
+    for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
+         ++i) {
+      const int32_t a = column(structure.frame_of[i]);
+      if (a < 0) continue;
+      for (int64_t j = structure.point_begin[k];
+           j < structure.point_begin[k + 1]; ++j) {
+        const int32_t b = column(structure.frame_of[j]);
+        if (b >= 0 && a >= b) rows[b / 3].push_back(a / 3);
+      }
+    }
+    // Keep the lists short while they grow.
+    if (k % 4096 == 4095 || k + 1 == structure.num_points()) {
+      for (std::vector<int32_t>& list : rows) {
+        std::sort(list.begin(), list.end());
+        list.erase(std::unique(list.begin(), list.end()), list.end());
+      }
+    }
+  }
+  block_begin_.assign(1, 0);
+  for (size_t column = 0; column < rows.size(); ++column) {
+    // Every diagonal block exists, observed or not.
+    if (rows[column].empty() ||
+        rows[column].front() != static_cast<int32_t>(column)) {
+      rows[column].insert(rows[column].begin(), static_cast<int32_t>(column));
+    }
+    block_row_.insert(block_row_.end(), rows[column].begin(),
+                      rows[column].end());
+    block_begin_.push_back(static_cast<int64_t>(block_row_.size()));
+  }
+}
+
+int64_t FrameSystem::BlockIndex(int32_t a, int32_t b) const {
+  const auto begin = block_row_.begin() + block_begin_[b / 3];
+  const auto end = block_row_.begin() + block_begin_[b / 3 + 1];
+  return std::lower_bound(begin, end, a / 3) - block_row_.begin();
+}
+
+void FrameSystem::SetZero() {
+  for (Eigen::MatrixXd& part : dense_) part.setZero(num_columns_, num_columns_);
+  for (std::vector<double>& part : blocks_) {
+    part.assign(9 * block_row_.size(), 0.0);
+  }
+}
+
+void FrameSystem::AddBlock(int part, int32_t a, int32_t b,
+                           const double block[9]) {
+  const int32_t row = column(a);
+  const int32_t col = column(b);
+  if (is_dense_) {
+    double* target = &dense_[part](row, col);
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) target[r] += block[3 * c + r];
+      target += num_columns_;
+    }
+  } else {
+    double* target = blocks_[part].data() + 9 * BlockIndex(row, col);
+    for (int k = 0; k < 9; ++k) target[k] += block[k];
+  }
+}
+
+bool FrameSystem::Factorize(int num_threads) {
+  if (is_dense_) {
+    ParallelFor(num_columns_, 64, num_threads,
+                [&](int64_t begin, int64_t end, int) {
+                  for (int part = 1; part < num_parts_; ++part) {
+                    dense_[0].middleCols(begin, end - begin) +=
+                        dense_[part].middleCols(begin, end - begin);
+                  }
+                });
+  } else {
+    using Index = Eigen::SparseMatrix<double>::StorageIndex;
+    sparse_.resize(num_columns_, num_columns_);
+    sparse_.resizeNonZeros(static_cast<Index>(9 * block_row_.size()));
+    Index entry = 0;
+    for (int64_t column = 0; column < num_columns_; ++column) {
+      sparse_.outerIndexPtr()[column] = entry;
+      for (int64_t n = block_begin_[column / 3];
+           n < block_begin_[column / 3 + 1]; ++n) {
+        for (int r = 0; r < 3; ++r, ++entry) {
+          double sum = 0;
+          for (int part = 0; part < num_parts_; ++part) {
+            sum += blocks_[part][9 * n + 3 * (column % 3) + r];
+          }
+          sparse_.innerIndexPtr()[entry] =
+              static_cast<Index>(3 * block_row_[n] + r);
+          sparse_.valuePtr()[entry] = sum;
+        }
+      }
+    }
+    sparse_.outerIndexPtr()[num_columns_] = entry;
+    if (!is_analyzed_) {
+      sparse_factor_.analyzePattern(sparse_);
+      is_analyzed_ = true;
+    }
+  }
+  for (double regularization = kRegularization;
+       regularization < kLargestRegularization; regularization *= 100) {
+    constexpr double kTiny = std::numeric_limits<double>::min();
+    if (is_dense_) {
+      dense_[0].diagonal() *= 1 + regularization;
+      dense_[0].diagonal().array() += kTiny;
+      dense_factor_.compute(dense_[0]);
+      if (dense_factor_.info() == Eigen::Success) return true;
+    } else {
+      for (int64_t column = 0; column < num_columns_; ++column) {
+        double& diagonal = sparse_.coeffRef(column, column);
+        diagonal = diagonal * (1 + regularization) + kTiny;
+      }
+      sparse_factor_.factorize(sparse_);
+      if (sparse_factor_.info() == Eigen::Success) return true;
+    }
+  }
+  return false;
+}
+
+Eigen::VectorXd FrameSystem::Solve(const Eigen::VectorXd& rhs) const {
+  if (num_columns_ == 0) return rhs;
+  return is_dense_ ? Eigen::VectorXd(dense_factor_.solve(rhs))
+                   : Eigen::VectorXd(sparse_factor_.solve(rhs));
+}
+
+int64_t FrameSystem::MemoryBytes() const {
+  const int64_t doubles =
+      is_dense_
+          ? (num_parts_ + 1) * num_columns_ * num_columns_
+          : (num_parts_ + 8) * 9 * static_cast<int64_t>(block_row_.size());
+  return doubles * static_cast<int64_t>(sizeof(double));
+}
+
+}  // namespace krot

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+#include "krot/conic/block_structure.h"
+
+namespace krot {
+
+// The normal equations of the frames once the points are eliminated: 3x3
+// blocks, symmetric, positive definite up to rounding. Dense for up to a few
+// thousand frames or where most frames share points; beyond, sparse with a
+// fill-reducing order.
+//
+// The sum over points is taken in `num_parts` parts, whose number and order
+// depend on the structure alone: the same bits at any number of threads.
+class FrameSystem {
+ public:
+  explicit FrameSystem(const BlockStructure& structure);
+
+  int num_parts() const { return num_parts_; }
+  int64_t num_columns() const { return num_columns_; }
+  // The first column of a frame; -1 if it is fixed.
+  int32_t column(int32_t frame) const { return column_of_frame_[frame]; }
+
+  void SetZero();
+  // Adds a 3x3 block (column-major) at frames a, b with column(a) >=
+  // column(b) >= 0. Different parts may be filled at the same time.
+  void AddBlock(int part, int32_t a, int32_t b, const double block[9]);
+
+  // Cholesky factor of the sum of the parts, with growing regularisation
+  // until it exists; false if it never does.
+  bool Factorize(int num_threads);
+  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
+
+  // What a system of this structure will occupy.
+  int64_t MemoryBytes() const;
+
+ private:
+  void FindPattern(const BlockStructure& structure);
+  int64_t BlockIndex(int32_t a, int32_t b) const;
+
+  bool is_dense_ = true;
+  int num_parts_ = 1;
+  int64_t num_columns_ = 0;
+  std::vector<int32_t> column_of_frame_;
+  // Dense.
+  std::vector<Eigen::MatrixXd> dense_;  // per part; lower triangle
+  Eigen::LLT<Eigen::MatrixXd> dense_factor_;
+  // Sparse: the block columns of the lower triangle.
+  std::vector<int64_t> block_begin_;
+  std::vector<int32_t> block_row_;
+  std::vector<std::vector<double>> blocks_;  // per part, 9 per block
+  Eigen::SparseMatrix<double> sparse_;
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower,
+                       Eigen::AMDOrdering<int>>
+      sparse_factor_;
+  bool is_analyzed_ = false;
+};
+
+}  // namespace krot
