@@ -1,0 +1,133 @@
+#include "krot/solver/certificate.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "krot/base/check.h"
+#include "krot/problem/restrict.h"
+#include "krot/solver/dual_repair.h"
+#include "krot/solver/support.h"
+
+namespace krot {
+namespace {
+
+constexpr double kThresholds[] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
+// Of the sub-problems.
+constexpr double kSmallestGap = 1e-9;
+constexpr int kMaxIterations = 100;
+constexpr int kMaxReductions = 4;
+// The defect that a certificate states, over the one that was found here:
+// another machine's arithmetic may find a little more.
+constexpr double kDefectAllowance = 2;
+
+class Maker {
+ public:
+  Maker(const KnownRotationProblem& problem, Norm norm,
+        const CertificateOptions& options)
+      : problem_(problem), norm_(norm), options_(options) {}
+
+  // Tries the sub-problem of these observations, connected, from `estimate`
+  // of the whole, then that of what sets its maximum, and so on.
+  void Try(const std::vector<int64_t>& observations, const Estimate& estimate,
+           double threshold, int num_reductions);
+
+  bool IsEnough() const {
+    return IsCancelled(options_.cancel) ||
+           best_.lower_bound >= options_.sufficient_bound;
+  }
+
+  std::optional<Certificate> best() const {
+    if (best_.observations.empty()) return std::nullopt;
+    return best_;
+  }
+
+ private:
+  bool IsTooLarge(const KnownRotationProblem& part) const {
+    return 3 * (int64_t{part.num_points} + part.num_frames - 1) >
+           options_.max_unknowns;
+  }
+  void Offer(const RestrictedProblem& part, const Estimate& estimate,
+             const std::vector<Multiplier>& multipliers);
+
+  const KnownRotationProblem& problem_;
+  const Norm norm_;
+  const CertificateOptions& options_;
+  Certificate best_;
+};
+
+void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
+                double threshold, int num_reductions) {
+  const RestrictedProblem part = RestrictProblem(problem_, observations);
+  if (IsTooLarge(part.problem)) return;
+  InteriorPointOptions options;
+  options.norm = norm_;
+  options.smallest_gap = kSmallestGap;
+  options.max_iterations = kMaxIterations;
+  options.num_threads = options_.num_threads;
+  options.cancel = options_.cancel;
+  Estimate estimate = RestrictEstimate(part, whole);
+  std::vector<Multiplier> multipliers;
+  const InteriorPointSummary summary =
+      MinimizeJointly(part.problem, options, &estimate, &multipliers);
+  Offer(part, estimate, multipliers);
+
+  const std::vector<int64_t> support = SelectSupport(
+      part.problem,
+      SupportScores(part.problem, norm_, estimate, summary.gamma, multipliers),
+      threshold);
+  if (num_reductions == 0 || support.size() == observations.size()) return;
+  for (const std::vector<int64_t>& component :
+       SplitIntoComponents(part.problem, support)) {
+    if (IsEnough()) return;
+    std::vector<int64_t> rest;
+    for (const int64_t i : component) rest.push_back(part.observation_of[i]);
+    Try(rest, whole, threshold, num_reductions - 1);
+  }
+}
+
+void Maker::Offer(const RestrictedProblem& part, const Estimate& estimate,
+                  const std::vector<Multiplier>& multipliers) {
+  std::optional<Certificate> certificate = RepairMultipliers(
+      part.problem, norm_, estimate, multipliers, options_.max_unknowns);
+  if (!certificate || certificate->lower_bound <= best_.lower_bound) return;
+  for (CertifiedObservation& o : certificate->observations) {
+    o.observation = part.observation_of[o.observation];
+  }
+  certificate->defect = kMaxDefect;
+  const CertificateCheck check =
+      CheckCertificate(problem_, norm_, *certificate);
+  if (!check.is_accepted) return;
+  certificate->defect = std::min(kMaxDefect, kDefectAllowance * check.defect);
+  best_ = std::move(*certificate);
+}
+
+}  // namespace
+
+std::optional<Certificate> MakeCertificate(
+    const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
+    double gamma, const std::vector<Multiplier>& multipliers,
+    const CertificateOptions& options) {
+  CheckArgument(multipliers.size() == problem.observations.size(),
+                "multipliers.size()", multipliers.size(),
+                "the number of observations");
+  CheckArgument(options.max_unknowns >= 1, "options.max_unknowns",
+                options.max_unknowns, ">= 1");
+  const std::vector<double> scores =
+      SupportScores(problem, norm, estimate, gamma, multipliers);
+  Maker maker(problem, norm, options);
+  std::vector<int64_t> previous;
+  for (const double threshold : kThresholds) {
+    const std::vector<int64_t> support =
+        SelectSupport(problem, scores, threshold);
+    if (support == previous) continue;
+    previous = support;
+    for (const std::vector<int64_t>& component :
+         SplitIntoComponents(problem, support)) {
+      maker.Try(component, estimate, threshold, kMaxReductions);
+      if (maker.IsEnough()) return maker.best();
+    }
+  }
+  return maker.best();
+}
+
+}  // namespace krot

@@ -1,0 +1,386 @@
+#include "krot/solver/certificate_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+#include <Eigen/LU>
+#include <Eigen/QR>
+
+#include "krot/problem/components.h"
+#include "krot/problem/restrict.h"
+
+// How (1) is proved. Let M = [A_i' lambda_i]_i, without the rows of one frame
+// per connected component: with R_f the frames' rotations, sum_f R_f' (rows of
+// t_f) = sum_k (rows of s_k) for A and c alike, as a translation moves nothing,
+// so these rows vanish once all others do. Let g be what the other rows of (1)
+// miss. If X is an approximate right inverse and E = I - M X has
+// |E|_inf = alpha < 1, then a = -X (I - E)^-1 g exists and solves M a = -g, so
+// y_i + lambda_i a_i satisfies (1) exactly, and
+//
+//   |a| <= |X| (|g| + alpha / (1 - alpha) |g|_inf)      entry by entry.
+//
+// Divided by rho = max_i (|y_i|_dual / lambda_i + |a_i|_dual) it is dual
+// feasible and proves delta / rho. Rows may be scaled freely; powers of two
+// add no rounding.
+
+namespace krot {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Real = long double;
+using Matrix3 = Eigen::Matrix<Real, 3, 3>;
+using Matrix23 = Eigen::Matrix<Real, 2, 3>;
+using Vector2 = Eigen::Matrix<Real, 2, 1>;
+using Vector3 = Eigen::Matrix<Real, 3, 1>;
+
+constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
+constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
+constexpr double kMaxExcess = 1e-12;  // of |y|_dual over lambda
+constexpr int64_t kMaxUnknowns = 6000;
+// Covers the roundings of sums of non-negative doubles: their relative error
+// is below (number of terms) * kUnitRoundoff.
+constexpr double kOutward = 1 + 1e-9;
+
+std::string Sentence(const std::string& start, double value,
+                     const std::string& end) {
+  std::ostringstream text;
+  text.precision(17);
+  text << start << value << end;
+  return text.str();
+}
+
+Real DualNorm(const Vector2& y, Norm norm) {
+  if (norm.p == 1) return y.cwiseAbs().maxCoeff();
+  if (norm.p == 2) return y.norm();
+  return y.cwiseAbs().sum();
+}
+
+// E = J (I2 | -u): v = E x_cam.
+Matrix23 NumeratorRows(const Observation& observation) {
+  Matrix23 rows;
+  rows << Matrix23::Identity().leftCols<2>(), -observation.u.cast<Real>();
+  return observation.J.cast<Real>() * rows;
+}
+
+class Checker {
+ public:
+  Checker(const KnownRotationProblem& problem, Norm norm,
+          const Certificate& certificate)
+      : whole_(problem), norm_(norm), certificate_(certificate) {}
+
+  // The first thing that is wrong, or none.
+  std::optional<std::string> Run();
+
+  double rho() const { return rho_; }
+
+ private:
+  std::optional<std::string> CheckNumbers() const;
+  std::optional<std::string> Restrict();
+  std::optional<std::string> CheckRotations() const;
+  void NumberUnknowns();
+  void Assemble();
+  std::optional<std::string> BoundCorrection();
+  std::optional<std::string> CheckConstants() const;
+  void BoundRho();
+
+  // Calls visit(first row, R, is_frame) for the two unknowns of observation i.
+  template <typename Visit>
+  void ForUnknowns(int64_t i, const Visit& visit) const;
+
+  const KnownRotationProblem& whole_;
+  const Norm norm_;
+  const Certificate& certificate_;
+
+  RestrictedProblem part_;
+  std::vector<Real> lambda_;  // of part_, scaled to a maximum in [1/2, 1)
+  std::vector<Vector2> y_;
+
+  // The row of an unknown in (1); -1 for frames whose rows are omitted.
+  std::vector<int64_t> row_of_frame_;
+  int64_t num_rows_ = 0;
+  MatrixXd M_;        // rows scaled
+  MatrixXd M_error_;  // bounds |M_ - what it stands for|
+  VectorXd g_bound_;  // bounds |g|, rows scaled alike
+  VectorXd a_bound_;  // bounds |a|
+  double rho_ = 0;
+};
+
+std::optional<std::string> Checker::CheckNumbers() const {
+  if (norm_.p != 2 && !norm_.IsPolyhedral()) {
+    return Sentence("there are no certificates for p = ", norm_.p, "");
+  }
+  const double bound = certificate_.lower_bound;
+  if (!(bound > 0) || !std::isfinite(bound)) {
+    return Sentence("the lower bound is ", bound, ", must be positive");
+  }
+  const double defect = certificate_.defect;
+  if (!(defect >= 0 && defect <= kMaxDefect)) {
+    return Sentence("the defect is ", defect, ", must be in [0, 1e-6]");
+  }
+  if (certificate_.observations.empty()) return "it holds no observation";
+  const int64_t count = static_cast<int64_t>(whole_.observations.size());
+  int64_t previous = -1;
+  for (const CertifiedObservation& o : certificate_.observations) {
+    if (o.observation <= previous || o.observation >= count) {
+      return "its observations do not ascend or are not the problem's";
+    }
+    previous = o.observation;
+    const std::string which =
+        "the multipliers of observation " + std::to_string(o.observation);
+    if (!std::isfinite(o.lambda) || !o.y.allFinite() || !(o.lambda > 0)) {
+      return which + " are not finite, or lambda is not positive";
+    }
+    if (!(DualNorm(o.y.cast<Real>(), norm_) <= o.lambda * (1 + kMaxExcess))) {
+      return which + " are infeasible: y is longer than lambda";
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> Checker::Restrict() {
+  std::vector<int64_t> observations;
+  double largest = 0;
+  for (const CertifiedObservation& o : certificate_.observations) {
+    observations.push_back(o.observation);
+    largest = std::max(largest, o.lambda);
+  }
+  part_ = RestrictProblem(whole_, observations);
+  int exponent = 0;
+  std::frexp(largest, &exponent);
+  for (const CertifiedObservation& o : certificate_.observations) {
+    lambda_.push_back(std::ldexp(Real{o.lambda}, -exponent));
+    y_.push_back({std::ldexp(Real{o.y[0]}, -exponent),
+                  std::ldexp(Real{o.y[1]}, -exponent)});
+  }
+  if (auto refusal = CheckRotations()) return refusal;
+  NumberUnknowns();
+  if (num_rows_ > kMaxUnknowns) return "its support is too large to be checked";
+  if (num_rows_ > 2 * static_cast<int64_t>(lambda_.size())) {
+    return "its support is flexible: it has more unknowns than equations";
+  }
+  return std::nullopt;
+}
+
+// Every R_cw must be R_sr R_rw, to kRotationError per entry, for one R_rw per
+// frame; and R_sr must be a rotation as far as the bounds here rely on it.
+std::optional<std::string> Checker::CheckRotations() const {
+  const KnownRotationProblem& problem = part_.problem;
+  std::vector<int32_t> first_view(problem.num_frames, -1);
+  for (size_t v = 0; v < problem.views.size(); ++v) {
+    const View& view = problem.views[v];
+    const Matrix3 R_sr = view.cam_from_rig_rotation.cast<Real>();
+    const Matrix3 R_cw = view.cam_from_world_rotation.cast<Real>();
+    for (const Matrix3& R : {R_sr, R_cw}) {
+      const Real error =
+          (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
+      if (!(error <= 1e-12)) return "a rotation of its views is none";
+    }
+    int32_t& first = first_view[view.frame];
+    if (first < 0) first = static_cast<int32_t>(v);
+    const View& reference = problem.views[first];
+    const Matrix3 R_rw =
+        Matrix3(reference.cam_from_rig_rotation.cast<Real>()).inverse() *
+        reference.cam_from_world_rotation.cast<Real>();
+    if (!((R_cw - R_sr * R_rw).cwiseAbs().maxCoeff() <= kRotationError)) {
+      return "the rotations of a frame's views contradict each other";
+    }
+  }
+  return std::nullopt;
+}
+
+void Checker::NumberUnknowns() {
+  const Components components = FindComponents(part_.problem);
+  num_rows_ = 3 * int64_t{part_.problem.num_points};
+  row_of_frame_.assign(part_.problem.num_frames, -1);
+  int32_t num_seen = 0;  // components are numbered by their first frame
+  for (int32_t f = 0; f < part_.problem.num_frames; ++f) {
+    if (components.of_frame[f] == num_seen) {
+      ++num_seen;
+      continue;
+    }
+    row_of_frame_[f] = num_rows_;
+    num_rows_ += 3;
+  }
+}
+
+template <typename Visit>
+void Checker::ForUnknowns(int64_t i, const Visit& visit) const {
+  const Observation& observation = part_.problem.observations[i];
+  const View& view = part_.problem.views[observation.view];
+  visit(3 * int64_t{observation.point},
+        Matrix3(view.cam_from_world_rotation.cast<Real>()), kRotationError);
+  const int64_t row = row_of_frame_[view.frame];
+  if (row >= 0) {
+    visit(row, Matrix3(view.cam_from_rig_rotation.cast<Real>()), 0.0);
+  }
+}
+
+// M, g and what their entries may be wrong by. A point's rotation R_sr R_rw
+// counts as known to kRotationError, a frame's R_sr as exact: then the two are
+// those of some R_rw, as the argument about the omitted rows needs.
+void Checker::Assemble() {
+  const int64_t count = static_cast<int64_t>(lambda_.size());
+  const Real delta = certificate_.lower_bound;
+  M_ = MatrixXd::Zero(num_rows_, 2 * count);
+  M_error_ = MatrixXd::Zero(num_rows_, 2 * count);
+  using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+  Column g = Column::Zero(num_rows_);
+  Column g_error = Column::Zero(num_rows_);
+  Column g_terms = Column::Zero(num_rows_);  // sum of absolute values
+  for (int64_t i = 0; i < count; ++i) {
+    const Matrix23 E = NumeratorRows(part_.problem.observations[i]);
+    const Matrix23 E_abs =  // before cancellation in E itself
+        part_.problem.observations[i].J.cast<Real>().cwiseAbs() *
+        (Matrix23() << Matrix23::Identity().leftCols<2>(),
+         part_.problem.observations[i].u.cast<Real>().cwiseAbs())
+            .finished();
+    ForUnknowns(i, [&](int64_t row, const Matrix3& R, double rotation_error) {
+      const Matrix23 A = E * R;
+      const Matrix23 A_terms = E_abs * R.cwiseAbs();
+      const Vector2 A_error = rotation_error * E_abs.rowwise().sum();
+      const Vector3 c = R.row(2).transpose();
+      g.segment<3>(row) += A.transpose() * y_[i] + delta * lambda_[i] * c;
+      g_terms.segment<3>(row) += A_terms.transpose() * y_[i].cwiseAbs() +
+                                 delta * lambda_[i] * c.cwiseAbs();
+      g_error.segment<3>(row).array() +=
+          A_error.dot(y_[i].cwiseAbs()) + delta * lambda_[i] * rotation_error;
+      M_.block<3, 2>(row, 2 * i) = (lambda_[i] * A.transpose()).cast<double>();
+      M_error_.block<3, 2>(row, 2 * i) =
+          (lambda_[i] * A_terms.transpose() *
+               (2 * kUnitRoundoff + 12 * kRealRoundoff) +
+           lambda_[i] * Vector3::Ones() * A_error.transpose())
+              .cast<double>();
+    });
+  }
+  // Every term went through at most 12 roundings, and each sum adds one.
+  const Real sum_error = (static_cast<Real>(count) + 12) * kRealRoundoff;
+  g_bound_ = ((g.cwiseAbs() + g_error + sum_error * g_terms) * Real{kOutward})
+                 .cast<double>();
+  for (int64_t row = 0; row < num_rows_; ++row) {
+    int exponent = 0;
+    std::frexp(M_.row(row).norm(), &exponent);
+    const double scale = std::ldexp(1.0, -exponent);
+    M_.row(row) *= scale;
+    M_error_.row(row) *= scale;
+    g_bound_[row] *= scale;
+  }
+}
+
+std::optional<std::string> Checker::BoundCorrection() {
+  const char* const flexible =
+      "its support is flexible, or too nearly so for this arithmetic";
+  // X = Q R^-T where M' = Q R.
+  const Eigen::HouseholderQR<MatrixXd> qr(M_.transpose());
+  const MatrixXd Q =
+      qr.householderQ() * MatrixXd::Identity(M_.cols(), num_rows_);
+  const MatrixXd X = qr.matrixQR()
+                         .topRows(num_rows_)
+                         .triangularView<Eigen::Upper>()
+                         .solve(Q.transpose())
+                         .transpose();
+  if (!X.allFinite()) return flexible;
+
+  const MatrixXd E = MatrixXd::Identity(num_rows_, num_rows_) - M_ * X;
+  const VectorXd X_sums = X.cwiseAbs().rowwise().sum();
+  const double product_error =
+      (static_cast<double>(M_.cols()) + 3) * 2 * kUnitRoundoff;
+  const VectorXd E_sums =
+      E.cwiseAbs().rowwise().sum() * (1 + 2 * kUnitRoundoff) +
+      M_.cwiseAbs() * X_sums * product_error + M_error_ * X_sums;
+  const double alpha = E_sums.maxCoeff() * kOutward;
+  if (!(alpha < 0.5)) return flexible;
+
+  const VectorXd b =
+      g_bound_.array() + alpha / (1 - alpha) * g_bound_.maxCoeff();
+  a_bound_ = X.cwiseAbs() * b * (kOutward * kOutward);
+  return std::nullopt;
+}
+
+// (2), once every frame's origin has moved to the projection centre of the
+// first of its views that the support sees: t_f + R_sr^-1 t_sr of that view is
+// the unknown as well as t_f is. If each frame has one centre, the constants
+// are gone.
+std::optional<std::string> Checker::CheckConstants() const {
+  const KnownRotationProblem& problem = part_.problem;
+  const int64_t count = static_cast<int64_t>(lambda_.size());
+  std::vector<int32_t> first_view(problem.num_frames, -1);
+  Real kappa = 0;
+  Real kappa_error = 0;
+  for (int64_t i = 0; i < count; ++i) {
+    const Observation& observation = problem.observations[i];
+    const View& view = problem.views[observation.view];
+    int32_t& first = first_view[view.frame];
+    if (first < 0) first = observation.view;
+    if (first == observation.view) continue;
+    const Vector3 t = view.cam_from_rig_translation.cast<Real>();
+    const Vector3 t_first =
+        problem.views[first].cam_from_rig_translation.cast<Real>();
+    const Vector3 o =
+        t - view.cam_from_rig_rotation.cast<Real>() *
+                Matrix3(problem.views[first].cam_from_rig_rotation.cast<Real>())
+                    .inverse() *
+                t_first;
+    const Real o_error =
+        8 * kRotationError * (t.cwiseAbs().sum() + t_first.cwiseAbs().sum());
+    const Matrix23 E = NumeratorRows(observation);
+    const Vector2 b = E * o;
+    const Vector2 b_error = E.cwiseAbs().rowwise().sum() * (2 * o_error);
+    const Vector2 a = a_bound_.segment<2>(2 * i).cast<Real>();
+    const Real delta = certificate_.lower_bound;
+    kappa += y_[i].dot(b) + delta * lambda_[i] * o[2];
+    kappa_error += y_[i].cwiseAbs().dot(b_error) +
+                   delta * lambda_[i] * 2 * o_error +
+                   lambda_[i] * a.dot(b.cwiseAbs() + b_error);
+  }
+  if (kappa + kappa_error * Real{kOutward} <= 0) return std::nullopt;
+  return "the constants of its rig rows do not keep their sign";
+}
+
+void Checker::BoundRho() {
+  for (size_t i = 0; i < lambda_.size(); ++i) {
+    const Vector2 a =
+        a_bound_.segment<2>(2 * static_cast<int64_t>(i)).cast<Real>();
+    const Real rho = DualNorm(y_[i], norm_) / lambda_[i] + DualNorm(a, norm_);
+    rho_ = std::max(rho_, static_cast<double>(rho) * (1 + 4 * kUnitRoundoff));
+  }
+}
+
+std::optional<std::string> Checker::Run() {
+  if (auto refusal = CheckNumbers()) return refusal;
+  if (auto refusal = Restrict()) return refusal;
+  Assemble();
+  if (auto refusal = BoundCorrection()) return refusal;
+  if (auto refusal = CheckConstants()) return refusal;
+  BoundRho();
+  const double defect = rho_ - 1;
+  if (!(defect <= certificate_.defect)) {
+    return Sentence(
+        "what rounding or a change takes from the bound, relative ", defect,
+        Sentence(", exceeds the ", certificate_.defect, " that it states"));
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
+                                  Norm norm, const Certificate& certificate) {
+  Checker checker(problem, norm, certificate);
+  CertificateCheck check;
+  if (auto refusal = checker.Run()) {
+    check.refusal = *refusal;
+    check.defect = std::max(0.0, checker.rho() - 1);
+    return check;
+  }
+  check.is_accepted = true;
+  check.proved_bound =
+      certificate.lower_bound / checker.rho() * (1 - 4 * kUnitRoundoff);
+  check.defect = std::max(0.0, checker.rho() - 1);
+  return check;
+}
+
+}  // namespace krot

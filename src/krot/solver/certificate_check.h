@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// An observation of the support: those with lambda > 0 alone set the maximum.
+struct CertifiedObservation {
+  int64_t observation = 0;  // index in KnownRotationProblem::observations
+  double lambda = 0;        // multiplier of the depth, > 0
+  Eigen::Vector2d y = Eigen::Vector2d::Zero();  // of v; |y|_dual <= lambda
+};
+
+// A proof that no estimate costs less than lower_bound (1 - defect).
+//
+// With z the stacked unknowns, w_i = c_i'z + d_i and v_i = A_i z + b_i,
+// multipliers with |y_i|_dual <= lambda_i and
+//
+//   (1)  sum_i A_i'y_i + delta sum_i lambda_i c_i  = 0
+//   (2)  sum_i y_i'b_i + delta sum_i lambda_i d_i <= 0
+//
+// give for every z of cost gamma and positive depths
+//
+//   0 <= sum_i (y_i'v_i + gamma lambda_i w_i)
+//     <= (gamma - delta) sum_i lambda_i w_i,
+//
+// hence gamma >= delta. In doubles (1) holds to rounding only, which alone
+// would prove nothing, as z is unbounded.
+struct Certificate {
+  double lower_bound = 0;  // delta, pixels
+  double defect = 0;       // what rounding may take from it, relative
+  std::vector<CertifiedObservation> observations;  // ascending
+};
+
+inline constexpr double kMaxDefect = 1e-6;
+
+struct CertificateCheck {
+  bool is_accepted = false;
+  double proved_bound = 0;  // pixels; 0 unless accepted
+  double defect = 0;        // 1 - proved_bound / lower_bound, relative
+  std::string refusal;      // one sentence; empty if accepted
+};
+
+// Judges a certificate from the problem alone. Accepted if and only if it is
+// proved, by arithmetic that accounts for every rounding, that multipliers
+// exist beside the certificate's that satisfy (1) and (2) exactly and prove
+// lower_bound (1 - certificate.defect), certificate.defect <= kMaxDefect, and
+// |y_i|_dual <= lambda_i (1 + 1e-12).
+//
+// The rotations count as known to kRotationError per entry. Works for p = 1, 2
+// and infinity; anything else, and whatever else is wrong with the
+// certificate, is a refusal and never an exception. O(n^2 m) for m
+// observations and n unknowns of the support.
+CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
+                                  Norm norm, const Certificate& certificate);
+
+// Entries of a rotation matrix that is computed from a quaternion, or is the
+// product of two such, are this near to the truth.
+inline constexpr double kRotationError = 2e-15;
+
+}  // namespace krot
