@@ -1,0 +1,66 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "krot/base/progress.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/solver/certificate.h"
+
+namespace krot {
+
+// The global optimum of the known rotation problem, with a proof: all frames
+// and points at once by the interior point of conic/, each connected component
+// for itself, until a certificate that CheckCertificate accepts shows the
+// relative gap.
+
+struct JointIteration {
+  double cost = 0;                    // pixels, the best so far
+  std::optional<double> lower_bound;  // pixels, certified so far
+  double gap = 0;  // of the interior point: an estimate, not a bound
+  double seconds = 0;
+};
+
+struct JointOptions {
+  Norm norm;                   // p = 1, 2 or infinity
+  double relative_gap = 1e-4;  // (cost - lower_bound) / cost; > 0
+  int max_iterations = 200;    // per component; >= 1
+  int num_threads = -1;
+  const CancelFlag* cancel = nullptr;  // may be null
+  // After every iteration, counted from 1 over all components; may be empty.
+  std::function<void(int iteration, const JointIteration&)> callback;
+};
+
+enum class JointTermination {
+  kNotRun,
+  kGapReached,  // certified
+  kMaxIterations,
+  kStalled,  // rounding ended the progress before the gap was reached
+  kInterrupted,
+};
+
+struct JointSummary {
+  JointTermination termination = JointTermination::kNotRun;
+  double cost_initial = 0;  // pixels
+  double cost_final = 0;    // <= cost_initial
+  // The highest certified bound of any component: also one of the whole.
+  std::optional<Certificate> certificate;
+  double lower_bound = 0;  // pixels, what the certificate proves; 0 if none
+  int32_t num_components = 0;
+  std::vector<JointIteration> iterations;
+
+  double RelativeGap() const {
+    return cost_final > 0 ? (cost_final - lower_bound) / cost_final : 0;
+  }
+};
+
+// Improves `estimate`, all of whose depths must be positive (throws
+// std::invalid_argument otherwise, and for options out of range). Never worse
+// than the start. Frames and points without observations stay. Memory: see
+// EstimateInteriorPointMemory.
+JointSummary SolveJoint(const KnownRotationProblem& problem,
+                        const JointOptions& options, Estimate* estimate);
+
+}  // namespace krot
