@@ -16,8 +16,8 @@ class Interrupt : public ::testing::Test {
  protected:
   Interrupt() {
     SceneOptions options = SmallScene();
-    options.num_frames = 30;
-    options.num_points = 5000;
+    options.num_frames = 10;
+    options.num_points = 300;
     Save(SynthesizeScene(options).model, folder_ / "model");
     before_ = Load(folder_ / "model");
   }
