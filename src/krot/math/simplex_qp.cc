@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "krot/base/check.h"
 
@@ -232,12 +231,12 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
   }
 }
 
-Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count) {
-  CheckArgument(count >= 1, "count", count, ">= 1");
-  std::vector<LinearPiece> pieces(count);
-  for (int i = 0; i < count; ++i) pieces[i].gradient = vectors[i];
+Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count,
+                             std::vector<LinearPiece>* scratch) {
+  scratch->clear();
+  for (int i = 0; i < count; ++i) scratch->push_back({0, vectors[i]});
   SimplexQpSolution solution;
-  SolveSimplexQp(pieces.data(), count, &solution);
+  SolveSimplexQp(scratch->data(), count, &solution);
   return -solution.step;
 }
 

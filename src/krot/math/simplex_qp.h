@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 namespace krot {
@@ -36,7 +38,9 @@ struct SimplexQpSolution {
 void SolveSimplexQp(const LinearPiece* pieces, int count,
                     SimplexQpSolution* solution);
 
-// The point of least norm of the convex hull of `count` >= 1 vectors.
-Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count);
+// The point of least norm of the convex hull of `count` >= 1 vectors. `scratch`
+// keeps its memory between calls.
+Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count,
+                             std::vector<LinearPiece>* scratch);
 
 }  // namespace krot

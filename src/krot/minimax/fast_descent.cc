@@ -53,8 +53,8 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
   while (summary.iterations < options_.max_iterations) {
     FindDescentNormals(residuals_, *x, norm_, options_.active_tolerance,
                        &descent_normals_);
-    const std::optional<Eigen::Vector3d> direction =
-        FindDescentDirection(descent_normals_, options_.stationarity_tolerance);
+    const std::optional<Eigen::Vector3d> direction = FindDescentDirection(
+        descent_normals_, options_.stationarity_tolerance, &pieces_);
     if (!direction) {
       summary.termination = DescentTermination::kStationary;
       break;

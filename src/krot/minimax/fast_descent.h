@@ -50,6 +50,7 @@ class FastDescent {
   ResidualSet residuals_;
   NewtonDescent newton_;
   std::vector<Eigen::Vector3d> descent_normals_;
+  std::vector<LinearPiece> pieces_;
   std::vector<LineResidual> line_;
 };
 

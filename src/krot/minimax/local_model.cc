@@ -13,6 +13,8 @@ constexpr int kZeroPiece = 0;
 constexpr int kNoMember = -1;
 // Weights that the residuals bear together below this are rounding.
 constexpr double kSmallestWeight = 1e-9;
+// See DepthShare.
+constexpr double kSmallestDepthShare = 0.1;
 // Keeps H invertible where rounding would not: relative to its trace.
 constexpr double kRounding = 1e-14;
 
@@ -138,20 +140,24 @@ bool LocalModel::AddTangents(const Vector3d& x, const Vector3d& x_trial,
   return added;
 }
 
-double LocalModel::DepthShare(const Vector3d& x, const Vector3d& d,
-                              double max_growth) const {
+double LocalModel::DepthShare(const Vector3d& x, const Vector3d& d) const {
   double share = 1;
+  for (const Member& member : members_) {
+    const double growth = member.residual.c.dot(d);
+    const double room = (1 - kSmallestDepthShare) * member.residual.Depth(x);
+    if (room < -share * growth) share = -room / growth;
+  }
+  return share;
+}
+
+double LocalModel::DepthGrowth(const Vector3d& x) const {
+  double growth = 0;
   for (int k = 0; k < solution_.size; ++k) {
     if (solution_.index[k] == kZeroPiece) continue;
     const Member& member = members_[member_of_piece_[solution_.index[k]]];
-    const double growth = member.residual.c.dot(d);
-    const double room =
-        max_growth * member.start_depth - member.residual.Depth(x);
-    if (growth > 0 && room < share * growth) {
-      share = std::max(0.0, room / growth);
-    }
+    growth = std::max(growth, member.residual.Depth(x) / member.start_depth);
   }
-  return share;
+  return growth;
 }
 
 }  // namespace krot

@@ -61,10 +61,13 @@ class LocalModel {
   bool AddTangents(const Eigen::Vector3d& x, const Eigen::Vector3d& x_trial,
                    const double* trial_values, double level, Norm norm);
 
-  // The share of the step d, at most 1, that lets no depth of a member that
-  // bears it grow beyond `max_growth` times its start.
-  double DepthShare(const Eigen::Vector3d& x, const Eigen::Vector3d& d,
-                    double max_growth) const;
+  // The share of the step d, at most 1, on which no depth of a member falls
+  // below a tenth of what it is at x.
+  double DepthShare(const Eigen::Vector3d& x, const Eigen::Vector3d& d) const;
+
+  // The largest depth at x, relative to its start, of the members that bear
+  // the last step.
+  double DepthGrowth(const Eigen::Vector3d& x) const;
 
  private:
   struct Member {

@@ -16,9 +16,6 @@ constexpr int kMaxAdded = 8;
 constexpr double kPredictionTolerance = 1e-11;
 // Residuals this small are zero, in pixels.
 constexpr double kZeroPixels = 1e-10;
-// No depth grows beyond this multiple of its start: farther away nothing
-// changes by more than 1e-6 of it.
-constexpr double kMaxDepthGrowth = 1e6;
 // kappa falls by kShrink after a good step and rises by kGrow after a failure.
 // Below kSmallest rounding in the model, about 1e-16 / kappa, would show.
 constexpr double kInitialKappa = 1e-2;
@@ -30,7 +27,14 @@ constexpr double kGrow = 10;
 constexpr double kSufficientShare = 0.1;
 constexpr double kGoodShare = 0.5;
 // So often a failed trial may teach the model before kappa rises.
-constexpr int kMaxLessons = 2;
+constexpr int kMaxLessons = 5;
+
+// Whether the minimiser lies so far away that going on has no point: where
+// depths have grown a millionfold nothing changes by more than 1e-6 of it any
+// more, and long before that little is left to gain.
+bool IsFarAway(double depth_growth, double relative_promise) {
+  return depth_growth > 1e6 || (depth_growth > 1e3 && relative_promise < 1e-8);
+}
 
 }  // namespace
 
@@ -88,11 +92,11 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       ++summary.iterations;
       continue;
     }
-    const double share = model_.DepthShare(*x, step.d, kMaxDepthGrowth);
-    if (!(share > 1e-9)) {
+    if (IsFarAway(model_.DepthGrowth(*x), promise / cost)) {
       summary.termination = DescentTermination::kFarAway;
       break;
     }
+    const double share = model_.DepthShare(*x, step.d);
     ++summary.iterations;
     const Vector3d x_trial = *x + share * step.d;
     const double cost_trial = residuals->Evaluate(x_trial, norm);

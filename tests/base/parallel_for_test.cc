@@ -1,0 +1,72 @@
+#include "krot/base/parallel_for.h"
+
+#include <atomic>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace krot {
+namespace {
+
+TEST(ParallelFor, VisitsEveryItemOnceInFixedChunks) {
+  for (const int threads : {1, 2, 3, 8}) {
+    for (const int64_t count : {1, 9, 10, 11, 1000}) {
+      std::vector<std::atomic<int>> visits(count);
+      ParallelFor(count, 10, threads,
+                  [&](int64_t begin, int64_t end, int worker) {
+                    EXPECT_EQ(begin % 10, 0);
+                    EXPECT_EQ(end, std::min<int64_t>(begin + 10, count));
+                    EXPECT_GE(worker, 0);
+                    EXPECT_LT(worker, threads);
+                    for (int64_t i = begin; i < end; ++i) ++visits[i];
+                  });
+      for (const std::atomic<int>& n : visits) EXPECT_EQ(n, 1);
+    }
+  }
+}
+
+TEST(ParallelFor, DoesNothingForNoItems) {
+  const auto fail = [](int64_t, int64_t, int) { FAIL(); };
+  ParallelFor(0, 10, 2, fail);
+  ParallelFor(-3, 10, 2, fail);
+}
+
+TEST(ParallelFor, RethrowsTheFirstExceptionByChunk) {
+  for (const int threads : {1, 2, 4}) {
+    std::atomic<int> finished{0};
+    try {
+      ParallelFor(100, 10, threads, [&](int64_t begin, int64_t, int) {
+        if (begin == 30 || begin == 70) {
+          throw std::runtime_error(std::to_string(begin));
+        }
+        ++finished;
+      });
+      FAIL() << "no exception";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "30");
+    }
+    EXPECT_EQ(finished, 8);
+  }
+}
+
+TEST(ParallelFor, RefusesChunksWithoutItems) {
+  EXPECT_THROW(ParallelFor(1, 0, 1, [](int64_t, int64_t, int) {}),
+               std::invalid_argument);
+}
+
+TEST(NumChunks, CountsTheLastIncompleteOne) {
+  EXPECT_EQ(NumChunks(0, 10), 0);
+  EXPECT_EQ(NumChunks(10, 10), 1);
+  EXPECT_EQ(NumChunks(11, 10), 2);
+}
+
+TEST(ResolveNumThreads, KeepsPositiveNumbersAndReplacesOthers) {
+  EXPECT_EQ(ResolveNumThreads(3), 3);
+  EXPECT_GE(ResolveNumThreads(-1), 1);
+  EXPECT_GE(ResolveNumThreads(0), 1);
+}
+
+}  // namespace
+}  // namespace krot
