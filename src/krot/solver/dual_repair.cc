@@ -2,22 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-
-#include <Eigen/LU>
-#include <Eigen/QR>
 
 #include "krot/problem/cost.h"
+#include "krot/solver/dual_system.h"
 
 namespace krot {
 namespace {
 
 using Eigen::MatrixXd;
+using Eigen::Vector2d;
 using Eigen::VectorXd;
-using Real = long double;
-using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-using Matrix3r = Eigen::Matrix<Real, 3, 3>;
-using Vector3r = Eigen::Matrix<Real, 3, 1>;
 
 // By how much (2) stays below zero, relative to delta sum lambda w: what the
 // checker may need, and what it costs of the bound.
@@ -28,141 +22,9 @@ constexpr double kBoundMargin = 4e-13;
 constexpr double kNoFreedom = 1e-9;
 constexpr int kNumRefinements = 3;
 constexpr int kSectionSteps = 90;  // 0.618^90 is below double precision
-
-// (1) and (2) for eta_i = y_i / lambda_i, in the unknowns of one component
-// without its first frame:  M eta + delta c = 0,  M = [A_i' lambda_i]_i. Where
-// there are baselines, a last row holds the constants. Row scaled.
-class DualSystem {
- public:
-  DualSystem(const KnownRotationProblem& problem,
-             const std::vector<Multiplier>& multipliers);
-
-  // Whether every right-hand side has a solution.
-  bool Factorize();
-
-  // The eta of least norm with M eta = rhs.
-  VectorXd LeastNormSolution(const VectorXr& rhs) const;
-
-  // M eta, in long double.
-  VectorXr Multiply(const VectorXd& eta) const;
-
-  const VectorXr& c() const { return c_; }
-  // Asks for a left-hand side of (2) that is -delta * margin instead of 0.
-  void SetConstantMargin(double margin) {
-    if (has_constants_) c_[rows_ - 1] += margin;
-  }
-
-  static int64_t NumUnknowns(const KnownRotationProblem& problem) {
-    return 3 * (int64_t{problem.num_points} + problem.num_frames - 1);
-  }
-
- private:
-  // E of one observation, and where its unknowns begin.
-  struct Block {
-    Eigen::Matrix<Real, 3, 3> point, frame;  // rows: lambda (A; c)
-    Vector3r constants;                      // lambda (b; d)
-    int64_t point_row, frame_row;            // frame_row -1: omitted
-  };
-
-  template <typename Visit>
-  void ForRows(const Block& block, const Visit& visit) const {
-    for (int c = 0; c < 3; ++c) {
-      visit(block.point_row + c, Vector3r(block.point.col(c)));
-      if (block.frame_row >= 0) {
-        visit(block.frame_row + c, Vector3r(block.frame.col(c)));
-      }
-    }
-    if (has_constants_) visit(rows_ - 1, block.constants);
-  }
-
-  std::vector<Block> blocks_;
-  bool has_constants_ = false;
-  int64_t rows_ = 0;
-  VectorXr c_;
-  VectorXd scale_;                     // of rows
-  Eigen::HouseholderQR<MatrixXd> qr_;  // of M'
-};
-
-DualSystem::DualSystem(const KnownRotationProblem& problem,
-                       const std::vector<Multiplier>& multipliers) {
-  std::vector<const View*> first_view(problem.num_frames, nullptr);
-  for (size_t i = 0; i < problem.observations.size(); ++i) {
-    const Observation& observation = problem.observations[i];
-    const View& view = problem.views[observation.view];
-    const View*& first = first_view[view.frame];
-    if (first == nullptr) first = &view;
-    Matrix3r E;
-    E << observation.J.cast<Real>(),
-        -observation.J.cast<Real>() * observation.u.cast<Real>(), 0, 0, 1;
-    E *= multipliers[i].lambda;
-    Block block;
-    block.point = E * view.cam_from_world_rotation.cast<Real>();
-    block.frame = E * view.cam_from_rig_rotation.cast<Real>();
-    // From the projection centre of the frame's first view.
-    block.constants.setZero();
-    if (first != &view) {
-      block.constants =
-          E * view.cam_from_rig_translation.cast<Real>() -
-          block.frame *
-              (Matrix3r(first->cam_from_rig_rotation.cast<Real>()).inverse() *
-               first->cam_from_rig_translation.cast<Real>());
-      has_constants_ |= !block.constants.isZero(0);
-    }
-    block.point_row = 3 * int64_t{observation.point};
-    block.frame_row = view.frame == 0
-                          ? -1
-                          : 3 * (int64_t{problem.num_points} + view.frame - 1);
-    blocks_.push_back(block);
-  }
-  rows_ = NumUnknowns(problem) + has_constants_;
-  c_ = VectorXr::Zero(rows_);
-  for (const Block& block : blocks_) {
-    ForRows(block,
-            [&](int64_t row, const Vector3r& entry) { c_[row] += entry[2]; });
-  }
-}
-
-bool DualSystem::Factorize() {
-  const int64_t columns = 2 * static_cast<int64_t>(blocks_.size());
-  if (rows_ > columns) return false;
-  MatrixXd transposed = MatrixXd::Zero(columns, rows_);
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    ForRows(blocks_[i], [&](int64_t row, const Vector3r& entry) {
-      transposed.block<2, 1>(2 * static_cast<int64_t>(i), row) =
-          entry.head<2>().cast<double>();
-    });
-  }
-  scale_ = transposed.colwise().norm().cwiseInverse();
-  if (!scale_.allFinite()) return false;
-  transposed *= scale_.asDiagonal();
-  qr_.compute(transposed);
-  const VectorXd diagonal = qr_.matrixQR().diagonal().cwiseAbs();
-  return diagonal.minCoeff() >
-         std::numeric_limits<double>::epsilon() * diagonal.maxCoeff();
-}
-
-VectorXd DualSystem::LeastNormSolution(const VectorXr& rhs) const {
-  VectorXd padded = VectorXd::Zero(qr_.rows());
-  padded.head(rows_) =
-      qr_.matrixQR()
-          .topRows(rows_)
-          .triangularView<Eigen::Upper>()
-          .transpose()
-          .solve(VectorXd(rhs.cast<double>().cwiseProduct(scale_)));
-  return qr_.householderQ() * padded;
-}
-
-VectorXr DualSystem::Multiply(const VectorXd& eta) const {
-  VectorXr product = VectorXr::Zero(rows_);
-  for (size_t i = 0; i < blocks_.size(); ++i) {
-    const auto eta_i =
-        eta.segment<2>(2 * static_cast<int64_t>(i)).cast<Real>().eval();
-    ForRows(blocks_[i], [&](int64_t row, const Vector3r& entry) {
-      product[row] += entry.head<2>().dot(eta_i);
-    });
-  }
-  return product;
-}
+constexpr int kNumPolishes = 3;
+// Lengthening eta_i costs the bound in first order, turning it in second.
+constexpr double kLengthWeight = 1e3;
 
 double DualNorm(const Eigen::Vector2d& y, Norm norm) {
   if (norm.p == 1) return y.cwiseAbs().maxCoeff();
@@ -204,35 +66,46 @@ double MinimizeConvex(const Function& function, double high) {
   return at_left <= at_right ? left : right;
 }
 
-}  // namespace
+// eta_i = y_i / lambda_i, the lambda_i, and the delta that they suggest.
+struct Dual {
+  std::vector<double> lambda;
+  VectorXd eta;
+  double delta = 0;
+  double weighted_depth = 0;  // sum lambda w
+};
 
-std::optional<Certificate> RepairMultipliers(
-    const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
-    const std::vector<Multiplier>& multipliers, int max_unknowns) {
-  const int64_t count = static_cast<int64_t>(multipliers.size());
-  if (count == 0 || DualSystem::NumUnknowns(problem) > max_unknowns) {
-    return std::nullopt;
+Dual MakeDual(const KnownRotationProblem& problem, const Estimate& estimate,
+              const std::vector<Multiplier>& multipliers) {
+  Dual dual;
+  dual.eta.resize(2 * static_cast<int64_t>(multipliers.size()));
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    const Multiplier& multiplier = multipliers[i];
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], estimate);
+    dual.lambda.push_back(multiplier.lambda);
+    dual.eta.segment<2>(2 * static_cast<int64_t>(i)) =
+        multiplier.y / multiplier.lambda;
+    dual.weighted_depth += multiplier.lambda * viewed.depth;
+    dual.delta -= multiplier.y.dot(viewed.v);
   }
-  DualSystem system(problem, multipliers);
-  double weighted_depth = 0;
-  for (int64_t i = 0; i < count; ++i) {
-    weighted_depth +=
-        multipliers[i].lambda *
-        ViewPoint(problem, problem.observations[i], estimate).depth;
-  }
-  system.SetConstantMargin(kConstantMargin * weighted_depth);
-  if (!system.Factorize()) return std::nullopt;
+  dual.delta /= dual.weighted_depth;  // (1) times the estimate
+  return dual;
+}
 
-  // With y0 the given multipliers, eta(theta) = theta p + q satisfies
-  // M eta = -c for every theta, p being y0 / lambda without its part in the
-  // row space of M. It proves the bound 1 / max |eta_i|_dual, of which the
-  // inverse is convex in theta = 1 / delta.
-  VectorXd y0(2 * count);
-  for (int64_t i = 0; i < count; ++i) {
-    y0.segment<2>(2 * i) = multipliers[i].y / multipliers[i].lambda;
-  }
-  const VectorXd p = y0 - system.LeastNormSolution(system.Multiply(y0));
-  const VectorXd q = system.LeastNormSolution(-system.c());
+// The best dual with these lambda.
+struct Repaired {
+  double bound = 0;  // 0: none
+  VectorXd eta;      // of length 1 at most; M eta + bound c = 0
+};
+
+Repaired RepairEta(const DualSystem& system, const VectorXd& eta0, Norm norm) {
+  LeastNormSolver solver;
+  if (!solver.Factorize(system.TransposedColumns())) return {};
+  // eta(theta) = theta p + q satisfies M eta = -c for every theta, p being
+  // eta0 without its part in the row space of M. It proves the bound
+  // 1 / max |eta_i|_dual, whose inverse is convex in theta = 1 / delta.
+  const VectorXd p = eta0 - solver.Solve(system.Multiply(eta0));
+  const VectorXd q = solver.Solve(-system.c());
   const auto inverse_bound = [&](double theta) {
     return LargestDualNorm(theta * p + q, norm);
   };
@@ -242,24 +115,88 @@ std::optional<Certificate> RepairMultipliers(
       longest_p > kNoFreedom
           ? MinimizeConvex(inverse_bound, 2 * inverse_bound(0) / longest_p)
           : 0;
-  VectorXd eta = theta * p + q;
-  const double inverse = LargestDualNorm(eta, norm);
-  if (!(inverse > 0) || !std::isfinite(inverse)) return std::nullopt;
-  const double delta = (1 - kBoundMargin) / inverse;
-  eta *= delta;
-  const VectorXr target = -Real{delta} * system.c();
-  for (int n = 0; n < kNumRefinements; ++n) {
-    eta += system.LeastNormSolution(target - system.Multiply(eta));
-  }
 
-  Certificate certificate;
-  certificate.lower_bound = delta;
+  Repaired repaired;
+  repaired.eta = theta * p + q;
+  repaired.bound = 1;
+  for (int n = 0; n < kNumRefinements; ++n) {
+    const double longest = LargestDualNorm(repaired.eta, norm);
+    if (!(longest > 0) || !std::isfinite(longest)) return {};
+    const double shrink = (1 - kBoundMargin) / longest;
+    repaired.bound *= shrink;
+    repaired.eta *= shrink;
+    repaired.eta +=
+        solver.Solve(-DualSystem::Real{repaired.bound} * system.c() -
+                     system.Multiply(repaired.eta));
+  }
+  return repaired;
+}
+
+// One Gauss-Newton step on (1) and (2) in eta and log lambda at a fixed delta,
+// in which eta_i turns and lambda_i changes rather than eta_i grows. False if
+// it leaves lambda > 0.
+bool Polish(const DualSystem& system, Dual* dual) {
+  const int64_t count = static_cast<int64_t>(dual->lambda.size());
+  MatrixXd transposed(3 * count, system.num_rows());
+  transposed.topRows(2 * count) = system.TransposedColumns();
+  transposed.bottomRows(count) =
+      system.TransposedScalings(dual->eta, dual->delta);
+  // Turn the columns of eta_i to (along it, across it).
+  std::vector<Eigen::Matrix2d> axes(count);
   for (int64_t i = 0; i < count; ++i) {
-    const double lambda = multipliers[i].lambda;
+    const Vector2d along =
+        dual->eta.segment<2>(2 * i).normalized() / kLengthWeight;
+    axes[i].row(0) = along;
+    axes[i].row(1) = kLengthWeight * Vector2d(-along[1], along[0]);
+    transposed.middleRows<2>(2 * i) =
+        axes[i] * transposed.middleRows<2>(2 * i).eval();
+  }
+  LeastNormSolver solver;
+  if (!solver.Factorize(std::move(transposed))) return false;
+  const VectorXd step = solver.Solve(
+      -DualSystem::Real{dual->delta} * system.c() - system.Multiply(dual->eta));
+  for (int64_t i = 0; i < count; ++i) {
+    const double growth = step[2 * count + i];
+    if (!(std::abs(growth) < 0.5)) return false;
+    dual->lambda[i] *= 1 + growth;
+    dual->eta.segment<2>(2 * i) +=
+        axes[i].transpose() * step.segment<2>(2 * i) / (1 + growth);
+  }
+  return true;
+}
+
+Certificate MakeCertificate(const Dual& dual, const Repaired& repaired) {
+  Certificate certificate;
+  certificate.lower_bound = repaired.bound;
+  for (size_t i = 0; i < dual.lambda.size(); ++i) {
     certificate.observations.push_back(
-        {i, lambda, lambda * eta.segment<2>(2 * i)});
+        {static_cast<int64_t>(i), dual.lambda[i],
+         dual.lambda[i] *
+             repaired.eta.segment<2>(2 * static_cast<int64_t>(i))});
   }
   return certificate;
+}
+
+}  // namespace
+
+std::optional<Certificate> RepairMultipliers(
+    const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
+    const std::vector<Multiplier>& multipliers, int max_unknowns) {
+  if (multipliers.empty() || DualSystem::NumRows(problem) > max_unknowns) {
+    return std::nullopt;
+  }
+  Dual dual = MakeDual(problem, estimate, multipliers);
+  std::optional<Certificate> best;
+  for (int n = 0; n <= kNumPolishes; ++n) {
+    DualSystem system(problem, dual.lambda);
+    system.SetConstantMargin(kConstantMargin * dual.weighted_depth);
+    const Repaired repaired = RepairEta(system, dual.eta, norm);
+    if (repaired.bound > (best ? best->lower_bound : 0)) {
+      best = MakeCertificate(dual, repaired);
+    }
+    if (!Polish(system, &dual)) break;
+  }
+  return best;
 }
 
 }  // namespace krot
