@@ -11,7 +11,7 @@ enum ExitCode {
   kExitOptions = 1,
   kExitModel = 2,
   kExitNothingToSolve = 3,
-  // 4: a certificate was refused; no command of this version checks one.
+  kExitCertificateRefused = 4,
   kExitNotWritten = 5,
   kExitInternal = 6,
   kExitInterrupted = 130,

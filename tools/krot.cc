@@ -30,6 +30,8 @@ constexpr Command kCommands[] = {
      &RunPointTriangulator},
     {"model_analyzer", "show what a model's errors look like",
      &RunModelAnalyzer},
+    {"certificate_checker", "re-check the proof of a lower bound",
+     &RunCertificateChecker},
     {"model_synthesizer", "make a model with ground truth",
      &RunModelSynthesizer},
     {"help", "print this text, or that of a command", &RunHelp},
@@ -52,7 +54,7 @@ constexpr char kHelpTail[] =
     "    1  the options are wrong\n"
     "    2  the model cannot be read or is inconsistent\n"
     "    3  nothing to solve\n"
-    "    4  a certificate was refused (reserved)\n"
+    "    4  a certificate was refused\n"
     "    5  the output cannot be written\n"
     "    6  out of memory, or an error in KROT itself\n"
     "  130  interrupted by SIGINT or SIGTERM\n";

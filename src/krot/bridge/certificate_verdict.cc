@@ -1,0 +1,130 @@
+#include "krot/bridge/certificate_verdict.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "krot/bridge/model_digest.h"
+#include "krot/problem/cost.h"
+
+namespace krot {
+namespace {
+
+// How far u and J of another implementation may be from ours, relative.
+constexpr double kRayTolerance = 1e-9;
+
+std::string NameOf(const CertificateFile::SupportObservation& o) {
+  return "observation " + std::to_string(o.point2D_idx) + " of image " +
+         std::to_string(o.image_id);
+}
+
+// Also false for NaN.
+bool IsSameRay(const CertificateFile::SupportObservation& o,
+               const Observation& own) {
+  return (o.u - own.u).norm() <= kRayTolerance * own.u.homogeneous().norm() &&
+         (o.J - own.J).norm() <= kRayTolerance * own.J.norm();
+}
+
+// The certificate in terms of the problem, into which the file's u and J go.
+struct Translation {
+  std::string refusal;
+  Certificate certificate;
+};
+
+Translation Translate(const Model& model, const CertificateFile& file,
+                      BuiltProblem* built) {
+  using Key = std::pair<ImageId, uint32_t>;
+  std::map<Key, const CertificateFile::SupportObservation*> by_key;
+  Translation translation;
+  for (const CertificateFile::SupportObservation& o : file.observations) {
+    if (!by_key.emplace(Key(o.image_id, o.point2D_idx), &o).second) {
+      translation.refusal = NameOf(o) + " stands there twice";
+      return translation;
+    }
+  }
+  translation.certificate.lower_bound = file.lower_bound;
+  translation.certificate.defect = file.defect;
+  KnownRotationProblem& problem = built->problem;
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    Observation& own = problem.observations[i];
+    const auto found =
+        by_key.find({model.images[built->image_of[own.view]].id,
+                     static_cast<uint32_t>(built->point2D_of[i])});
+    if (found == by_key.end()) continue;
+    const CertificateFile::SupportObservation& o = *found->second;
+    by_key.erase(found);
+    if (o.point3D_id != model.points3D[built->point_of[own.point]].id) {
+      translation.refusal = NameOf(o) + " is not of point " +
+                            std::to_string(o.point3D_id) + " in the model";
+    } else if (!IsSameRay(o, own)) {
+      translation.refusal = "u or J of " + NameOf(o) + " is not the model's";
+    }
+    if (!translation.refusal.empty()) return translation;
+    own.u = o.u;
+    own.J = o.J;
+    translation.certificate.observations.push_back(
+        {static_cast<int64_t>(i), o.lambda, o.y});
+  }
+  if (!by_key.empty()) {
+    translation.refusal = NameOf(*by_key.begin()->second) +
+                          " is not among those that can be used";
+  }
+  return translation;
+}
+
+std::vector<CertificateVerdict::SupportObservation> ListSupport(
+    const Model& model, const BuiltProblem& built, Norm norm,
+    const Certificate& certificate) {
+  double sum = 0;
+  for (const CertifiedObservation& o : certificate.observations) {
+    sum += o.lambda;
+  }
+  std::vector<CertificateVerdict::SupportObservation> support;
+  for (const CertifiedObservation& o : certificate.observations) {
+    const Observation& observation = built.problem.observations[o.observation];
+    const Image& image = model.images[built.image_of[observation.view]];
+    support.push_back(
+        {image.id, image.name,
+         static_cast<uint32_t>(built.point2D_of[o.observation]),
+         model.points3D[built.point_of[observation.point]].id, o.lambda / sum,
+         ResidualOf(ViewPoint(built.problem, observation, built.start), norm)});
+  }
+  std::stable_sort(
+      support.begin(), support.end(),
+      [](const auto& a, const auto& b) { return a.error_px > b.error_px; });
+  return support;
+}
+
+}  // namespace
+
+CertificateVerdict VerifyCertificateFile(const Model& model,
+                                         const CertificateFile& file) {
+  CertificateVerdict verdict;
+  if (file.model_sha256 != ModelSha256(model)) {
+    verdict.refusal =
+        "it belongs to another model: cameras, rotations or observations "
+        "differ";
+    return verdict;
+  }
+  BuiltProblem built = BuildProblem(model, {});
+  const Translation translation = Translate(model, file, &built);
+  verdict.refusal = translation.refusal;
+  if (!verdict.refusal.empty()) return verdict;
+
+  const CertificateCheck check =
+      CheckCertificate(built.problem, file.norm, translation.certificate);
+  verdict.refusal = check.refusal;
+  if (!check.is_accepted) return verdict;
+
+  verdict.is_accepted = true;
+  verdict.lower_bound = check.proved_bound;
+  verdict.defect = check.defect;
+  verdict.cost = Cost(built.problem, built.start, file.norm, -1);
+  verdict.relative_gap = (verdict.cost - verdict.lower_bound) / verdict.cost;
+  verdict.support =
+      ListSupport(model, built, file.norm, translation.certificate);
+  return verdict;
+}
+
+}  // namespace krot

@@ -1,0 +1,178 @@
+#include "krot/bridge/model_digest.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <numeric>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include <openssl/evp.h>
+
+namespace krot {
+namespace {
+
+// Collects little-endian bytes and digests them in pieces.
+class Digest {
+ public:
+  Digest() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+    if (!context_ ||
+        EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1) {
+      throw std::bad_alloc();
+    }
+  }
+
+  void Integer(uint64_t value) {
+    std::array<unsigned char, 8> bytes;
+    for (unsigned char& byte : bytes) {
+      byte = static_cast<unsigned char>(value & 0xff);
+      value >>= 8;
+    }
+    Append(bytes);
+  }
+
+  void Number(double value) {
+    uint64_t bits;
+    std::memcpy(&bits, &value, sizeof(bits));
+    Integer(bits);
+  }
+
+  std::string Hex() {
+    Flush();
+    std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
+    unsigned int size = 0;
+    EVP_DigestFinal_ex(context_.get(), digest.data(), &size);
+    std::string hex;
+    for (unsigned int n = 0; n < size; ++n) {
+      hex += "0123456789abcdef"[digest[n] >> 4];
+      hex += "0123456789abcdef"[digest[n] & 15];
+    }
+    return hex;
+  }
+
+ private:
+  static constexpr size_t kPiece = 1 << 16;
+
+  void Append(const std::array<unsigned char, 8>& bytes) {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+    if (buffer_.size() >= kPiece) Flush();
+  }
+
+  void Flush() {
+    EVP_DigestUpdate(context_.get(), buffer_.data(), buffer_.size());
+    buffer_.clear();
+  }
+
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+  std::vector<unsigned char> buffer_;
+};
+
+// Indices in the order of their ids.
+template <typename Record>
+std::vector<size_t> OrderById(const std::vector<Record>& records) {
+  std::vector<size_t> order(records.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](size_t a, size_t b) { return records[a].id < records[b].id; });
+  return order;
+}
+
+// How an image's camera sits: in which frame, how that is turned, where in it.
+struct Place {
+  uint64_t frame_id = 0;
+  std::array<double, 4> rig_from_world = {1, 0, 0, 0};
+  Pose cam_from_rig;
+};
+
+std::optional<Pose> CamFromRig(const Rig& rig, const SensorId& sensor_id) {
+  const auto is_same = [&](const SensorId& other) {
+    return other.type == sensor_id.type && other.id == sensor_id.id;
+  };
+  if (rig.ref_sensor_id && is_same(*rig.ref_sensor_id)) return Pose();
+  for (const RigSensor& sensor : rig.sensors) {
+    if (is_same(sensor.sensor_id)) return sensor.sensor_from_rig;
+  }
+  return std::nullopt;
+}
+
+// By image id; images without a place are absent.
+std::unordered_map<ImageId, Place> Places(const Model& model) {
+  std::unordered_map<ImageId, Place> places;
+  if (!model.has_rigs) {
+    for (const Image& image : model.images) {
+      places[image.id] = {image.id, image.cam_from_world.quaternion_wxyz, {}};
+    }
+    return places;
+  }
+  std::unordered_map<RigId, const Rig*> rigs;
+  for (const Rig& rig : model.rigs) rigs[rig.id] = &rig;
+  for (const Frame& frame : model.frames) {
+    for (const FrameData& data : frame.data) {
+      if (data.sensor_id.type != kSensorTypeCamera) continue;
+      const std::optional<Pose> cam_from_rig =
+          CamFromRig(*rigs.at(frame.rig_id), data.sensor_id);
+      if (!cam_from_rig) continue;
+      places[static_cast<ImageId>(data.data_id)] = {
+          frame.id, frame.rig_from_world.quaternion_wxyz, *cam_from_rig};
+    }
+  }
+  return places;
+}
+
+void AddCamera(const Camera& camera, Digest* digest) {
+  digest->Integer(camera.id);
+  digest->Integer(static_cast<uint64_t>(camera.model_id));
+  digest->Integer(camera.params.size());
+  for (const double param : camera.params) digest->Number(param);
+}
+
+void AddImage(const Image& image, const Place* place, Digest* digest) {
+  digest->Integer(image.id);
+  digest->Integer(image.camera_id);
+  digest->Integer(place != nullptr);
+  if (place != nullptr) {
+    digest->Integer(place->frame_id);
+    for (const double q : place->rig_from_world) digest->Number(q);
+    for (const double q : place->cam_from_rig.quaternion_wxyz) {
+      digest->Number(q);
+    }
+    for (const double t : place->cam_from_rig.translation) digest->Number(t);
+  }
+  const auto is_observation = [](const Point2D& point2D) {
+    return point2D.point3D_id != kInvalidPoint3DId;
+  };
+  digest->Integer(static_cast<uint64_t>(std::count_if(
+      image.points2D.begin(), image.points2D.end(), is_observation)));
+  for (size_t n = 0; n < image.points2D.size(); ++n) {
+    const Point2D& point2D = image.points2D[n];
+    if (!is_observation(point2D)) continue;
+    digest->Integer(n);
+    digest->Number(point2D.x);
+    digest->Number(point2D.y);
+    digest->Integer(point2D.point3D_id);
+  }
+}
+
+}  // namespace
+
+std::string ModelSha256(const Model& model) {
+  Digest digest;
+  digest.Integer(model.cameras.size());
+  for (const size_t n : OrderById(model.cameras)) {
+    AddCamera(model.cameras[n], &digest);
+  }
+  const std::unordered_map<ImageId, Place> places = Places(model);
+  digest.Integer(model.images.size());
+  for (const size_t n : OrderById(model.images)) {
+    const auto place = places.find(model.images[n].id);
+    AddImage(model.images[n], place == places.end() ? nullptr : &place->second,
+             &digest);
+  }
+  return digest.Hex();
+}
+
+}  // namespace krot
