@@ -11,13 +11,13 @@
 namespace krot {
 namespace {
 
-// A solve that would take far longer than the test.
+// A solve of some 30 sweeps and 5 seconds; the signal comes after the first.
 class Interrupt : public ::testing::Test {
  protected:
   Interrupt() {
     SceneOptions options = SmallScene();
-    options.num_frames = 10;
-    options.num_points = 300;
+    options.num_frames = 30;
+    options.num_points = 8000;
     Save(SynthesizeScene(options).model, folder_ / "model");
     before_ = Load(folder_ / "model");
   }
