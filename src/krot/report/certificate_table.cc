@@ -1,6 +1,7 @@
 #include "krot/report/certificate_table.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "krot/report/text_table.h"
@@ -19,7 +20,9 @@ std::string Scientific(double value) {
 std::string CertificateTable(const CertificateVerdict& verdict,
                              int max_observations) {
   TextTable bounds;
-  bounds.AddRow({"lower bound", FormatNumber(verdict.lower_bound, 6)});
+  // Downwards: more than this is not claimed.
+  bounds.AddRow({"lower bound",
+                 FormatNumber(std::floor(verdict.lower_bound * 1e6) / 1e6, 6)});
   bounds.AddRow({"this model", FormatNumber(verdict.cost, 6)});
   bounds.AddRow({"relative gap", Scientific(verdict.relative_gap)});
 

@@ -15,10 +15,21 @@ constexpr double kThresholds[] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
 // Of the sub-problems.
 constexpr double kSmallestGap = 1e-9;
 constexpr int kMaxIterations = 100;
+constexpr double kEqualBounds = 1e-9;  // relative
 constexpr int kMaxReductions = 4;
-// The defect that a certificate states, over the one that was found here:
-// another machine's arithmetic may find a little more.
-constexpr double kDefectAllowance = 2;
+// The defect that a certificate states allows for another machine's
+// arithmetic, which may find a little more than was found here.
+constexpr double kDefectFactor = 2;
+constexpr double kSmallestDefect = 1e-12;
+
+// Equal bounds are told by the smaller support.
+bool IsBetter(const Certificate& a, const Certificate& b) {
+  const double margin = kEqualBounds * b.lower_bound;
+  if (a.observations.size() < b.observations.size()) {
+    return a.lower_bound > b.lower_bound - margin;
+  }
+  return a.lower_bound > b.lower_bound + margin;
+}
 
 class Maker {
  public:
@@ -89,7 +100,7 @@ void Maker::Offer(const RestrictedProblem& part, const Estimate& estimate,
                   const std::vector<Multiplier>& multipliers) {
   std::optional<Certificate> certificate = RepairMultipliers(
       part.problem, norm_, estimate, multipliers, options_.max_unknowns);
-  if (!certificate || certificate->lower_bound <= best_.lower_bound) return;
+  if (!certificate || !IsBetter(*certificate, best_)) return;
   for (CertifiedObservation& o : certificate->observations) {
     o.observation = part.observation_of[o.observation];
   }
@@ -97,7 +108,8 @@ void Maker::Offer(const RestrictedProblem& part, const Estimate& estimate,
   const CertificateCheck check =
       CheckCertificate(problem_, norm_, *certificate);
   if (!check.is_accepted) return;
-  certificate->defect = std::min(kMaxDefect, kDefectAllowance * check.defect);
+  certificate->defect =
+      std::clamp(kDefectFactor * check.defect, kSmallestDefect, kMaxDefect);
   best_ = std::move(*certificate);
 }
 
