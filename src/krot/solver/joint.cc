@@ -9,6 +9,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/restrict.h"
+#include "krot/solver/unit_depth.h"
 
 namespace krot {
 namespace {
@@ -18,6 +19,16 @@ namespace {
 constexpr double kGapBetweenCertificates = 0.3;
 // Where rounding ends the interior point anyway.
 constexpr double kSmallestGap = 1e-10;
+// Iterations that the interior point is given from one start. Most models
+// take 10 to 50; a start whose points hug the boundary of the cones can hold
+// it back for hundreds.
+constexpr int kIterationsPerStart = 80;
+// A fresh start is looked for at this share of the cost, and again from there
+// as long as there is one.
+constexpr double kRestartShare = 0.25;
+constexpr int kMaxRestarts = 4;
+// The feasibility programme has failed once its gap is this small.
+constexpr double kHopelessGap = 1e-2;
 
 void CheckOptions(const JointOptions& options) {
   CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
@@ -26,17 +37,6 @@ void CheckOptions(const JointOptions& options) {
                 "> 0");
   CheckArgument(options.max_iterations >= 1, "max_iterations",
                 options.max_iterations, ">= 1");
-}
-
-JointTermination FromInteriorPoint(InteriorPointTermination termination) {
-  switch (termination) {
-    case InteriorPointTermination::kMaxIterations:
-      return JointTermination::kMaxIterations;
-    case InteriorPointTermination::kInterrupted:
-      return JointTermination::kInterrupted;
-    default:
-      return JointTermination::kStalled;
-  }
 }
 
 // A connected component on its way to its certified optimum.
@@ -60,6 +60,9 @@ class ComponentSolve {
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
+  InteriorPointTermination RunFromEstimate(
+      const std::function<void(double gap)>& report);
+  bool FindFreshStart(double bound);
   void TryCertificate(const ConicIterate& iterate);
 
   const KnownRotationProblem& problem_;
@@ -68,6 +71,7 @@ class ComponentSolve {
   double cost_ = 0;
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
+  int iterations_ = 0;
 };
 
 void ComponentSolve::TryCertificate(const ConicIterate& iterate) {
@@ -87,17 +91,18 @@ void ComponentSolve::TryCertificate(const ConicIterate& iterate) {
   }
 }
 
-JointTermination ComponentSolve::Run(
+InteriorPointTermination ComponentSolve::RunFromEstimate(
     const std::function<void(double gap)>& report) {
-  if (!(cost_ > 0)) return JointTermination::kGapReached;
   InteriorPointOptions options;
   options.norm = options_.norm;
-  options.max_iterations = options_.max_iterations;
+  options.max_iterations =
+      std::min(kIterationsPerStart, options_.max_iterations - iterations_);
   options.smallest_gap = std::min(kSmallestGap, options_.relative_gap);
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
   double next_gap = options_.relative_gap;
   options.stop = [&](const ConicIterate& iterate) {
+    ++iterations_;
     if (iterate.cost < cost_) {
       cost_ = iterate.cost;
       estimate_ = *iterate.estimate;
@@ -111,10 +116,53 @@ JointTermination ComponentSolve::Run(
   };
   std::vector<Multiplier> multipliers;
   Estimate last = estimate_;
-  const InteriorPointSummary summary =
-      MinimizeJointly(problem_, options, &last, &multipliers);
-  if (IsGapReached()) return JointTermination::kGapReached;
-  return FromInteriorPoint(summary.termination);
+  return MinimizeJointly(problem_, options, &last, &multipliers).termination;
+}
+
+// A feasible estimate below `bound`, far from the boundary of the cones: the
+// feasibility programme starts from the perfectly centred origin.
+bool ComponentSolve::FindFreshStart(double bound) {
+  InteriorPointOptions options;
+  options.norm = options_.norm;
+  options.max_iterations =
+      std::min(kIterationsPerStart, options_.max_iterations - iterations_);
+  options.num_threads = options_.num_threads;
+  options.cancel = options_.cancel;
+  options.stop = [&](const ConicIterate& iterate) {
+    ++iterations_;
+    return iterate.gamma > 1 && iterate.gap < kHopelessGap;
+  };
+  std::vector<Multiplier> multipliers;
+  Estimate fresh;
+  if (FindFeasible(problem_, options, bound, UnitDepth(problem_), &fresh,
+                   &multipliers)
+          .termination != InteriorPointTermination::kFeasible) {
+    return false;
+  }
+  estimate_ = std::move(fresh);
+  cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
+  return true;
+}
+
+JointTermination ComponentSolve::Run(
+    const std::function<void(double gap)>& report) {
+  if (!(cost_ > 0)) return JointTermination::kGapReached;
+  for (int restart = 0; restart <= kMaxRestarts; ++restart) {
+    const InteriorPointTermination termination = RunFromEstimate(report);
+    if (IsGapReached()) return JointTermination::kGapReached;
+    if (termination == InteriorPointTermination::kInterrupted) {
+      return JointTermination::kInterrupted;
+    }
+    // Nearer to the cost on every restart: 1/4, 1/2, 0.71, ... of it.
+    const double share = std::pow(kRestartShare, std::pow(0.5, restart));
+    while (iterations_ < options_.max_iterations &&
+           share * cost_ > lower_bound_ && FindFreshStart(share * cost_)) {
+    }
+    if (iterations_ >= options_.max_iterations) {
+      return JointTermination::kMaxIterations;
+    }
+  }
+  return JointTermination::kStalled;
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ struct JointIteration {
 struct JointOptions {
   Norm norm;                   // p = 1, 2 or infinity
   double relative_gap = 1e-4;  // (cost - lower_bound) / cost; > 0
-  int max_iterations = 200;    // per component; >= 1
+  int max_iterations = 300;    // per component; >= 1
   int num_threads = -1;
   const CancelFlag* cancel = nullptr;  // may be null
   // After every iteration, counted from 1 over all components; may be empty.
