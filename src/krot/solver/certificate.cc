@@ -11,11 +11,11 @@
 namespace krot {
 namespace {
 
-constexpr double kThresholds[] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
+constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
 // Of the sub-problems.
 constexpr double kSmallestGap = 1e-9;
 constexpr int kMaxIterations = 100;
-constexpr double kEqualBounds = 1e-9;  // relative
+constexpr double kEqualBounds = 1e-7;  // relative
 constexpr int kMaxReductions = 4;
 // The defect that a certificate states allows for another machine's
 // arithmetic, which may find a little more than was found here.

@@ -5,11 +5,10 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/restrict.h"
+#include "krot/solver/feasible_start.h"
 #include "krot/solver/joint.h"
-#include "krot/solver/unit_depth.h"
 
 namespace krot {
 namespace {
@@ -18,21 +17,16 @@ namespace {
 // bound, and again, and its cost lowered to the optimum.
 constexpr double kBoundGrowth = 10;
 constexpr double kLargestBound = 1e7;  // pixels
+// When lowering a start that already meets the bound is given up.
+constexpr double kHopelessGap = 1e-2;
 
-InteriorPointTermination FindBelow(const KnownRotationProblem& problem,
-                                   const InitializerOptions& options,
-                                   double bound, Estimate* estimate,
-                                   int* iterations) {
-  InteriorPointOptions conic;
-  conic.norm = options.norm;
-  conic.max_iterations = options.max_iterations;
-  conic.num_threads = options.num_threads;
-  conic.cancel = options.cancel;
-  std::vector<Multiplier> multipliers;
-  const InteriorPointSummary summary = FindFeasible(
-      problem, conic, bound, UnitDepth(problem), estimate, &multipliers);
-  *iterations += summary.iterations;
-  return summary.termination;
+FeasibleStartOptions StartOptions(const InitializerOptions& options) {
+  FeasibleStartOptions start;
+  start.norm = options.norm;
+  start.max_iterations = options.max_iterations;
+  start.num_threads = options.num_threads;
+  start.cancel = options.cancel;
+  return start;
 }
 
 // Scales the estimate to a median depth of one.
@@ -64,8 +58,9 @@ InitializerTermination ProveInfeasible(const RestrictedProblem& part,
   Estimate estimate;
   for (double bound = kBoundGrowth * options.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
-    const InteriorPointTermination found = FindBelow(
-        part.problem, options, bound, &estimate, &summary->iterations);
+    const InteriorPointTermination found =
+        FindEstimateBelow(part.problem, bound, StartOptions(options), &estimate,
+                          &summary->iterations);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
@@ -107,8 +102,9 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
        SplitIntoComponents(problem, all)) {
     const RestrictedProblem part = RestrictProblem(problem, observations);
     Estimate start;
-    const InteriorPointTermination termination = FindBelow(
-        part.problem, options, options.max_error, &start, &summary.iterations);
+    const InteriorPointTermination termination =
+        FindEstimateBelow(part.problem, options.max_error,
+                          StartOptions(options), &start, &summary.iterations);
     if (termination == InteriorPointTermination::kInterrupted) {
       summary.termination = InitializerTermination::kInterrupted;
       return summary;
@@ -117,6 +113,9 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
       summary.termination = ProveInfeasible(part, options, &summary);
       return summary;
     }
+    FeasibleStartOptions lower = StartOptions(options);
+    lower.hopeless_gap = kHopelessGap;
+    LowerByFeasibility(part.problem, lower, &start, &summary.iterations);
     if (!HasBaseline(part.problem)) NormalizeScale(part.problem, &start);
     ReplaceEstimate(part, start, &found);
   }

@@ -38,11 +38,11 @@ struct InitializerSummary {
   double lower_bound = 0;  // pixels, what it proves
 };
 
-// Finds an estimate whose residuals are all below max_error, each connected
-// component for itself; `*estimate` is only written if there is one, its
-// points and frames without observations not even then. Where baselines do not
-// set the scale, components come out with a median depth of one. Throws
-// std::invalid_argument for options out of range.
+// Finds an estimate whose residuals are all below max_error, and as far below
+// as comes easily, each connected component for itself; `*estimate` is only
+// written if there is one, its points and frames without observations not even
+// then. Where baselines do not set the scale, components come out with a median
+// depth of one. Throws std::invalid_argument for options out of range.
 InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
                              Estimate* estimate);

@@ -9,7 +9,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/restrict.h"
-#include "krot/solver/unit_depth.h"
+#include "krot/solver/feasible_start.h"
 
 namespace krot {
 namespace {
@@ -19,15 +19,14 @@ namespace {
 constexpr double kGapBetweenCertificates = 0.3;
 // Where rounding ends the interior point anyway.
 constexpr double kSmallestGap = 1e-10;
-// Iterations that the interior point is given from one start. Most models
-// take 10 to 50; a start whose points hug the boundary of the cones can hold
-// it back for hundreds.
-constexpr int kIterationsPerStart = 80;
-// A fresh start is looked for at this share of the cost, and again from there
-// as long as there is one.
-constexpr double kRestartShare = 0.25;
+// Iterations after which a start is given up if the gap is still large. Most
+// models take 10 to 50 in all; a start whose points hug the boundary of the
+// cones can hold the interior point back for hundreds.
+constexpr int kIterationsPerStart = 60;
+constexpr double kLargeGap = 0.1;
+// A fresh start is looked for at these shares of the cost.
+constexpr double kRestartShares[] = {0.25, 0.5, 0.75, 0.9, 0.97};
 constexpr int kMaxRestarts = 4;
-// The feasibility programme has failed once its gap is this small.
 constexpr double kHopelessGap = 1e-2;
 
 void CheckOptions(const JointOptions& options) {
@@ -62,7 +61,7 @@ class ComponentSolve {
   }
   InteriorPointTermination RunFromEstimate(
       const std::function<void(double gap)>& report);
-  bool FindFreshStart(double bound);
+  bool FindFreshStart();
   void TryCertificate(const ConicIterate& iterate);
 
   const KnownRotationProblem& problem_;
@@ -95,8 +94,7 @@ InteriorPointTermination ComponentSolve::RunFromEstimate(
     const std::function<void(double gap)>& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
-  options.max_iterations =
-      std::min(kIterationsPerStart, options_.max_iterations - iterations_);
+  options.max_iterations = options_.max_iterations - iterations_;
   options.smallest_gap = std::min(kSmallestGap, options_.relative_gap);
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
@@ -112,36 +110,32 @@ InteriorPointTermination ComponentSolve::RunFromEstimate(
       next_gap = kGapBetweenCertificates * iterate.gap;
     }
     report(iterate.gap);
-    return IsGapReached();
+    return IsGapReached() || (iterate.iteration >= kIterationsPerStart &&
+                              iterate.gap > kLargeGap);
   };
   std::vector<Multiplier> multipliers;
   Estimate last = estimate_;
   return MinimizeJointly(problem_, options, &last, &multipliers).termination;
 }
 
-// A feasible estimate below `bound`, far from the boundary of the cones: the
-// feasibility programme starts from the perfectly centred origin.
-bool ComponentSolve::FindFreshStart(double bound) {
-  InteriorPointOptions options;
+// An estimate of lower cost, far from the boundary of the cones.
+bool ComponentSolve::FindFreshStart() {
+  FeasibleStartOptions options;
   options.norm = options_.norm;
-  options.max_iterations =
-      std::min(kIterationsPerStart, options_.max_iterations - iterations_);
+  options.hopeless_gap = kHopelessGap;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
-  options.stop = [&](const ConicIterate& iterate) {
-    ++iterations_;
-    return iterate.gamma > 1 && iterate.gap < kHopelessGap;
-  };
-  std::vector<Multiplier> multipliers;
-  Estimate fresh;
-  if (FindFeasible(problem_, options, bound, UnitDepth(problem_), &fresh,
-                   &multipliers)
-          .termination != InteriorPointTermination::kFeasible) {
-    return false;
+  for (const double share : kRestartShares) {
+    if (share * cost_ <= lower_bound_) continue;
+    if (FindEstimateBelow(problem_, share * cost_, options, &estimate_,
+                          &iterations_) ==
+        InteriorPointTermination::kFeasible) {
+      LowerByFeasibility(problem_, options, &estimate_, &iterations_);
+      cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
+      return true;
+    }
   }
-  estimate_ = std::move(fresh);
-  cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
-  return true;
+  return false;
 }
 
 JointTermination ComponentSolve::Run(
@@ -153,11 +147,10 @@ JointTermination ComponentSolve::Run(
     if (termination == InteriorPointTermination::kInterrupted) {
       return JointTermination::kInterrupted;
     }
-    // Nearer to the cost on every restart: 1/4, 1/2, 0.71, ... of it.
-    const double share = std::pow(kRestartShare, std::pow(0.5, restart));
-    while (iterations_ < options_.max_iterations &&
-           share * cost_ > lower_bound_ && FindFreshStart(share * cost_)) {
+    if (iterations_ >= options_.max_iterations) {
+      return JointTermination::kMaxIterations;
     }
+    if (!FindFreshStart()) break;
     if (iterations_ >= options_.max_iterations) {
       return JointTermination::kMaxIterations;
     }

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "krot/conic/interior_point.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+struct FeasibleStartOptions {
+  Norm norm;
+  int max_iterations = 200;  // >= 1
+  // Gives up, without proof, once the programme's gap is this small and the
+  // bound not met; 0: never.
+  double hopeless_gap = 0;
+  int num_threads = -1;
+  const CancelFlag* cancel = nullptr;  // may be null
+};
+
+// An estimate of a connected problem whose residuals are all below `bound`,
+// pixels, from nothing: FindFeasible with a unit of depth that suits the
+// problem's baselines. As that starts from the centre of the cones, the
+// estimate is a good start for MinimizeJointly. `*estimate` is only written if
+// one is found (kFeasible). Adds to `*iterations`.
+InteriorPointTermination FindEstimateBelow(const KnownRotationProblem& problem,
+                                           double bound,
+                                           const FeasibleStartOptions& options,
+                                           Estimate* estimate, int* iterations);
+
+// Lowers an estimate by FindEstimateBelow at a quarter of its cost, again and
+// again as long as there is one; returns whether there was. Takes some five
+// iterations each.
+bool LowerByFeasibility(const KnownRotationProblem& problem,
+                        FeasibleStartOptions options, Estimate* estimate,
+                        int* iterations);
+
+}  // namespace krot
