@@ -54,16 +54,12 @@ struct SecondOrderCone {
     const double a = d[0] * d[0] - d.tail<2>().squaredNorm();
     const double b = x[0] * d[0] - x.tail<2>().dot(d.tail<2>());
     const double c = Determinant(x);
-    const double discriminant = b * b - a * c;
-    if (discriminant > 0) {
-      const double root = std::sqrt(discriminant);
-      // The smallest positive root, without cancellation.
-      const double q = b > 0 ? -b - root : -b + root;
-      for (const double alpha : {q / a, c / q}) {
-        if (alpha > 0 && x[0] + alpha * d[0] >= 0) {
-          limit = std::min(limit, alpha);
-        }
-      }
+    // b^2 >= a c, with equality towards the apex: there only rounding differs.
+    const double root = std::sqrt(std::max(0.0, b * b - a * c));
+    // The smallest positive root, without cancellation, is where x leaves.
+    const double q = b > 0 ? -b - root : -b + root;
+    for (const double alpha : {q / a, c / q}) {
+      if (alpha > 0) limit = std::min(limit, alpha);
     }
     return limit;
   }

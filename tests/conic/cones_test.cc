@@ -1,0 +1,126 @@
+#include "krot/conic/cones.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/conic/random_cones.h"
+
+namespace krot {
+namespace {
+
+constexpr int kTrials = 2000;
+
+template <typename Cone>
+class ConeTest : public testing::Test {
+ protected:
+  using Vector = typename Cone::Vector;
+
+  // The step to the boundary by bisection on the smallest eigenvalue.
+  static double Bisect(const Vector& x, const Vector& d, double limit) {
+    if (Cone::SmallestEigenvalue(x + limit * d) >= 0) return limit;
+    double inside = 0;
+    double outside = limit;
+    for (int n = 0; n < 100; ++n) {
+      const double middle = (inside + outside) / 2;
+      (Cone::SmallestEigenvalue(x + middle * d) >= 0 ? inside : outside) =
+          middle;
+    }
+    return inside;
+  }
+};
+
+using Cones = testing::Types<SecondOrderCone, FourHalfLines>;
+TYPED_TEST_SUITE(ConeTest, Cones);
+
+TYPED_TEST(ConeTest, IdentityIsNeutralAndInside) {
+  const auto e = TypeParam::Identity();
+  EXPECT_EQ(TypeParam::SmallestEigenvalue(e), 1);
+  EXPECT_EQ(e.squaredNorm(), TypeParam::kDegree);  // e.e = degree
+  ConeGenerator<TypeParam> random(1);
+  for (int n = 0; n < kTrials; ++n) {
+    const auto x = random.Direction();
+    EXPECT_EQ(TypeParam::Product(e, x), x);
+    EXPECT_EQ(TypeParam::Product(x, e), x);
+  }
+}
+
+TYPED_TEST(ConeTest, DivideInvertsTheProduct) {
+  ConeGenerator<TypeParam> random(2);
+  for (int n = 0; n < kTrials; ++n) {
+    const double margin = std::pow(10, -(n % 7));
+    const auto x = random.Inside(margin, 0);
+    const auto y = random.Direction();
+    const auto quotient = TypeParam::Divide(x, TypeParam::Product(x, y));
+    // The product's condition is that of x.
+    EXPECT_LT((quotient - y).norm(), 4e-15 / margin);
+  }
+}
+
+TYPED_TEST(ConeTest, SmallestEigenvalueIsWhatTheIdentityMayTakeAway) {
+  ConeGenerator<TypeParam> random(3);
+  for (int n = 0; n < kTrials; ++n) {
+    const auto x = random.Direction();
+    const double least = TypeParam::SmallestEigenvalue(x);
+    EXPECT_NEAR(
+        TypeParam::SmallestEigenvalue(x - least * TypeParam::Identity()), 0,
+        1e-15);
+    EXPECT_NEAR(TypeParam::SmallestEigenvalue(-2.0 * TypeParam::Identity()), -2,
+                0);
+  }
+}
+
+TYPED_TEST(ConeTest, MaxStepEndsWhereBisectionFindsTheBoundary) {
+  ConeGenerator<TypeParam> random(4);
+  int num_limited = 0;
+  for (int n = 0; n < kTrials; ++n) {
+    const double margin = std::pow(10, -(n % 7));
+    const auto x = random.Inside(margin, 0);
+    const auto d = random.Direction();
+    for (const double limit : {1 / 0.98, 1e3}) {
+      const double expected = this->Bisect(x, d, limit);
+      const double step = TypeParam::MaxStep(x, d, limit);
+      EXPECT_NEAR(step, expected, 1e-9 * expected);
+      if (expected < limit) {
+        EXPECT_NEAR(TypeParam::SmallestEigenvalue(x + step * d), 0,
+                    1e-14 * (x.norm() + step * d.norm()));
+      }
+      num_limited += expected == limit;
+    }
+  }
+  EXPECT_GT(num_limited, kTrials / 50);  // both cases were seen
+  EXPECT_LT(num_limited, kTrials);
+}
+
+TYPED_TEST(ConeTest, MaxStepTowardsTheApexEndsThere) {
+  ConeGenerator<TypeParam> random(5);
+  for (int n = 0; n < kTrials; ++n) {
+    const auto x = random.Inside(0.1, 0);
+    EXPECT_NEAR(TypeParam::MaxStep(x, -2 * x, 10), 0.5, 1e-6);
+  }
+  const auto e = TypeParam::Identity();
+  EXPECT_EQ(TypeParam::MaxStep(e, -4 * e, 10), 0.25);
+}
+
+TYPED_TEST(ConeTest, MaxStepInsideTheConeIsTheLimit) {
+  ConeGenerator<TypeParam> random(6);
+  for (int n = 0; n < kTrials; ++n) {
+    const auto x = random.Inside(0.1, 0);
+    EXPECT_EQ(TypeParam::MaxStep(x, random.Inside(1e-3, 0), 7), 7);
+    EXPECT_EQ(TypeParam::MaxStep(x, 0 * x, 7), 7);
+  }
+}
+
+TEST(SecondOrderCone, DeterminantKeepsItsDigitsBesideTheBoundary) {
+  const double norm = 5;  // of (3, 4)
+  const double margin = std::ldexp(1.0, -40);
+  EXPECT_EQ(SecondOrderCone::Determinant({norm + margin, 3, 4}),
+            margin * (2 * norm + margin));
+}
+
+TEST(SecondOrderCone, MaxStepMeetsTheBoundaryAlongANullDirection) {
+  // (2 - a, a, 0): on the boundary at a = 1; a null direction has no a^2.
+  EXPECT_DOUBLE_EQ(SecondOrderCone::MaxStep({2, 0, 0}, {-1, 1, 0}, 9), 1);
+  EXPECT_EQ(SecondOrderCone::MaxStep({2, 0, 0}, {1, 1, 0}, 9), 9);
+}
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,188 @@
+#include "krot/conic/frame_system.h"
+
+#include <random>
+
+#include <gtest/gtest.h>
+#include <Eigen/Dense>
+
+namespace krot {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kSparseFrames = 560;  // more than are always dense
+
+// Point k is seen by frames k, k + 1 and k + 2; frame `fixed` has no columns.
+BlockStructure MakeChain(int num_frames, int fixed) {
+  BlockStructure structure;
+  structure.point_begin = {0};
+  for (int k = 0; k + 2 < num_frames; ++k) {
+    for (int f = k; f <= k + 2; ++f) structure.frame_of.push_back(f);
+    structure.point_begin.push_back(
+        static_cast<int64_t>(structure.frame_of.size()));
+  }
+  structure.frame_is_fixed.assign(num_frames, 0);
+  structure.frame_is_fixed[fixed] = 1;
+  return structure;
+}
+
+// One more point that all frames see.
+BlockStructure WithPointSeenByAll(BlockStructure structure) {
+  for (int f = 0; f < structure.num_frames(); ++f) {
+    structure.frame_of.push_back(f);
+  }
+  structure.point_begin.push_back(
+      static_cast<int64_t>(structure.frame_of.size()));
+  return structure;
+}
+
+// Random positive semidefinite 9x9 blocks for neighbouring frames, dealt out to
+// the parts, and a multiple of the identity.
+void FillChain(int num_frames, FrameSystem* system) {
+  std::mt19937 generator(1);
+  std::normal_distribution<double> normal;
+  system->SetZero();
+  for (int k = 0; k + 2 < num_frames; ++k) {
+    MatrixXd A(9, 9);
+    for (double& entry : A.reshaped()) entry = normal(generator);
+    const MatrixXd H = A.transpose() * A + 0.1 * MatrixXd::Identity(9, 9);
+    for (int a = 0; a < 3; ++a) {
+      for (int b = 0; b <= a; ++b) {
+        if (system->column(k + a) < 0 || system->column(k + b) < 0) continue;
+        const Eigen::Matrix3d block = H.block<3, 3>(3 * a, 3 * b);
+        system->AddBlock(k % system->num_parts(), k + a, k + b, block.data());
+      }
+    }
+  }
+}
+
+// The same, densely: all but the fixed frame's columns.
+MatrixXd DenseChain(int num_frames, int fixed) {
+  std::mt19937 generator(1);
+  std::normal_distribution<double> normal;
+  MatrixXd all = MatrixXd::Zero(3 * num_frames, 3 * num_frames);
+  for (int k = 0; k + 2 < num_frames; ++k) {
+    MatrixXd A(9, 9);
+    for (double& entry : A.reshaped()) entry = normal(generator);
+    all.block<9, 9>(3 * k, 3 * k) +=
+        A.transpose() * A + 0.1 * MatrixXd::Identity(9, 9);
+  }
+  const int before = 3 * fixed;
+  const int after = 3 * (num_frames - fixed - 1);
+  MatrixXd free(before + after, before + after);
+  free << all.topLeftCorner(before, before), all.topRightCorner(before, after),
+      all.bottomLeftCorner(after, before), all.bottomRightCorner(after, after);
+  return free;
+}
+
+VectorXd RandomVector(int64_t size) {
+  std::mt19937 generator(2);
+  std::normal_distribution<double> normal;
+  VectorXd x(size);
+  for (double& entry : x) entry = normal(generator);
+  return x;
+}
+
+TEST(FrameSystem, NumbersTheColumnsOfFreeFrames) {
+  const BlockStructure structure = MakeChain(5, 2);
+  const FrameSystem system(structure);
+  EXPECT_EQ(system.num_columns(), 12);
+  EXPECT_EQ(system.column(0), 0);
+  EXPECT_EQ(system.column(1), 3);
+  EXPECT_EQ(system.column(2), -1);
+  EXPECT_EQ(system.column(3), 6);
+}
+
+TEST(FrameSystem, SolvesAFewFramesDensely) {
+  const int num_frames = 12;
+  const BlockStructure structure = MakeChain(num_frames, 3);
+  FrameSystem system(structure);
+  FillChain(num_frames, &system);
+  ASSERT_TRUE(system.Factorize(1));
+  const VectorXd x_true = RandomVector(system.num_columns());
+  const VectorXd x = system.Solve(DenseChain(num_frames, 3) * x_true);
+  EXPECT_LT((x - x_true).norm(), 1e-11 * x_true.norm());
+}
+
+TEST(FrameSystem, SolvesALongChainSparselyAsItDoesDensely) {
+  const BlockStructure chain = MakeChain(kSparseFrames, 7);
+  const BlockStructure full = WithPointSeenByAll(chain);
+  FrameSystem sparse(chain);
+  FrameSystem dense(full);
+  ASSERT_LT(10 * sparse.MemoryBytes(), dense.MemoryBytes());
+
+  const VectorXd x_true = RandomVector(sparse.num_columns());
+  const VectorXd rhs = DenseChain(kSparseFrames, 7) * x_true;
+  for (FrameSystem* system : {&sparse, &dense}) {
+    FillChain(kSparseFrames, system);
+    ASSERT_TRUE(system->Factorize(2));
+    EXPECT_LT((system->Solve(rhs) - x_true).norm(), 1e-11 * x_true.norm());
+  }
+}
+
+TEST(FrameSystem, IsFilledAnewAfterSetZero) {
+  for (const int num_frames : {12, kSparseFrames}) {
+    const BlockStructure structure = MakeChain(num_frames, 0);
+    FrameSystem system(structure);
+    const VectorXd rhs = RandomVector(system.num_columns());
+    FillChain(num_frames, &system);
+    ASSERT_TRUE(system.Factorize(1));
+    const VectorXd first = system.Solve(rhs);
+    FillChain(num_frames, &system);
+    ASSERT_TRUE(system.Factorize(1));
+    EXPECT_EQ(first, system.Solve(rhs));
+  }
+}
+
+TEST(FrameSystem, HasTheSameBitsAtAnyNumberOfThreads) {
+  const BlockStructure structure = MakeChain(100, 0);
+  FrameSystem system(structure);
+  const VectorXd rhs = RandomVector(system.num_columns());
+  FillChain(100, &system);
+  ASSERT_TRUE(system.Factorize(1));
+  const VectorXd one = system.Solve(rhs);
+  FillChain(100, &system);
+  ASSERT_TRUE(system.Factorize(3));
+  EXPECT_EQ(one, system.Solve(rhs));
+}
+
+TEST(FrameSystem, RegularisesAFrameThatNothingHolds) {
+  // Three free frames; the last one has no blocks at all.
+  const BlockStructure structure = MakeChain(4, 0);
+  FrameSystem system(structure);
+  system.SetZero();
+  const Eigen::Matrix3d identity = Eigen::Matrix3d::Identity();
+  system.AddBlock(0, 1, 1, identity.data());
+  system.AddBlock(0, 2, 2, identity.data());
+  ASSERT_TRUE(system.Factorize(1));
+  VectorXd rhs = VectorXd::Zero(9);
+  rhs[0] = 2;
+  EXPECT_NEAR(system.Solve(rhs)[0], 2, 1e-12);
+  EXPECT_EQ(system.Solve(rhs).tail<3>().norm(), 0);
+}
+
+TEST(FrameSystem, RefusesAnIndefiniteMatrix) {
+  for (const int num_frames : {4, kSparseFrames}) {
+    const BlockStructure structure = MakeChain(num_frames, 0);
+    FrameSystem system(structure);
+    FillChain(num_frames, &system);
+    const Eigen::Matrix3d negative = -1e6 * Eigen::Matrix3d::Identity();
+    system.AddBlock(0, 1, 1, negative.data());
+    EXPECT_FALSE(system.Factorize(1));
+  }
+}
+
+TEST(FrameSystem, WithoutFreeFramesSolvesNothing) {
+  BlockStructure structure;
+  structure.point_begin = {0, 1};
+  structure.frame_of = {0};
+  structure.frame_is_fixed = {1};
+  FrameSystem system(structure);
+  system.SetZero();
+  EXPECT_TRUE(system.Factorize(1));
+  EXPECT_EQ(system.Solve(VectorXd()).size(), 0);
+}
+
+}  // namespace
+}  // namespace krot
