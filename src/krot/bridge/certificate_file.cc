@@ -1,9 +1,8 @@
 #include "krot/bridge/certificate_file.h"
 
-#include <cmath>
 #include <fstream>
-#include <iterator>
 #include <limits>
+#include <sstream>
 
 #include <nlohmann/json.hpp>
 
@@ -188,12 +187,12 @@ CertificateFile ParseCertificate(const std::string& json,
 
 CertificateFile ReadCertificateFile(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
-  std::string json{std::istreambuf_iterator<char>(stream),
-                   std::istreambuf_iterator<char>()};
-  if (!stream.is_open() || stream.bad()) {
-    throw ModelError(path.string() + ": cannot be read");
+  std::ostringstream json;
+  // Fails on an empty file, too, and on a folder.
+  if (!stream.is_open() || !(json << stream.rdbuf())) {
+    throw ModelError(path.string() + ": cannot be read, or is empty");
   }
-  return ParseCertificate(json, path.string());
+  return ParseCertificate(json.str(), path.string());
 }
 
 }  // namespace krot

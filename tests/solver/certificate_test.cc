@@ -1,0 +1,136 @@
+#include "krot/solver/certificate.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "krot/problem/cost.h"
+#include "tests/problem/random_problem.h"
+#include "tests/solver/joint_iterate.h"
+#include "tests/solver/naive_certificate_check.h"
+
+namespace krot {
+namespace {
+
+RandomScene MakeScene(unsigned seed, int views_per_frame, double baseline) {
+  RandomSceneOptions options;
+  options.num_frames = 5;
+  options.num_points = 40;
+  options.views_per_frame = views_per_frame;
+  options.baseline = baseline;
+  options.seed = seed;
+  return MakeRandomScene(options);
+}
+
+class CertificateOfNorm : public ::testing::TestWithParam<double> {
+ protected:
+  Norm norm() const { return {GetParam()}; }
+};
+
+TEST_P(CertificateOfNorm, ProvesTheOptimumAndAStrangerAgrees) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeScene(seed, 1, 0);
+    const JointIterate iterate =
+        SolveToGap(scene.problem, norm(), scene.estimate, 1e-7);
+    const double cost = Cost(scene.problem, iterate.estimate, norm(), 1);
+    const std::optional<Certificate> certificate =
+        Certify(scene.problem, norm(), iterate);
+    ASSERT_TRUE(certificate);
+    EXPECT_LE(certificate->lower_bound * (1 - certificate->defect), cost);
+    EXPECT_GE(certificate->lower_bound, cost * (1 - 1e-6));
+    EXPECT_TRUE(
+        CheckCertificate(scene.problem, norm(), *certificate).is_accepted);
+
+    const NaiveCheck naive =
+        CheckNaively(scene.problem, GetParam(), *certificate);
+    EXPECT_LE(naive.longest, 1 + 1e-12);
+    EXPECT_LE(naive.term, 1e-6);
+  }
+}
+
+TEST_P(CertificateOfNorm, ProvesTheOptimumOfRigsWithBaselines) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeScene(seed, 2, 0.3);
+    const JointIterate iterate =
+        SolveToGap(scene.problem, norm(), scene.estimate, 1e-7);
+    const double cost = Cost(scene.problem, iterate.estimate, norm(), 1);
+    const std::optional<Certificate> certificate =
+        Certify(scene.problem, norm(), iterate);
+    ASSERT_TRUE(certificate);
+    EXPECT_LE(certificate->lower_bound * (1 - certificate->defect), cost);
+    EXPECT_GE(certificate->lower_bound, cost * (1 - 1e-6));
+  }
+}
+
+TEST_P(CertificateOfNorm, NeedsNoMoreThanARoughIterate) {
+  const RandomScene scene = MakeScene(1, 1, 0);
+  const std::optional<Certificate> rough =
+      Certify(scene.problem, norm(),
+              SolveToGap(scene.problem, norm(), scene.estimate, 1e-3));
+  const std::optional<Certificate> fine =
+      Certify(scene.problem, norm(),
+              SolveToGap(scene.problem, norm(), scene.estimate, 1e-8));
+  ASSERT_TRUE(rough);
+  ASSERT_TRUE(fine);
+  EXPECT_NEAR(rough->lower_bound, fine->lower_bound, 1e-4 * fine->lower_bound);
+}
+
+INSTANTIATE_TEST_SUITE_P(P, CertificateOfNorm,
+                         ::testing::Values(1.0, 2.0, INFINITY),
+                         [](const auto& test) {
+                           return std::isinf(test.param)
+                                      ? std::string("Inf")
+                                      : std::to_string(
+                                            static_cast<int>(test.param));
+                         });
+
+TEST(MakeCertificate, ReachesAndNeverExceedsAnOptimumThatIsKnownExactly) {
+  // One image sees one point twice, 16 px apart; nothing else is as bad.
+  RandomScene scene = MakeScene(2, 1, 0);
+  Observation twin = scene.problem.observations.back();
+  twin.J = 1024 * Eigen::Matrix2d::Identity();
+  scene.problem.observations.back() = twin;
+  twin.u[0] += 1.0 / 64;
+  scene.problem.observations.push_back(twin);
+  IndexObservations(&scene.problem);
+  const std::optional<Certificate> certificate =
+      Certify(scene.problem, Norm::L2(),
+              SolveToGap(scene.problem, Norm::L2(), scene.estimate, 1e-7));
+  ASSERT_TRUE(certificate);
+  EXPECT_EQ(certificate->observations.size(), 2u);
+  EXPECT_LE(certificate->lower_bound * (1 - certificate->defect), 8);
+  EXPECT_GE(certificate->lower_bound, 8 * (1 - 1e-9));
+}
+
+TEST(MakeCertificate, GivesNoneFromMultipliersThatMeanNothing) {
+  const RandomScene scene = MakeScene(1, 1, 0);
+  JointIterate iterate;
+  iterate.estimate = scene.estimate;
+  iterate.gamma = 2 * Cost(scene.problem, scene.estimate, Norm::L2(), 1);
+  iterate.multipliers.resize(scene.problem.observations.size());
+  // All zero: no observation is in any support.
+  EXPECT_FALSE(Certify(scene.problem, Norm::L2(), iterate));
+}
+
+TEST(MakeCertificate, KeepsWithinTheUnknownsItIsGranted) {
+  const RandomScene scene = MakeScene(1, 1, 0);
+  CertificateOptions options;
+  options.max_unknowns = 2;
+  EXPECT_FALSE(Certify(
+      scene.problem, Norm::L2(),
+      SolveToGap(scene.problem, Norm::L2(), scene.estimate, 1e-6), options));
+}
+
+TEST(MakeCertificate, RefusesAnIterateOfAnotherProblem) {
+  const RandomScene scene = MakeScene(1, 1, 0);
+  JointIterate iterate;
+  iterate.estimate = scene.estimate;
+  EXPECT_THROW(Certify(scene.problem, Norm::L2(), iterate),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace krot
