@@ -14,6 +14,7 @@ enum ExitCode {
   kExitCertificateRefused = 4,
   kExitNotWritten = 5,
   kExitInternal = 6,
+  kExitNoStart = 7,
   kExitInterrupted = 130,
 };
 

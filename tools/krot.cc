@@ -57,6 +57,7 @@ constexpr char kHelpTail[] =
     "    4  a certificate was refused\n"
     "    5  the output cannot be written\n"
     "    6  out of memory, or an error in KROT itself\n"
+    "    7  no estimate below the error that a start may have\n"
     "  130  interrupted by SIGINT or SIGTERM\n";
 
 const Command* FindCommand(const std::string& name) {

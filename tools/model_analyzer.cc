@@ -1,6 +1,8 @@
 #include <string>
 #include <vector>
 
+#include "krot/bridge/certificate_verdict.h"
+#include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
 #include "krot/report/write_file.h"
 #include "tools/command.h"
@@ -14,6 +16,7 @@ struct AnalyzerOptions {
   std::string path;
   std::string input_path;
   std::string report_path;
+  std::string certificate_path;
   int num_worst = 10;
   CommonOptions common;
 };
@@ -27,6 +30,10 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                      "How many of the worst images and observations to list");
   parser->AddPath("report_path", &options->report_path, false, "a file",
                   "Where the report goes, as JSON");
+  parser->AddPath("certificate_path", &options->certificate_path, false,
+                  "a file",
+                  "A certificate of this model: show what it proves, and the "
+                  "observations that set the maximum");
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
 }
@@ -44,6 +51,18 @@ std::string ModelPath(const AnalyzerOptions& options,
   return parser.IsGiven("path") ? options.path : options.input_path;
 }
 
+// What the certificate says of the model; "" if none is given.
+std::string CertificateText(const AnalyzerOptions& options,
+                            const Model& model) {
+  if (options.certificate_path.empty()) return "";
+  const CertificateVerdict verdict = VerifyCertificateFile(
+      model, ReadCertificateFile(options.certificate_path));
+  if (!verdict.is_accepted) {
+    throw CommandError(kExitCertificateRefused, "refused: " + verdict.refusal);
+  }
+  return "\n" + CertificateTable(verdict, options.num_worst);
+}
+
 }  // namespace
 
 int RunModelAnalyzer(const std::vector<std::string>& arguments) {
@@ -57,16 +76,15 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   const std::string path = ModelPath(options, parser);
-  if (!options.report_path.empty()) {
-    CheckReportName(options.report_path);
-    CheckFileWritable(options.report_path);
-  }
-  const ModelReport report =
-      AnalyzeModel(ReadValidModel(path), options.num_worst);
+  CheckSidePath("report_path", options.report_path);
+  const Model model = ReadValidModel(path);
+  const std::string certificate = CertificateText(options, model);
+  const ModelReport report = AnalyzeModel(model, options.num_worst);
   if (!options.report_path.empty()) {
     WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));
   }
-  PrintTable(options.common.log, ModelTable(report, options.num_worst));
+  PrintTable(options.common.log,
+             ModelTable(report, options.num_worst) + certificate);
   return kExitDone;
 }
 

@@ -25,6 +25,20 @@ ModelFormat OutputFormat(const ModelPaths& paths) {
   return input_format;
 }
 
+// COLMAP's files are not for reports.
+void CheckSideName(const std::string& option, const std::string& path) {
+  constexpr std::array<const char*, 5> kStems = {"cameras", "rigs", "frames",
+                                                 "images", "points3D"};
+  const fs::path name = fs::path(path).filename();
+  for (const char* stem : kStems) {
+    if (name.stem() == stem &&
+        (name.extension() == ".bin" || name.extension() == ".txt")) {
+      throw OptionError("--" + option + " = " + path +
+                        ", must not bear the name of a model's file");
+    }
+  }
+}
+
 }  // namespace
 
 void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
@@ -46,7 +60,7 @@ void AddOverwrite(bool* overwrite, OptionParser* parser) {
 }
 
 WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
-  CheckReportName(paths.report_path);
+  CheckSideName("report_path", paths.report_path);
   if (IsSameFolder(paths.input_path, paths.output_path) && !paths.overwrite) {
     throw OptionError(
         "--output_path is --input_path; add --overwrite 1 to replace the "
@@ -57,23 +71,15 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   options.overwrite = paths.overwrite;
   options.copy_project_from = paths.input_path;
   CheckModelWritable(paths.output_path, options);
-  if (!paths.report_path.empty()) {
-    CheckFileWritable(paths.report_path, paths.output_path);
-  }
+  CheckSidePath("report_path", paths.report_path, paths.output_path);
   return options;
 }
 
-void CheckReportName(const std::string& report_path) {
-  constexpr std::array<const char*, 5> kStems = {"cameras", "rigs", "frames",
-                                                 "images", "points3D"};
-  const fs::path name = fs::path(report_path).filename();
-  for (const char* stem : kStems) {
-    if (name.stem() == stem &&
-        (name.extension() == ".bin" || name.extension() == ".txt")) {
-      throw OptionError("--report_path = " + report_path +
-                        ", must not bear the name of a model's file");
-    }
-  }
+void CheckSidePath(const std::string& option, const std::string& path,
+                   const std::string& folder_to_come) {
+  if (path.empty()) return;
+  CheckSideName(option, path);
+  CheckFileWritable(path, folder_to_come);
 }
 
 Model ReadValidModel(const std::string& path) {

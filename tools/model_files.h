@@ -26,8 +26,12 @@ void AddOverwrite(bool* overwrite, OptionParser* parser);
 // Returns how to write.
 WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 
-// A report may not take the place of one of COLMAP's files. Throws OptionError.
-void CheckReportName(const std::string& report_path);
+// Whether a file beside the model, a report or a certificate, can be written to
+// `path`, the value of --`option`; "": none is. `folder_to_come` will exist by
+// then. Throws OptionError if it would take the place of one of COLMAP's files,
+// WriteError if it cannot be written.
+void CheckSidePath(const std::string& option, const std::string& path,
+                   const std::string& folder_to_come = "");
 
 // Reads and validates. Throws ModelError.
 Model ReadValidModel(const std::string& path);

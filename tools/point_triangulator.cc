@@ -26,7 +26,7 @@ void RefuseDatabase(OptionParser* parser) {
 int RunPointTriangulator(const std::vector<std::string>& arguments) {
   SolveCommand command;
   command.name = "point_triangulator";
-  command.method = "intersection";
+  command.method_name = "intersection";
   command.solve = &TriangulateModel;
   OptionParser parser(command.name,
                       "re-estimates every point of a COLMAP model for the "

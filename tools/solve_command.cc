@@ -10,7 +10,7 @@
 #include "krot/report/text_table.h"
 #include "krot/report/write_file.h"
 #include "tools/interrupt.h"
-#include "tools/sweep_progress.h"
+#include "tools/solve_progress.h"
 
 namespace krot {
 namespace {
@@ -19,10 +19,21 @@ SolveReport DescribeRun(const SolveCommand& command) {
   SolveReport report;
   report.version = KROT_VERSION;
   report.command = command.name;
-  report.method = command.method;
-  report.threads = ResolveNumThreads(command.options.res_int.num_threads);
+  report.method = command.method_name;
+  report.threads = ResolveNumThreads(command.options.num_threads);
   report.seed = command.common.random_seed;
   return report;
+}
+
+SolveProgress::Goals ProgressGoals(const SolveModelOptions& options) {
+  SolveProgress::Goals goals;
+  goals.relative_gap = options.joint.relative_gap;
+  const bool is_auto = EffectiveMethod(options) == SolveMethod::kAuto;
+  goals.sweep_tolerance = is_auto ? options.leading_sweep_tolerance
+                                  : options.res_int.sweep_tolerance;
+  goals.max_sweeps =
+      is_auto ? options.max_leading_sweeps : options.res_int.max_sweeps;
+  return goals;
 }
 
 // The solve with its progress on stderr. Throws CommandError where there is
@@ -31,11 +42,18 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
                        const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   SolveModelOptions options = command.options;
-  SweepProgress progress(log, options.res_int.sweep_tolerance,
-                         options.res_int.max_sweeps);
-  options.res_int.cancel = &cancel;
+  SolveProgress progress(log, ProgressGoals(options));
+  options.cancel = &cancel;
+  options.describe_certificate = !command.certificate_path.empty();
   options.res_int.callback = [&progress](int sweep, const Sweep& state) {
     progress.Update(sweep, state);
+  };
+  options.joint.callback = [&progress](int iteration,
+                                       const JointIteration& state) {
+    progress.Update(iteration, state);
+  };
+  options.on_note = [&log](const std::string& sentence) {
+    LogLine(log, 1, sentence);
   };
   options.on_built = [&](const SolveSummary& summary) {
     ThrowIfInterrupted();
@@ -46,13 +64,64 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
             Counted(summary.num_images, "image") + ", " +
                 Counted(summary.num_points, "point") + ", " +
                 Counted(summary.num_observations, "observation") +
-                "; the solve needs about " +
-                FormatBytes(EstimateSolveBytes(model)));
+                (summary.num_components > 1
+                     ? " in " + std::to_string(summary.num_components) +
+                           " components"
+                     : std::string()) +
+                "; about " + FormatBytes(summary.estimated_bytes) +
+                " will be needed");
   };
   SolveModelResult result = command.solve(model, options);
   progress.Finish();
   ThrowIfInterrupted();
   return result;
+}
+
+void WriteCertificate(const SolveCommand& command,
+                      const SolveSummary& summary) {
+  if (!summary.certificate) return;
+  LogLine(command.common.log, 2, "writing " + command.certificate_path);
+  WriteFileAtomically(command.certificate_path,
+                      CertificateJson(*summary.certificate));
+}
+
+// Where no model can be written: all that is left is a proof, maybe.
+void ThrowIfNoStart(const SolveCommand& command, const SolveSummary& summary) {
+  if (summary.termination == SolveTermination::kNothingToSolve) {
+    throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
+  }
+  const std::string bound =
+      FormatNumber(command.options.init_max_error, 6) + " px";
+  if (summary.termination == SolveTermination::kInfeasible) {
+    WriteCertificate(command, summary);
+    throw CommandError(
+        kExitNoStart,
+        "infeasible: " +
+            (summary.lower_bound
+                 ? "the largest error of every estimate is proved to be at "
+                   "least " +
+                       FormatNumber(*summary.lower_bound, 6) + " px, above "
+                 : std::string("no estimate is below ")) +
+            "Problem.init_max_error = " + bound);
+  }
+  if (summary.termination == SolveTermination::kNoStart) {
+    throw CommandError(kExitNoStart,
+                       "no start was found below Problem.init_max_error = " +
+                           bound + ", and no proof that there is none");
+  }
+}
+
+void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
+  const LogOptions& log = command.common.log;
+  if (summary.method == SolveMethod::kResInt) return;
+  if (summary.termination != SolveTermination::kGapReached) {
+    LogLine(log, 0, "warning: " + MissedGapSentence(summary));
+  }
+  if (!command.certificate_path.empty() && !summary.certificate) {
+    LogLine(log, 0,
+            "warning: there is no certificate, so " + command.certificate_path +
+                " is not written");
+  }
 }
 
 void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
@@ -74,6 +143,8 @@ int RunSolveCommand(const SolveCommand& command) {
   const ModelPaths& paths = command.paths;
   const CancelFlag& cancel = CatchInterrupts();
   const WriteModelOptions write_options = CheckModelPaths(paths);
+  CheckSidePath("certificate_path", command.certificate_path,
+                paths.output_path);
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
@@ -83,6 +154,10 @@ int RunSolveCommand(const SolveCommand& command) {
 
   SolveModelResult result = Solve(command, model, cancel);
   report.summary = std::move(result.summary);
+  if (command.method_name.empty()) {
+    report.method = MethodName(report.summary.method);
+  }
+  ThrowIfNoStart(command, report.summary);
 
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, result.model);
@@ -97,7 +172,9 @@ int RunSolveCommand(const SolveCommand& command) {
     LogLine(log, 2, "writing " + paths.report_path);
     WriteFileAtomically(paths.report_path, SolveJson(report));
   }
+  WriteCertificate(command, report.summary);
   PrintTable(log, SolveTable(report));
+  WarnOfMissedGap(command, report.summary);
   return kExitDone;
 }
 

@@ -13,8 +13,9 @@ namespace krot {
 // read, solve, write, report.
 struct SolveCommand {
   std::string name;
-  std::string method;  // for the report
+  std::string method_name;  // for the report; "": that of the solve
   ModelPaths paths;
+  std::string certificate_path;  // "": not wanted
   CommonOptions common;
   SolveModelOptions options;  // its callbacks and flag are set by the run
   SolveModelResult (*solve)(const Model&, const SolveModelOptions&) = nullptr;

@@ -62,8 +62,8 @@ void AddSolveOptions(SolveModelOptions* options, OptionParser* parser) {
   ResIntOptions* res_int = &options->res_int;
   parser->Add({"Solver.norm", "The p of the residuals' norm",
                "1, 2, inf or a number >= 1", "2", false,
-               [res_int](const std::string& text) {
-                 return ParseNorm(text, &res_int->norm);
+               [options](const std::string& text) {
+                 return ParseNorm(text, &options->norm);
                }});
   parser->Add({"Solver.num_threads",
                "Threads, -1 being all; the result is the same, bit by bit",
@@ -71,8 +71,7 @@ void AddSolveOptions(SolveModelOptions* options, OptionParser* parser) {
                [options](const std::string& text) {
                  int threads = 0;
                  if (!ParseInteger(text, &threads)) return false;
-                 options->res_int.num_threads = threads;
-                 options->problem.num_threads = threads;
+                 options->num_threads = threads;
                  return threads == -1 || (threads >= 1 && threads <= 1024);
                }});
   parser->Add({"Solver.settings",

@@ -31,6 +31,10 @@ struct BuildProblemOptions {
   // Usable observations that a point needs to be optimised; >= 1. Two of one
   // image are two.
   int min_track_length = 2;
+  // Takes nothing from the model but rotations, rigs and rays: no observation
+  // is left out as `behind`, and as `no_pose` only where rotation or rig are
+  // unknown. No start then: `start` is what the model says, whatever that is.
+  bool ignore_translations = false;
   int num_threads = -1;  // -1: all; the result does not depend on it
 };
 
@@ -39,7 +43,8 @@ struct BuildProblemOptions {
 struct BuiltProblem {
   KnownRotationProblem problem;
   // The model's own translations and points, with the points re-triangulated
-  // that were behind a camera. All depths are positive.
+  // that were behind a camera. All depths are positive (unless translations
+  // are ignored).
   Estimate start;
   std::vector<int32_t> frame_of;    // problem frame -> index in model.frames
                                     // (model.images if !model.has_rigs)

@@ -132,16 +132,23 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
 }
 
 PointOutcome ProcessPoint(const Sources& sources, int32_t point,
-                          int min_track_length, Slots slots,
+                          const BuildProblemOptions& options, Slots slots,
                           LeftOutCounts* left_out) {
   const int num_rays = CollectRays(sources, point, slots, left_out);
+  const Vector3d& xyz = sources.model.points3D[point].xyz;
   PointOutcome outcome;
-  outcome.point = RepairPoint(sources.geometries, slots.observations, num_rays,
-                              sources.model.points3D[point].xyz);
-  outcome.num_kept = RemoveBehind(sources, outcome.point.xyz, num_rays, slots);
-  (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
-      num_rays - outcome.num_kept;
-  if (outcome.num_kept < min_track_length) {
+  if (options.ignore_translations) {
+    outcome.point.xyz = xyz;
+    outcome.num_kept = num_rays;
+  } else {
+    outcome.point =
+        RepairPoint(sources.geometries, slots.observations, num_rays, xyz);
+    outcome.num_kept =
+        RemoveBehind(sources, outcome.point.xyz, num_rays, slots);
+    (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
+        num_rays - outcome.num_kept;
+  }
+  if (outcome.num_kept < options.min_track_length) {
     (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome.num_kept;
     outcome.num_kept = 0;
   }
@@ -165,8 +172,7 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
                 for (int64_t k = begin; k < end; ++k) {
                   const uint64_t first = model.points3D[k].track_begin;
                   outcomes[k] =
-                      ProcessPoint(sources, static_cast<int32_t>(k),
-                                   options.min_track_length,
+                      ProcessPoint(sources, static_cast<int32_t>(k), options,
                                    {built->problem.observations.data() + first,
                                     built->point2D_of.data() + first},
                                    &chunk_left_out[begin / kPointsPerChunk]);
@@ -238,6 +244,14 @@ void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
   }
 }
 
+// An image has a pose if its rotation and its place in the rig are known.
+void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
+  for (ImageGeometry& image : *geometries) {
+    image.has_pose =
+        image.frame >= 0 && image.cam_from_rig_translation.allFinite();
+  }
+}
+
 }  // namespace
 
 const char* LeftOutName(LeftOut reason) {
@@ -263,7 +277,8 @@ BuiltProblem BuildProblem(const Model& model,
   CheckArgument(options.min_track_length >= 1, "options.min_track_length",
                 options.min_track_length, ">= 1");
   CheckImagePlanes(model);
-  const Sources sources{model, ImageGeometries(model), ImageIndices(model)};
+  Sources sources{model, ImageGeometries(model), ImageIndices(model)};
+  if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;
   Compact(model, ProcessPoints(sources, options, &built), &built);
   AddFramesAndViews(sources, &built);

@@ -1,6 +1,5 @@
 #include "krot/bridge/certificate_verdict.h"
 
-#include <algorithm>
 #include <map>
 #include <optional>
 #include <utility>
@@ -73,29 +72,6 @@ Translation Translate(const Model& model, const CertificateFile& file,
   return translation;
 }
 
-std::vector<CertificateVerdict::SupportObservation> ListSupport(
-    const Model& model, const BuiltProblem& built, Norm norm,
-    const Certificate& certificate) {
-  double sum = 0;
-  for (const CertifiedObservation& o : certificate.observations) {
-    sum += o.lambda;
-  }
-  std::vector<CertificateVerdict::SupportObservation> support;
-  for (const CertifiedObservation& o : certificate.observations) {
-    const Observation& observation = built.problem.observations[o.observation];
-    const Image& image = model.images[built.image_of[observation.view]];
-    support.push_back(
-        {image.id, image.name,
-         static_cast<uint32_t>(built.point2D_of[o.observation]),
-         model.points3D[built.point_of[observation.point]].id, o.lambda / sum,
-         ResidualOf(ViewPoint(built.problem, observation, built.start), norm)});
-  }
-  std::stable_sort(
-      support.begin(), support.end(),
-      [](const auto& a, const auto& b) { return a.error_px > b.error_px; });
-  return support;
-}
-
 }  // namespace
 
 CertificateVerdict VerifyCertificateFile(const Model& model,
@@ -122,8 +98,8 @@ CertificateVerdict VerifyCertificateFile(const Model& model,
   verdict.defect = check.defect;
   verdict.cost = Cost(built.problem, built.start, file.norm, -1);
   verdict.relative_gap = (verdict.cost - verdict.lower_bound) / verdict.cost;
-  verdict.support =
-      ListSupport(model, built, file.norm, translation.certificate);
+  verdict.support = ListSupport(model, built, built.start, file.norm,
+                                translation.certificate);
   return verdict;
 }
 

@@ -4,21 +4,13 @@
 #include <vector>
 
 #include "krot/bridge/certificate_file.h"
+#include "krot/bridge/certificate_support.h"
 #include "krot/model/model.h"
 
 namespace krot {
 
 // What a certificate says about a model, judged from the two alone.
 struct CertificateVerdict {
-  struct SupportObservation {
-    ImageId image_id = 0;
-    std::string image_name;
-    uint32_t point2D_idx = 0;
-    Point3DId point3D_id = 0;
-    double multiplier = 0;  // lambda, of a sum of 1
-    double error_px = 0;    // the model's own residual, linearised pixels
-  };
-
   bool is_accepted = false;
   std::string refusal;  // one sentence; empty if accepted
   // The rest is meaningful only if accepted.

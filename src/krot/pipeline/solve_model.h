@@ -3,11 +3,16 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/certificate_file.h"
+#include "krot/bridge/certificate_support.h"
 #include "krot/model/model.h"
+#include "krot/solver/joint.h"
 #include "krot/solver/res_int.h"
 
 namespace krot {
@@ -16,16 +21,33 @@ namespace krot {
 // error: what `krot solver` and `krot point_triangulator` do between reading
 // and writing.
 
+enum class SolveMethod {
+  kAuto,    // sweeps while they pay, the joint solver, finishing sweeps
+  kResInt,  // sweeps alone: no bound
+  kJoint,   // the joint solver alone
+};
+
+enum class SolveInit {
+  kModel,     // the model's own translations and points
+  kFeasible,  // from nothing but rotations and rays
+};
+
 enum class SolveTermination {
   kNotRun,
   kNothingToSolve,  // every observation was left out
-  kStalled,         // the last sweep gained less than the sweep tolerance
+  kGapReached,      // a certificate shows the relative gap asked for
+  kStalled,         // no further progress, and no proof that there is none
   kMaxSweeps,
+  kMaxIterations,
+  kInfeasible,   // proved: no estimate below init_max_error
+  kNoStart,      // no estimate below init_max_error was found
   kInterrupted,  // the estimate is the best so far
 };
 
 struct SolveSummary {
   SolveTermination termination = SolveTermination::kNotRun;
+  SolveMethod method = SolveMethod::kAuto;  // that was used, not asked for
+  SolveInit init = SolveInit::kModel;       // likewise
   Norm norm;
 
   // What took part in the optimisation, and what did not.
@@ -33,54 +55,94 @@ struct SolveSummary {
   int64_t num_images = 0;
   int64_t num_points = 0;
   int64_t num_observations = 0;
+  int32_t num_components = 0;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
 
   // The largest residual, in pixels linearised at the observations; initial:
-  // after re-triangulation.
+  // of the start, after re-triangulation; final: of the model that is given
+  // back.
   double cost_initial = 0;
   double cost_final = 0;
-  std::vector<Sweep> sweeps;
+  std::vector<Sweep> sweeps;  // the leading and the finishing ones
+  std::vector<JointIteration> iterations;
+
+  // What a certificate proves that CheckCertificate accepted in the end.
+  bool is_certified = false;
+  std::optional<double> lower_bound;  // linearised pixels
+  std::optional<double>
+      relative_gap;  // (cost_final - lower_bound) / cost_final
+  std::vector<SupportObservation> support;     // worst first
+  std::optional<CertificateFile> certificate;  // if asked for
 
   // Over all observations of the model, those left out included.
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
 
+  // What a process that holds the model needs, at its peak; see solve_memory.h.
+  int64_t estimated_bytes = 0;
+
   double seconds_build = 0;  // wall clock
   double seconds_solve = 0;
+  std::optional<double> seconds_certify;  // the final check
 };
 
 struct SolveModelOptions {
+  SolveMethod method = SolveMethod::kAuto;
+  SolveInit init = SolveInit::kModel;
+  double init_max_error = 100;        // pixels; > 0; the start's, if kFeasible
+  bool describe_certificate = false;  // fill SolveSummary::certificate
   BuildProblemOptions problem;
-  // Its num_threads also serves the pixel errors.
+
+  // Take the place of those in the stages' own options.
+  Norm norm;
+  int num_threads = -1;
+  const CancelFlag* cancel = nullptr;  // may be null
+
+  // kResInt. Its fast_descent and callback serve all sweeps, of which those of
+  // kAuto are counted on.
   ResIntOptions res_int;
+  // kAuto: the sweeps in front stop when one lowers the cost by less than the
+  // tolerance. They make a rough start ten times better within the time of one
+  // or two joint iterations, and do nothing for a good one.
+  int max_leading_sweeps = 10;            // >= 0
+  double leading_sweep_tolerance = 0.05;  // relative; >= 0
+  JointOptions joint;                     // kAuto, kJoint
+
+  // A sentence on what was chosen, and why; may be empty.
+  std::function<void(const std::string&)> on_note;
   // Called once, with the counts filled in, before the solve; may be empty.
   std::function<void(const SolveSummary&)> on_built;
 };
 
 struct SolveModelResult {
-  Model model;  // a copy of the input if there is nothing to solve
+  // A copy of the input if there is nothing to solve or no start.
+  Model model;
   SolveSummary summary;
 };
 
-// Re-estimates translations and points by Resection-Intersection and updates
-// the stored point errors (mean, true pixels). Rotations, intrinsics, ids,
-// names, tracks, colours, 2D points and all orders stay; so do, per connected
-// component, the centroid of the camera centres and, unless a rig fixes it,
-// their RMS distance to it. Requires a valid model (ValidateModel); throws
-// ModelError for cameras without an image plane and std::invalid_argument for
-// options out of range. Memory: see EstimateSolveBytes.
+// Re-estimates translations and points and updates the stored point errors
+// (mean, true pixels). Rotations, intrinsics, ids, names, tracks, colours, 2D
+// points and all orders stay; so do, per connected component, the centroid of
+// the camera centres and, unless a rig fixes it, their RMS distance to it,
+// where the model has finite ones.
+//
+// kAuto takes a feasible start by itself where the model's own would leave out
+// observations (as behind or without a pose) or has all centres in one place;
+// it is kResInt for a p without a joint solver and for the paper's settings.
+//
+// Requires a valid model (ValidateModel); throws ModelError for cameras without
+// an image plane and std::invalid_argument for options out of range. Memory:
+// see solve_memory.h.
 SolveModelResult SolveModel(const Model& model,
                             const SolveModelOptions& options);
 
 // The same with all frames fixed. Points do not depend on each other then, so
-// one sweep is all there is: `res_int.max_sweeps` and `update_frames` are
-// ignored.
+// one sweep is all there is: method, init and the number of sweeps are ignored.
 SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options);
 
-// About what SolveModel allocates on top of its input, in bytes; the copy of
-// the model that it returns is part of that.
-int64_t EstimateSolveBytes(const Model& model);
+// The method that SolveModel uses for these options.
+SolveMethod EffectiveMethod(const SolveModelOptions& options);
 
 }  // namespace krot

@@ -22,8 +22,8 @@ constexpr double kCoincident = 1e-12;
 struct FrameGeometry {
   Matrix3d world_from_rig = Matrix3d::Identity();  // R_rw'
   Vector3d centre_in_rig = Vector3d::Zero();       // -R_sr' t_sr
-  int num_views = 0;
-  bool is_seen_through = false;  // it has an observation
+  int num_views = 0;                               // that count
+  bool is_seen_through = false;                    // it has an observation
   bool has_two_centres = false;  // its observations fix the scale
 };
 
@@ -60,7 +60,8 @@ struct Spread {
   double rms = 0;  // distance to the centroid
 };
 
-// One per component; position n counts weights[n] times.
+// One per component; position n counts weights[n] times. The centroid is NaN
+// where nothing counts.
 std::vector<Spread> MeasureSpreads(const std::vector<Vector3d>& positions,
                                    const std::vector<int>& weights,
                                    const std::vector<int32_t>& component_of,
@@ -69,7 +70,7 @@ std::vector<Spread> MeasureSpreads(const std::vector<Vector3d>& positions,
   std::vector<double> sum_of_weights(num_components, 0);
   for (size_t n = 0; n < positions.size(); ++n) {
     const int32_t component = component_of[n];
-    if (component < 0) continue;
+    if (component < 0 || weights[n] == 0) continue;
     spreads[component].centroid += weights[n] * positions[n];
     sum_of_weights[component] += weights[n];
   }
@@ -78,7 +79,7 @@ std::vector<Spread> MeasureSpreads(const std::vector<Vector3d>& positions,
   }
   for (size_t n = 0; n < positions.size(); ++n) {
     const int32_t component = component_of[n];
-    if (component < 0) continue;
+    if (component < 0 || weights[n] == 0) continue;
     Spread& spread = spreads[component];
     spread.rms += weights[n] * (positions[n] - spread.centroid).squaredNorm();
   }
@@ -97,12 +98,13 @@ struct Extent {
   double nearest_point = std::numeric_limits<double>::infinity();
 
   bool CentresCoincide() const {
-    return centres.rms <=
-           kCoincident * (centres.centroid.norm() + nearest_point);
+    const double distance = std::isfinite(nearest_point) ? nearest_point : 0;
+    return centres.rms <= kCoincident * (centres.centroid.norm() + distance);
   }
 };
 
 std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
+                                   const std::vector<int>& point_weights,
                                    const Components& components,
                                    const Estimate& estimate) {
   std::vector<Vector3d> centres;
@@ -114,8 +116,7 @@ std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
   const std::vector<Spread> of_centres =
       MeasureSpreads(centres, num_views, components.of_frame, components.count);
   const std::vector<Spread> of_points = MeasureSpreads(
-      estimate.points, std::vector<int>(estimate.points.size(), 1),
-      components.of_point, components.count);
+      estimate.points, point_weights, components.of_point, components.count);
 
   std::vector<Extent> extents(components.count);
   for (int32_t c = 0; c < components.count; ++c) {
@@ -123,7 +124,7 @@ std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
     extents[c].points = of_points[c];
   }
   for (size_t k = 0; k < estimate.points.size(); ++k) {
-    if (components.of_point[k] < 0) continue;
+    if (components.of_point[k] < 0 || point_weights[k] == 0) continue;
     Extent& extent = extents[components.of_point[k]];
     extent.nearest_point =
         std::min(extent.nearest_point,
@@ -151,6 +152,7 @@ Move MoveOnto(const Extent& reference, const Extent& estimate,
   const Spread& to = use_points ? reference.points : reference.centres;
   const Spread& from = use_points ? estimate.points : estimate.centres;
 
+  if (!to.centroid.allFinite()) return {};
   Move move{from.centroid, to.centroid, 1};
   if (scale_is_free && from.rms > 0 && to.rms > 0) {
     move.scale = to.rms / from.rms;
@@ -163,11 +165,18 @@ Move MoveOnto(const Extent& reference, const Extent& estimate,
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate) {
   const Components components = FindComponents(problem);
-  const std::vector<FrameGeometry> frames = DescribeFrames(problem);
+  std::vector<FrameGeometry> frames = DescribeFrames(problem);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    if (!reference.translations[f].allFinite()) frames[f].num_views = 0;
+  }
+  std::vector<int> point_weights;
+  for (const Vector3d& point : reference.points) {
+    point_weights.push_back(point.allFinite());
+  }
   const std::vector<Extent> wanted =
-      MeasureExtents(frames, components, reference);
+      MeasureExtents(frames, point_weights, components, reference);
   const std::vector<Extent> found =
-      MeasureExtents(frames, components, *estimate);
+      MeasureExtents(frames, point_weights, components, *estimate);
 
   std::vector<char> scale_is_free(components.count, true);
   for (int32_t f = 0; f < problem.num_frames; ++f) {

@@ -17,9 +17,10 @@ namespace krot {
 // `reference` and, where the scale is free, the RMS distance to it. Every view
 // of a frame counts once, with the centre through which its frame sees points.
 // Where all centres of a component coincide (in either estimate), its points
-// take their place. The cost does not change. Frames and points without an
-// observation stay, and an estimate in the right place keeps its bits.
-// O(observations).
+// take their place. What is not finite in `reference` does not count, and a
+// component without anything that does stays. The cost does not change. Frames
+// and points without an observation stay, and an estimate in the right place
+// keeps its bits. O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate);
 

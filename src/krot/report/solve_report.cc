@@ -4,10 +4,12 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
+#include "krot/report/certificate_table.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -17,10 +19,18 @@ using Json = nlohmann::ordered_json;
 
 const char* TerminationName(SolveTermination termination) {
   switch (termination) {
+    case SolveTermination::kGapReached:
+      return "gap_reached";
     case SolveTermination::kStalled:
       return "stalled";
     case SolveTermination::kMaxSweeps:
       return "max_sweeps";
+    case SolveTermination::kMaxIterations:
+      return "max_iterations";
+    case SolveTermination::kInfeasible:
+      return "infeasible";
+    case SolveTermination::kNoStart:
+      return "no_start";
     case SolveTermination::kInterrupted:
       return "interrupted";
     case SolveTermination::kNothingToSolve:
@@ -31,20 +41,50 @@ const char* TerminationName(SolveTermination termination) {
   return "not_run";
 }
 
+// How many observations of the support the terminal shows.
+constexpr int kListedSupport = 10;
+
+// What is proved, and what is not.
+std::string Verdict(const SolveSummary& summary) {
+  const std::string maximum =
+      "Maximum " + FormatNumber(summary.cost_final, 4) + " px (linearised)";
+  if (!summary.is_certified) return maximum + ", not proved optimal.";
+  // Downwards: more than this is not proved.
+  const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
+  return maximum + ", proved optimal to " +
+         FormatNumber(100 * *summary.relative_gap, 4) +
+         " %: no estimate is below " + FormatNumber(bound, 4) + " px.";
+}
+
 std::string TerminationSentence(const SolveSummary& summary) {
+  const std::string sweeps =
+      Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
   const std::string after =
-      " after " + Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
+      " after " +
+      (summary.method == SolveMethod::kResInt
+           ? sweeps
+           : Counted(static_cast<int64_t>(summary.iterations.size()),
+                     "joint iteration") +
+                 " and " + sweeps);
   switch (summary.termination) {
+    case SolveTermination::kGapReached:
+      return "Ended" + after + " with the gap asked for.";
+    case SolveTermination::kMaxIterations:
+      return "Ended" + after + ", as many iterations as were allowed.";
     case SolveTermination::kStalled:
       return "Stalled" + after +
-             ": the last one gained less than the tolerance; whether a lower "
-             "cost exists is not known.";
+             (summary.method == SolveMethod::kResInt
+                  ? ": the last one gained less than the tolerance; whether a "
+                    "lower cost exists is not known."
+                  : ": rounding allows no further progress.");
     case SolveTermination::kMaxSweeps:
       return "Ended" + after + ", as many as were allowed.";
     case SolveTermination::kInterrupted:
       return "Interrupted" + after + ".";
     case SolveTermination::kNothingToSolve:
       return NothingToSolveSentence(summary) + ".";
+    case SolveTermination::kInfeasible:
+    case SolveTermination::kNoStart:
     case SolveTermination::kNotRun:
       break;
   }
@@ -85,6 +125,35 @@ std::string CountsSentence(const SolveSummary& summary) {
   return text.str() + ".";
 }
 
+Json NumberOrNull(const std::optional<double>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json IterationsJson(const std::vector<JointIteration>& iterations) {
+  Json json = Json::array();
+  for (const JointIteration& iteration : iterations) {
+    json.push_back({{"method", "joint"},
+                    {"cost", iteration.cost},
+                    {"lower_bound", NumberOrNull(iteration.lower_bound)},
+                    {"gap", iteration.gap},
+                    {"seconds", iteration.seconds}});
+  }
+  return json;
+}
+
+Json SupportJson(const std::vector<SupportObservation>& support) {
+  Json json = Json::array();
+  for (const SupportObservation& observation : support) {
+    json.push_back({{"image_id", observation.image_id},
+                    {"image_name", observation.image_name},
+                    {"point2D_idx", observation.point2D_idx},
+                    {"point3D_id", observation.point3D_id},
+                    {"multiplier", observation.multiplier},
+                    {"error_px", observation.error_px}});
+  }
+  return json;
+}
+
 Json ErrorJson(const PixelErrorStatistics& statistics) {
   if (statistics.count == 0) {
     return {{"max", nullptr},
@@ -99,6 +168,29 @@ Json ErrorJson(const PixelErrorStatistics& statistics) {
 }
 
 }  // namespace
+
+std::string MissedGapSentence(const SolveSummary& summary) {
+  const std::string why =
+      summary.termination == SolveTermination::kMaxIterations
+          ? "Joint.max_iterations was hit"
+          : "rounding allows no further progress";
+  return "the gap asked for is not reached: " + why +
+         (summary.relative_gap
+              ? "; the gap is " + Scientific(*summary.relative_gap)
+              : "; no bound is proved");
+}
+
+std::string MethodName(SolveMethod method) {
+  switch (method) {
+    case SolveMethod::kResInt:
+      return "res_int";
+    case SolveMethod::kJoint:
+      return "joint";
+    case SolveMethod::kAuto:
+      break;
+  }
+  return "auto";
+}
 
 std::string NormName(Norm norm) {
   if (std::isinf(norm.p)) return "inf";
@@ -143,8 +235,17 @@ std::string SolveTable(const SolveReport& report) {
          << " without a finite error (behind the camera, no pose, or not "
             "projectable), in no row above.\n";
   }
-  text << TerminationSentence(summary) << '\n'
-       << "Read " << FormatNumber(report.seconds_read, 2) << " s, built "
+  if (summary.num_components > 1) {
+    text << "The problem falls into "
+         << Counted(summary.num_components, "component")
+         << " without observations in common; each is solved.\n";
+  }
+  text << TerminationSentence(summary) << '\n' << Verdict(summary) << '\n';
+  if (summary.is_certified) {
+    text << SupportTable(summary.support, kListedSupport);
+  }
+  text << (summary.is_certified ? "\n" : "") << "Read "
+       << FormatNumber(report.seconds_read, 2) << " s, built "
        << FormatNumber(summary.seconds_build, 2) << " s, solved "
        << FormatNumber(summary.seconds_solve, 2) << " s, wrote "
        << FormatNumber(report.seconds_write, 2) << " s; "
@@ -178,28 +279,28 @@ std::string SolveJson(const SolveReport& report) {
       {"left_out", left_out},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
-      // No method of this version bounds the cost from below.
-      {"lower_bound", nullptr},
-      {"relative_gap", nullptr},
-      {"certified", false},
+      {"lower_bound", NumberOrNull(summary.lower_bound)},
+      {"relative_gap", NumberOrNull(summary.relative_gap)},
+      {"certified", summary.is_certified},
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
       {"sweeps", sweeps},
-      {"iterations", Json::array()},
-      {"support", Json::array()},
+      {"iterations", IterationsJson(summary.iterations)},
+      {"support", SupportJson(summary.support)},
       {"seconds",
        {{"read", report.seconds_read},
         {"build", summary.seconds_build},
         {"solve", summary.seconds_solve},
-        {"certify", nullptr},
+        {"certify", NumberOrNull(summary.seconds_certify)},
         {"write", report.seconds_write},
         {"total", report.seconds_total}}},
       {"peak_memory_bytes", report.peak_memory_bytes},
       {"threads", report.threads},
       {"seed", report.seed},
   };
-  return json.dump(2) + "\n";
+  // Image names are bytes, not always UTF-8.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace krot

@@ -32,6 +32,12 @@ std::string SolveJson(const SolveReport& report);
 // the termination kNothingToSolve.
 std::string NothingToSolveSentence(const SolveSummary& summary);
 
+// "the gap asked for is not reached after 300 iterations, as many as ...".
+std::string MissedGapSentence(const SolveSummary& summary);
+
+// As --Solver.method takes it.
+std::string MethodName(SolveMethod method);
+
 // As --Solver.norm takes it: "1", "2", "inf", "1.5".
 std::string NormName(Norm norm);
 

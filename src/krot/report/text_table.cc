@@ -44,6 +44,13 @@ std::string FormatNumber(double value, int decimals) {
   return text.str();
 }
 
+std::string Scientific(double value) {
+  if (!std::isfinite(value)) return "-";
+  std::ostringstream text;
+  text << std::scientific << std::setprecision(1) << value;
+  return text.str();
+}
+
 std::string Counted(int64_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }

@@ -23,6 +23,9 @@ class TextTable {
 // With `decimals` digits after the point; "-" if not finite.
 std::string FormatNumber(double value, int decimals);
 
+// With two digits: "1.2e-05".
+std::string Scientific(double value);
+
 // "1 point", "2 points".
 std::string Counted(int64_t count, const std::string& noun);
 

@@ -11,16 +11,13 @@
 namespace krot {
 namespace {
 
-// A sweep with momentum may fail where the next one, without, does not: fast
-// settings stop after so many sweeps in a row that gain too little.
-constexpr int kPatience = 3;
-
 void CheckOptions(const ResIntOptions& options) {
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
   CheckArgument(options.max_sweeps >= 0, "max_sweeps", options.max_sweeps,
                 ">= 0");
   CheckArgument(options.sweep_tolerance >= 0, "sweep_tolerance",
                 options.sweep_tolerance, ">= 0");
+  CheckArgument(options.patience >= 1, "patience", options.patience, ">= 1");
 }
 
 }  // namespace
@@ -31,7 +28,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   const Timer timer;
   const bool literal =
       options.fast_descent.settings == FastDescentSettings::kPaper;
-  const int patience = literal ? 1 : kPatience;
+  const int patience = literal ? 1 : options.patience;
   ResIntSummary summary;
   summary.cost_initial =
       Cost(problem, *estimate, options.norm, options.num_threads);

@@ -28,9 +28,11 @@ struct ResIntOptions {
   // Literally as in the paper, or the same sub-problem optima by better means.
   FastDescentOptions fast_descent;
   int max_sweeps = 1000;  // >= 0
-  // Stop when sweeps lower the cost by less than this, relative; >= 0. One
-  // such sweep with paper settings, three in a row with fast ones.
+  // Stop when sweeps lower the cost by less than this, relative; >= 0.
   double sweep_tolerance = 1e-6;
+  // After so many such sweeps in a row; >= 1. A sweep with momentum may fail
+  // where the next one, without, does not. Paper settings: after the first.
+  int patience = 3;
   int num_threads = -1;       // -1: all; the result does not depend on it
   bool update_frames = true;  // false: points only (triangulation)
   const CancelFlag* cancel = nullptr;  // may be null

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "krot/bridge/bridge.h"
+#include "krot/minimax/norm.h"
+#include "krot/model/model.h"
+#include "krot/solver/certificate_check.h"
+
+namespace krot {
+
+// An observation that, with the others of its certificate, sets the maximum.
+struct SupportObservation {
+  ImageId image_id = 0;
+  std::string image_name;
+  uint32_t point2D_idx = 0;
+  Point3DId point3D_id = 0;
+  double multiplier = 0;  // lambda, of a sum of 1
+  double error_px = 0;    // the estimate's residual, linearised pixels
+};
+
+// The support of a certificate of built.problem, worst first.
+std::vector<SupportObservation> ListSupport(const Model& model,
+                                            const BuiltProblem& built,
+                                            const Estimate& estimate, Norm norm,
+                                            const Certificate& certificate);
+
+}  // namespace krot

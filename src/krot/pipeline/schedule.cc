@@ -1,0 +1,165 @@
+#include "krot/pipeline/schedule.h"
+
+#include "krot/base/timer.h"
+#include "krot/problem/cost.h"
+#include "krot/solver/block_sweep.h"
+
+namespace krot {
+namespace {
+
+// Sweeps behind the joint solver: after them a third would hardly lower any
+// block's own maximum.
+constexpr int kFinishingSweeps = 2;
+// What a finishing sweep may add to the cost by rounding, relative.
+constexpr double kCostRounding = 1e-12;
+// Leaves room in the gap for finishing sweeps' and the gauge's rounding.
+constexpr double kShareOfGap = 0.999;
+
+SolveTermination FromResInt(ResIntTermination termination) {
+  switch (termination) {
+    case ResIntTermination::kStalled:
+      return SolveTermination::kStalled;
+    case ResIntTermination::kMaxSweeps:
+      return SolveTermination::kMaxSweeps;
+    case ResIntTermination::kInterrupted:
+      return SolveTermination::kInterrupted;
+    case ResIntTermination::kNotRun:
+      break;
+  }
+  return SolveTermination::kNotRun;
+}
+
+SolveTermination FromJoint(JointTermination termination) {
+  switch (termination) {
+    case JointTermination::kGapReached:
+      return SolveTermination::kGapReached;
+    case JointTermination::kMaxIterations:
+      return SolveTermination::kMaxIterations;
+    case JointTermination::kStalled:
+      return SolveTermination::kStalled;
+    case JointTermination::kInterrupted:
+      return SolveTermination::kInterrupted;
+    case JointTermination::kNotRun:
+      break;
+  }
+  return SolveTermination::kNotRun;
+}
+
+class Schedule {
+ public:
+  Schedule(const KnownRotationProblem& problem,
+           const SolveModelOptions& options, Estimate* estimate,
+           SolveSummary* summary)
+      : problem_(problem),
+        options_(options),
+        estimate_(*estimate),
+        summary_(*summary) {}
+
+  void Sweeps(ResIntOptions res_int);
+  void LeadingSweeps();
+  std::optional<Certificate> Joint();
+  void FinishingSweeps();
+
+  bool IsInterrupted() const {
+    return summary_.termination == SolveTermination::kInterrupted;
+  }
+
+ private:
+  void AddSweep(double cost) {
+    summary_.sweeps.push_back({cost, timer_.Seconds()});
+    if (!options_.res_int.callback) return;
+    options_.res_int.callback(static_cast<int>(summary_.sweeps.size()),
+                              summary_.sweeps.back());
+  }
+
+  const KnownRotationProblem& problem_;
+  const SolveModelOptions& options_;
+  Estimate& estimate_;
+  SolveSummary& summary_;
+  const Timer timer_;
+};
+
+void Schedule::Sweeps(ResIntOptions res_int) {
+  res_int.norm = options_.norm;
+  res_int.num_threads = options_.num_threads;
+  res_int.cancel = options_.cancel;
+  res_int.callback = [this](int, const Sweep& sweep) { AddSweep(sweep.cost); };
+  const ResIntSummary result = SolveResInt(problem_, res_int, &estimate_);
+  summary_.termination = FromResInt(result.termination);
+  summary_.cost_final = result.cost_final;
+}
+
+void Schedule::LeadingSweeps() {
+  ResIntOptions res_int = options_.res_int;
+  res_int.max_sweeps = options_.max_leading_sweeps;
+  res_int.sweep_tolerance = options_.leading_sweep_tolerance;
+  res_int.patience = 1;
+  Sweeps(res_int);
+}
+
+std::optional<Certificate> Schedule::Joint() {
+  JointOptions joint = options_.joint;
+  joint.norm = options_.norm;
+  joint.num_threads = options_.num_threads;
+  joint.cancel = options_.cancel;
+  joint.relative_gap *= kShareOfGap;
+  const double seconds_before = timer_.Seconds();
+  joint.callback = [&](int iteration, const JointIteration& state) {
+    summary_.iterations.push_back(state);
+    summary_.iterations.back().seconds += seconds_before;
+    if (!options_.joint.callback) return;
+    options_.joint.callback(iteration, summary_.iterations.back());
+  };
+  const JointSummary result = SolveJoint(problem_, joint, &estimate_);
+  summary_.termination = FromJoint(result.termination);
+  summary_.cost_final = result.cost_final;
+  return result.certificate;
+}
+
+void Schedule::FinishingSweeps() {
+  BlockSweep blocks(problem_, options_.res_int.fast_descent, options_.norm,
+                    options_.num_threads, options_.cancel);
+  for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
+    Estimate swept = estimate_;
+    blocks.IntersectPoints(&swept);
+    blocks.ResectFrames(&swept);
+    if (IsCancelled(options_.cancel)) {
+      summary_.termination = SolveTermination::kInterrupted;
+      return;
+    }
+    const double cost =
+        Cost(problem_, swept, options_.norm, options_.num_threads);
+    if (!(cost <= (1 + kCostRounding) * summary_.cost_final)) return;
+    estimate_ = std::move(swept);
+    summary_.cost_final = cost;
+    AddSweep(cost);
+  }
+}
+
+}  // namespace
+
+std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
+                                       const SolveModelOptions& options,
+                                       SolveMethod method, Estimate* estimate,
+                                       SolveSummary* summary) {
+  summary->cost_initial =
+      Cost(problem, *estimate, options.norm, options.num_threads);
+  summary->cost_final = summary->cost_initial;
+  Schedule schedule(problem, options, estimate, summary);
+  switch (method) {
+    case SolveMethod::kResInt:
+      schedule.Sweeps(options.res_int);
+      return std::nullopt;
+    case SolveMethod::kJoint:
+      return schedule.Joint();
+    case SolveMethod::kAuto:
+      break;
+  }
+  schedule.LeadingSweeps();
+  if (schedule.IsInterrupted()) return std::nullopt;
+  const std::optional<Certificate> certificate = schedule.Joint();
+  if (!schedule.IsInterrupted()) schedule.FinishingSweeps();
+  return certificate;
+}
+
+}  // namespace krot

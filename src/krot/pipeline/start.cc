@@ -1,0 +1,120 @@
+#include "krot/pipeline/start.h"
+
+#include <string>
+#include <utility>
+
+#include "krot/solver/initializer.h"
+
+namespace krot {
+namespace {
+
+void Note(const SolveModelOptions& options, const std::string& sentence) {
+  if (options.on_note) options.on_note(sentence);
+}
+
+bool IsLarger(const BuiltProblem& a, const BuiltProblem& b) {
+  return a.problem.observations.size() > b.problem.observations.size();
+}
+
+// Whether all frames see the points from the same place, as in a model whose
+// translations are all zero: any translations are better then. Rigs with
+// baselines have several places.
+bool CentresCoincide(const BuiltProblem& built) {
+  const auto centre = [&](const View& view) -> Eigen::Vector3d {
+    return -view.cam_from_world_rotation.transpose() *
+           (view.cam_from_rig_rotation * built.start.translations[view.frame] +
+            view.cam_from_rig_translation);
+  };
+  if (built.problem.num_frames < 2) return false;
+  const Eigen::Vector3d first = centre(built.problem.views.front());
+  for (const View& view : built.problem.views) {
+    if (centre(view) != first) return false;
+  }
+  return true;
+}
+
+std::string NumberOfMissing(const BuiltProblem& all, const BuiltProblem& own) {
+  return std::to_string(all.problem.observations.size() -
+                        own.problem.observations.size());
+}
+
+BuiltProblem Build(const Model& model, const SolveModelOptions& options,
+                   bool ignore_translations) {
+  BuildProblemOptions build_options = options.problem;
+  build_options.num_threads = options.num_threads;
+  build_options.ignore_translations = ignore_translations;
+  return BuildProblem(model, build_options);
+}
+
+}  // namespace
+
+Start OwnStart(const Model& model, const SolveModelOptions& options) {
+  return {Build(model, options, /*ignore_translations=*/false),
+          SolveInit::kModel};
+}
+
+Start ChooseStart(const Model& model, const SolveModelOptions& options,
+                  SolveMethod method) {
+  Start own = OwnStart(model, options);
+  const auto count = [&own](LeftOut reason) {
+    return own.built.left_out[static_cast<size_t>(reason)];
+  };
+  const bool coincide = CentresCoincide(own.built);
+  const bool asked = options.init == SolveInit::kFeasible;
+  if (!asked && !coincide && count(LeftOut::kBehind) == 0 &&
+      count(LeftOut::kNoPose) == 0) {
+    return own;
+  }
+
+  Start all{Build(model, options, /*ignore_translations=*/true),
+            SolveInit::kFeasible};
+  if (asked) return all;
+  const bool is_larger = IsLarger(all.built, own.built);
+  if (!is_larger && !coincide) return own;
+  if (method != SolveMethod::kAuto) {
+    if (is_larger) {
+      Note(options,
+           NumberOfMissing(all.built, own.built) +
+               " observations are left out because they have no pose or are "
+               "behind their cameras; --Solver.init feasible takes them in");
+    }
+    return own;
+  }
+  Note(options, is_larger ? "the model's translations and points leave out " +
+                                NumberOfMissing(all.built, own.built) +
+                                " observations; looking for a start that has "
+                                "all of them"
+                          : std::string("all cameras of the model stand in one "
+                                        "place; looking for a start"));
+  return all;
+}
+
+FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
+                             const SolveModelOptions& options) {
+  InitializerOptions initializer;
+  initializer.norm = options.norm;
+  initializer.max_error = options.init_max_error;
+  initializer.num_threads = options.num_threads;
+  initializer.cancel = options.cancel;
+  FoundStart start;
+  InitializerSummary summary = FindStart(problem, initializer, &start.estimate);
+  switch (summary.termination) {
+    case InitializerTermination::kFeasible:
+      start.termination = SolveTermination::kNotRun;
+      break;
+    case InitializerTermination::kInfeasible:
+      start.termination = SolveTermination::kInfeasible;
+      start.certificate = std::move(summary.certificate);
+      break;
+    case InitializerTermination::kInterrupted:
+      start.termination = SolveTermination::kInterrupted;
+      break;
+    case InitializerTermination::kNotRun:
+    case InitializerTermination::kFailed:
+      start.termination = SolveTermination::kNoStart;
+      break;
+  }
+  return start;
+}
+
+}  // namespace krot

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+
+#include "krot/bridge/bridge.h"
+#include "krot/pipeline/solve_model.h"
+
+namespace krot {
+
+// Where a solve starts.
+struct Start {
+  // Of all observations that the start can serve; built.start is what the
+  // model says, and the reference for its coordinate frame.
+  BuiltProblem built;
+  SolveInit init = SolveInit::kModel;
+};
+
+// The model's own start or, if asked for or if `method` is kAuto and the
+// model's own is not fit for all observations, one to be found. Says so.
+Start ChooseStart(const Model& model, const SolveModelOptions& options,
+                  SolveMethod method);
+
+// The model's own start; observations that it cannot serve are left out.
+Start OwnStart(const Model& model, const SolveModelOptions& options);
+
+struct FoundStart {
+  // kNotRun: there is a start.
+  SolveTermination termination = SolveTermination::kNotRun;
+  Estimate estimate;                       // all depths are positive
+  std::optional<Certificate> certificate;  // kInfeasible
+};
+
+// One whose residuals are below options.init_max_error.
+FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
+                             const SolveModelOptions& options);
+
+}  // namespace krot
