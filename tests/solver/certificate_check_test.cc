@@ -133,6 +133,33 @@ TEST(CheckCertificate, SaysWhatIsWrongWithTheNumbers) {
       HasSubstr("p = 3"));
 }
 
+TEST(CheckCertificate, RefusesWhateverOverflowsOrUnderflows) {
+  const Twice twice = MakeTwice(4.0 / 1024);
+  for (const double bound : {1e200, 1e300, 1.7e308}) {
+    Certificate certificate = twice.certificate;
+    certificate.lower_bound = bound;
+    EXPECT_FALSE(
+        CheckCertificate(twice.problem, Norm::L2(), certificate).is_accepted);
+  }
+  for (const double lambda : {1e-150, 5e-324}) {
+    Certificate certificate = twice.certificate;
+    certificate.observations[1].lambda = lambda;
+    certificate.observations[1].y.setZero();
+    EXPECT_FALSE(
+        CheckCertificate(twice.problem, Norm::L2(), certificate).is_accepted);
+  }
+  for (const double huge : {1e200, 1e308}) {
+    KnownRotationProblem problem = twice.problem;
+    problem.observations[0].J *= huge;
+    EXPECT_FALSE(
+        CheckCertificate(problem, Norm::L2(), twice.certificate).is_accepted);
+    problem = twice.problem;
+    problem.observations[0].u[1] = huge;
+    EXPECT_FALSE(
+        CheckCertificate(problem, Norm::L2(), twice.certificate).is_accepted);
+  }
+}
+
 TEST(CheckCertificate, RefusesViewsThatAreNotOfOneFrame) {
   Twice twice = MakeTwice(4.0 / 1024);
   twice.problem.views[0].cam_from_rig_rotation *= 2;

@@ -7,30 +7,23 @@
 #include <sstream>
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 
 #include "krot/problem/components.h"
 #include "krot/problem/restrict.h"
+#include "krot/solver/verified_solution.h"
 
 // How (1) is proved. Let M = [A_i' lambda_i]_i, without the rows of one frame
 // per connected component: with R_f the frames' rotations, sum_f R_f' (rows of
 // t_f) = sum_k (rows of s_k) for A and c alike, as a translation moves nothing,
 // so these rows vanish once all others do. Let g be what the other rows of (1)
-// miss. If X is an approximate right inverse and E = I - M X has
-// |E|_inf = alpha < 1, then a = -X (I - E)^-1 g exists and solves M a = -g, so
-// y_i + lambda_i a_i satisfies (1) exactly, and
-//
-//   |a| <= |X| (|g| + alpha / (1 - alpha) |g|_inf)      entry by entry.
-//
-// Divided by rho = max_i (|y_i|_dual / lambda_i + |a_i|_dual) it is dual
-// feasible and proves delta / rho. Rows may be scaled freely; powers of two
-// add no rounding.
+// miss. With M a = -g (verified_solution.h), y_i + lambda_i a_i satisfies (1)
+// exactly; divided by rho = max_i (|y_i|_dual / lambda_i + |a_i|_dual) it is
+// dual feasible and proves delta / rho.
 
 namespace krot {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using Real = long double;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Matrix23 = Eigen::Matrix<Real, 2, 3>;
@@ -41,9 +34,10 @@ constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
 constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
 constexpr double kMaxExcess = 1e-12;  // of |y|_dual over lambda
 constexpr int64_t kMaxUnknowns = 6000;
-// Covers the roundings of sums of non-negative doubles: their relative error
-// is below (number of terms) * kUnitRoundoff.
+// Covers a few roundings of non-negative bounds, and their cast to double.
 constexpr double kOutward = 1 + 1e-9;
+// Smaller multipliers, relative, might underflow.
+constexpr double kSmallestShare = 1e-100;
 
 std::string Sentence(const std::string& start, double value,
                      const std::string& end) {
@@ -66,6 +60,14 @@ Matrix23 NumeratorRows(const Observation& observation) {
   return observation.J.cast<Real>() * rows;
 }
 
+// What E sums up, before any cancellation: |J| (I2 | |u|).
+Matrix23 NumeratorTerms(const Observation& observation) {
+  Matrix23 rows;
+  rows << Matrix23::Identity().leftCols<2>(),
+      observation.u.cast<Real>().cwiseAbs();
+  return observation.J.cast<Real>().cwiseAbs() * rows;
+}
+
 class Checker {
  public:
   Checker(const KnownRotationProblem& problem, Norm norm,
@@ -82,12 +84,17 @@ class Checker {
   std::optional<std::string> Restrict();
   std::optional<std::string> CheckRotations() const;
   void NumberUnknowns();
-  void Assemble();
-  std::optional<std::string> BoundCorrection();
+  UncertainSystem Assemble() const;
+  // Of sums over the support, relative to the sum of absolute values: every
+  // term goes through at most 12 roundings, and each sum adds one.
+  Real SumError() const {
+    return (static_cast<Real>(lambda_.size()) + 12) * kRealRoundoff;
+  }
   std::optional<std::string> CheckConstants() const;
   void BoundRho();
 
-  // Calls visit(first row, R, is_frame) for the two unknowns of observation i.
+  // Calls visit(first row, R, error of R) for the two unknowns of observation
+  // i.
   template <typename Visit>
   void ForUnknowns(int64_t i, const Visit& visit) const;
 
@@ -102,10 +109,7 @@ class Checker {
   // The row of an unknown in (1); -1 for frames whose rows are omitted.
   std::vector<int64_t> row_of_frame_;
   int64_t num_rows_ = 0;
-  MatrixXd M_;        // rows scaled
-  MatrixXd M_error_;  // bounds |M_ - what it stands for|
-  VectorXd g_bound_;  // bounds |g|, rows scaled alike
-  VectorXd a_bound_;  // bounds |a|
+  Eigen::VectorXd a_bound_;  // bounds |a|
   double rho_ = 0;
 };
 
@@ -152,6 +156,9 @@ std::optional<std::string> Checker::Restrict() {
   int exponent = 0;
   std::frexp(largest, &exponent);
   for (const CertifiedObservation& o : certificate_.observations) {
+    if (o.lambda < kSmallestShare * largest) {
+      return "its multipliers differ by more than 100 decades";
+    }
     lambda_.push_back(std::ldexp(Real{o.lambda}, -exponent));
     y_.push_back({std::ldexp(Real{o.y[0]}, -exponent),
                   std::ldexp(Real{o.y[1]}, -exponent)});
@@ -219,85 +226,45 @@ void Checker::ForUnknowns(int64_t i, const Visit& visit) const {
   }
 }
 
-// M, g and what their entries may be wrong by. A point's rotation R_sr R_rw
+// M, |g| and what their entries may be wrong by. A point's rotation R_sr R_rw
 // counts as known to kRotationError, a frame's R_sr as exact: then the two are
 // those of some R_rw, as the argument about the omitted rows needs.
-void Checker::Assemble() {
+UncertainSystem Checker::Assemble() const {
   const int64_t count = static_cast<int64_t>(lambda_.size());
   const Real delta = certificate_.lower_bound;
-  M_ = MatrixXd::Zero(num_rows_, 2 * count);
-  M_error_ = MatrixXd::Zero(num_rows_, 2 * count);
+  UncertainSystem system;
+  system.M = MatrixXd::Zero(num_rows_, 2 * count);
+  system.M_error = MatrixXd::Zero(num_rows_, 2 * count);
   using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
   Column g = Column::Zero(num_rows_);
   Column g_error = Column::Zero(num_rows_);
   Column g_terms = Column::Zero(num_rows_);  // sum of absolute values
   for (int64_t i = 0; i < count; ++i) {
     const Matrix23 E = NumeratorRows(part_.problem.observations[i]);
-    const Matrix23 E_abs =  // before cancellation in E itself
-        part_.problem.observations[i].J.cast<Real>().cwiseAbs() *
-        (Matrix23() << Matrix23::Identity().leftCols<2>(),
-         part_.problem.observations[i].u.cast<Real>().cwiseAbs())
-            .finished();
+    const Matrix23 E_terms = NumeratorTerms(part_.problem.observations[i]);
     ForUnknowns(i, [&](int64_t row, const Matrix3& R, double rotation_error) {
       const Matrix23 A = E * R;
-      const Matrix23 A_terms = E_abs * R.cwiseAbs();
-      const Vector2 A_error = rotation_error * E_abs.rowwise().sum();
+      const Matrix23 A_terms = E_terms * R.cwiseAbs();
+      const Vector2 A_error = rotation_error * E_terms.rowwise().sum();
       const Vector3 c = R.row(2).transpose();
       g.segment<3>(row) += A.transpose() * y_[i] + delta * lambda_[i] * c;
       g_terms.segment<3>(row) += A_terms.transpose() * y_[i].cwiseAbs() +
                                  delta * lambda_[i] * c.cwiseAbs();
       g_error.segment<3>(row).array() +=
           A_error.dot(y_[i].cwiseAbs()) + delta * lambda_[i] * rotation_error;
-      M_.block<3, 2>(row, 2 * i) = (lambda_[i] * A.transpose()).cast<double>();
-      M_error_.block<3, 2>(row, 2 * i) =
+      system.M.block<3, 2>(row, 2 * i) =
+          (lambda_[i] * A.transpose()).cast<double>();
+      system.M_error.block<3, 2>(row, 2 * i) =
           (lambda_[i] * A_terms.transpose() *
                (2 * kUnitRoundoff + 12 * kRealRoundoff) +
            lambda_[i] * Vector3::Ones() * A_error.transpose())
               .cast<double>();
     });
   }
-  // Every term went through at most 12 roundings, and each sum adds one.
-  const Real sum_error = (static_cast<Real>(count) + 12) * kRealRoundoff;
-  g_bound_ = ((g.cwiseAbs() + g_error + sum_error * g_terms) * Real{kOutward})
-                 .cast<double>();
-  for (int64_t row = 0; row < num_rows_; ++row) {
-    int exponent = 0;
-    std::frexp(M_.row(row).norm(), &exponent);
-    const double scale = std::ldexp(1.0, -exponent);
-    M_.row(row) *= scale;
-    M_error_.row(row) *= scale;
-    g_bound_[row] *= scale;
-  }
-}
-
-std::optional<std::string> Checker::BoundCorrection() {
-  const char* const flexible =
-      "its support is flexible, or too nearly so for this arithmetic";
-  // X = Q R^-T where M' = Q R.
-  const Eigen::HouseholderQR<MatrixXd> qr(M_.transpose());
-  const MatrixXd Q =
-      qr.householderQ() * MatrixXd::Identity(M_.cols(), num_rows_);
-  const MatrixXd X = qr.matrixQR()
-                         .topRows(num_rows_)
-                         .triangularView<Eigen::Upper>()
-                         .solve(Q.transpose())
-                         .transpose();
-  if (!X.allFinite()) return flexible;
-
-  const MatrixXd E = MatrixXd::Identity(num_rows_, num_rows_) - M_ * X;
-  const VectorXd X_sums = X.cwiseAbs().rowwise().sum();
-  const double product_error =
-      (static_cast<double>(M_.cols()) + 3) * 2 * kUnitRoundoff;
-  const VectorXd E_sums =
-      E.cwiseAbs().rowwise().sum() * (1 + 2 * kUnitRoundoff) +
-      M_.cwiseAbs() * X_sums * product_error + M_error_ * X_sums;
-  const double alpha = E_sums.maxCoeff() * kOutward;
-  if (!(alpha < 0.5)) return flexible;
-
-  const VectorXd b =
-      g_bound_.array() + alpha / (1 - alpha) * g_bound_.maxCoeff();
-  a_bound_ = X.cwiseAbs() * b * (kOutward * kOutward);
-  return std::nullopt;
+  system.g_bound =
+      ((g.cwiseAbs() + g_error + SumError() * g_terms) * Real{kOutward})
+          .cast<double>();
+  return system;
 }
 
 // (2), once every frame's origin has moved to the projection centre of the
@@ -326,14 +293,16 @@ std::optional<std::string> Checker::CheckConstants() const {
                 t_first;
     const Real o_error =
         8 * kRotationError * (t.cwiseAbs().sum() + t_first.cwiseAbs().sum());
-    const Matrix23 E = NumeratorRows(observation);
-    const Vector2 b = E * o;
-    const Vector2 b_error = E.cwiseAbs().rowwise().sum() * (2 * o_error);
+    const Vector2 b = NumeratorRows(observation) * o;
+    const Matrix23 E_terms = NumeratorTerms(observation);
+    const Vector2 b_error = E_terms.rowwise().sum() * (2 * o_error);
     const Vector2 a = a_bound_.segment<2>(2 * i).cast<Real>();
     const Real delta = certificate_.lower_bound;
     kappa += y_[i].dot(b) + delta * lambda_[i] * o[2];
     kappa_error += y_[i].cwiseAbs().dot(b_error) +
                    delta * lambda_[i] * 2 * o_error +
+                   SumError() * (y_[i].cwiseAbs().dot(E_terms * o.cwiseAbs()) +
+                                 delta * lambda_[i] * std::abs(o[2])) +
                    lambda_[i] * a.dot(b.cwiseAbs() + b_error);
   }
   if (kappa + kappa_error * Real{kOutward} <= 0) return std::nullopt;
@@ -352,8 +321,11 @@ void Checker::BoundRho() {
 std::optional<std::string> Checker::Run() {
   if (auto refusal = CheckNumbers()) return refusal;
   if (auto refusal = Restrict()) return refusal;
-  Assemble();
-  if (auto refusal = BoundCorrection()) return refusal;
+  const std::optional<Eigen::VectorXd> a_bound = BoundSolution(Assemble());
+  if (!a_bound) {
+    return "its support is flexible, or too nearly so for this arithmetic";
+  }
+  a_bound_ = *a_bound;
   if (auto refusal = CheckConstants()) return refusal;
   BoundRho();
   const double defect = rho_ - 1;
