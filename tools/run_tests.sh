@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
 # Builds krot and its tests into build/ and runs all of them, installing what is
-# missing first (with sudo if not root). COLMAP serves as a test oracle. Set
+# missing first (with sudo if not root). COLMAP and CLP serve as test oracles. Set
 # KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
 #
 # Usage: tools/run_tests.sh
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${build_needs[@]}" libgtest-dev libgmock-dev colmap:colmap
+install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
+  coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap
 build_krot -DKROT_BUILD_TESTS=ON
 
 say "Testing"

@@ -50,16 +50,17 @@ bool HasBaseline(const KnownRotationProblem& problem) {
                      });
 }
 
-// Looks for the proof that no estimate of a component meets the bound: its
-// optimum, from an estimate that misses the bound.
-InitializerTermination ProveInfeasible(const RestrictedProblem& part,
+// Where no estimate of a component was found at the bound, its optimum decides:
+// sought from an estimate that misses the bound, it proves that there is none,
+// or meets the bound itself.
+InitializerTermination DecideByOptimum(const RestrictedProblem& part,
                                        const InitializerOptions& options,
+                                       Estimate* estimate,
                                        InitializerSummary* summary) {
-  Estimate estimate;
   for (double bound = kBoundGrowth * options.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
     const InteriorPointTermination found =
-        FindEstimateBelow(part.problem, bound, StartOptions(options), &estimate,
+        FindEstimateBelow(part.problem, bound, StartOptions(options), estimate,
                           &summary->iterations);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
@@ -70,7 +71,7 @@ InitializerTermination ProveInfeasible(const RestrictedProblem& part,
     joint.max_iterations = options.max_iterations;
     joint.num_threads = options.num_threads;
     joint.cancel = options.cancel;
-    const JointSummary optimum = SolveJoint(part.problem, joint, &estimate);
+    const JointSummary optimum = SolveJoint(part.problem, joint, estimate);
     summary->iterations += static_cast<int>(optimum.iterations.size());
     summary->cost = optimum.cost_final;
     if (optimum.certificate && optimum.lower_bound > options.max_error) {
@@ -81,7 +82,12 @@ InitializerTermination ProveInfeasible(const RestrictedProblem& part,
       summary->lower_bound = optimum.lower_bound;
       return InitializerTermination::kInfeasible;
     }
-    return InitializerTermination::kFailed;
+    if (optimum.termination == JointTermination::kInterrupted) {
+      return InitializerTermination::kInterrupted;
+    }
+    return optimum.cost_final < options.max_error
+               ? InitializerTermination::kFeasible
+               : InitializerTermination::kFailed;
   }
   return InitializerTermination::kFailed;
 }
@@ -110,8 +116,10 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
       return summary;
     }
     if (termination != InteriorPointTermination::kFeasible) {
-      summary.termination = ProveInfeasible(part, options, &summary);
-      return summary;
+      summary.termination = DecideByOptimum(part, options, &start, &summary);
+      if (summary.termination != InitializerTermination::kFeasible) {
+        return summary;
+      }
     }
     FeasibleStartOptions lower = StartOptions(options);
     lower.hopeless_gap = kHopelessGap;
