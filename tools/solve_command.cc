@@ -114,7 +114,8 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveSummary& summary) {
 void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   const LogOptions& log = command.common.log;
   if (summary.method == SolveMethod::kResInt) return;
-  if (summary.termination != SolveTermination::kGapReached) {
+  if (summary.termination != SolveTermination::kGapReached &&
+      !IsZeroUpToRounding(summary)) {
     LogLine(log, 0, "warning: " + MissedGapSentence(summary));
   }
   if (!command.certificate_path.empty() && !summary.certificate) {

@@ -47,7 +47,11 @@ class Options : public ::testing::Test {
 
 TEST_F(Options, OfTheSolverAreCheckedAgainstTheirRanges) {
   const std::vector<Words> wrong = {
-      {"--Solver.method", "joint", "one of {res_int}"},
+      {"--Solver.method", "fast", "one of {auto, res_int, joint}"},
+      {"--Solver.init", "zero", "one of {model, feasible}"},
+      {"--Solver.relative_gap", "0", "a number > 0"},
+      {"--Problem.init_max_error", "0", "a number > 0, pixels"},
+      {"--Joint.max_iterations", "0", "an integer >= 1"},
       {"--Solver.norm", "0.5", "1, 2, inf or a number >= 1"},
       {"--Solver.norm", "nan", "1, 2, inf or a number >= 1"},
       {"--Solver.norm", "two", "1, 2, inf or a number >= 1"},
@@ -142,6 +146,59 @@ TEST_F(Options, ThatContradictEachOtherAreRefused) {
                 "must be at most the number of images, 3");
 }
 
+TEST_F(Options, ThatTheMethodDoesNotLookAtAreRefused) {
+  const std::vector<Words> contradictions = {
+      {"--Solver.relative_gap", "1e-3", "--Solver.method", "res_int"},
+      {"--Joint.max_iterations", "9", "--Solver.method", "res_int"},
+      {"--certificate_path", folder_ / "c.json", "--Solver.method", "res_int"},
+      {"--certificate_path", folder_ / "c.json", "--Solver.settings", "paper"},
+      {"--Solver.relative_gap", "1e-3", "--Solver.norm", "3"},
+      {"--ResInt.max_sweeps", "3", "--Solver.method", "joint"},
+      {"--ResInt.sweep_tolerance", "1", "--Solver.method", "joint"},
+      {"--Solver.settings", "fast", "--Solver.method", "joint"},
+      {"--FastDescent.max_iterations", "3", "--Solver.method", "joint"},
+      {"--Problem.init_max_error", "9", "--Solver.method", "joint"},
+      {"--Problem.init_max_error", "9", "--Solver.method", "res_int"},
+  };
+  for (const Words& pair : contradictions) {
+    SCOPED_TRACE(pair[0] + " " + pair[2] + " " + pair[3]);
+    ExpectRefused("solver", Paths() + pair, pair[0] + " has no effect");
+  }
+  ExpectRefused(
+      "solver",
+      Paths() + Words{"--Solver.norm", "3", "--Solver.method", "joint"},
+      "--Solver.method joint needs --Solver.norm 1, 2 or inf");
+  ExpectRefused(
+      "solver",
+      Paths() + Words{"--Solver.norm", "3", "--Solver.init", "feasible"},
+      "--Solver.init feasible needs --Solver.norm 1, 2 or inf");
+  ExpectRefused(
+      "solver",
+      Paths() + Words{"--certificate_path", folder_ / "output/images.bin"},
+      "must not bear the name of a model's file");
+}
+
+TEST_F(Options, ThatChooseAScheduleAreTaken) {
+  for (const Words& more :
+       {Words{"--Solver.init", "feasible", "--Problem.init_max_error", "50",
+              "--Solver.method", "res_int"},
+        Words{"--Problem.init_max_error", "50", "--ResInt.sweep_tolerance",
+              "0.5"},
+        Words{"--Solver.method", "joint", "--Solver.relative_gap", "1e-2",
+              "--Joint.max_iterations", "100"}}) {
+    const KrotResult result = Solve(more + Words{"--overwrite", "1"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+  }
+}
+
+TEST_F(Options, ForSweepsAloneByNormOrSettingsSaySo) {
+  const KrotResult norm = Solve({"--Solver.norm", "3"});
+  EXPECT_THAT(norm.err, ::testing::HasSubstr("this norm has no joint solver"));
+  const KrotResult paper =
+      Solve({"--Solver.settings", "paper", "--overwrite", "1"});
+  EXPECT_THAT(paper.err, ::testing::HasSubstr("paper settings: sweeps alone"));
+}
+
 TEST_F(Options, ThatAreUnknownComeWithTheNearestKnownOne) {
   ExpectRefused("solver", Paths() + Words{"--Solver.nrom", "1"},
                 "--Solver.nrom is no option of krot solver; did you mean "
@@ -178,7 +235,7 @@ TEST_F(Options, OfThePaperAreTakenWithItsSettings) {
 TEST_F(Options, ComeFromAProjectFileUnlessGivenExplicitly) {
   WriteBytes(folder_ / "project.ini",
              "log_level=0\noutput_type=TXT\noverwrite=false\n"
-             "[ResInt]\nmax_sweeps=1\n[Solver]\nnorm=inf\n");
+             "[ResInt]\nmax_sweeps=1\n[Solver]\nmethod=res_int\nnorm=inf\n");
   const KrotResult result =
       Solve({"--project_path", folder_ / "project.ini", "--Solver.norm", "1"});
   ASSERT_EQ(result.exit_code, 0) << result.err;

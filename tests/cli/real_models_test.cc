@@ -51,15 +51,32 @@ std::map<Point3DId, double> StoredErrors(const Model& model) {
   return errors;
 }
 
-class SolverOnRealModel : public ::testing::TestWithParam<const char*> {
+struct RealModel {
+  const char* folder;
+  double optimum_px;  // known to five digits
+};
+
+std::string NameOf(const ::testing::TestParamInfo<RealModel>& test) {
+  return test.param.folder;
+}
+
+void ExpectCertifiedOptimum(const nlohmann::json& report, double optimum_px) {
+  EXPECT_EQ(report["certified"], true);
+  EXPECT_EQ(report["termination"], "gap_reached");
+  EXPECT_LE(report["relative_gap"], 1e-4);
+  EXPECT_NEAR(report["cost_final"], optimum_px, 1e-4 * optimum_px);
+  EXPECT_LE(report["lower_bound"], report["cost_final"]);
+}
+
+class SolverOnRealModel : public ::testing::TestWithParam<RealModel> {
  protected:
   void SetUp() override {
     if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
-    input_ = *RealModels() / GetParam();
+    input_ = *RealModels() / GetParam().folder;
     const KrotResult result =
         RunKrot({"solver", "--input_path", input_, "--output_path", output_,
-                 "--report_path", folder_ / "report.json",
-                 "--ResInt.sweep_tolerance", "1e-3"});
+                 "--report_path", folder_ / "report.json", "--certificate_path",
+                 folder_ / "certificate.json"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     before_ = Load(input_);
     after_ = Load(output_);
@@ -81,7 +98,7 @@ class SolverOnRealModel : public ::testing::TestWithParam<const char*> {
 };
 
 // The three in one test: the solve is what takes the time.
-TEST_P(SolverOnRealModel, LowersTheCostAndPleasesColmap) {
+TEST_P(SolverOnRealModel, ReachesTheCertifiedOptimumAndPleasesColmap) {
   ExpectLowerCostAndSameContents();
   if (!HasColmap()) GTEST_SKIP() << "COLMAP is not installed";
   ExpectColmapReadsConvertsAndAdjusts();
@@ -91,7 +108,11 @@ TEST_P(SolverOnRealModel, LowersTheCostAndPleasesColmap) {
 void SolverOnRealModel::ExpectLowerCostAndSameContents() {
   const auto report = nlohmann::json::parse(ReadBytes(folder_ / "report.json"));
   EXPECT_LE(report["cost_final"], report["cost_initial"]);
-  EXPECT_EQ(report["termination"], "stalled");
+  ExpectCertifiedOptimum(report, GetParam().optimum_px);
+  EXPECT_EQ(RunKrot({"certificate_checker", "--input_path", output_,
+                     "--certificate_path", folder_ / "certificate.json"})
+                .exit_code,
+            0);
   EXPECT_THAT(after_, IsModel(before_, Ignoring{true, true, true}));
 
   const CentreStatistics before = Centres(before_);
@@ -141,12 +162,77 @@ void SolverOnRealModel::ExpectColmapComputesTheStoredErrors() {
 
 INSTANTIATE_TEST_SUITE_P(
     Local, SolverOnRealModel,
-    ::testing::Values("crane8_txt", "door", "door_colmap", "edge_one_point",
-                      "fountain11", "longtracks92", "maupertuis4_txt",
-                      "outliers12", "room50_opencv", "south128",
-                      "south128_full", "task41_rigs_frames", "tower",
-                      "tower_init", "two_cameras44"),
-    [](const auto& test) { return std::string(test.param); });
+    ::testing::Values(
+        RealModel{"crane8_txt", 3.1011}, RealModel{"door", 4.3929},
+        RealModel{"door_colmap", 3.4205}, RealModel{"fountain11", 3.2858},
+        RealModel{"longtracks92", 3.4528}, RealModel{"maupertuis4_txt", 2.5369},
+        RealModel{"outliers12", 18.9275}, RealModel{"room50_opencv", 3.6473},
+        RealModel{"south128", 3.1778}, RealModel{"south128_full", 3.5773},
+        RealModel{"task41_rigs_frames", 3.5041}, RealModel{"tower", 4.6315},
+        RealModel{"tower_init", 4.6315}, RealModel{"two_cameras44", 2.9279}),
+    NameOf);
+
+// The smaller ones: what counts here is where they start.
+class StartOnRealModel : public ::testing::TestWithParam<RealModel> {
+ protected:
+  void SetUp() override {
+    if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+  }
+
+  void ExpectOptimumFrom(const Model& start,
+                         const std::vector<std::string>& more) {
+    TempFolder folder;
+    Save(start, folder / "start");
+    std::vector<std::string> arguments = {"solver",
+                                          "--input_path",
+                                          folder / "start",
+                                          "--output_path",
+                                          folder / "output",
+                                          "--report_path",
+                                          folder / "report.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const KrotResult result = RunKrot(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto report =
+        nlohmann::json::parse(ReadBytes(folder / "report.json"));
+    ExpectCertifiedOptimum(report, GetParam().optimum_px);
+    EXPECT_EQ(report["num_observations"], start.track_elements.size());
+  }
+
+  Model Input() const { return Load(*RealModels() / GetParam().folder); }
+};
+
+TEST_P(StartOnRealModel, ThatIsPerturbedByATenthOfTheSceneGivesTheOptimum) {
+  ExpectOptimumFrom(Perturbed(Input(), 0.1, 7), {});
+}
+
+TEST_P(StartOnRealModel, FromNothingGivesTheOptimum) {
+  ExpectOptimumFrom(Input(), {"--Solver.init", "feasible"});
+}
+
+TEST_P(StartOnRealModel, WithoutTranslationsGivesTheOptimum) {
+  ExpectOptimumFrom(WithoutTranslations(Input()), {});
+}
+
+INSTANTIATE_TEST_SUITE_P(Local, StartOnRealModel,
+                         ::testing::Values(RealModel{"crane8_txt", 3.1011},
+                                           RealModel{"maupertuis4_txt", 2.5369},
+                                           RealModel{"room50_opencv", 3.6473},
+                                           RealModel{"task41_rigs_frames",
+                                                     3.5041},
+                                           RealModel{"two_cameras44", 2.9279}),
+                         NameOf);
+
+TEST(SolverOnOnePoint, SaysThatAllErrorsAreZero) {
+  if (!RealModels()) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+  TempFolder folder;
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", *RealModels() / "edge_one_point",
+               "--output_path", folder / "output"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out,
+              ::testing::HasSubstr("Every error is zero up to rounding"));
+}
 
 class SettingsOnRealModel : public ::testing::TestWithParam<const char*> {};
 
@@ -157,7 +243,7 @@ TEST_P(SettingsOnRealModel, FastOnesEndNoHigherThanThePapers) {
     const KrotResult result = RunKrot(
         {"solver", "--input_path", *RealModels() / GetParam(), "--output_path",
          folder / settings, "--report_path", folder / settings / "report.json",
-         "--Solver.settings", settings});
+         "--Solver.method", "res_int", "--Solver.settings", settings});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return nlohmann::json::parse(
         ReadBytes(folder / settings / "report.json"))["cost_final"];

@@ -1,5 +1,11 @@
 #include "tests/cli/scenes.h"
 
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "krot/bridge/bridge.h"
 #include "krot/model/validate.h"
 
 namespace krot {
@@ -34,6 +40,48 @@ Model Load(const std::filesystem::path& folder) {
   Model model = ReadModel(folder, DetectModelFormat(folder));
   ValidateModel(model);
   return model;
+}
+
+Model Perturbed(const Model& model, double share, uint64_t seed) {
+  BuildProblemOptions all;
+  all.ignore_translations = true;
+  const BuiltProblem built = BuildProblem(model, all);
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+  for (const View& view : built.problem.views) {
+    centroid -= view.cam_from_world_rotation.transpose() *
+                built.start.translations[view.frame];
+  }
+  centroid /= static_cast<double>(built.problem.views.size());
+  std::vector<double> distances;
+  for (const Eigen::Vector3d& point : built.start.points) {
+    distances.push_back((point - centroid).norm());
+  }
+  const auto median =
+      distances.begin() + static_cast<int64_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), median, distances.end());
+
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0, share * *median);
+  Estimate moved = built.start;
+  for (std::vector<Eigen::Vector3d>* unknowns :
+       {&moved.translations, &moved.points}) {
+    for (Eigen::Vector3d& x : *unknowns) {
+      for (int axis = 0; axis < 3; ++axis) x[axis] += noise(random);
+    }
+  }
+  return ApplyEstimate(model, built, moved);
+}
+
+Model WithoutTranslations(const Model& model) {
+  Model result = model;
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (Frame& frame : result.frames) {
+    frame.rig_from_world.translation.setConstant(kNaN);
+  }
+  for (Image& image : result.images) {
+    image.cam_from_world.translation.setConstant(kNaN);
+  }
+  return result;
 }
 
 Model WithShortTracks(const Model& model, uint64_t length) {

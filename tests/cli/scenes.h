@@ -21,6 +21,15 @@ void Save(const Model& model, const std::filesystem::path& folder,
           ModelFormat format = ModelFormat::kBinary);
 Model Load(const std::filesystem::path& folder);
 
+// With all centres and points moved by Gaussian noise; sigma per axis is
+// `share` of the scene: of the median distance of the points from the centroid
+// of the cameras.
+Model Perturbed(const Model& model, double share, uint64_t seed);
+
+// Without what a solver estimates: NaN instead of every translation of frames
+// and images.
+Model WithoutTranslations(const Model& model);
+
 // With the first `length` observations of every track only; 0: no points.
 Model WithShortTracks(const Model& model, uint64_t length);
 

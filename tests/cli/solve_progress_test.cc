@@ -1,4 +1,7 @@
-#include "tools/sweep_progress.h"
+#include "tools/solve_progress.h"
+
+#include <algorithm>
+#include <optional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,35 +11,46 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string ErrorTextOf(const SweepProgress::Style style,
+std::string ErrorTextOf(const SolveProgress::Style style,
                         const LogOptions& log) {
   testing::internal::CaptureStderr();
-  SweepProgress progress(log, 1e-4, 100, style);
-  progress.Update(1, {8.0, 0.5});
-  progress.Update(2, {7.92, 1.0});  // a gain of 1e-2: half way to 1e-4
+  SolveProgress progress(log, {1e-4, 100, 1e-4}, style);
+  progress.Update(1, Sweep{8.0, 0.5});
+  progress.Update(2, Sweep{7.92, 1.0});  // a gain of 1e-2: half way to 1e-4
+  // A gap of 1e-2: half way to 1e-4.
+  progress.Update(1, JointIteration{7.5, std::nullopt, 1e-2, 1.5});
+  progress.Update(2, JointIteration{7.0, 6.9999, 1e-3, 2.0});
   progress.Finish();
   return testing::internal::GetCapturedStderr();
 }
 
-TEST(SweepProgress, PrintsOneLinePerSweepWhereNoTerminalIs) {
-  EXPECT_EQ(ErrorTextOf(SweepProgress::Style::kLines, {}),
+TEST(SolveProgress, PrintsOneLinePerStepWhereNoTerminalIs) {
+  EXPECT_EQ(ErrorTextOf(SolveProgress::Style::kLines, {}),
             "sweep 1: cost 8.000000 px, 0.50 s\n"
-            "sweep 2: cost 7.920000 px, 1.00 s\n");
+            "sweep 2: cost 7.920000 px, 1.00 s\n"
+            "iteration 1: cost 7.500000 px, proved bound not yet known, "
+            "estimated gap 1.0e-02, 1.50 s\n"
+            "iteration 2: cost 7.000000 px, proved bound 6.999900 px, "
+            "estimated gap 1.0e-03, 2.00 s\n");
 }
 
-TEST(SweepProgress, RewritesOneLineWithABarOnATerminal) {
-  const std::string text = ErrorTextOf(SweepProgress::Style::kBar, {});
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\r'), 2);
+TEST(SolveProgress, RewritesOneLineWithABarOnATerminal) {
+  const std::string text = ErrorTextOf(SolveProgress::Style::kBar, {});
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2);  // two stages
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\r'), 4);
   EXPECT_THAT(text, HasSubstr("[###############...............] sweep 2: cost "
                               "7.920000 px, 1.00 s"));
+  EXPECT_THAT(text,
+              HasSubstr("[###############...............] iteration 1: "));
+  EXPECT_THAT(text,
+              HasSubstr("[##############################] iteration 2: "));
 }
 
-TEST(SweepProgress, IsSilentAtLogLevelZero) {
+TEST(SolveProgress, IsSilentAtLogLevelZero) {
   LogOptions quiet;
   quiet.level = 0;
-  EXPECT_EQ(ErrorTextOf(SweepProgress::Style::kLines, quiet), "");
-  EXPECT_EQ(ErrorTextOf(SweepProgress::Style::kBar, quiet), "");
+  EXPECT_EQ(ErrorTextOf(SolveProgress::Style::kLines, quiet), "");
+  EXPECT_EQ(ErrorTextOf(SolveProgress::Style::kBar, quiet), "");
 }
 
 }  // namespace

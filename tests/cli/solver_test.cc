@@ -58,7 +58,7 @@ TEST_F(Commands, SolverLowersTheCostAndKeepsEverythingElse) {
     EXPECT_THAT(after, IsModel(before, kWhatASolveChanges));
     const Json report = Report();
     EXPECT_LT(report["cost_final"], 0.9 * report["cost_initial"].get<double>());
-    EXPECT_EQ(report["termination"], "stalled");
+    EXPECT_EQ(report["termination"], "gap_reached");
     EXPECT_EQ(report["pixel_error"]["before"]["max"],
               Summarize(PixelErrors(before)).max);
     EXPECT_EQ(report["pixel_error"]["after"]["max"],
@@ -86,18 +86,20 @@ TEST_F(Commands, SolverGivesTheSameBytesAtAnyNumberOfThreads) {
   SceneOptions options = SmallScene();
   options.num_points = 2000;
   Save(SynthesizeScene(options).model, folder_ / "input");
-  std::vector<std::string> images;
-  std::vector<std::string> points;
-  for (const char* threads : {"1", "2", "3", "-1"}) {
-    ASSERT_EQ(Run("solver", {"--Solver.num_threads", threads, "--overwrite",
-                             "1", "--ResInt.max_sweeps", "5"})
-                  .exit_code,
-              0);
-    images.push_back(ReadBytes(folder_ / "output/images.bin"));
-    points.push_back(ReadBytes(folder_ / "output/points3D.bin"));
+  for (const char* method : {"auto", "res_int"}) {
+    std::vector<std::string> images;
+    std::vector<std::string> points;
+    for (const char* threads : {"1", "2", "3", "-1"}) {
+      ASSERT_EQ(Run("solver", {"--Solver.num_threads", threads, "--overwrite",
+                               "1", "--Solver.method", method})
+                    .exit_code,
+                0);
+      images.push_back(ReadBytes(folder_ / "output/images.bin"));
+      points.push_back(ReadBytes(folder_ / "output/points3D.bin"));
+    }
+    EXPECT_THAT(images, ::testing::Each(images.front()));
+    EXPECT_THAT(points, ::testing::Each(points.front()));
   }
-  EXPECT_THAT(images, ::testing::Each(images.front()));
-  EXPECT_THAT(points, ::testing::Each(points.front()));
 }
 
 TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
@@ -129,21 +131,128 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
   ASSERT_FALSE(report["sweeps"].empty());
   EXPECT_EQ(Keys(report["sweeps"][0]),
             (std::vector<std::string>{"cost", "seconds"}));
-  EXPECT_EQ(report["sweeps"].back()["cost"], report["cost_final"]);
+  EXPECT_NEAR(report["sweeps"].back()["cost"], report["cost_final"], 1e-9);
   EXPECT_EQ(report["version"], KROT_VERSION);
   EXPECT_EQ(report["command"], "solver");
-  EXPECT_EQ(report["method"], "res_int");
+  EXPECT_EQ(report["method"], "auto");
   EXPECT_EQ(report["norm"], "inf");
-  EXPECT_TRUE(report["lower_bound"].is_null());
-  EXPECT_TRUE(report["relative_gap"].is_null());
-  EXPECT_EQ(report["certified"], false);
-  EXPECT_EQ(report["iterations"], Json::array());
-  EXPECT_EQ(report["support"], Json::array());
+  EXPECT_EQ(report["certified"], true);
+  EXPECT_LE(report["relative_gap"], 1e-4);
+  EXPECT_EQ(report["relative_gap"].get<double>(),
+            (report["cost_final"].get<double>() -
+             report["lower_bound"].get<double>()) /
+                report["cost_final"].get<double>());
+  ASSERT_FALSE(report["iterations"].empty());
+  EXPECT_EQ(Keys(report["iterations"][0]),
+            (std::vector<std::string>{"cost", "gap", "lower_bound", "method",
+                                      "seconds"}));
+  ASSERT_FALSE(report["support"].empty());
+  EXPECT_EQ(
+      Keys(report["support"][0]),
+      (std::vector<std::string>{"error_px", "image_id", "image_name",
+                                "multiplier", "point2D_idx", "point3D_id"}));
   EXPECT_EQ(report["num_images"], 6);
   EXPECT_EQ(report["num_points"], 60);
   EXPECT_EQ(report["threads"], 2);
   EXPECT_EQ(report["seed"], 7);
   EXPECT_GT(report["peak_memory_bytes"], 1000000);
+}
+
+TEST_F(Commands, SolverSaysNullForWhatSweepsAloneDoNotKnow) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  ASSERT_EQ(Run("solver", {"--Solver.method", "res_int"}).exit_code, 0);
+  const Json report = Report();
+  EXPECT_EQ(report["method"], "res_int");
+  EXPECT_EQ(report["termination"], "stalled");
+  EXPECT_TRUE(report["lower_bound"].is_null());
+  EXPECT_TRUE(report["relative_gap"].is_null());
+  EXPECT_TRUE(report["seconds"]["certify"].is_null());
+  EXPECT_EQ(report["certified"], false);
+  EXPECT_EQ(report["iterations"], Json::array());
+  EXPECT_EQ(report["support"], Json::array());
+}
+
+TEST_F(Commands, SolverWritesACertificateThatCheckerAndAnalyzerAccept) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  const std::string certificate = folder_ / "certificate.json";
+  const KrotResult solve = Run("solver", {"--certificate_path", certificate});
+  ASSERT_EQ(solve.exit_code, 0) << solve.err;
+  EXPECT_THAT(solve.out, ::testing::HasSubstr(", proved optimal to "));
+  // Of the model that was read as well as of the one that was written.
+  for (const char* model : {"input", "output"}) {
+    const KrotResult check =
+        RunKrot({"certificate_checker", "--input_path", folder_ / model,
+                 "--certificate_path", certificate});
+    EXPECT_EQ(check.exit_code, 0) << check.err;
+  }
+  const KrotResult analysis =
+      RunKrot({"model_analyzer", "--path", folder_ / "output",
+               "--certificate_path", certificate});
+  EXPECT_EQ(analysis.exit_code, 0) << analysis.err;
+  EXPECT_THAT(analysis.out, ::testing::HasSubstr("\nPoints: 60\n"));
+  EXPECT_THAT(analysis.out, ::testing::HasSubstr("The certificate holds"));
+  EXPECT_THAT(analysis.out, ::testing::HasSubstr("worst first"));
+
+  Save(SynthesizeScene(SmallScene()).model, folder_ / "other");
+  const KrotResult other =
+      RunKrot({"model_analyzer", "--path", folder_ / "other",
+               "--certificate_path", certificate});
+  EXPECT_EQ(other.exit_code, 4);
+  EXPECT_THAT(other.err, IsOneSentence("krot model_analyzer", "refused"));
+}
+
+TEST_F(Commands, SolverWarnsOfAGapThatIsMissed) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  const KrotResult result =
+      Run("solver", {"--Joint.max_iterations", "2", "--certificate_path",
+                     folder_ / "certificate.json"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err,
+              ::testing::HasSubstr("warning: the gap asked for is not reached: "
+                                   "Joint.max_iterations was hit"));
+  EXPECT_THAT(result.err, ::testing::HasSubstr("is not written"));
+  EXPECT_EQ(Report()["termination"], "max_iterations");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "certificate.json"));
+}
+
+TEST_F(Commands, SolverNeedsNoTranslations) {
+  for (const bool has_rigs : {true, false}) {
+    SceneOptions options = SmallScene();
+    options.has_rigs = has_rigs;
+    const Model model = SynthesizeScene(options).model;
+    Save(model, folder_ / "input");
+    ASSERT_EQ(Run("solver", {"--overwrite", "1"}).exit_code, 0);
+    const double cost = Report()["cost_final"];
+    Save(WithoutTranslations(model), folder_ / "input");
+    for (const char* init : {"model", "feasible"}) {
+      const KrotResult result =
+          Run("solver", {"--Solver.init", init, "--overwrite", "1"});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(Report()["certified"], true);
+      EXPECT_EQ(Report()["num_observations"], model.track_elements.size());
+      EXPECT_NEAR(Report()["cost_final"], cost, 2e-4 * cost);
+      EXPECT_NO_THROW(Load(folder_ / "output"));
+    }
+  }
+}
+
+TEST_F(Commands, SolverProvesThatNoStartIsBelowABound) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  const std::string certificate = folder_ / "certificate.json";
+  const KrotResult result = Run(
+      "solver", {"--Solver.init", "feasible", "--Problem.init_max_error", "0.1",
+                 "--certificate_path", certificate, "--log_level", "0"});
+  EXPECT_EQ(result.exit_code, 7);
+  EXPECT_THAT(result.err,
+              IsOneSentence("krot solver",
+                            "infeasible: the largest error of every estimate "
+                            "is proved to be at least "));
+  EXPECT_EQ(FileNames(folder_.path()),
+            (std::vector<std::string>{"certificate.json", "input"}));
+  EXPECT_EQ(RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+                     "--certificate_path", certificate})
+                .exit_code,
+            0);
 }
 
 TEST_F(Commands, SolverCountsWhatItLeavesOut) {
@@ -190,10 +299,11 @@ TEST_F(Commands, SolverStopsWhereThePaperDoesWithItsSettings) {
 
 TEST_F(Commands, SolverRunsAsManySweepsAsAllowed) {
   Save(SmallLegacyModel(), folder_ / "input");
-  ASSERT_EQ(Run("solver",
-                {"--ResInt.max_sweeps", "2", "--ResInt.sweep_tolerance", "0"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      Run("solver", {"--ResInt.max_sweeps", "2", "--ResInt.sweep_tolerance",
+                     "0", "--Solver.method", "res_int"})
+          .exit_code,
+      0);
   EXPECT_EQ(Report()["termination"], "max_sweeps");
   EXPECT_EQ(Report()["sweeps"].size(), 2u);
 }
@@ -332,7 +442,10 @@ TEST_F(Commands, SolverHalvesTheCostAtLeastWhereObservationsAreExact) {
   SceneOptions options = SmallScene();
   options.pixel_noise = 0;
   Save(SynthesizeScene(options).model, folder_ / "input");
-  ASSERT_EQ(Run("solver", {"--ResInt.sweep_tolerance", "1e-3"}).exit_code, 0);
+  ASSERT_EQ(Run("solver", {"--Solver.method", "res_int",
+                           "--ResInt.sweep_tolerance", "1e-3"})
+                .exit_code,
+            0);
   EXPECT_LT(Report()["cost_final"],
             0.5 * Report()["cost_initial"].get<double>());
 }

@@ -3,12 +3,17 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/bridge/certificate_verdict.h"
 #include "krot/model/validate.h"
 #include "krot/problem/cost.h"
+#include "krot/solver/block_sweep.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
@@ -36,13 +41,147 @@ double CostOf(const Model& model) {
 
 TEST(SolveModel, ReportsTheCostsOfTheModelsItTakesAndGives) {
   const Model model = SynthesizeScene(NoisyScene()).model;
-  const SolveModelResult result = SolveModel(model, {});
-  const SolveSummary& summary = result.summary;
+  for (const SolveMethod method :
+       {SolveMethod::kAuto, SolveMethod::kResInt, SolveMethod::kJoint}) {
+    SolveModelOptions options;
+    options.method = method;
+    const SolveModelResult result = SolveModel(model, options);
+    const SolveSummary& summary = result.summary;
+    EXPECT_EQ(summary.method, method);
+    EXPECT_NEAR(summary.cost_initial, CostOf(model), 1e-9);
+    EXPECT_NEAR(summary.cost_final, CostOf(result.model), 1e-9);
+    EXPECT_LT(summary.cost_final, summary.cost_initial);
+  }
+}
+
+TEST(SolveModel, ProvesTheGapOfTheModelItGives) {
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  SolveModelOptions options;
+  options.describe_certificate = true;
+  for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
+    options.norm = norm;
+    const SolveModelResult result = SolveModel(model, options);
+    const SolveSummary& summary = result.summary;
+    EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
+    ASSERT_TRUE(summary.is_certified);
+    EXPECT_LE(*summary.relative_gap, 1e-4);
+    EXPECT_EQ(*summary.relative_gap,
+              (summary.cost_final - *summary.lower_bound) / summary.cost_final);
+
+    const CertificateVerdict verdict =
+        VerifyCertificateFile(result.model, *summary.certificate);
+    ASSERT_TRUE(verdict.is_accepted) << verdict.refusal;
+    EXPECT_EQ(verdict.lower_bound, *summary.lower_bound);
+    EXPECT_NEAR(verdict.cost, summary.cost_final, 1e-9);
+  }
+}
+
+TEST(SolveModel, ListsTheSupportWorstFirstWithMultipliersOfSumOne) {
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  const SolveSummary summary = SolveModel(model, {}).summary;
+  ASSERT_GE(summary.support.size(), 2u);
+  double sum = 0;
+  double last_px = summary.cost_final * (1 + 1e-12);
+  for (const SupportObservation& observation : summary.support) {
+    sum += observation.multiplier;
+    EXPECT_LE(observation.error_px, last_px);
+    last_px = observation.error_px;
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
+  // All of it lies at the maximum, but for the gap.
+  EXPECT_GT(last_px, 0.98 * summary.cost_final);
+}
+
+TEST(SolveModel, BoundsNothingBySweepsAlone) {
+  SolveModelOptions options;
+  options.method = SolveMethod::kResInt;
+  const SolveSummary summary =
+      SolveModel(SynthesizeScene(NoisyScene()).model, options).summary;
   EXPECT_EQ(summary.termination, SolveTermination::kStalled);
-  EXPECT_NEAR(summary.cost_initial, CostOf(model), 1e-9);
-  EXPECT_NEAR(summary.cost_final, CostOf(result.model), 1e-9);
-  EXPECT_LT(summary.cost_final, summary.cost_initial);
-  EXPECT_EQ(summary.sweeps.back().cost, summary.cost_final);
+  EXPECT_FALSE(summary.is_certified);
+  EXPECT_FALSE(summary.lower_bound.has_value());
+  EXPECT_FALSE(summary.relative_gap.has_value());
+  EXPECT_TRUE(summary.iterations.empty());
+  EXPECT_TRUE(summary.support.empty());
+}
+
+TEST(SolveModel, SweepsAloneForANormWithoutAJointSolver) {
+  SolveModelOptions options;
+  options.norm = {3};
+  EXPECT_EQ(EffectiveMethod(options), SolveMethod::kResInt);
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  EXPECT_EQ(SolveModel(model, options).summary.method, SolveMethod::kResInt);
+  options.method = SolveMethod::kJoint;
+  EXPECT_THROW(SolveModel(model, options), std::invalid_argument);
+}
+
+// The largest residual of every frame.
+std::vector<double> FrameMaxima(const BuiltProblem& built,
+                                const Estimate& estimate) {
+  std::vector<double> maxima(built.problem.num_frames, 0);
+  for (const Observation& observation : built.problem.observations) {
+    double& maximum = maxima[built.problem.views[observation.view].frame];
+    maximum = std::max(
+        maximum, ResidualOf(ViewPoint(built.problem, observation, estimate),
+                            Norm::L2()));
+  }
+  return maxima;
+}
+
+// By how much, relative, the frame that gains most can lower its own maximum.
+double LargestFrameGain(const Model& model) {
+  const BuiltProblem built = BuildProblem(model, {});
+  Estimate swept = built.start;
+  BlockSweep(built.problem, {}, Norm::L2(), 1, nullptr).ResectFrames(&swept);
+  const std::vector<double> before = FrameMaxima(built, built.start);
+  const std::vector<double> after = FrameMaxima(built, swept);
+  double gain = 0;
+  for (size_t f = 0; f < before.size(); ++f) {
+    gain = std::max(gain, (before[f] - after[f]) / before[f]);
+  }
+  return gain;
+}
+
+TEST(SolveModel, LeavesEveryFrameAtItsOwnLowestMaximum) {
+  SceneOptions scene = NoisyScene();
+  scene.num_frames = 20;  // more than set the maximum
+  const Model model = SynthesizeScene(scene).model;
+  SolveModelOptions options;
+  EXPECT_LT(LargestFrameGain(SolveModel(model, options).model), 1e-6);
+  options.method = SolveMethod::kJoint;
+  EXPECT_GT(LargestFrameGain(SolveModel(model, options).model), 1e-2);
+}
+
+TEST(SolveModel, FindsTheSameOptimumFromNothing) {
+  for (const int sensors_per_rig : {1, 2}) {
+    SceneOptions scene = NoisyScene();
+    scene.sensors_per_rig = sensors_per_rig;
+    const Model model = SynthesizeScene(scene).model;
+    const double cost = SolveModel(model, {}).summary.cost_final;
+    SolveModelOptions options;
+    options.init = SolveInit::kFeasible;
+    const SolveModelResult result = SolveModel(model, options);
+    EXPECT_EQ(result.summary.init, SolveInit::kFeasible);
+    EXPECT_EQ(result.summary.termination, SolveTermination::kGapReached);
+    EXPECT_NEAR(result.summary.cost_final, cost, 2e-4 * cost);
+    EXPECT_NEAR(CostOf(result.model), result.summary.cost_final, 1e-9);
+  }
+}
+
+TEST(SolveModel, ProvesThatABoundIsInfeasible) {
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  SolveModelOptions options;
+  options.init = SolveInit::kFeasible;
+  options.init_max_error = 0.1;
+  options.describe_certificate = true;
+  const SolveModelResult result = SolveModel(model, options);
+  EXPECT_EQ(result.summary.termination, SolveTermination::kInfeasible);
+  EXPECT_THAT(result.model, IsModel(model));
+  ASSERT_TRUE(result.summary.is_certified);
+  EXPECT_GT(*result.summary.lower_bound, 0.1);
+  EXPECT_FALSE(result.summary.relative_gap.has_value());
+  EXPECT_TRUE(
+      VerifyCertificateFile(model, *result.summary.certificate).is_accepted);
 }
 
 TEST(SolveModel, GivesAValidModelThatDiffersInPosesPointsAndErrorsOnly) {
@@ -66,13 +205,16 @@ TEST(SolveModel, MeasuresPixelErrorsBeforeAndAfterAndStoresThem) {
 
 TEST(SolveModel, GivesTheSameBitsAtAnyNumberOfThreads) {
   const Model model = SynthesizeScene(NoisyScene()).model;
-  SolveModelOptions options;
-  options.res_int.max_sweeps = 5;
-  options.res_int.num_threads = 1;
-  const Model expected = SolveModel(model, options).model;
-  options.res_int.num_threads = 3;
-  options.problem.num_threads = 3;
-  EXPECT_THAT(SolveModel(model, options).model, IsModel(expected));
+  for (const SolveInit init : {SolveInit::kModel, SolveInit::kFeasible}) {
+    SolveModelOptions options;
+    options.init = init;
+    options.num_threads = 1;
+    const Model expected = SolveModel(model, options).model;
+    for (const int num_threads : {2, 3}) {
+      options.num_threads = num_threads;
+      EXPECT_THAT(SolveModel(model, options).model, IsModel(expected));
+    }
+  }
 }
 
 TEST(SolveModel, ReturnsTheModelUnchangedIfThereIsNothingToSolve) {
@@ -111,8 +253,9 @@ TEST(SolveModel, GivesTheBestSoFarWhenInterrupted) {
   const Model model = SynthesizeScene(NoisyScene()).model;
   CancelFlag cancel{false};
   SolveModelOptions options;
+  options.method = SolveMethod::kResInt;
   options.res_int.sweep_tolerance = 0;
-  options.res_int.cancel = &cancel;
+  options.cancel = &cancel;
   options.res_int.callback = [&](int sweep, const Sweep&) {
     if (sweep == 2) cancel = true;
   };
@@ -122,21 +265,90 @@ TEST(SolveModel, GivesTheBestSoFarWhenInterrupted) {
   EXPECT_NEAR(CostOf(result.model), result.summary.sweeps.back().cost, 1e-9);
 }
 
-TEST(SolveModel, KeepsAnImageWithoutPoseAndCountsItsObservations) {
+TEST(SolveModel, GivesTheBestSoFarWhenInterruptedInAJointIteration) {
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  CancelFlag cancel{false};
+  SolveModelOptions options;
+  options.cancel = &cancel;
+  options.joint.callback = [&](int iteration, const JointIteration&) {
+    if (iteration == 3) cancel = true;
+  };
+  const SolveModelResult result = SolveModel(model, options);
+  EXPECT_EQ(result.summary.termination, SolveTermination::kInterrupted);
+  EXPECT_NEAR(CostOf(result.model), result.summary.cost_final, 1e-9);
+}
+
+// A legacy scene whose first image has no translation.
+struct PoselessScene {
+  PoselessScene() {
+    SceneOptions scene = NoisyScene();
+    scene.has_rigs = false;
+    model = SynthesizeScene(scene).model;
+    cost = SolveModel(model, {}).summary.cost_final;
+    model.images[0].cam_from_world.translation.setConstant(
+        std::numeric_limits<double>::quiet_NaN());
+    for (const TrackElement& element : model.track_elements) {
+      num_observations += element.image_id == model.images[0].id;
+    }
+  }
+
+  Model model;
+  double cost = 0;               // the optimum of all observations
+  int64_t num_observations = 0;  // of the image
+};
+
+TEST(SolveModel, StartsFromNothingWhereTheModelLeavesObservationsOut) {
+  const PoselessScene scene;
+  SolveModelOptions options;
+  std::vector<std::string> notes;
+  options.on_note = [&](const std::string& note) { notes.push_back(note); };
+  const SolveModelResult result = SolveModel(scene.model, options);
+  EXPECT_EQ(result.summary.init, SolveInit::kFeasible);
+  EXPECT_THAT(result.summary.left_out, ::testing::Each(0));
+  EXPECT_NEAR(result.summary.cost_final, scene.cost, 2e-4 * scene.cost);
+  EXPECT_EQ(result.summary.pixel_error_after.not_finite, 0);
+  EXPECT_THAT(notes, ::testing::ElementsAre(
+                         ::testing::HasSubstr("looking for a start")));
+}
+
+TEST(SolveModel, GoesOnWithoutTheObservationsThatNoStartCanServe) {
+  const PoselessScene scene;
+  SolveModelOptions options;
+  options.init_max_error = 0.1;
+  const SolveModelResult result = SolveModel(scene.model, options);
+  EXPECT_EQ(result.summary.init, SolveInit::kModel);
+  EXPECT_EQ(result.summary.termination, SolveTermination::kGapReached);
+  EXPECT_GE(result.summary.left_out[static_cast<int>(LeftOut::kNoPose)],
+            scene.num_observations);
+}
+
+TEST(SolveModel, KeepsAnImageWithoutPoseInSweepsAloneAndSaysWhatHelps) {
+  const PoselessScene scene;
+  SolveModelOptions options;
+  options.method = SolveMethod::kResInt;
+  std::vector<std::string> notes;
+  options.on_note = [&](const std::string& note) { notes.push_back(note); };
+  const SolveModelResult result = SolveModel(scene.model, options);
+  EXPECT_EQ(result.summary.left_out[static_cast<int>(LeftOut::kNoPose)],
+            scene.num_observations);
+  EXPECT_EQ(result.summary.pixel_error_after.not_finite,
+            scene.num_observations);
+  EXPECT_THAT(result.model, IsModel(scene.model, kWhatASolveChanges));
+  EXPECT_THAT(notes, ::testing::ElementsAre(
+                         ::testing::HasSubstr("--Solver.init feasible")));
+}
+
+TEST(SolveModel, StartsFromNothingWhereAllCamerasStandInOnePlace) {
   SceneOptions scene = NoisyScene();
   scene.has_rigs = false;
   Model model = SynthesizeScene(scene).model;
-  model.images[0].cam_from_world.translation.setConstant(
-      std::numeric_limits<double>::quiet_NaN());
-  int64_t num_observations = 0;
-  for (const TrackElement& element : model.track_elements) {
-    num_observations += element.image_id == model.images[0].id;
+  const double cost = SolveModel(model, {}).summary.cost_final;
+  for (Image& image : model.images) {
+    image.cam_from_world.translation.setZero();
   }
-  const SolveModelResult result = SolveModel(model, {});
-  EXPECT_EQ(result.summary.left_out[static_cast<int>(LeftOut::kNoPose)],
-            num_observations);
-  EXPECT_EQ(result.summary.pixel_error_after.not_finite, num_observations);
-  EXPECT_THAT(result.model, IsModel(model, kWhatASolveChanges));
+  const SolveSummary summary = SolveModel(model, {}).summary;
+  EXPECT_EQ(summary.init, SolveInit::kFeasible);
+  EXPECT_NEAR(summary.cost_final, cost, 2e-4 * cost);
 }
 
 TEST(TriangulateModel, MovesPointsOnlyAndLowersTheLargestErrorOfEveryTrack) {
@@ -166,15 +378,6 @@ TEST(TriangulateModel, IsDoneAfterOneSweep) {
   EXPECT_EQ(once.summary.sweeps.size(), 1u);
   EXPECT_NEAR(twice.summary.cost_final, once.summary.cost_final,
               1e-9 * once.summary.cost_final);
-}
-
-TEST(EstimateSolveBytes, GrowsWithTheObservations) {
-  const Model model = SynthesizeScene(NoisyScene()).model;
-  const int64_t num_observations =
-      static_cast<int64_t>(model.track_elements.size());
-  EXPECT_GT(EstimateSolveBytes(model), 100 * num_observations);
-  EXPECT_LT(EstimateSolveBytes(model), 1000 * num_observations);
-  EXPECT_EQ(EstimateSolveBytes(Model()), 0);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "krot/report/solve_report.h"
 
+#include <optional>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -8,6 +10,7 @@ namespace krot {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 SolveReport SomeReport() {
   SolveReport report;
@@ -18,6 +21,7 @@ SolveReport SomeReport() {
   report.seed = 18446744073709551615u;
   SolveSummary& summary = report.summary;
   summary.termination = SolveTermination::kStalled;
+  summary.method = SolveMethod::kResInt;
   summary.num_frames = 1;
   summary.num_observations = 8;
   summary.left_out = {2, 0, 0, 3, 0, 0};
@@ -57,6 +61,81 @@ TEST(SolveTable, ShowsErrorsCountsAndWhyItEnded) {
               HasSubstr("5 observations left out (behind 2, short_track 3)"));
   EXPECT_THAT(table, HasSubstr("1 observation without a finite error"));
   EXPECT_THAT(table, HasSubstr("Stalled after 2 sweeps"));
+  EXPECT_THAT(table, HasSubstr("not proved optimal"));
+  EXPECT_THAT(table, Not(HasSubstr("support")));
+}
+
+// A certified solve with a support of twelve.
+SolveReport CertifiedReport() {
+  SolveReport report = SomeReport();
+  SolveSummary& summary = report.summary;
+  summary.method = SolveMethod::kAuto;
+  summary.termination = SolveTermination::kGapReached;
+  summary.num_components = 2;
+  summary.cost_final = 3.10106;
+  summary.is_certified = true;
+  summary.lower_bound = 3.10105;
+  summary.relative_gap = 3.2e-6;
+  summary.seconds_certify = 0.25;
+  summary.iterations = {{4, std::nullopt, 0.5, 1}, {3.5, 3.0, 0.1, 2}};
+  for (uint32_t n = 0; n < 12; ++n) {
+    summary.support.push_back({n + 1, "image\xff.jpg", n, 70 + n, 1 / 12.0, 3});
+  }
+  return report;
+}
+
+TEST(SolveJson, HoldsBoundIterationsAndSupport) {
+  const nlohmann::json json =
+      nlohmann::json::parse(SolveJson(CertifiedReport()));
+  EXPECT_EQ(json["termination"], "gap_reached");
+  EXPECT_EQ(json["certified"], true);
+  EXPECT_EQ(json["lower_bound"], 3.10105);
+  EXPECT_EQ(json["relative_gap"], 3.2e-6);
+  EXPECT_EQ(json["seconds"]["certify"], 0.25);
+  ASSERT_EQ(json["iterations"].size(), 2u);
+  EXPECT_EQ(json["iterations"][0]["method"], "joint");
+  EXPECT_TRUE(json["iterations"][0]["lower_bound"].is_null());
+  EXPECT_EQ(json["iterations"][1]["lower_bound"], 3.0);
+  EXPECT_EQ(json["iterations"][1]["cost"], 3.5);
+  EXPECT_EQ(json["iterations"][1]["gap"], 0.1);
+  EXPECT_EQ(json["iterations"][1]["seconds"], 2);
+  ASSERT_EQ(json["support"].size(), 12u);
+  EXPECT_EQ(json["support"][11]["image_id"], 12);
+  EXPECT_EQ(json["support"][11]["point2D_idx"], 11);
+  EXPECT_EQ(json["support"][11]["point3D_id"], 81);
+  EXPECT_EQ(json["support"][11]["multiplier"], 1 / 12.0);
+  EXPECT_EQ(json["support"][11]["error_px"], 3);
+}
+
+TEST(SolveTable, GivesTheVerdictAndTheTenWorstOfTheSupport) {
+  const std::string table = SolveTable(CertifiedReport());
+  EXPECT_THAT(table, HasSubstr("Maximum 3.1011 px (linearised), proved optimal "
+                               "to 0.0003 %: no estimate is below 3.1010 px."));
+  EXPECT_THAT(table, HasSubstr("12 observations, worst first; the first 10"));
+  EXPECT_THAT(table, HasSubstr("  79  "));
+  EXPECT_THAT(table, Not(HasSubstr("  80  ")));
+  EXPECT_THAT(table, HasSubstr("after 2 joint iterations and 2 sweeps"));
+  EXPECT_THAT(table, HasSubstr("falls into 2 components"));
+}
+
+TEST(SolveTable, SaysWhereAllErrorsAreZero) {
+  SolveReport report = SomeReport();
+  report.summary.cost_final = 2e-14;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("Every error is zero up to rounding (2.0e-14 px"));
+}
+
+TEST(MissedGapSentence, SaysWhichLimitWasHit) {
+  SolveSummary summary = CertifiedReport().summary;
+  summary.termination = SolveTermination::kMaxIterations;
+  EXPECT_EQ(MissedGapSentence(summary),
+            "the gap asked for is not reached: Joint.max_iterations was hit; "
+            "the gap is 3.2e-06");
+  summary.termination = SolveTermination::kStalled;
+  summary.relative_gap.reset();
+  EXPECT_EQ(MissedGapSentence(summary),
+            "the gap asked for is not reached: no further progress was made; "
+            "no bound is proved");
 }
 
 TEST(NothingToSolve, SaysWhy) {

@@ -1,6 +1,9 @@
 #include "krot/pipeline/schedule.h"
 
+#include <utility>
+
 #include "krot/base/timer.h"
+#include "krot/pipeline/start.h"
 #include "krot/problem/cost.h"
 #include "krot/solver/block_sweep.h"
 
@@ -59,6 +62,8 @@ class Schedule {
   void LeadingSweeps();
   std::optional<Certificate> Joint();
   void FinishingSweeps();
+  // Leaves an estimate that is still worse than a start found from nothing.
+  void StartAfresh();
 
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
@@ -136,6 +141,23 @@ void Schedule::FinishingSweeps() {
   }
 }
 
+void Schedule::StartAfresh() {
+  if (!(summary_.cost_final > options_.init_max_error)) return;
+  if (options_.on_note) {
+    options_.on_note("the start is a rough one; looking for a better");
+  }
+  FoundStart found = FindFeasibleStart(problem_, options_);
+  if (found.termination == SolveTermination::kInterrupted) {
+    summary_.termination = SolveTermination::kInterrupted;
+  }
+  if (found.termination != SolveTermination::kNotRun) return;
+  const double cost =
+      Cost(problem_, found.estimate, options_.norm, options_.num_threads);
+  if (!(cost < summary_.cost_final)) return;
+  estimate_ = std::move(found.estimate);
+  summary_.cost_final = cost;
+}
+
 }  // namespace
 
 std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
@@ -156,6 +178,7 @@ std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
       break;
   }
   schedule.LeadingSweeps();
+  if (!schedule.IsInterrupted()) schedule.StartAfresh();
   if (schedule.IsInterrupted()) return std::nullopt;
   const std::optional<Certificate> certificate = schedule.Joint();
   if (!schedule.IsInterrupted()) schedule.FinishingSweeps();

@@ -128,8 +128,9 @@ struct SolveModelResult {
 // where the model has finite ones.
 //
 // kAuto takes a feasible start by itself where the model's own would leave out
-// observations (as behind or without a pose) or has all centres in one place;
-// it is kResInt for a p without a joint solver and for the paper's settings.
+// observations (as behind or without a pose), has all centres in one place, or
+// is still above init_max_error after the leading sweeps; it is kResInt for a p
+// without a joint solver and for the paper's settings.
 //
 // Requires a valid model (ValidateModel); throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range. Memory:

@@ -48,6 +48,10 @@ constexpr int kListedSupport = 10;
 std::string Verdict(const SolveSummary& summary) {
   const std::string maximum =
       "Maximum " + FormatNumber(summary.cost_final, 4) + " px (linearised)";
+  if (IsZeroUpToRounding(summary)) {
+    return "Every error is zero up to rounding (" +
+           Scientific(summary.cost_final) + " px at most).";
+  }
   if (!summary.is_certified) return maximum + ", not proved optimal.";
   // Downwards: more than this is not proved.
   const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
@@ -76,7 +80,7 @@ std::string TerminationSentence(const SolveSummary& summary) {
              (summary.method == SolveMethod::kResInt
                   ? ": the last one gained less than the tolerance; whether a "
                     "lower cost exists is not known."
-                  : ": rounding allows no further progress.");
+                  : ": no further progress was made.");
     case SolveTermination::kMaxSweeps:
       return "Ended" + after + ", as many as were allowed.";
     case SolveTermination::kInterrupted:
@@ -169,11 +173,16 @@ Json ErrorJson(const PixelErrorStatistics& statistics) {
 
 }  // namespace
 
+bool IsZeroUpToRounding(const SolveSummary& summary) {
+  constexpr double kRoundingPx = 1e-9;
+  return summary.cost_final < kRoundingPx;
+}
+
 std::string MissedGapSentence(const SolveSummary& summary) {
   const std::string why =
       summary.termination == SolveTermination::kMaxIterations
           ? "Joint.max_iterations was hit"
-          : "rounding allows no further progress";
+          : "no further progress was made";
   return "the gap asked for is not reached: " + why +
          (summary.relative_gap
               ? "; the gap is " + Scientific(*summary.relative_gap)
