@@ -1,0 +1,197 @@
+#include "krot/conic/newton_system.h"
+
+#include <algorithm>
+
+#include <Eigen/LU>
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// T: (top; v) into the cone.
+template <int kDim>
+Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
+  Eigen::Matrix<double, kDim, 3> T;
+  if constexpr (kDim == 3) {
+    T.setIdentity();
+  } else if (norm.p == 1) {  // top +- v1 +- v2
+    T << 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, -1;
+  } else {  // top +- v1, top +- v2
+    T << 1, 1, 0, 1, -1, 0, 1, 0, 1, 1, 0, -1;
+  }
+  return T;
+}
+
+// The translation gauge: the frame with the most observations stays put.
+BlockStructure MakeStructure(const KnownRotationProblem& problem) {
+  BlockStructure structure;
+  structure.point_begin = problem.point_begin;
+  structure.frame_of.reserve(problem.observations.size());
+  for (const Observation& observation : problem.observations) {
+    structure.frame_of.push_back(problem.views[observation.view].frame);
+  }
+  structure.frame_is_fixed.assign(problem.num_frames, 0);
+  int32_t anchor = 0;
+  for (int32_t f = 1; f < problem.num_frames; ++f) {
+    if (problem.frame_begin[f + 1] - problem.frame_begin[f] >
+        problem.frame_begin[anchor + 1] - problem.frame_begin[anchor]) {
+      anchor = f;
+    }
+  }
+  if (problem.num_frames > 0) structure.frame_is_fixed[anchor] = 1;
+  return structure;
+}
+
+bool HasBaseline(const KnownRotationProblem& problem) {
+  return std::any_of(problem.views.begin(), problem.views.end(),
+                     [](const View& view) {
+                       return !view.cam_from_rig_translation.isZero(0);
+                     });
+}
+
+}  // namespace
+
+template <typename Cone>
+NewtonSystem<Cone>::NewtonSystem(const KnownRotationProblem& problem,
+                                 const ConeProgram& program, Norm norm,
+                                 int num_threads)
+    : problem_(problem),
+      program_(program),
+      loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
+      has_free_scale_(program.IsCost() && !HasBaseline(problem)),
+      structure_(MakeStructure(problem)),
+      T_(ConeMap<kDim>(norm)),
+      elimination_(structure_, num_threads),
+      scaling_(problem.observations.size()),
+      lambda_(problem.observations.size()),
+      border_(problem.observations.size()),
+      rest_(problem.observations.size()),
+      target_(problem.observations.size()),
+      ds_(problem.observations.size()),
+      dz_(problem.observations.size()) {}
+
+template <typename Cone>
+typename Cone::Vector NewtonSystem<Cone>::Slack(const ViewedPoint& viewed,
+                                                double scalar) const {
+  return T_ *
+         Vector3d(program_.Top(viewed.depth, scalar), viewed.v[0], viewed.v[1]);
+}
+
+template <typename Cone>
+bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
+                                   double scalar,
+                                   const std::vector<Vector>& z) {
+  const double top_per_depth = program_.TopPerDepth(scalar);
+  loop_.ForEach([&](int64_t i) {
+    scaling_[i] = NtScaling<Cone>(Slack(viewed[i], scalar), z[i]);
+    lambda_[i] = scaling_[i].Apply(z[i]);
+    border_[i] = scaling_[i].ApplyInverse(
+        T_.col(0) * program_.TopPerScalar(viewed[i].depth));
+    const Observation& o = problem_.observations[i];
+    const View& view = problem_.views[o.view];
+    Matrix3d E;
+    E.row(0) << 0, 0, top_per_depth;
+    E.template bottomRows<2>() << o.J, -o.J * o.u;
+    FillRows(i, E * view.cam_from_world_rotation, elimination_.point_rows(i));
+    FillRows(i, E * view.cam_from_rig_rotation, elimination_.frame_rows(i));
+  });
+  gap_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); });
+  mu_ = gap_ / static_cast<double>(loop_.count() * Cone::kDegree);
+  if (!elimination_.Factorize()) return false;
+
+  // What the border needs of the factorised part.
+  BlockVector zero;
+  zero.SetZero(problem_.num_points, problem_.num_frames);
+  elimination_.Solve(zero, border_[0].data(), &x_border_);
+  FindGauge(viewed);
+  elimination_.Solve(gauge_, nullptr, &x_gauge_);
+  elimination_.Multiply(x_border_, rest_[0].data());
+  loop_.ForEach([&](int64_t i) { rest_[i] = border_[i] - rest_[i]; });
+  return true;
+}
+
+template <typename Cone>
+void NewtonSystem<Cone>::FillRows(int64_t i, const Matrix3d& K,
+                                  double* rows) const {
+  for (int c = 0; c < 3; ++c) {
+    const Vector column = scaling_[i].ApplyInverse(T_ * K.col(c));
+    for (int r = 0; r < kDim; ++r) rows[3 * r + c] = column[r];
+  }
+}
+
+// e = mean of c_i / w_i: e'dx is the mean relative change of the depths.
+template <typename Cone>
+void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
+  gauge_.SetZero(problem_.num_points, problem_.num_frames);
+  if (!program_.IsCost()) return;
+  for (int64_t i = 0; i < loop_.count(); ++i) {
+    const Observation& o = problem_.observations[i];
+    const View& view = problem_.views[o.view];
+    const double weight =
+        1 / (static_cast<double>(loop_.count()) * viewed[i].depth);
+    gauge_.points[o.point] +=
+        weight * view.cam_from_world_rotation.row(2).transpose();
+    if (structure_.frame_is_fixed[view.frame]) continue;
+    gauge_.frames[view.frame] +=
+        weight * view.cam_from_rig_rotation.row(2).transpose();
+  }
+}
+
+// The direction for the targets f, and the multipliers'. With H = A'A and
+// dx = Xf - Xb dg - Xe nu, the rows of g and of the gauge are
+//   (b - A Xb)'b dg - b'A Xe nu = b'(f - A Xf) - 1,
+//   e'dx = 0                  where the scale is free,
+//   nu = mu (e'dx + sigma)    where baselines set it: depths are only kept
+//                             from growing without bound, less and less.
+template <typename Cone>
+void NewtonSystem<Cone>::SolveForTarget(double sigma) {
+  BlockVector zero;
+  zero.SetZero(problem_.num_points, problem_.num_frames);
+  elimination_.Solve(zero, target_[0].data(), &x_target_);
+  Eigen::Matrix2d M;
+  Eigen::Vector2d rhs;
+  M(0, 0) = loop_.Sum([&](int64_t i) { return rest_[i].squaredNorm(); });
+  // b'A X = (A'b)'X = (H Xb)'X, and (b - A Xb)'f = b'f - b'A Xf.
+  M(0, 1) = -x_border_.Dot(gauge_);
+  rhs[0] = loop_.Sum([&](int64_t i) { return rest_[i].dot(target_[i]); }) - 1;
+  M(1, 0) = -gauge_.Dot(x_border_);
+  M(1, 1) = -gauge_.Dot(x_gauge_);
+  rhs[1] = -gauge_.Dot(x_target_);
+  if (!program_.IsCost()) {
+    M(0, 1) = M(1, 0) = rhs[1] = 0;
+    M(1, 1) = 1;
+  } else if (!has_free_scale_) {
+    M(1, 1) -= 1 / mu_;
+    rhs[1] -= sigma;
+  }
+  const Eigen::Vector2d solution = M.fullPivLu().solve(rhs);
+  dscalar_ = solution[0];
+  dx_ = x_target_;
+  dx_.Add(-dscalar_, x_border_);
+  dx_.Add(-solution[1], x_gauge_);
+  elimination_.Multiply(dx_, ds_[0].data());
+  loop_.ForEach([&](int64_t i) {
+    ds_[i] += dscalar_ * border_[i];
+    dz_[i] = target_[i] - lambda_[i] - ds_[i];
+  });
+}
+
+template <typename Cone>
+int64_t NewtonSystem<Cone>::MemoryBytes(const KnownRotationProblem& problem) {
+  constexpr int64_t kPerObservation =
+      sizeof(NtScaling<Cone>) + 6 * sizeof(Vector) +
+      2 * sizeof(Vector) +             // refinement
+      3 * 3 * kDim * sizeof(double) +  // A_s, A_t, Q
+      2 * sizeof(int32_t);             // structure and order
+  constexpr int64_t kPerUnknown = 10 * sizeof(Vector3d);
+  return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
+         (problem.num_points + problem.num_frames) * kPerUnknown +
+         FrameSystem(MakeStructure(problem)).MemoryBytes();
+}
+
+template class NewtonSystem<SecondOrderCone>;
+template class NewtonSystem<FourHalfLines>;
+
+}  // namespace krot

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/conic/cone_program.h"
+#include "krot/conic/cones.h"
+#include "krot/conic/nt_scaling.h"
+#include "krot/conic/observation_loop.h"
+#include "krot/conic/point_elimination.h"
+#include "krot/minimax/norm.h"
+
+namespace krot {
+
+// The Newton system of the interior point at an iterate. With s_i = T (top_i;
+// v_i) in the cone, z_i its multiplier and W_i their scaling, a direction
+// (dx, dg) minimises
+//
+//   1/2 sum_i | W_i^-1 ds_i - f_i |^2 + dg,   ds_i = (A dx + b dg)_i,
+//
+// a linear least squares problem, along the gauge e'dx = 0. The multipliers
+// follow: W dz = f - lambda - W^-1 ds. All that is kept per observation is
+// scaled by W.
+//
+// For the cost programme, top = g w is bilinear. Its second-order term is left
+// out, so that the system is that of a Dinkelbach step based at the iterate,
+// and convex.
+template <typename Cone>
+class NewtonSystem {
+ public:
+  static constexpr int kDim = Cone::kDim;
+  using Vector = typename Cone::Vector;
+
+  NewtonSystem(const KnownRotationProblem& problem, const ConeProgram& program,
+               Norm norm, int num_threads);
+
+  // s = T (top; v).
+  Vector Slack(const ViewedPoint& viewed, double scalar) const;
+  // (lambda; y) = T'z: the multipliers of the depth and of v.
+  Eigen::Vector3d ToMultiplier(const Vector& z) const {
+    return T_.transpose() * z;
+  }
+
+  // Scales and factorises at an iterate; false if there is no factor.
+  bool Factorize(const std::vector<ViewedPoint>& viewed, double scalar,
+                 const std::vector<Vector>& z);
+
+  // The direction for the targets f = target(i), and for the centring sigma
+  // of the depths' growth where baselines set the scale.
+  template <typename Target>
+  void Solve(const Target& target, double sigma) {
+    loop_.ForEach([&](int64_t i) { target_[i] = target(i); });
+    SolveForTarget(sigma);
+  }
+
+  const ObservationLoop& loop() const { return loop_; }
+  double gap() const { return gap_; }  // sum s'z = sum |lambda|^2
+  double mu() const { return mu_; }    // of each pair, on the central path
+  const std::vector<Vector>& lambda() const { return lambda_; }
+  const std::vector<Vector>& ds() const { return ds_; }
+  const std::vector<Vector>& dz() const { return dz_; }
+  const BlockVector& dx() const { return dx_; }
+  double dscalar() const { return dscalar_; }
+  // The multipliers' direction without its scaling.
+  Vector UnscaledDz(int64_t i) const {
+    return scaling_[i].ApplyInverse(dz_[i]);
+  }
+
+  static int64_t MemoryBytes(const KnownRotationProblem& problem);
+
+ private:
+  void FillRows(int64_t i, const Eigen::Matrix3d& K, double* rows) const;
+  void FindGauge(const std::vector<ViewedPoint>& viewed);
+  void SolveForTarget(double sigma);
+
+  const KnownRotationProblem& problem_;
+  const ConeProgram program_;
+  const ObservationLoop loop_;
+  const bool has_free_scale_;
+  const BlockStructure structure_;
+  const Eigen::Matrix<double, kDim, 3> T_;
+  PointElimination<kDim> elimination_;
+  double gap_ = 0;
+  double mu_ = 0;
+  std::vector<NtScaling<Cone>> scaling_;
+  std::vector<Vector> lambda_;
+  std::vector<Vector> border_;  // b: the column of g
+  std::vector<Vector> rest_;    // b - A Xb
+  std::vector<Vector> target_;  // f
+  std::vector<Vector> ds_, dz_;
+  BlockVector gauge_;     // e
+  BlockVector x_border_;  // Xb = H^-1 A'b
+  BlockVector x_gauge_;   // Xe = H^-1 e
+  BlockVector x_target_;  // Xf = H^-1 A'f
+  BlockVector dx_;
+  double dscalar_ = 0;
+};
+
+}  // namespace krot
