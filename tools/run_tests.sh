@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds krot and its tests into build/ and runs all of them, installing what is
-# missing first (with sudo if not root). COLMAP and CLP serve as test oracles. Set
-# KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
+# missing first (with sudo if not root). COLMAP and CLP serve as test oracles.
+# Set KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
 #
 # Usage: tools/run_tests.sh
 set -euo pipefail
