@@ -70,6 +70,27 @@ TEST(LeftOutName, IsTheKeyOfTheReport) {
                                  "short_track", "no_pose", "single_ray"));
 }
 
+TEST(LeftOut, NothingDependsOnTranslationsThatAreIgnored) {
+  Model model = EightImages();
+  const BuiltProblem expected = BuildProblem(model, {});
+  model.images[3].cam_from_world.translation.x() = std::nan("");
+  for (Image& image : model.images) image.cam_from_world.translation *= -1;
+  model.points3D[5].xyz.setConstant(std::nan(""));
+  BuildProblemOptions options;
+  options.ignore_translations = true;
+  const BuiltProblem built = BuildProblem(model, options);
+  EXPECT_THAT(built.left_out, ::testing::Each(0));
+  EXPECT_EQ(built.num_retriangulated_points, 0);
+  ASSERT_EQ(built.problem.observations.size(),
+            expected.problem.observations.size());
+  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
+    const Observation& a = built.problem.observations[i];
+    const Observation& b = expected.problem.observations[i];
+    EXPECT_EQ(a.view, b.view);
+    EXPECT_LT((a.u - b.u).norm(), 1e-12);
+  }
+}
+
 TEST(LeftOut, AnImageWithoutFiniteTranslationHasNoPose) {
   Model model = EightImages();
   int64_t num_observations = 0;
