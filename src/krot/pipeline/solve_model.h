@@ -103,8 +103,8 @@ struct SolveModelOptions {
   // kAuto are counted on.
   ResIntOptions res_int;
   // kAuto: the sweeps in front stop when one lowers the cost by less than the
-  // tolerance. They make a rough start ten times better within the time of one
-  // or two joint iterations, and do nothing for a good one.
+  // tolerance. They make a rough start several times better within the time of
+  // a few joint iterations, and do little for a good one.
   int max_leading_sweeps = 10;            // >= 0
   double leading_sweep_tolerance = 0.05;  // relative; >= 0
   JointOptions joint;                     // kAuto, kJoint

@@ -55,9 +55,11 @@ std::string Verdict(const SolveSummary& summary) {
   if (!summary.is_certified) return maximum + ", not proved optimal.";
   // Downwards: more than this is not proved.
   const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
-  return maximum + ", proved optimal to " +
-         FormatNumber(100 * *summary.relative_gap, 4) +
-         " %: no estimate is below " + FormatNumber(bound, 4) + " px.";
+  const double gap_percent = 100 * *summary.relative_gap;
+  const std::string gap =
+      gap_percent < 1e-4 ? "less than 0.0001" : FormatNumber(gap_percent, 4);
+  return maximum + ", proved optimal to " + gap + " %: no estimate is below " +
+         FormatNumber(bound, 4) + " px.";
 }
 
 std::string TerminationSentence(const SolveSummary& summary) {
