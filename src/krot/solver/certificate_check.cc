@@ -10,6 +10,7 @@
 
 #include "krot/problem/components.h"
 #include "krot/problem/restrict.h"
+#include "krot/solver/certificate_input.h"
 #include "krot/solver/verified_solution.h"
 
 // How (1) is proved. Let M = [A_i' lambda_i]_i, without the rows of one frame
@@ -32,26 +33,11 @@ using Vector3 = Eigen::Matrix<Real, 3, 1>;
 
 constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
 constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
-constexpr double kMaxExcess = 1e-12;  // of |y|_dual over lambda
 constexpr int64_t kMaxUnknowns = 6000;
 // Covers a few roundings of non-negative bounds, and their cast to double.
 constexpr double kOutward = 1 + 1e-9;
 // Smaller multipliers, relative, might underflow.
 constexpr double kSmallestShare = 1e-100;
-
-std::string Sentence(const std::string& start, double value,
-                     const std::string& end) {
-  std::ostringstream text;
-  text.precision(17);
-  text << start << value << end;
-  return text.str();
-}
-
-Real DualNorm(const Vector2& y, Norm norm) {
-  if (norm.p == 1) return y.cwiseAbs().maxCoeff();
-  if (norm.p == 2) return y.norm();
-  return y.cwiseAbs().sum();
-}
 
 // E = J (I2 | -u): v = E x_cam.
 Matrix23 NumeratorRows(const Observation& observation) {
@@ -80,9 +66,7 @@ class Checker {
   double rho() const { return rho_; }
 
  private:
-  std::optional<std::string> CheckNumbers() const;
   std::optional<std::string> Restrict();
-  std::optional<std::string> CheckRotations() const;
   void NumberUnknowns();
   UncertainSystem Assemble() const;
   // Of sums over the support, relative to the sum of absolute values: every
@@ -113,38 +97,6 @@ class Checker {
   double rho_ = 0;
 };
 
-std::optional<std::string> Checker::CheckNumbers() const {
-  if (norm_.p != 2 && !norm_.IsPolyhedral()) {
-    return Sentence("there are no certificates for p = ", norm_.p, "");
-  }
-  const double bound = certificate_.lower_bound;
-  if (!(bound > 0) || !std::isfinite(bound)) {
-    return Sentence("the lower bound is ", bound, ", must be positive");
-  }
-  const double defect = certificate_.defect;
-  if (!(defect >= 0 && defect <= kMaxDefect)) {
-    return Sentence("the defect is ", defect, ", must be in [0, 1e-6]");
-  }
-  if (certificate_.observations.empty()) return "it holds no observation";
-  const int64_t count = static_cast<int64_t>(whole_.observations.size());
-  int64_t previous = -1;
-  for (const CertifiedObservation& o : certificate_.observations) {
-    if (o.observation <= previous || o.observation >= count) {
-      return "its observations do not ascend or are not the problem's";
-    }
-    previous = o.observation;
-    const std::string which =
-        "the multipliers of observation " + std::to_string(o.observation);
-    if (!std::isfinite(o.lambda) || !o.y.allFinite() || !(o.lambda > 0)) {
-      return which + " are not finite, or lambda is not positive";
-    }
-    if (!(DualNorm(o.y.cast<Real>(), norm_) <= o.lambda * (1 + kMaxExcess))) {
-      return which + " are infeasible: y is longer than lambda";
-    }
-  }
-  return std::nullopt;
-}
-
 std::optional<std::string> Checker::Restrict() {
   std::vector<int64_t> observations;
   double largest = 0;
@@ -163,38 +115,11 @@ std::optional<std::string> Checker::Restrict() {
     y_.push_back({std::ldexp(Real{o.y[0]}, -exponent),
                   std::ldexp(Real{o.y[1]}, -exponent)});
   }
-  if (auto refusal = CheckRotations()) return refusal;
+  if (auto refusal = RefuseRotations(part_.problem)) return refusal;
   NumberUnknowns();
   if (num_rows_ > kMaxUnknowns) return "its support is too large to be checked";
   if (num_rows_ > 2 * static_cast<int64_t>(lambda_.size())) {
     return "its support is flexible: it has more unknowns than equations";
-  }
-  return std::nullopt;
-}
-
-// Every R_cw must be R_sr R_rw, to kRotationError per entry, for one R_rw per
-// frame; and R_sr must be a rotation as far as the bounds here rely on it.
-std::optional<std::string> Checker::CheckRotations() const {
-  const KnownRotationProblem& problem = part_.problem;
-  std::vector<int32_t> first_view(problem.num_frames, -1);
-  for (size_t v = 0; v < problem.views.size(); ++v) {
-    const View& view = problem.views[v];
-    const Matrix3 R_sr = view.cam_from_rig_rotation.cast<Real>();
-    const Matrix3 R_cw = view.cam_from_world_rotation.cast<Real>();
-    for (const Matrix3& R : {R_sr, R_cw}) {
-      const Real error =
-          (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
-      if (!(error <= 1e-12)) return "a rotation of its views is none";
-    }
-    int32_t& first = first_view[view.frame];
-    if (first < 0) first = static_cast<int32_t>(v);
-    const View& reference = problem.views[first];
-    const Matrix3 R_rw =
-        Matrix3(reference.cam_from_rig_rotation.cast<Real>()).inverse() *
-        reference.cam_from_world_rotation.cast<Real>();
-    if (!((R_cw - R_sr * R_rw).cwiseAbs().maxCoeff() <= kRotationError)) {
-      return "the rotations of a frame's views contradict each other";
-    }
   }
   return std::nullopt;
 }
@@ -319,7 +244,7 @@ void Checker::BoundRho() {
 }
 
 std::optional<std::string> Checker::Run() {
-  if (auto refusal = CheckNumbers()) return refusal;
+  if (auto refusal = RefuseNumbers(whole_, norm_, certificate_)) return refusal;
   if (auto refusal = Restrict()) return refusal;
   const std::optional<Eigen::VectorXd> a_bound = BoundSolution(Assemble());
   if (!a_bound) {
