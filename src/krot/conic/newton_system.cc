@@ -44,13 +44,6 @@ BlockStructure MakeStructure(const KnownRotationProblem& problem) {
   return structure;
 }
 
-bool HasBaseline(const KnownRotationProblem& problem) {
-  return std::any_of(problem.views.begin(), problem.views.end(),
-                     [](const View& view) {
-                       return !view.cam_from_rig_translation.isZero(0);
-                     });
-}
-
 }  // namespace
 
 template <typename Cone>

@@ -1,5 +1,6 @@
 #include "krot/problem/known_rotation_problem.h"
 
+#include <algorithm>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -72,6 +73,13 @@ void IndexObservations(KnownRotationProblem* problem) {
     const int32_t frame = problem->views[observations[i].view].frame;
     problem->frame_observations[next[frame]++] = static_cast<int32_t>(i);
   }
+}
+
+bool HasBaseline(const KnownRotationProblem& problem) {
+  return std::any_of(problem.views.begin(), problem.views.end(),
+                     [](const View& view) {
+                       return !view.cam_from_rig_translation.isZero(0);
+                     });
 }
 
 }  // namespace krot

@@ -60,4 +60,8 @@ struct Estimate {
 // broken. O(observations); 4 bytes per observation and 8 per point and frame.
 void IndexObservations(KnownRotationProblem* problem);
 
+// Whether a camera stands off its frame's origin, t_sr != 0: without any, the
+// problem is homogeneous and its scale is free. O(views).
+bool HasBaseline(const KnownRotationProblem& problem);
+
 }  // namespace krot

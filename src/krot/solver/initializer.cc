@@ -43,13 +43,6 @@ void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
   for (Eigen::Vector3d& s : estimate->points) s /= *median;
 }
 
-bool HasBaseline(const KnownRotationProblem& problem) {
-  return std::any_of(problem.views.begin(), problem.views.end(),
-                     [](const View& view) {
-                       return !view.cam_from_rig_translation.isZero(0);
-                     });
-}
-
 // Where no estimate of a component was found at the bound, its optimum decides:
 // sought from an estimate that misses the bound, it proves that there is none,
 // or meets the bound itself.
