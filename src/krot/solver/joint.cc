@@ -150,7 +150,9 @@ JointTermination ComponentSolve::Run(
     if (iterations_ >= options_.max_iterations) {
       return JointTermination::kMaxIterations;
     }
-    if (!FindFreshStart()) break;
+    const bool is_fresh = FindFreshStart();
+    if (IsCancelled(options_.cancel)) return JointTermination::kInterrupted;
+    if (!is_fresh) break;
     if (iterations_ >= options_.max_iterations) {
       return JointTermination::kMaxIterations;
     }
