@@ -5,6 +5,7 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
+#include "krot/report/html_page.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -146,6 +147,7 @@ int RunSolveCommand(const SolveCommand& command) {
   const WriteModelOptions write_options = CheckModelPaths(paths);
   CheckSidePath("certificate_path", command.certificate_path,
                 paths.output_path);
+  CheckSidePath("html_path", command.html_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
@@ -169,9 +171,16 @@ int RunSolveCommand(const SolveCommand& command) {
   report.seconds_write = write_timer.Seconds();
   report.seconds_total = total_timer.Seconds();
   report.peak_memory_bytes = PeakMemoryBytes();
+  const std::string report_json = SolveJson(report);
   if (!paths.report_path.empty()) {
     LogLine(log, 2, "writing " + paths.report_path);
-    WriteFileAtomically(paths.report_path, SolveJson(report));
+    WriteFileAtomically(paths.report_path, report_json);
+  }
+  if (!command.html_path.empty()) {
+    LogLine(log, 2, "writing " + command.html_path);
+    WriteFileAtomically(command.html_path,
+                        HtmlPage(report_json, model, result.model,
+                                 command.options.num_threads));
   }
   WriteCertificate(command, report.summary);
   PrintTable(log, SolveTable(report));

@@ -1,0 +1,46 @@
+// How the cost fell and the bound rose, step by step.
+
+import { chart, linear, logarithmic, polyline } from './axes.js';
+import { svg } from './dom.js';
+
+// Sweeps and iterations in the order in which they ended.
+export function courseOf(report) {
+  const steps = [
+    ...(report.sweeps ?? []).map((step) => ({ ...step, lower_bound: null })),
+    ...(report.iterations ?? []),
+  ];
+  return steps.sort((a, b) => a.seconds - b.seconds);
+}
+
+function path(name, places) {
+  return svg('path', { class: `${name} line`, d: polyline(places) });
+}
+
+export function convergenceChart(report) {
+  const steps = courseOf(report);
+  const costs = [report.cost_initial, ...steps.map(({ cost }) => cost)];
+  const bounds = steps
+    .map((step, i) => [i + 1, step.lower_bound ?? null])
+    .filter(([, bound]) => bound !== null && bound > 0);
+  const values = [...costs, ...bounds.map(([, bound]) => bound)]
+    .filter((value) => value > 0);
+  if (values.length === 0) return null;
+  const low = values.reduce((a, b) => Math.min(a, b));
+  const high = values.reduce((a, b) => Math.max(a, b));
+  const { figure, at, add } = chart({
+    caption: 'Cost, and the lower bound proved so far, after every step',
+    legend: [['after', 'cost'], ...(bounds.length ? [['bound', 'bound']] : [])],
+    x: linear(0, steps.length),
+    y: logarithmic(low / 1.05, high * 1.05),
+    xName: `${(report.sweeps ?? []).length} sweeps and ` +
+      `${(report.iterations ?? []).length} joint iterations, in turn`,
+    yName: 'px',
+    width: 900,
+    height: 260,
+  });
+  add(path('after', costs.map((cost, i) => at(i, cost))));
+  if (bounds.length) {
+    add(path('bound', bounds.map(([i, bound]) => at(i, bound))));
+  }
+  return figure;
+}

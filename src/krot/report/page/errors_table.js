@@ -1,0 +1,33 @@
+import { html, table } from './dom.js';
+import { pixels } from './format.js';
+
+const kRows = [
+  ['max', 'Maximum'], ['p99', '99th percentile'], ['mean', 'Mean'],
+  ['rms', 'Root mean square'],
+];
+
+function change(before, after) {
+  if (before === null || after === null || !(before > 0)) return '–';
+  const percent = 100 * (after / before - 1);
+  return `${percent > 0 ? '+' : percent < 0 ? '−' : ''}` +
+    `${Math.abs(percent).toFixed(1)} %`;
+}
+
+function row(name, id, before, after) {
+  const cell = (value, end) =>
+    html('span', { id: `error-${id}-${end}` }, pixels(value));
+  return [name, cell(before, 'before'), cell(after, 'after'),
+    change(before, after)];
+}
+
+// The true errors of all observations, and the cost that was minimised.
+export function errorsTable(report, labels) {
+  const { before, after } = report.pixel_error;
+  const rows = kRows.map(([key, name]) =>
+    row(name, key, before[key], after[key]));
+  if ('cost_final' in report) {
+    rows.push(row('Cost: maximum, linearised', 'cost', report.cost_initial,
+      report.cost_final));
+  }
+  return table(['Pixels', ...labels, 'Change'], rows);
+}

@@ -1,0 +1,73 @@
+// Puts the page together.
+
+import { viewerControls, viewerNotes } from './controls.js';
+import { convergenceChart } from './convergence.js';
+import { histogramChart, imagesChart, tailChart } from './curves.js';
+import { decodeModel, modelLabels, readJson } from './data.js';
+import { byId, html } from './dom.js';
+import { errorsTable } from './errors_table.js';
+import { cards, factsTable } from './facts.js';
+import { counted } from './format.js';
+import { imagesTable, pairImages, supportTable } from './lists.js';
+import { scope, verdict } from './verdict.js';
+import { Viewer } from './viewer.js';
+
+function showViewer(models, labels, support) {
+  const stage = html('div', { class: 'stage' });
+  try {
+    const viewer = new Viewer(stage, models, labels, support);
+    byId('scene').append(viewerControls(viewer, labels), stage,
+      viewerNotes(models));
+    return (selected) => viewer.show(selected);
+  } catch (error) {
+    byId('scene').append(html('p', { class: 'note' },
+      `The 3D view needs WebGL 2, which this browser does not offer (${
+        error.message}).`));
+    return () => {};
+  }
+}
+
+function showSupport(support, show) {
+  if (support.length === 0) {
+    byId('support-section').hidden = true;
+    return;
+  }
+  byId('support-note').textContent =
+    `${counted(support.length, 'observation')} alone set the proved bound, ` +
+    'worst first. Click one to see it in the 3D view.';
+  byId('support').append(supportTable(support, (observation) => show({
+    imageId: observation.image_id, pointId: observation.point3D_id,
+  })));
+}
+
+function showCourse(report) {
+  const chart = (report.sweeps ?? report.iterations) &&
+    'cost_initial' in report ? convergenceChart(report) : null;
+  if (chart) byId('convergence').append(chart);
+  byId('course').hidden = !chart;
+}
+
+function showPage(report, models) {
+  const labels = modelLabels(report);
+  const support = report.support ?? [];
+  document.title = `KROT: ${verdict(report)}`;
+  byId('command').textContent = `krot ${report.command}`;
+  byId('version').textContent = `KROT ${report.version}`;
+  byId('verdict').textContent = verdict(report);
+  byId('scope').textContent = scope(report);
+  byId('cards').append(...cards(report, labels));
+  byId('errors').append(errorsTable(report, labels));
+  byId('curves').append(histogramChart(models, labels),
+    tailChart(models, labels));
+  byId('facts').append(factsTable(report));
+  showCourse(report);
+  const show = showViewer(models, labels, support);
+  showSupport(support, show);
+  const showImage = (imageId) => show({ imageId });
+  byId('image-chart').append(
+    imagesChart(pairImages(models), labels, showImage));
+  byId('images').append(imagesTable(models, labels, showImage));
+}
+
+const { before, after } = readJson('krot-models');
+showPage(readJson('krot-report'), [before, after].map(decodeModel));

@@ -1,0 +1,46 @@
+import { lowerBound, pixels } from './format.js';
+
+function movement(before, after, decimals) {
+  const from = before.toFixed(decimals);
+  const to = after.toFixed(decimals);
+  if (from === to) return `stayed at ${to} px`;
+  return `${after < before ? 'fell' : 'rose'} from ${from} px to ${to} px`;
+}
+
+// Whether the cost is, to the digits shown, the largest true error.
+function costIsLargestError(report) {
+  return report.norm === '2' &&
+    pixels(report.cost_final) === pixels(report.pixel_error.after.max);
+}
+
+function proof(report) {
+  const bound = `no camera translations and points can lower it below ` +
+    `${lowerBound(report.lower_bound)} px (proved)`;
+  if (costIsLargestError(report)) return `; ${bound}.`;
+  return `. The cost, which is the largest residual linearised at the ` +
+    `observations (p = ${report.norm}), ` +
+    `${movement(report.cost_initial, report.cost_final, 4)}; ${bound}.`;
+}
+
+// What came of it, in a sentence or two, without more than is known.
+export function verdict(report) {
+  const { before, after } = report.pixel_error;
+  if (before.max === null || after.max === null) {
+    return 'There is no observation with an error to compare.';
+  }
+  if (report.command === 'model_comparer') {
+    return `The largest error of model 1 is ${before.max.toFixed(2)} px, ` +
+      `of model 2 ${after.max.toFixed(2)} px.`;
+  }
+  const sentence = `The largest error ${movement(before.max, after.max, 2)}`;
+  if (report.certified) return sentence + proof(report);
+  return 'certified' in report && report.command === 'solver' ?
+    `${sentence}; whether it can be lower was not proved.` : `${sentence}.`;
+}
+
+// What the verdict holds for.
+export function scope(report) {
+  return report.certified ?
+    'The proof is for the rotations, intrinsics and observations as given, ' +
+    'of the observations that took part in the optimisation.' : '';
+}
