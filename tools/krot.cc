@@ -30,6 +30,7 @@ constexpr Command kCommands[] = {
      &RunPointTriangulator},
     {"model_analyzer", "show what a model's errors look like",
      &RunModelAnalyzer},
+    {"model_comparer", "show how two models differ", &RunModelComparer},
     {"certificate_checker", "re-check the proof of a lower bound",
      &RunCertificateChecker},
     {"model_synthesizer", "make a model with ground truth",

@@ -1,0 +1,154 @@
+#include "krot/analysis/alignment.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Matrix3Xd;
+using Eigen::Vector3d;
+
+// Below this share of the largest, an extent of the cameras is rounding.
+constexpr double kOnALine = 1e-6;
+// A mean rotation is unique if the two least singular values of the sum, the
+// last one signed, do not cancel.
+constexpr double kNoMean = 1e-9;
+
+Matrix3Xd Centers(const std::vector<PosePair>& poses,
+                  Vector3d PosePair::*center) {
+  Matrix3Xd centers(3, poses.size());
+  for (size_t n = 0; n < poses.size(); ++n) centers.col(n) = poses[n].*center;
+  return centers;
+}
+
+double Radius(const Matrix3Xd& centers) {
+  if (centers.cols() == 0) return 0;
+  const Vector3d centroid = centers.rowwise().mean();
+  return (centers.colwise() - centroid).norm() /
+         std::sqrt(static_cast<double>(centers.cols()));
+}
+
+bool LieOnALine(const Matrix3Xd& centers) {
+  const Matrix3Xd centered = centers.colwise() - centers.rowwise().mean();
+  const Vector3d extents =
+      Eigen::JacobiSVD<Matrix3d>(centered * centered.transpose())
+          .singularValues()
+          .cwiseSqrt();
+  return !(extents[1] > kOnALine * extents[0]);
+}
+
+// The rotation nearest to `sum`, in the Frobenius norm.
+std::optional<Matrix3d> NearestRotation(const Matrix3d& sum) {
+  const Eigen::JacobiSVD<Matrix3d> svd(
+      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix3d& U = svd.matrixU();
+  const Matrix3d& V = svd.matrixV();
+  const double sign = (U * V.transpose()).determinant() < 0 ? -1 : 1;
+  const Vector3d& values = svd.singularValues();
+  if (!(values[1] + sign * values[2] > kNoMean * values[0])) {
+    return std::nullopt;
+  }
+  return U * Vector3d(1, 1, sign).asDiagonal() * V.transpose();
+}
+
+bool AreEqual(const PosePair& pose) {
+  return pose.cam_from_world1_rotation == pose.cam_from_world2_rotation &&
+         pose.center1 == pose.center2;
+}
+
+bool IsIdentity(const Similarity& similarity) {
+  return similarity.scale == 1 && similarity.rotation == Matrix3d::Identity() &&
+         similarity.translation == Vector3d::Zero();
+}
+
+// Camera coordinates grow with the world: scale (R x2 + t) = R' x1 + t'.
+void Transform(const Similarity& world1_from_world2, Pose* cam_from_world) {
+  const auto& q = cam_from_world->quaternion_wxyz;
+  const Eigen::Quaterniond rotated =
+      Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized() *
+      Eigen::Quaterniond(world1_from_world2.rotation).conjugate();
+  cam_from_world->quaternion_wxyz = {rotated.w(), rotated.x(), rotated.y(),
+                                     rotated.z()};
+  cam_from_world->translation =
+      world1_from_world2.scale * cam_from_world->translation -
+      rotated * world1_from_world2.translation;
+}
+
+}  // namespace
+
+double SceneRadius(const std::vector<PosePair>& poses) {
+  return Radius(Centers(poses, &PosePair::center1));
+}
+
+std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses) {
+  if (poses.empty()) return std::nullopt;
+  Matrix3d sum = Matrix3d::Zero();
+  for (const PosePair& pose : poses) {
+    sum += pose.cam_from_world1_rotation.transpose() *
+           pose.cam_from_world2_rotation;
+  }
+  const std::optional<Matrix3d> rotation = NearestRotation(sum);
+  if (!rotation) return std::nullopt;
+
+  const Matrix3Xd centers1 = Centers(poses, &PosePair::center1);
+  const Matrix3Xd centers2 = Centers(poses, &PosePair::center2);
+  const double radius1 = Radius(centers1);
+  const double radius2 = Radius(centers2);
+  Similarity similarity;
+  similarity.rotation = *rotation;
+  if (radius1 > 0 && radius2 > 0) similarity.scale = radius1 / radius2;
+  similarity.translation =
+      centers1.rowwise().mean() -
+      similarity.scale * (*rotation * centers2.rowwise().mean());
+  return similarity;
+}
+
+std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses) {
+  if (poses.size() < 3) return std::nullopt;
+  const Matrix3Xd centers1 = Centers(poses, &PosePair::center1);
+  const Matrix3Xd centers2 = Centers(poses, &PosePair::center2);
+  if (LieOnALine(centers1) || LieOnALine(centers2)) return std::nullopt;
+  const Eigen::Matrix4d fitted = Eigen::umeyama(centers2, centers1, true);
+  Similarity similarity;
+  similarity.scale = fitted.topLeftCorner<3, 1>().norm();
+  similarity.rotation = fitted.topLeftCorner<3, 3>() / similarity.scale;
+  similarity.translation = fitted.topRightCorner<3, 1>();
+  return similarity;
+}
+
+std::optional<Similarity> Align(AlignmentKind kind,
+                                const std::vector<PosePair>& poses) {
+  if (kind == AlignmentKind::kNone) return Similarity();
+  const std::optional<Similarity> similarity =
+      kind == AlignmentKind::kFrame ? AlignFrames(poses) : AlignCenters(poses);
+  const bool is_same = std::all_of(poses.begin(), poses.end(), &AreEqual);
+  return similarity && is_same ? Similarity() : similarity;
+}
+
+Model TransformModel(const Model& model, const Similarity& world1_from_world2) {
+  Model result = model;
+  if (IsIdentity(world1_from_world2)) return result;
+  for (Rig& rig : result.rigs) {
+    for (RigSensor& sensor : rig.sensors) {
+      if (!sensor.sensor_from_rig) continue;
+      sensor.sensor_from_rig->translation *= world1_from_world2.scale;
+    }
+  }
+  for (Frame& frame : result.frames) {
+    Transform(world1_from_world2, &frame.rig_from_world);
+  }
+  for (Image& image : result.images) {
+    Transform(world1_from_world2, &image.cam_from_world);
+  }
+  for (Point3D& point : result.points3D) {
+    point.xyz = world1_from_world2 * point.xyz;
+  }
+  return result;
+}
+
+}  // namespace krot

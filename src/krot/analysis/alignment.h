@@ -1,0 +1,67 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+// How the coordinates of a second model are taken to those of a first.
+enum class AlignmentKind {
+  kNone,       // as stored
+  kFrame,      // the frame that KROT keeps: see AlignFrames
+  kSimilarity  // least squares on the camera centres: see AlignCenters
+};
+
+// x1 = scale * rotation * x2 + translation; the default is the identity.
+struct Similarity {
+  double scale = 1;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const {
+    return scale * (rotation * x) + translation;
+  }
+};
+
+// Where one image stands in two models.
+struct PosePair {
+  Eigen::Matrix3d cam_from_world1_rotation = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d cam_from_world2_rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d center1 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center2 = Eigen::Vector3d::Zero();
+};
+
+// The RMS distance of the first model's camera centres from their centroid: a
+// length that differences can be compared with, and the one that KROT's gauge
+// keeps. 0 if there are none.
+double SceneRadius(const std::vector<PosePair>& poses);
+
+// The frame in which KROT keeps a model (problem/gauge.h), made the same in
+// both: the rotation is the chordal mean of those that the images name
+// (R1' R2), then the centroids of the camera centres coincide, and their RMS
+// distances from it, too. Where one of the two radii is zero the scale is 1.
+// None if there are no poses, or if the rotations point in all directions and
+// have no mean. O(images).
+std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses);
+
+// The similarity that minimises the sum of squares of the distances between
+// the camera centres [Umeyama, PAMI 13(4), 1991]. None if there are fewer than
+// three, or if those of one model lie on a line: to 1e-6 of its length no
+// rotation about it could be told. O(images).
+std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses);
+
+// The identity for kNone, the above otherwise. Where all poses are equal, bit
+// by bit, every kind gives the identity to the bit, if it gives anything.
+std::optional<Similarity> Align(AlignmentKind kind,
+                                const std::vector<PosePair>& poses);
+
+// The model in the coordinates world1_from_world2 leads to: poses of frames and
+// images, baselines of rigs, points. Pixels stay where they are. What is not
+// finite stays so; the identity leaves all bits. O(size of the model).
+Model TransformModel(const Model& model, const Similarity& world1_from_world2);
+
+}  // namespace krot

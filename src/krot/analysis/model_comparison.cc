@@ -1,0 +1,202 @@
+#include "krot/analysis/model_comparison.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "krot/analysis/model_statistics.h"
+#include "krot/base/check.h"
+#include "krot/model/image_geometry.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double kDegrees = 180 / 3.14159265358979323846;
+
+ModelCounts Count(const Model& model) {
+  return {static_cast<int64_t>(model.images.size()),
+          static_cast<int64_t>(model.points3D.size()),
+          static_cast<int64_t>(model.track_elements.size())};
+}
+
+ModelCounts Count(const ModelCorrespondence& correspondence) {
+  return {static_cast<int64_t>(correspondence.images.size()),
+          static_cast<int64_t>(correspondence.points.size()),
+          static_cast<int64_t>(correspondence.observations.size())};
+}
+
+Vector3d Center(const ImageGeometry& image) {
+  return -image.cam_from_world_rotation.transpose() *
+         image.cam_from_world_translation;
+}
+
+// None if either has no pose.
+std::optional<PosePair> MakePosePair(const ImageGeometry& image1,
+                                     const ImageGeometry& image2) {
+  if (!image1.has_pose || !image2.has_pose) return std::nullopt;
+  return PosePair{image1.cam_from_world_rotation,
+                  image2.cam_from_world_rotation, Center(image1),
+                  Center(image2)};
+}
+
+// One per shared image.
+std::vector<std::optional<PosePair>> PosePairs(
+    const Model& model1, const Model& model2,
+    const ModelCorrespondence& correspondence) {
+  const std::vector<ImageGeometry> images1 = ImageGeometries(model1);
+  const std::vector<ImageGeometry> images2 = ImageGeometries(model2);
+  std::vector<std::optional<PosePair>> poses;
+  for (const IndexPair& pair : correspondence.images) {
+    poses.push_back(MakePosePair(images1[pair.first], images2[pair.second]));
+  }
+  return poses;
+}
+
+std::vector<PosePair> Known(const std::vector<std::optional<PosePair>>& poses) {
+  std::vector<PosePair> known;
+  for (const std::optional<PosePair>& pose : poses) {
+    if (pose) known.push_back(*pose);
+  }
+  return known;
+}
+
+// From the chord |A - B|_F = 2 sqrt(2) sin(angle / 2): exact for small angles,
+// where the trace is not.
+double AngleDeg(const Matrix3d& A, const Matrix3d& B) {
+  const double sine = (A - B).norm() / std::sqrt(8.0);
+  return 2 * std::asin(std::min(1.0, sine)) * kDegrees;
+}
+
+PoseDifference Difference(const PosePair& pose,
+                          const Similarity& world1_from_world2) {
+  const Matrix3d cam2_from_world1 =
+      pose.cam_from_world2_rotation * world1_from_world2.rotation.transpose();
+  return {AngleDeg(pose.cam_from_world1_rotation, cam2_from_world1),
+          (pose.center1 - world1_from_world2 * pose.center2).norm()};
+}
+
+DifferenceStatistics SummarizeDifferences(std::vector<double> values) {
+  DifferenceStatistics statistics;
+  if (values.empty()) return statistics;
+  std::sort(values.begin(), values.end());
+  double sum = 0;
+  double sum_of_squares = 0;
+  for (const double value : values) {
+    sum += value;
+    sum_of_squares += value * value;
+  }
+  const double count = static_cast<double>(values.size());
+  statistics.max = values.back();
+  statistics.median = values[(values.size() - 1) / 2];
+  statistics.mean = sum / count;
+  statistics.rms = std::sqrt(sum_of_squares / count);
+  statistics.count = static_cast<int64_t>(values.size());
+  return statistics;
+}
+
+void ComparePoses(ComparisonSummary* summary) {
+  std::vector<double> angles_deg;
+  std::vector<double> distances;
+  for (const ImageDifference& image : summary->images) {
+    if (!image.pose) continue;
+    angles_deg.push_back(image.pose->rotation_deg);
+    distances.push_back(image.pose->center);
+  }
+  summary->rotation_deg = SummarizeDifferences(std::move(angles_deg));
+  summary->center = SummarizeDifferences(std::move(distances));
+}
+
+void ComparePoints(const Model& model1, const Model& model2,
+                   const ModelCorrespondence& correspondence, int num_worst,
+                   ComparisonSummary* summary) {
+  std::vector<PointDifference> moved;
+  std::vector<double> distances;
+  for (const IndexPair& pair : correspondence.points) {
+    const Point3D& point1 = model1.points3D[pair.first];
+    const Point3D& point2 = model2.points3D[pair.second];
+    const double distance =
+        (point1.xyz - summary->world1_from_world2 * point2.xyz).norm();
+    moved.push_back({point1.id, point2.id, distance});
+    distances.push_back(distance);
+  }
+  summary->point = SummarizeDifferences(std::move(distances));
+  std::stable_sort(moved.begin(), moved.end(),
+                   [](const PointDifference& a, const PointDifference& b) {
+                     return a.distance > b.distance;
+                   });
+  moved.resize(std::min(moved.size(), static_cast<size_t>(num_worst)));
+  summary->worst_points = std::move(moved);
+}
+
+// Those of the shared observations, in both models.
+void CompareSharedErrors(const std::vector<ElementPair>& observations,
+                         const std::vector<double>& errors1_px,
+                         const std::vector<double>& errors2_px,
+                         ComparisonSummary* summary) {
+  std::vector<double> shared1_px;
+  std::vector<double> shared2_px;
+  for (const ElementPair& pair : observations) {
+    shared1_px.push_back(errors1_px[pair.first]);
+    shared2_px.push_back(errors2_px[pair.second]);
+  }
+  summary->shared_errors1 = Summarize(shared1_px);
+  summary->shared_errors2 = Summarize(shared2_px);
+}
+
+}  // namespace
+
+std::vector<PosePair> SharedPoses(const Model& model1, const Model& model2,
+                                  const ModelCorrespondence& correspondence) {
+  return Known(PosePairs(model1, model2, correspondence));
+}
+
+std::optional<ComparisonSummary> CompareModels(
+    const Model& model1, const Model& model2,
+    const ModelCorrespondence& correspondence,
+    const CompareModelsOptions& options) {
+  CheckArgument(options.num_worst >= 0, "options.num_worst", options.num_worst,
+                ">= 0");
+  const std::vector<std::optional<PosePair>> poses =
+      PosePairs(model1, model2, correspondence);
+  const std::vector<PosePair> known_poses = Known(poses);
+  const std::optional<Similarity> world1_from_world2 =
+      Align(options.alignment, known_poses);
+  if (!world1_from_world2) return std::nullopt;
+
+  ComparisonSummary summary;
+  summary.model1 = Count(model1);
+  summary.model2 = Count(model2);
+  summary.shared = Count(correspondence);
+  summary.num_shared_poses = static_cast<int64_t>(known_poses.size());
+  summary.alignment = options.alignment;
+  summary.world1_from_world2 = *world1_from_world2;
+  summary.scene_radius = SceneRadius(known_poses);
+
+  const std::vector<double> errors1_px =
+      PixelErrors(model1, options.num_threads);
+  const std::vector<double> errors2_px =
+      PixelErrors(model2, options.num_threads);
+  summary.errors1 = Summarize(errors1_px);
+  summary.errors2 = Summarize(errors2_px);
+  CompareSharedErrors(correspondence.observations, errors1_px, errors2_px,
+                      &summary);
+
+  const std::vector<ImageErrors> images1 = ErrorsByImage(model1, errors1_px);
+  const std::vector<ImageErrors> images2 = ErrorsByImage(model2, errors2_px);
+  for (size_t n = 0; n < correspondence.images.size(); ++n) {
+    const ImageErrors& image1 = images1[correspondence.images[n].first];
+    const ImageErrors& image2 = images2[correspondence.images[n].second];
+    ImageDifference image{image1.image_id, image2.image_id, image1.image_name,
+                          std::nullopt,    image1.errors,   image2.errors};
+    if (poses[n]) image.pose = Difference(*poses[n], *world1_from_world2);
+    summary.images.push_back(std::move(image));
+  }
+  ComparePoses(&summary);
+  ComparePoints(model1, model2, correspondence, options.num_worst, &summary);
+  return summary;
+}
+
+}  // namespace krot

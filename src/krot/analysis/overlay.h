@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+// How OverlayModels tells the two apart: blue and vermilion, which colour-blind
+// eyes tell apart, too [Okabe and Ito].
+inline constexpr std::array<uint8_t, 3> kOverlayColor1 = {0, 114, 178};
+inline constexpr std::array<uint8_t, 3> kOverlayColor2 = {213, 94, 0};
+
+// One model that holds both, for COLMAP's GUI to show on top of each other.
+// - Image names become "1/name" and "2/name".
+// - Ids of the first model stay; those of the second grow by the least power
+//   of ten above the largest id of the first, kind by kind.
+// - Points bear one colour per model, and the mean true pixel error of their
+//   track.
+// - If either has rigs, so has the result: an image of a legacy model becomes
+//   a frame of its own, of a rig that holds its camera alone. The pose of an
+//   image is then its frame's, as COLMAP since 3.12 reads it.
+// Everything else stays, coordinates included: bring them into one frame
+// first (TransformModel).
+//
+// Requires valid models (ValidateModel); the result is one. Throws ModelError
+// if an id leaves its type's range. O(size of the models).
+Model OverlayModels(const Model& model1, const Model& model2,
+                    int num_threads = -1);
+
+}  // namespace krot
