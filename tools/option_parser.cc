@@ -53,8 +53,9 @@ OptionAssignment ToAssignment(const po::option& option) {
 
 }  // namespace
 
-OptionParser::OptionParser(std::string command, std::string summary)
-    : command_(std::move(command)), summary_(std::move(summary)) {}
+OptionParser::OptionParser(const std::string& command, std::string summary,
+                           const std::string& program)
+    : command_(program + " " + command), summary_(std::move(summary)) {}
 
 void OptionParser::Add(Option option) { options_.push_back(std::move(option)); }
 
@@ -116,7 +117,7 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   }
   for (const Option& option : options_) {
     if (option.required && !IsGiven(option.name)) {
-      throw OptionError("--" + option.name + " is required (krot " + command_ +
+      throw OptionError("--" + option.name + " is required (" + command_ +
                         " -h lists the options)");
     }
   }
@@ -174,7 +175,7 @@ void OptionParser::Assign(const std::vector<OptionAssignment>& assignments) {
   std::set<std::string> names;
   for (const OptionAssignment& assignment : assignments) {
     const Option& option = Find(assignment);
-    if (!names.insert(option.name).second) {
+    if (!names.insert(option.name).second && !option.repeatable) {
       throw OptionError(assignment.source + " is given twice");
     }
     if (IsGiven(option.name)) continue;  // an explicit flag wins
@@ -198,14 +199,14 @@ const Option& OptionParser::Find(const OptionAssignment& assignment) const {
     names.push_back(option.name);
   }
   const std::string nearest = NearestName(assignment.name, names);
-  throw OptionError(assignment.source + " is no option of krot " + command_ +
-                    (nearest.empty() ? " (krot " + command_ + " -h lists them)"
+  throw OptionError(assignment.source + " is no option of " + command_ +
+                    (nearest.empty() ? " (" + command_ + " -h lists them)"
                                      : "; did you mean --" + nearest + "?"));
 }
 
 std::string OptionParser::Help() const {
-  std::string text = Wrap("krot " + command_ + ": " + summary_, "") +
-                     "\nUsage:\n  krot " + command_;
+  std::string text =
+      Wrap(command_ + ": " + summary_, "") + "\nUsage:\n  " + command_;
   for (const Option& option : options_) {
     if (option.required) text += " --" + option.name + " VALUE";
   }

@@ -19,6 +19,7 @@ struct Option {
   std::string default_text;  // "" if there is none
   bool required = false;
   std::function<bool(const std::string& text)> parse;
+  bool repeatable = false;  // parse is called for every one
 };
 
 // What one argument, or one line of a project file, says.
@@ -33,7 +34,9 @@ struct OptionAssignment {
 // explicit flags win over the file.
 class OptionParser {
  public:
-  OptionParser(std::string command, std::string summary);
+  // Of `program` `command`, as messages and help call it.
+  OptionParser(const std::string& command, std::string summary,
+               const std::string& program = "krot");
 
   void Add(Option option);
   void AddPath(const std::string& name, std::string* value, bool required,
