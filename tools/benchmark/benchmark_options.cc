@@ -1,0 +1,47 @@
+#include "tools/benchmark/benchmark_options.h"
+
+#include <filesystem>
+
+namespace krot {
+
+void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser) {
+  parser->Add({"input_path", "A model to measure on; may be given repeatedly",
+               "a folder", "", false,
+               [options](const std::string& text) {
+                 options->input_paths.push_back(text);
+                 return !text.empty();
+               },
+               /*repeatable=*/true});
+  parser->AddInteger("repeats", &options->repeats, AtLeast(1),
+                     "Rounds in which every competitor runs once; medians are "
+                     "printed");
+  parser->AddChoice("format", &options->format, {"text", "markdown"},
+                    "How to print the tables");
+  parser->AddPath("report_path", &options->report_path, false, "a file",
+                  "Where the same goes as JSON");
+  parser->AddPath("plot_path", &options->plot_path, false, "a file",
+                  "Where the plot goes as SVG");
+  parser->Add({"random_seed", "What random instances are made from",
+               "an integer >= 0", std::to_string(options->random_seed), false,
+               [options](const std::string& text) {
+                 return ParseInteger(text, &options->random_seed);
+               }});
+  parser->AddInteger("log_level", &options->log.level, Between(0, 2),
+                     "What to say on stderr: 0 errors only, 1 progress, 2 "
+                     "details");
+  parser->AddPath("project_path", &options->project_path, false, "an .ini file",
+                  "Options in COLMAP's manner; explicit flags win");
+}
+
+OptionParser MakeBenchmarkParser(const std::string& command,
+                                 const std::string& summary) {
+  return {command, summary, "krot_benchmark"};
+}
+
+std::string ModelName(const std::string& path) {
+  const std::filesystem::path normal =
+      (std::filesystem::absolute(path) / "").lexically_normal().parent_path();
+  return normal.filename().string();
+}
+
+}  // namespace krot

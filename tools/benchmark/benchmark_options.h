@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tools/log.h"
+#include "tools/option_parser.h"
+
+namespace krot {
+
+// What every benchmark takes.
+struct BenchmarkOptions {
+  std::vector<std::string> input_paths;  // models
+  int repeats = 5;
+  std::string format = "text";  // or "markdown"
+  std::string report_path;      // JSON; empty: none
+  std::string plot_path;        // SVG; empty: none
+  uint64_t random_seed = 0;
+  LogOptions log;
+  std::string project_path;
+};
+
+void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser);
+
+OptionParser MakeBenchmarkParser(const std::string& command,
+                                 const std::string& summary);
+
+// The last part of a path that names a model: "south128".
+std::string ModelName(const std::string& path);
+
+}  // namespace krot

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tools/benchmark/benchmark_options.h"
+#include "tools/benchmark/log_plot.h"
+#include "tools/benchmark/machine.h"
+#include "tools/benchmark/result_table.h"
+
+namespace krot {
+
+// What one benchmark found.
+struct BenchmarkReport {
+  std::string command;
+  std::vector<ResultTable> tables;
+  std::optional<LogPlot> plot;
+};
+
+// Throws WriteError if what `options` asks for could not be written. To be
+// called before anything is measured.
+void CheckReportPaths(const BenchmarkOptions& options);
+
+// Prints the tables and the machine; writes the report and the plot if asked
+// for.
+void PublishReport(const BenchmarkReport& report,
+                   const BenchmarkOptions& options);
+
+}  // namespace krot

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/benchmark/subproblem_solver.h"
+
+namespace krot {
+
+// How one solver did on a list of sub-problems, beside all the others.
+struct Standing {
+  std::string name;
+  double seconds = 0;  // per instance: median over rounds of the mean
+  // How far its costs are above the lowest of any solver, relative.
+  double max_excess = 0;
+  double mean_excess = 0;
+};
+
+// A cost this little above the lowest, relative, is the same optimum.
+inline constexpr double kSameOptimum = 1e-5;
+
+// Every solver on every instance, `repeats` rounds in turn.
+std::vector<Standing> Compete(
+    const std::vector<Subproblem>& instances, Norm norm,
+    const std::vector<std::unique_ptr<SubproblemSolver>>& solvers, int repeats);
+
+// KROT's own solvers, then the rivals that can solve this norm.
+std::vector<std::unique_ptr<SubproblemSolver>> AllSolvers(Norm norm);
+
+}  // namespace krot

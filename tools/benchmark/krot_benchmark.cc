@@ -1,0 +1,88 @@
+// krot_benchmark COMMAND [options]: the command table, and what becomes of
+// exceptions.
+
+#include <algorithm>
+#include <iostream>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "krot/model/model_error.h"
+#include "krot/report/write_file.h"
+#include "tools/benchmark/benchmark_command.h"
+#include "tools/command_error.h"
+
+namespace krot {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* summary;
+  int (*run)(const std::vector<std::string>& arguments);
+};
+
+constexpr Command kCommands[] = {
+    {"triangulation", "one point at a time against its rivals [Fig. 4, Tab. 1]",
+     &RunTriangulationBenchmark},
+};
+
+void PrintHelp() {
+  std::cout << "krot_benchmark: KROT against its rivals\n\nUsage:\n"
+               "  krot_benchmark COMMAND [options]\n"
+               "  krot_benchmark COMMAND -h\n\nCommands:\n";
+  for (const Command& command : kCommands) {
+    const std::string name = command.name;
+    std::cout << "  " << name << std::string(20 - name.size(), ' ')
+              << command.summary << '\n';
+  }
+  std::cout << "\nExit codes are those of krot.\n";
+}
+
+int RunCommand(const std::vector<std::string>& arguments) {
+  if (arguments.empty() || arguments.front() == "help" ||
+      arguments.front() == "-h" || arguments.front() == "--help") {
+    PrintHelp();
+    return kExitDone;
+  }
+  for (const Command& command : kCommands) {
+    if (arguments.front() == command.name) {
+      return command.run({arguments.begin() + 1, arguments.end()});
+    }
+  }
+  throw OptionError(arguments.front() +
+                    " is no command (krot_benchmark help lists them)");
+}
+
+// One line on stderr, whatever the message holds.
+int Fail(std::string message, int exit_code) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << "krot_benchmark: " << message << std::endl;
+  return exit_code;
+}
+
+int Main(const std::vector<std::string>& arguments) {
+  try {
+    const int exit_code = RunCommand(arguments);
+    if (!std::cout.flush()) {
+      return Fail("stdout cannot be written", kExitNotWritten);
+    }
+    return exit_code;
+  } catch (const CommandError& error) {
+    return Fail(error.what(), error.exit_code());
+  } catch (const ModelError& error) {
+    return Fail(error.what(), kExitModel);
+  } catch (const WriteError& error) {
+    return Fail(error.what(), kExitNotWritten);
+  } catch (const std::bad_alloc&) {
+    return Fail("out of memory", kExitInternal);
+  } catch (const std::exception& error) {
+    return Fail(std::string("internal error: ") + error.what(), kExitInternal);
+  }
+}
+
+}  // namespace
+}  // namespace krot
+
+int main(int argc, char** argv) {
+  return krot::Main({argv + std::min(argc, 1), argv + argc});
+}

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+namespace krot {
+
+// Where a measurement was made. Times mean nothing without it.
+struct Machine {
+  std::string cpu;  // model name; "unknown" where the system does not say
+  int cores = 0;    // hardware threads
+  std::string compiler;
+  std::string flags;  // of the build
+};
+
+Machine ThisMachine();
+
+// "AMD EPYC, 2 cores; GCC 12.2.0, -O3".
+std::string MachineLine(const Machine& machine);
+
+}  // namespace krot

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+namespace krot {
+
+// One value of a table: as JSON, and as a reader sees it.
+struct Cell {
+  nlohmann::ordered_json value;
+  std::string text;
+};
+
+Cell TextCell(const std::string& text);
+Cell CountCell(int64_t count);
+Cell RealCell(double value, int decimals);
+// With three significant digits, never in exponential notation: times and
+// ratios of any size. "-" if not finite.
+Cell SizedCell(double value);
+Cell ScientificCell(double value);
+Cell MissingCell(const std::string& why = "n/a");  // null
+
+// What a benchmark measured, one row per case.
+struct ResultTable {
+  std::string name;     // a key: "figure4"
+  std::string caption;  // one sentence, without full stop
+  std::vector<std::string> columns;
+  std::vector<std::vector<Cell>> rows;  // as many cells as columns
+  std::vector<std::string> notes;       // sentences below the table
+};
+
+std::string ToText(const ResultTable& table);
+std::string ToMarkdown(const ResultTable& table);
+// {"name", "caption", "columns", "rows": [{column: value}], "notes"}.
+nlohmann::ordered_json ToJson(const ResultTable& table);
+
+}  // namespace krot

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/minimax/residual.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/synthetic/random.h"
+
+namespace krot {
+
+// A problem (1) of [Zhang18] with a start of positive depths, in a unit of
+// length in which the start's mean depth is 1: thresholds in units of x then
+// mean the same for all.
+struct Subproblem {
+  std::vector<Residual> residuals;
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();
+
+  // max_i r_i(x), pixels; infinity unless all depths are positive.
+  double Cost(const Eigen::Vector3d& x, Norm norm) const;
+};
+
+// The point in the middle of the shortest line between the rays of two
+// residuals, v = 0 [Hartley, Schaffalitzky 2004]; none if they are parallel.
+std::optional<Eigen::Vector3d> MidPoint(const Residual& a, const Residual& b);
+
+// The triangulation of `residuals`, which starts, as in [Zhang18, Sec. 4.1], at
+// the mid-point of two that are drawn at random; pairs are drawn until all
+// depths there are positive. None after fifty.
+std::optional<Subproblem> MakeTriangulation(std::vector<Residual> residuals,
+                                            Random* random);
+
+// Point k of a problem as its frames stand: (Int_k).
+std::vector<Residual> IntersectionResiduals(const KnownRotationProblem& problem,
+                                            const Estimate& estimate,
+                                            int32_t point);
+
+// `num_cameras` at random, looking roughly at a random point among them, which
+// they observe with Gaussian noise of `sigma` pixels per axis, focal length
+// 1000 pixels: an instance of [Zhang18, Fig. 4].
+std::vector<Residual> RandomTriangulation(int num_cameras, double sigma,
+                                          Random* random);
+
+}  // namespace krot

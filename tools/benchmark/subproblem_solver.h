@@ -1,0 +1,34 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "tools/benchmark/subproblem.h"
+
+namespace krot {
+
+// A way to solve problems (1), the one or the other of which is measured. Keeps
+// its scratch memory; not thread-safe.
+class SubproblemSolver {
+ public:
+  virtual ~SubproblemSolver() = default;
+
+  virtual std::string Name() const = 0;  // "Gugat"
+
+  // The best point found from problem.start; its depths are positive and its
+  // cost is not above the start's.
+  virtual Eigen::Vector3d Minimize(const Subproblem& problem) = 0;
+};
+
+// Rivals end when what they know of the optimum, be it an interval or the gain
+// of a step, is narrower than this, relative.
+inline constexpr double kRivalTolerance = 1e-6;
+
+// KROT's own: `fast` first, then `paper`. p >= 1.
+std::vector<std::unique_ptr<SubproblemSolver>> OwnSolvers(Norm norm);
+
+// Those of the literature that can solve this norm: p = 2 or infinity.
+std::vector<std::unique_ptr<SubproblemSolver>> RivalSolvers(Norm norm);
+
+}  // namespace krot

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+namespace krot {
+
+// The median; the mean of the two in the middle for an even count. Requires at
+// least one value.
+double Median(std::vector<double> values);
+
+// Median wall-clock seconds of one call of each of `runs`, out of `repeats`
+// rounds in which every one is called in turn, so that what disturbs the
+// machine for a while disturbs all of them alike. What takes less than
+// `min_seconds` is called in a loop that takes at least as long. One round goes
+// ahead unmeasured where there is such a loop.
+std::vector<double> TimeInterleaved(
+    const std::vector<std::function<void()>>& runs, int repeats,
+    double min_seconds);
+
+}  // namespace krot
