@@ -13,6 +13,7 @@ using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
+constexpr double kDegrees = 180 / 3.14159265358979323846;
 // Below this share of the largest, an extent of the cameras is rounding.
 constexpr double kOnALine = 1e-6;
 // A mean rotation is unique if the two least singular values of the sum, the
@@ -80,6 +81,13 @@ void Transform(const Similarity& world1_from_world2, Pose* cam_from_world) {
 }
 
 }  // namespace
+
+double AngleDeg(const Matrix3d& A, const Matrix3d& B) {
+  // The chord |A - B|_F = 2 sqrt(2) sin(angle / 2): the trace is blind to
+  // small angles.
+  const double sine = (A - B).norm() / std::sqrt(8.0);
+  return 2 * std::asin(std::min(1.0, sine)) * kDegrees;
+}
 
 double SceneRadius(const std::vector<PosePair>& poses) {
   return Radius(Centers(poses, &PosePair::center1));

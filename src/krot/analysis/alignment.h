@@ -27,6 +27,9 @@ struct Similarity {
   }
 };
 
+// The angle between two rotations, in [0, 180] degrees; exact for small ones.
+double AngleDeg(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
+
 // Where one image stands in two models.
 struct PosePair {
   Eigen::Matrix3d cam_from_world1_rotation = Eigen::Matrix3d::Identity();

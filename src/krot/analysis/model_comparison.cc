@@ -14,8 +14,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kDegrees = 180 / 3.14159265358979323846;
-
 ModelCounts Count(const Model& model) {
   return {static_cast<int64_t>(model.images.size()),
           static_cast<int64_t>(model.points3D.size()),
@@ -61,13 +59,6 @@ std::vector<PosePair> Known(const std::vector<std::optional<PosePair>>& poses) {
     if (pose) known.push_back(*pose);
   }
   return known;
-}
-
-// From the chord |A - B|_F = 2 sqrt(2) sin(angle / 2): exact for small angles,
-// where the trace is not.
-double AngleDeg(const Matrix3d& A, const Matrix3d& B) {
-  const double sine = (A - B).norm() / std::sqrt(8.0);
-  return 2 * std::asin(std::min(1.0, sine)) * kDegrees;
 }
 
 PoseDifference Difference(const PosePair& pose,

@@ -56,10 +56,8 @@ std::string AlignmentSentence(const ComparisonSummary& summary) {
     return "as stored, not aligned";
   }
   const Similarity& similarity = summary.world1_from_world2;
-  const double sine =
-      (similarity.rotation - Eigen::Matrix3d::Identity()).norm() /
-      std::sqrt(8.0);
-  const double angle_deg = 2 * std::asin(std::min(1.0, sine)) * 180 / M_PI;
+  const double angle_deg =
+      AngleDeg(similarity.rotation, Eigen::Matrix3d::Identity());
   const std::string means =
       summary.alignment == AlignmentKind::kFrame
           ? "after giving model 2 the frame of model 1"
