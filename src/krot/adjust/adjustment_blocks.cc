@@ -1,0 +1,213 @@
+#include "krot/adjust/adjustment_blocks.h"
+
+#include <cmath>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "krot/camera/camera_model.h"
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Vector3d;
+
+void CheckImagePlane(const Camera& camera) {
+  const CameraModelInfo& info = *FindCameraModel(camera.model_id);
+  if (info.has_image_plane) return;
+  throw ModelError("camera " + std::to_string(camera.id) + " is " +
+                   std::string(info.name) +
+                   ", which has no image plane: expected a model that "
+                   "projects onto one");
+}
+
+// Where the sensors of each rig begin in AdjustmentBlocks::sensors.
+std::vector<int32_t> SensorOffsets(const Model& model) {
+  std::vector<int32_t> offsets;
+  int32_t offset = 0;
+  for (const Rig& rig : model.rigs) {
+    offsets.push_back(offset);
+    offset += static_cast<int32_t>(rig.sensors.size());
+  }
+  return offsets;
+}
+
+// What an image's observations are tied to.
+struct ImageBlocks {
+  ImageGeometry geometry;
+  int32_t sensor = -1;
+};
+
+std::vector<ImageBlocks> BlocksOfImages(const Model& model) {
+  const std::vector<int32_t> offsets = SensorOffsets(model);
+  std::unordered_map<RigId, int32_t> rig_indices;
+  for (size_t r = 0; r < model.rigs.size(); ++r) {
+    rig_indices.emplace(model.rigs[r].id, static_cast<int32_t>(r));
+  }
+  std::vector<ImageBlocks> blocks;
+  for (const ImageGeometry& geometry : ImageGeometries(model)) {
+    blocks.push_back({geometry, -1});
+    if (!model.has_rigs || geometry.frame < 0) continue;
+    const int32_t r = rig_indices.at(model.frames[geometry.frame].rig_id);
+    const std::vector<RigSensor>& sensors = model.rigs[r].sensors;
+    const CameraId camera_id = model.cameras[geometry.camera].id;
+    for (size_t i = 0; i < sensors.size(); ++i) {
+      const SensorId& sensor_id = sensors[i].sensor_id;
+      if (sensor_id.type == kSensorTypeCamera && sensor_id.id == camera_id) {
+        blocks.back().sensor = offsets[r] + static_cast<int32_t>(i);
+      }
+    }
+  }
+  return blocks;
+}
+
+bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
+              const Vector3d& xyz) {
+  const Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
+                         geometry.cam_from_world_translation;
+  if (!(x_cam.z() > 0)) return false;
+  return ProjectRay(camera.model_id, camera.params.data(), x_cam.hnormalized())
+      .allFinite();
+}
+
+void CollectObservations(const Model& model, int min_track_length,
+                         AdjustmentBlocks* blocks) {
+  const std::vector<ImageBlocks> images = BlocksOfImages(model);
+  const std::unordered_map<ImageId, int32_t> image_indices =
+      ImageIndices(model);
+  std::vector<bool> has_observation(images.size(), false);
+  std::vector<int32_t> images_of_point;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    const size_t begin = blocks->observations.size();
+    images_of_point.clear();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      const int32_t n = image_indices.at(element.image_id);
+      const ImageGeometry& geometry = images[n].geometry;
+      const Camera& camera = model.cameras[geometry.camera];
+      CheckImagePlane(camera);
+      if (!geometry.has_pose) {
+        ++blocks->num_no_pose;
+      } else if (!IsUsable(geometry, camera, point.xyz)) {
+        ++blocks->num_behind;
+      } else {
+        const Point2D& pixel = model.images[n].points2D[element.point2D_idx];
+        blocks->observations.push_back({geometry.frame,
+                                        images[n].sensor,
+                                        geometry.camera,
+                                        static_cast<int32_t>(k),
+                                        {pixel.x, pixel.y}});
+        images_of_point.push_back(n);
+      }
+    }
+    const auto length = static_cast<int>(images_of_point.size());
+    if (length < min_track_length) {
+      blocks->num_short_track += length;
+      blocks->observations.resize(begin);
+    } else {
+      for (const int32_t n : images_of_point) has_observation[n] = true;
+    }
+  }
+  for (const bool has : has_observation) blocks->num_images += has ? 1 : 0;
+}
+
+}  // namespace
+
+PoseBlock ToBlock(const Pose& pose) {
+  Eigen::Vector4d q(pose.quaternion_wxyz.data());
+  q.normalize();
+  const Vector3d& t = pose.translation;
+  return {q[0], q[1], q[2], q[3], t[0], t[1], t[2]};
+}
+
+Pose ToPose(const PoseBlock& block) {
+  return {{block[0], block[1], block[2], block[3]}, TranslationOf(block)};
+}
+
+Eigen::Matrix3d RotationOf(const PoseBlock& block) {
+  return ToPose(block).Rotation();
+}
+
+Eigen::Map<const Vector3d> TranslationOf(const PoseBlock& block) {
+  return Eigen::Map<const Vector3d>(block.data() + 4);
+}
+
+AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
+                                      int min_track_length) {
+  AdjustmentBlocks blocks;
+  if (model.has_rigs) {
+    for (const Frame& frame : model.frames) {
+      blocks.frames.push_back(ToBlock(frame.rig_from_world));
+    }
+  } else {
+    for (const Image& image : model.images) {
+      blocks.frames.push_back(ToBlock(image.cam_from_world));
+    }
+  }
+  for (const Rig& rig : model.rigs) {
+    for (const RigSensor& sensor : rig.sensors) {
+      blocks.sensors.push_back(
+          ToBlock(sensor.sensor_from_rig.value_or(Pose())));
+    }
+  }
+  for (const Camera& camera : model.cameras) {
+    blocks.cameras.push_back(camera.params);
+  }
+  for (const Point3D& point : model.points3D) {
+    blocks.points.push_back(point.xyz);
+  }
+  CollectObservations(model, min_track_length, &blocks);
+  return blocks;
+}
+
+Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
+                  const AdjustmentBlocks& after) {
+  Model result = model;
+  for (size_t k = 0; k < after.points.size(); ++k) {
+    result.points3D[k].xyz = after.points[k];
+  }
+  for (size_t c = 0; c < after.cameras.size(); ++c) {
+    result.cameras[c].params = after.cameras[c];
+  }
+  size_t s = 0;
+  for (Rig& rig : result.rigs) {
+    for (RigSensor& sensor : rig.sensors) {
+      if (after.sensors[s] != before.sensors[s]) {
+        sensor.sensor_from_rig = ToPose(after.sensors[s]);
+      }
+      ++s;
+    }
+  }
+  for (size_t f = 0; f < after.frames.size(); ++f) {
+    if (after.frames[f] == before.frames[f]) continue;
+    (model.has_rigs ? result.frames[f].rig_from_world
+                    : result.images[f].cam_from_world) =
+        ToPose(after.frames[f]);
+  }
+  if (!model.has_rigs) return result;
+
+  const std::vector<ImageBlocks> images = BlocksOfImages(model);
+  const std::vector<ImageGeometry> placed = ImageGeometries(result);
+  for (size_t n = 0; n < images.size(); ++n) {
+    const int32_t f = images[n].geometry.frame;
+    const int32_t sensor = images[n].sensor;
+    if (f < 0) continue;
+    const bool stays =
+        after.frames[f] == before.frames[f] &&
+        (sensor < 0 || after.sensors[sensor] == before.sensors[sensor]);
+    if (stays) continue;
+    Pose& pose = result.images[n].cam_from_world;
+    if (sensor < 0) {
+      pose = ToPose(after.frames[f]);
+      continue;
+    }
+    const Eigen::Quaterniond q(placed[n].cam_from_world_rotation);
+    pose.quaternion_wxyz = {q.w(), q.x(), q.y(), q.z()};
+    pose.translation = placed[n].cam_from_world_translation;
+  }
+  return result;
+}
+
+}  // namespace krot

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/model/image_geometry.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// qw qx qy qz tx ty tz, the quaternion of unit norm.
+using PoseBlock = std::array<double, 7>;
+
+PoseBlock ToBlock(const Pose& pose);
+Pose ToPose(const PoseBlock& block);
+Eigen::Matrix3d RotationOf(const PoseBlock& block);
+Eigen::Map<const Eigen::Vector3d> TranslationOf(const PoseBlock& block);
+
+// One reprojection error: which blocks it ties, and the measured pixel.
+struct AdjustmentObservation {
+  int32_t frame = -1;   // in AdjustmentBlocks::frames
+  int32_t sensor = -1;  // in sensors; -1: the rig's reference sensor
+  int32_t camera = -1;  // in cameras
+  int32_t point = -1;   // in points
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+};
+
+// The unknowns of bundle adjustment as flat blocks of doubles, in the order of
+// the model's own records, and the observations that take part.
+struct AdjustmentBlocks {
+  std::vector<PoseBlock> frames;   // rig_from_world; per image if !has_rigs
+  std::vector<PoseBlock> sensors;  // sensor_from_rig, rig by rig
+  std::vector<std::vector<double>> cameras;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<AdjustmentObservation> observations;  // point by point
+
+  int64_t num_images = 0;  // with observations
+  int64_t num_no_pose = 0;
+  int64_t num_behind = 0;
+  int64_t num_short_track = 0;
+};
+
+// Leaves out observations without a pose, behind their camera or without a
+// finite projection, then points with fewer than `min_track_length` others.
+// Throws ModelError for a camera without an image plane that an image with a
+// point uses. O(observations).
+AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length);
+
+// A copy of the model with the blocks in place of what they were made from.
+// Records whose blocks are those of `before` keep their bits; the poses of
+// images follow their frames.
+Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
+                  const AdjustmentBlocks& after);
+
+}  // namespace krot

@@ -1,0 +1,162 @@
+#include "krot/adjust/adjustment_problem.h"
+
+#include <limits>
+#include <memory>
+#include <numeric>
+
+#include <ceres/manifold.h>
+#include <ceres/product_manifold.h>
+
+#include "krot/adjust/reprojection_cost.h"
+#include "krot/base/parallel_for.h"
+#include "krot/camera/camera_model.h"
+#include "krot/camera/models.h"
+
+namespace krot {
+namespace {
+
+using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
+                                            ceres::EuclideanManifold<3>>;
+
+// The gauge is free, so the normal equations are singular but for the damping,
+// which is the diagonal of J'J divided by the radius: a larger one would leave
+// it to rounding whether they are positive definite.
+constexpr double kMaxRadius = 1e8;
+
+template <typename Camera>
+void AddObservation(const AdjustmentObservation& observation, double max_error,
+                    ceres::LossFunction* loss, AdjustmentBlocks* blocks,
+                    ceres::Problem* problem) {
+  double* point = blocks->points[observation.point].data();
+  double* frame = blocks->frames[observation.frame].data();
+  double* camera = blocks->cameras[observation.camera].data();
+  if (observation.sensor < 0) {
+    problem->AddResidualBlock(
+        new ReprojectionCost<Camera, false>(observation.pixel, max_error), loss,
+        point, frame, camera);
+  } else {
+    double* sensor = blocks->sensors[observation.sensor].data();
+    problem->AddResidualBlock(
+        new ReprojectionCost<Camera, true>(observation.pixel, max_error), loss,
+        point, frame, sensor, camera);
+  }
+}
+
+// Those that stay, in COLMAP's order: focal length(s), principal point, others.
+std::vector<int> ConstantParams(const CameraModelInfo& info,
+                                const BundleAdjustmentOptions& options) {
+  const int num_focal = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
+  std::vector<int> constant;
+  for (int i = 0; i < info.num_params; ++i) {
+    const bool is_refined = i < num_focal       ? options.refine_focal_length
+                            : i < num_focal + 2 ? options.refine_principal_point
+                                                : options.refine_extra_params;
+    if (!is_refined) constant.push_back(i);
+  }
+  return constant;
+}
+
+// Holds still the coordinates in `constant` of a block of `size`.
+void HoldStill(double* block, int size, const std::vector<int>& constant,
+               ceres::Problem* problem) {
+  if (!problem->HasParameterBlock(block) || constant.empty()) return;
+  if (static_cast<int>(constant.size()) == size) {
+    problem->SetParameterBlockConstant(block);
+  } else {
+    problem->SetManifold(block, new ceres::SubsetManifold(size, constant));
+  }
+}
+
+void ParameterizePose(bool is_refined, bool is_rotation_refined,
+                      PoseBlock* pose, ceres::Problem* problem) {
+  if (!problem->HasParameterBlock(pose->data())) return;
+  if (!is_refined) {
+    problem->SetParameterBlockConstant(pose->data());
+  } else if (!is_rotation_refined) {
+    problem->SetManifold(pose->data(),
+                         new ceres::SubsetManifold(7, {0, 1, 2, 3}));
+  } else {
+    problem->SetManifold(pose->data(), new PoseManifold());
+  }
+}
+
+}  // namespace
+
+ceres::Problem::Options AdjustmentProblemOptions() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
+void BuildAdjustmentProblem(const Model& model,
+                            const BundleAdjustmentOptions& options,
+                            ceres::LossFunction* loss, AdjustmentBlocks* blocks,
+                            ceres::Problem* problem) {
+  const double max_error =
+      options.max_error.value_or(std::numeric_limits<double>::infinity());
+  for (const AdjustmentObservation& observation : blocks->observations) {
+    VisitCameraModel(model.cameras[observation.camera].model_id,
+                     [&](auto camera) {
+                       AddObservation<decltype(camera)>(observation, max_error,
+                                                        loss, blocks, problem);
+                     });
+  }
+  for (PoseBlock& frame : blocks->frames) {
+    ParameterizePose(options.refine_rig_from_world,
+                     !options.constant_rig_from_world_rotation, &frame,
+                     problem);
+  }
+  for (PoseBlock& sensor : blocks->sensors) {
+    ParameterizePose(options.refine_sensor_from_rig, true, &sensor, problem);
+  }
+  for (size_t c = 0; c < blocks->cameras.size(); ++c) {
+    const CameraModelInfo& info = *FindCameraModel(model.cameras[c].model_id);
+    HoldStill(blocks->cameras[c].data(), info.num_params,
+              ConstantParams(info, options), problem);
+  }
+  if (options.refine_points3D) return;
+  for (Eigen::Vector3d& point : blocks->points) {
+    HoldStill(point.data(), 3, {0, 1, 2}, problem);
+  }
+}
+
+ceres::Solver::Options AdjustmentSolverOptions(
+    const BundleAdjustmentOptions& options, AdjustmentBlocks* blocks,
+    const ceres::Problem& problem) {
+  ceres::Solver::Options solver;
+  solver.logging_type = ceres::SILENT;
+  solver.max_num_iterations = options.max_num_iterations;
+  solver.max_linear_solver_iterations = options.max_linear_solver_iterations;
+  solver.function_tolerance = options.function_tolerance;
+  solver.gradient_tolerance = options.gradient_tolerance;
+  solver.parameter_tolerance = options.parameter_tolerance;
+  solver.max_num_consecutive_invalid_steps = 10;
+  solver.max_trust_region_radius = kMaxRadius;
+  solver.num_threads = ResolveNumThreads(options.num_threads);
+  if (!options.refine_points3D) {
+    solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    return solver;
+  }
+
+  if (blocks->num_images <= options.max_num_images_direct_dense) {
+    solver.linear_solver_type = ceres::DENSE_SCHUR;
+  } else if (blocks->num_images <= options.max_num_images_direct_sparse) {
+    solver.linear_solver_type = ceres::SPARSE_SCHUR;
+  } else {
+    solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
+    solver.preconditioner_type = ceres::SCHUR_JACOBI;
+  }
+  std::vector<double*> all;
+  problem.GetParameterBlocks(&all);
+  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  for (double* block : all) ordering->AddElementToGroup(block, 1);
+  for (Eigen::Vector3d& point : blocks->points) {
+    if (problem.HasParameterBlock(point.data())) {
+      ordering->AddElementToGroup(point.data(), 0);
+    }
+  }
+  solver.linear_solver_ordering = std::move(ordering);
+  return solver;
+}
+
+}  // namespace krot

@@ -1,0 +1,133 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "krot/base/progress.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Least squares over everything that a COLMAP model holds: poses, points and
+// intrinsics, on Ceres. Names and defaults are those of COLMAP 4.1 where it has
+// the option, and differ where a comment says so.
+
+enum class RobustLoss { kTrivial, kSoftL1, kCauchy, kHuber };
+
+struct BundleAdjustmentIteration {
+  int iteration = 0;  // 0: the start
+  double cost = 0;    // half the sum of the robust squared errors, pixels^2
+  double radius = 0;  // of the trust region
+  bool is_successful = false;
+  std::optional<double> barrier;  // pixels^2; with a max_error
+  double seconds = 0;             // wall clock, since the start
+};
+
+struct BundleAdjustmentOptions {
+  // What moves.
+  bool refine_focal_length = true;
+  bool refine_principal_point = false;
+  bool refine_extra_params = true;
+  bool refine_rig_from_world = true;
+  bool refine_sensor_from_rig = true;
+  bool refine_points3D = true;
+  bool constant_rig_from_world_rotation = false;
+
+  // Points with fewer usable observations take no part. At least 1; COLMAP's
+  // default is 0, which lets points of one ray move along it.
+  int min_track_length = 2;
+
+  RobustLoss loss = RobustLoss::kTrivial;
+  double loss_scale = 1;  // > 0; pixels
+
+  int max_num_iterations = 100;            // >= 0
+  int max_linear_solver_iterations = 200;  // >= 1; iterative solver only
+  double function_tolerance = 1e-6;        // relative; >= 0; COLMAP's is 0
+  double gradient_tolerance = 1e-4;        // >= 0
+  double parameter_tolerance = 0;          // relative; >= 0
+
+  // Up to so many images the reduced camera system is dense, sparse, and
+  // beyond them solved by conjugate gradients.
+  int max_num_images_direct_dense = 50;     // >= 0
+  int max_num_images_direct_sparse = 1000;  // >= 0
+
+  // No error may reach this: pixels; > 0; kTrivial only. The start must be
+  // strictly below it.
+  std::optional<double> max_error;
+
+  // With more than one thread Ceres adds up in no fixed order: the last digits
+  // differ from run to run then.
+  int num_threads = -1;
+  const CancelFlag* cancel = nullptr;  // may be null
+  std::function<void(const BundleAdjustmentIteration&)> callback;
+};
+
+enum class BundleAdjustmentTermination {
+  kNotRun,
+  kNothingToAdjust,  // no observation, or nothing that may move
+  kConverged,        // Ceres' function, gradient or parameter tolerance
+  kCapConverged,     // duality_gap and stationarity below their tolerances
+  kMaxIterations,
+  kStalled,          // no step lowers the cost; with a max_error: nor is the
+                     // end a proved one
+  kInfeasibleStart,  // the start is not strictly below max_error
+  kInterrupted,      // the model is the best so far
+};
+
+struct BundleAdjustmentSummary {
+  BundleAdjustmentTermination termination =
+      BundleAdjustmentTermination::kNotRun;
+  int64_t num_frames = 0;
+  int64_t num_images = 0;
+  int64_t num_points = 0;
+  int64_t num_observations = 0;
+  // Observations that took no part: without a pose, behind the camera or not
+  // projectable at the start, of too short a track.
+  int64_t num_no_pose = 0;
+  int64_t num_behind = 0;
+  int64_t num_short_track = 0;
+  int64_t num_parameters = 0;  // that moved, gauge included
+
+  // Half the sum of the robust squared errors, pixels^2.
+  double cost_initial = 0;
+  double cost_final = 0;
+  int num_iterations = 0;
+  std::string linear_solver;  // "dense_schur", ...
+
+  // At the end: g'D^-1 g / (2 cost), the share of the cost that the unknowns
+  // would remove, each moved by itself (g the gradient, D the diagonal of J'J).
+  // With a max_error both are the barrier problem's, whose gradient is that of
+  // the Lagrangian. 0 at a stationary point.
+  std::optional<double> stationarity;
+  // With a max_error: sum of multiplier times slack, relative to the cost. Were
+  // the problem convex, no feasible point would be lower by more.
+  std::optional<double> duality_gap;
+  // Observations whose multiplier is above 1e-3: those that the cap holds.
+  int64_t num_active = 0;
+
+  double seconds = 0;  // wall clock
+};
+
+struct BundleAdjustmentResult {
+  Model model;  // a copy of the input where nothing was adjusted
+  BundleAdjustmentSummary summary;
+};
+
+// Minimises the cost from the model's own estimate. What may not move keeps its
+// bits, and so do points and frames that take no part. The gauge is free during
+// the solve; after it every connected component gets back the centroid of its
+// camera centres, their RMS distance to it (unless a constant rig baseline
+// fixes the scale) and the mean of its rotations. Stored point errors are not
+// updated.
+//
+// A step that takes a point behind a camera that sees it is rejected; with a
+// max_error, so is one that takes an error to it.
+//
+// Requires a valid model (ValidateModel). Throws ModelError for cameras without
+// an image plane and std::invalid_argument for options out of range.
+BundleAdjustmentResult AdjustBundle(const Model& model,
+                                    const BundleAdjustmentOptions& options);
+
+}  // namespace krot

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+
+#include <ceres/iteration_callback.h>
+
+#include "krot/adjust/bundle_adjustment.h"
+#include "krot/base/timer.h"
+
+namespace krot {
+
+// Tells the caller of every iteration, and ends a solve that is cancelled.
+class IterationObserver final : public ceres::IterationCallback {
+ public:
+  explicit IterationObserver(const BundleAdjustmentOptions& options)
+      : callback_(options.callback), cancel_(options.cancel) {}
+
+  // The iterations to come belong to this weight of the barrier.
+  void set_barrier(double mu) { barrier_ = mu; }
+
+  // Of all solves so far, without their starts.
+  int num_iterations() const { return num_iterations_; }
+
+  ceres::CallbackReturnType operator()(
+      const ceres::IterationSummary& summary) override {
+    if (summary.iteration > 0) ++num_iterations_;
+    if (callback_) {
+      BundleAdjustmentIteration iteration;
+      iteration.iteration = num_iterations_;
+      iteration.cost = summary.cost;
+      iteration.radius = summary.trust_region_radius;
+      iteration.is_successful = summary.step_is_successful;
+      iteration.barrier = barrier_;
+      iteration.seconds = timer_.Seconds();
+      callback_(iteration);
+    }
+    return IsCancelled(cancel_) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  std::function<void(const BundleAdjustmentIteration&)> callback_;
+  const CancelFlag* cancel_;
+  const Timer timer_;
+  std::optional<double> barrier_;
+  int num_iterations_ = 0;
+};
+
+}  // namespace krot

@@ -1,0 +1,186 @@
+#include "krot/adjust/restore_similarity.h"
+
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <vector>
+
+#include <Eigen/SVD>
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Disjoint sets of [0, count).
+class UnionFind {
+ public:
+  explicit UnionFind(size_t count) : parents_(count) {
+    std::iota(parents_.begin(), parents_.end(), size_t{0});
+  }
+  size_t Find(size_t i) {
+    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
+    return i;
+  }
+  void Unite(size_t i, size_t j) { parents_[Find(i)] = Find(j); }
+
+ private:
+  std::vector<size_t> parents_;
+};
+
+// What moves together: indices of AdjustmentBlocks. Sensors only where they are
+// refined; else `has_fixed_scale` says whether they have a translation.
+struct Component {
+  std::vector<size_t> frames;
+  std::vector<size_t> sensors;
+  std::vector<size_t> points;
+  bool has_fixed_scale = false;
+};
+
+std::vector<Component> FindComponents(const AdjustmentBlocks& blocks,
+                                      bool refine_sensors) {
+  const size_t num_frames = blocks.frames.size();
+  const size_t num_sensors = blocks.sensors.size();
+  const size_t num_nodes = num_frames + num_sensors + blocks.points.size();
+  UnionFind nodes(num_nodes);
+  std::vector<bool> is_used(num_nodes, false);
+  std::vector<bool> is_scaled(num_frames, false);
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    const size_t frame = observation.frame;
+    const size_t point = num_frames + num_sensors + observation.point;
+    is_used[frame] = is_used[point] = true;
+    nodes.Unite(point, frame);
+    if (observation.sensor < 0) continue;
+    const size_t sensor = num_frames + observation.sensor;
+    if (refine_sensors) {
+      is_used[sensor] = true;
+      nodes.Unite(sensor, frame);
+    } else if (TranslationOf(blocks.sensors[observation.sensor]).norm() > 0) {
+      is_scaled[frame] = true;
+    }
+  }
+
+  std::map<size_t, Component> components;
+  for (size_t node = 0; node < num_nodes; ++node) {
+    if (!is_used[node]) continue;
+    Component& component = components[nodes.Find(node)];
+    if (node < num_frames) {
+      component.frames.push_back(node);
+      component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
+    } else if (node < num_frames + num_sensors) {
+      component.sensors.push_back(node - num_frames);
+    } else {
+      component.points.push_back(node - num_frames - num_sensors);
+    }
+  }
+  std::vector<Component> list;
+  for (auto& [root, component] : components) {
+    list.push_back(std::move(component));
+  }
+  return list;
+}
+
+Vector3d CenterOf(const PoseBlock& frame) {
+  return -(RotationOf(frame).transpose() * TranslationOf(frame));
+}
+
+struct CenterStatistics {
+  Vector3d centroid = Vector3d::Zero();
+  double rms = 0;  // distance to the centroid
+};
+
+CenterStatistics Summarize(const std::vector<PoseBlock>& frames,
+                           const std::vector<size_t>& indices) {
+  CenterStatistics statistics;
+  const double count = static_cast<double>(indices.size());
+  for (const size_t f : indices) {
+    statistics.centroid += CenterOf(frames[f]) / count;
+  }
+  for (const size_t f : indices) {
+    statistics.rms +=
+        (CenterOf(frames[f]) - statistics.centroid).squaredNorm() / count;
+  }
+  statistics.rms = std::sqrt(statistics.rms);
+  return statistics;
+}
+
+// The rotation nearest to the sum of R_before^T R_after.
+Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
+                      const std::vector<PoseBlock>& after,
+                      const std::vector<size_t>& indices) {
+  Matrix3d sum = Matrix3d::Zero();
+  for (const size_t f : indices) {
+    sum += RotationOf(before[f]).transpose() * RotationOf(after[f]);
+  }
+  const Eigen::JacobiSVD<Matrix3d> svd(
+      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  return svd.matrixU() * Vector3d(1, 1, sign).asDiagonal() *
+         svd.matrixV().transpose();
+}
+
+// x -> scale rotation (x - from) + to
+struct Similarity {
+  double scale = 1;
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d from;
+  Vector3d to;
+
+  Vector3d operator*(const Vector3d& x) const {
+    return scale * (rotation * (x - from)) + to;
+  }
+};
+
+void MoveFrame(const Similarity& similarity, bool keep_rotation,
+               PoseBlock* frame) {
+  const Vector3d center = similarity * CenterOf(*frame);
+  Pose pose = ToPose(*frame);
+  if (!keep_rotation) {
+    const Eigen::Quaterniond q(RotationOf(*frame) *
+                               similarity.rotation.transpose());
+    pose.quaternion_wxyz = {q.w(), q.x(), q.y(), q.z()};
+  }
+  pose.translation = -(pose.Rotation() * center);
+  const PoseBlock moved = ToBlock(pose);
+  std::copy(moved.begin() + (keep_rotation ? 4 : 0), moved.end(),
+            frame->begin() + (keep_rotation ? 4 : 0));
+}
+
+}  // namespace
+
+void RestoreSimilarity(const BundleAdjustmentOptions& options,
+                       const AdjustmentBlocks& before,
+                       AdjustmentBlocks* after) {
+  if (!options.refine_rig_from_world || !options.refine_points3D) return;
+  const bool keep_rotation = options.constant_rig_from_world_rotation;
+  for (const Component& component :
+       FindComponents(before, options.refine_sensor_from_rig)) {
+    const CenterStatistics old_centers =
+        Summarize(before.frames, component.frames);
+    const CenterStatistics new_centers =
+        Summarize(after->frames, component.frames);
+    Similarity similarity;
+    similarity.from = new_centers.centroid;
+    similarity.to = old_centers.centroid;
+    if (!component.has_fixed_scale && old_centers.rms > 0 &&
+        new_centers.rms > 0) {
+      similarity.scale = old_centers.rms / new_centers.rms;
+    }
+    if (!keep_rotation) {
+      similarity.rotation =
+          MeanRotation(before.frames, after->frames, component.frames);
+    }
+    for (const size_t f : component.frames) {
+      MoveFrame(similarity, keep_rotation, &after->frames[f]);
+    }
+    for (const size_t s : component.sensors) {
+      Eigen::Map<Vector3d>(after->sensors[s].data() + 4) *= similarity.scale;
+    }
+    for (const size_t k : component.points) {
+      after->points[k] = similarity * after->points[k];
+    }
+  }
+}
+
+}  // namespace krot
