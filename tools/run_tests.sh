@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Builds krot and its tests into build/ and runs all of them, installing what is
-# missing first (with sudo if not root). COLMAP and CLP serve as test oracles.
+# missing first (with sudo if not root). COLMAP and CLP serve as test oracles,
+# Chromium looks at the report page.
 # Set KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
 #
 # Usage: tools/run_tests.sh
@@ -8,7 +9,8 @@ set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
-  coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap
+  coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
+  chromium:chromium chromedriver:chromium-driver
 build_krot -DKROT_BUILD_TESTS=ON
 
 say "Testing"

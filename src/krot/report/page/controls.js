@@ -38,7 +38,7 @@ function errorScale(top) {
       html('span', {}, `${top.toFixed(2)} px and more`)));
 }
 
-export function viewerControls(viewer, labels) {
+export function viewerControls(viewer) {
   const scale = errorScale(viewer.top());
   viewer.stage.append(scale);
   const set = (property) => (value) => {
@@ -48,8 +48,9 @@ export function viewerControls(viewer, labels) {
   };
   scale.hidden = true;
   const controls = [
-    choice('model', [['before', labels[0]], ['after', labels[1]],
-      ['both', 'Both']], viewer.shown, set('shown')),
+    choice('model', [['before', viewer.labels[0]],
+      ['after', viewer.labels[1]], ['both', 'Both']], viewer.shown,
+    set('shown')),
     choice('color', [['rgb', 'Colours'], ['error', 'Errors']], viewer.mode,
       set('mode')),
     slider('Points', [1, 8, 0.5], viewer.pointSize, set('pointSize')),

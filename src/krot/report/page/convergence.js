@@ -12,8 +12,10 @@ export function courseOf(report) {
   return steps.sort((a, b) => a.seconds - b.seconds);
 }
 
-function path(name, places) {
-  return svg('path', { class: `${name} line`, d: polyline(places) });
+function curve(name, places) {
+  return [svg('path', { class: `${name} line`, d: polyline(places) }),
+    ...places.map(([cx, cy]) =>
+      svg('circle', { class: `${name} step`, cx, cy, r: 2.5 }))];
 }
 
 export function convergenceChart(report) {
@@ -38,9 +40,9 @@ export function convergenceChart(report) {
     width: 900,
     height: 260,
   });
-  add(path('after', costs.map((cost, i) => at(i, cost))));
+  add(...curve('after', costs.map((cost, i) => at(i, cost))));
   if (bounds.length) {
-    add(path('bound', bounds.map(([i, bound]) => at(i, bound))));
+    add(...curve('bound', bounds.map(([i, bound]) => at(i, bound))));
   }
   return figure;
 }

@@ -58,9 +58,8 @@ export function tailChart(models, labels) {
   const most = Math.max(2, ...models.map(({ tail }) => tail.at(-1)?.[0] ?? 0));
   const isCut = Math.max(...maxima) > right;
   const { figure, at, bottom, add } = chart({
-    caption: 'Observations with an error above x' +
-      (isCut ? ` (the larger one goes on to ${Math.max(...maxima).toFixed(2)} px)` :
-        ''),
+    caption: 'Observations with an error above x' + (isCut ?
+      `; one curve goes on to ${Math.max(...maxima).toFixed(2)} px` : ''),
     legend: legendOf(labels),
     x: linear(0, right * 1.04),
     y: logarithmic(1, most),
@@ -104,8 +103,9 @@ export function imagesChart(pairs, labels, onSelect) {
     const [cx, cy] = at(rank + 0.5, image.pixel_error.max);
     add(svg('circle', {
       class: `${name} dot`, cx: cx.toFixed(1), cy: cy.toFixed(1), r: radius,
-      onclick: () => onSelect(image.image_id),
-    }, svg('title', {}, `${image.name}: ${image.pixel_error.max.toFixed(4)} px`)));
+      onclick: () => onSelect(image.name),
+    }, svg('title', {},
+      `${image.name}: ${image.pixel_error.max.toFixed(4)} px`)));
   }));
   return figure;
 }

@@ -36,8 +36,36 @@ export function largestError(model) {
   return model.tail.length > 0 ? model.tail[0][1] : null;
 }
 
+// Whether the two models came from different hands, so that equal point ids do
+// not mean equal points; images are the same where their names are.
+export function isComparison(report) {
+  return report.command === 'model_comparer';
+}
+
 // How the two models of a report are called.
 export function modelLabels(report) {
-  return report.command === 'model_comparer' ?
-    ['Model 1', 'Model 2'] : ['Before', 'After'];
+  return isComparison(report) ? ['Model 1', 'Model 2'] : ['Before', 'After'];
+}
+
+// The statistics of the true errors of both.
+export function modelErrors(report) {
+  const errors = report.pixel_error;
+  return isComparison(report) ?
+    [errors.model1, errors.model2] : [errors.before, errors.after];
+}
+
+export function findImage(model, name) {
+  return model.images.find((image) => image.name === name);
+}
+
+// Among the points that the page holds; -1 if it is not one of them.
+export function pointIndex(model, pointId) {
+  model.pointIndices ??=
+    new Map(Array.from(model.points.ids, (id, index) => [id, index]));
+  return model.pointIndices.get(BigInt(pointId)) ?? -1;
+}
+
+// Relative to the page's origin.
+export function pointPlace(model, index) {
+  return [...model.points.xyz.slice(3 * index, 3 * index + 3)];
 }

@@ -1,3 +1,4 @@
+import { modelErrors } from './data.js';
 import { html, table } from './dom.js';
 import { pixels } from './format.js';
 
@@ -22,7 +23,7 @@ function row(name, id, before, after) {
 
 // The true errors of all observations, and the cost that was minimised.
 export function errorsTable(report, labels) {
-  const { before, after } = report.pixel_error;
+  const [before, after] = modelErrors(report);
   const rows = kRows.map(([key, name]) =>
     row(name, key, before[key], after[key]));
   if ('cost_final' in report) {

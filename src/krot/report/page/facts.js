@@ -1,5 +1,8 @@
+import { modelErrors } from './data.js';
 import { html, table } from './dom.js';
-import { count, lowerBound, percent, pixels, seconds } from './format.js';
+import {
+  count, lowerBound, percent, pixels, seconds, significant,
+} from './format.js';
 
 function card(name, id, value) {
   return html('div', { class: 'card' },
@@ -9,22 +12,39 @@ function card(name, id, value) {
 
 // The handful of numbers to see first.
 export function cards(report, labels) {
-  const { before, after } = report.pixel_error;
+  const [before, after] = modelErrors(report);
+  const largest = (i) => `largest error, ${labels[i].toLowerCase()}, px`;
   const shown = [
-    card(`${labels[0]}: largest error, px`, 'card-before', pixels(before.max)),
-    card(`${labels[1]}: largest error, px`, 'card-after', pixels(after.max)),
+    card(largest(0), 'card-before', pixels(before.max)),
+    card(largest(1), 'card-after', pixels(after.max)),
   ];
   if (report.certified) {
     shown.push(
-      card('Proved lower bound, px', 'card-bound',
+      card('proved lower bound, px', 'card-bound',
         lowerBound(report.lower_bound)),
-      card('Relative gap', 'card-gap', percent(report.relative_gap)));
+      card('relative gap', 'card-gap', percent(report.relative_gap)));
   }
-  if ('num_observations' in report) {
-    shown.push(card('Observations', 'card-observations',
+  if (Number.isInteger(report.num_observations)) {
+    shown.push(card('observations', 'card-observations',
       count(report.num_observations)));
   }
   return shown;
+}
+
+// Of two models, those that both have in common; after the alignment.
+export function differencesTable(report) {
+  const rows = [['Rotation, degrees', report.rotation_deg],
+    ['Camera centre, scene units', report.center],
+    ['Point, scene units', report.point]];
+  return table(['', 'Shared', 'Maximum', 'Median', 'Mean', 'RMS'],
+    rows.map(([name, { count: shared, max, median, mean, rms }]) =>
+      [name, count(shared),
+        ...[max, median, mean, rms].map((value) => significant(value, 4))]));
+}
+
+function counts(value) {
+  return typeof value === 'object' ?
+    listed(Object.entries(value), count) : count(value);
 }
 
 function listed(entries, format) {
@@ -39,13 +59,14 @@ export function factsTable(report) {
     ['Method', report.method],
     ['Norm, p', report.norm],
     ['Ended because', report.termination],
-    ['Frames', count(report.num_frames)],
-    ['Images', count(report.num_images)],
-    ['Points', count(report.num_points)],
-    ['Observations', count(report.num_observations)],
-    ['Left out', listed(Object.entries(report.left_out ?? {}), count) ||
-      'none'],
-    ['Seconds', listed(Object.entries(report.seconds ?? {}), seconds)],
+    ['Frames', counts(report.num_frames)],
+    ['Images', counts(report.num_images)],
+    ['Points', counts(report.num_points)],
+    ['Observations', counts(report.num_observations)],
+    ['Left out', report.left_out &&
+      (listed(Object.entries(report.left_out), count) || 'none')],
+    ['Alignment', report.alignment?.kind],
+    ['Time', report.seconds && listed(Object.entries(report.seconds), seconds)],
     ['Memory', report.peak_memory_bytes === undefined ? undefined :
       `${(report.peak_memory_bytes / 1e6).toFixed(1)} MB at most`],
     ['Threads', report.threads],

@@ -11,21 +11,33 @@ function columns(xyz, stride) {
   return axes;
 }
 
-// Of what is drawn, without the stragglers.
+// The distance from `target` that a share of the places, three lists of
+// coordinates, does not exceed.
+function reach(places, target, share) {
+  const distances = places[0].map((_, i) =>
+    norm(subtract(places.map((axis) => axis[i]), target)));
+  distances.sort((a, b) => a - b);
+  return distances[Math.floor(share * (distances.length - 1))] ?? 0;
+}
+
+// A ball around most of what is drawn, without the stragglers; `front` points
+// from its centre to where most cameras are.
 export function frame(model) {
-  const { xyz } = model.points;
   const stride = Math.max(1, Math.floor(model.points.num / 5000));
-  const centers = posedImages(model)
-    .map(({ center }) => subtract(center, model.origin));
-  const axes = columns(xyz, stride);
-  centers.forEach((center) => axes.forEach((axis, k) => axis.push(center[k])));
-  if (axes[0].length === 0) return { target: [0, 0, 0], radius: 1 };
-  const target = axes.map(median);
-  const distances = axes[0].map((_, i) =>
-    norm(subtract(axes.map((axis) => axis[i]), target)))
-    .sort((a, b) => a - b);
-  const radius = distances[Math.floor(0.9 * (distances.length - 1))];
-  return { target, radius: radius || 1 };
+  const points = columns(model.points.xyz, stride);
+  const cameras = columns(posedImages(model).flatMap(({ center }) =>
+    subtract(center, model.origin)), 1);
+  const kinds = [points, cameras].filter(([axis]) => axis.length > 0);
+  if (kinds.length === 0) {
+    return { target: [0, 0, 0], radius: 1, front: [0, 0, 1] };
+  }
+  const target = scale(
+    kinds.map((places) => places.map(median)).reduce(add), 1 / kinds.length);
+  const radius = Math.max(
+    reach(points, target, 0.9), reach(cameras, target, 0.95));
+  const front = cameras[0].length > 0 ?
+    subtract(cameras.map(median), target) : [0, 0, 1];
+  return { target, radius: radius || 1, front };
 }
 
 // Against the mean of the images' y axes, which point downwards.

@@ -1,6 +1,8 @@
 // The two models on the graphics card, in the colours asked for.
 
-import { errorColor, errorColors, styleColor, uniformColors } from './colors.js';
+import {
+  errorColor, errorColors, styleColor, uniformColors,
+} from './colors.js';
 import { allFrusta } from './framing.js';
 import { kVerticesPerImage, posedImages } from './frusta.js';
 

@@ -21,13 +21,12 @@ export function supportTable(support, onSelect) {
   return element;
 }
 
-// The images of both models by id, the largest error of the second first.
+// The images of both models by name, the largest error of the second first.
 export function pairImages(models) {
-  const before = new Map(
-    models[0].images.map((image) => [image.image_id, image]));
+  const before = new Map(models[0].images.map((image) => [image.name, image]));
   const largest = ({ after }) => after.pixel_error.max ?? -1;
   return models[1].images
-    .map((after) => ({ before: before.get(after.image_id), after }))
+    .map((after) => ({ before: before.get(after.name), after }))
     .sort((a, b) => largest(b) - largest(a));
 }
 
@@ -38,7 +37,7 @@ function imageRows(pairs, onSelect) {
       pixels(before?.pixel_error.rms), pixels(after.pixel_error.rms)];
     const row = html('tr', {}, ...texts.map((text) => html('td', {}, text)));
     row.firstChild.className = 'name';
-    makeSelectable(row, () => onSelect(after.image_id));
+    makeSelectable(row, () => onSelect(after.name));
     return row;
   });
 }

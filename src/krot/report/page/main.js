@@ -3,21 +3,23 @@
 import { viewerControls, viewerNotes } from './controls.js';
 import { convergenceChart } from './convergence.js';
 import { histogramChart, imagesChart, tailChart } from './curves.js';
-import { decodeModel, modelLabels, readJson } from './data.js';
+import {
+  decodeModel, isComparison, modelLabels, readJson,
+} from './data.js';
 import { byId, html } from './dom.js';
 import { errorsTable } from './errors_table.js';
-import { cards, factsTable } from './facts.js';
+import { cards, differencesTable, factsTable } from './facts.js';
 import { counted } from './format.js';
 import { imagesTable, pairImages, supportTable } from './lists.js';
 import { scope, verdict } from './verdict.js';
 import { Viewer } from './viewer.js';
 
-function showViewer(models, labels, support) {
+function showViewer(contents) {
   const stage = html('div', { class: 'stage' });
   try {
-    const viewer = new Viewer(stage, models, labels, support);
-    byId('scene').append(viewerControls(viewer, labels), stage,
-      viewerNotes(models));
+    const viewer = new Viewer(stage, contents);
+    byId('scene').append(viewerControls(viewer), stage,
+      viewerNotes(contents.models));
     return (selected) => viewer.show(selected);
   } catch (error) {
     byId('scene').append(html('p', { class: 'note' },
@@ -36,7 +38,7 @@ function showSupport(support, show) {
     `${counted(support.length, 'observation')} alone set the proved bound, ` +
     'worst first. Click one to see it in the 3D view.';
   byId('support').append(supportTable(support, (observation) => show({
-    imageId: observation.image_id, pointId: observation.point3D_id,
+    imageName: observation.image_name, pointId: observation.point3D_id,
   })));
 }
 
@@ -45,6 +47,13 @@ function showCourse(report) {
     'cost_initial' in report ? convergenceChart(report) : null;
   if (chart) byId('convergence').append(chart);
   byId('course').hidden = !chart;
+}
+
+function showDifferences(report) {
+  byId('differences-section').hidden = !isComparison(report);
+  if (isComparison(report)) {
+    byId('differences').append(differencesTable(report));
+  }
 }
 
 function showPage(report, models) {
@@ -60,10 +69,12 @@ function showPage(report, models) {
   byId('curves').append(histogramChart(models, labels),
     tailChart(models, labels));
   byId('facts').append(factsTable(report));
+  showDifferences(report);
   showCourse(report);
-  const show = showViewer(models, labels, support);
+  const show = showViewer(
+    { models, labels, support, sharesPoints: !isComparison(report) });
   showSupport(support, show);
-  const showImage = (imageId) => show({ imageId });
+  const showImage = (imageName) => show({ imageName });
   byId('image-chart').append(
     imagesChart(pairImages(models), labels, showImage));
   byId('images').append(imagesTable(models, labels, showImage));

@@ -2,30 +2,35 @@
 // with Shift or with two fingers to shift; wheel or pinch to come closer.
 
 import {
-  add, cross, lookAt, multiply, normalized, perspective, scale, subtract, dot,
+  add, cross, dot, lookAt, multiply, norm, normalized, perspective, scale,
+  subtract,
 } from './vectors.js';
 
 const kFieldOfView = 0.8;  // radians, vertical
 const kTurn = 0.006;  // radians per CSS pixel
 const kClickSlack = 5;  // CSS pixels
 
-// Any unit vector across `up`.
-function across(up) {
-  const axis = Math.abs(up[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0];
-  return normalized(subtract(axis, scale(up, dot(axis, up))));
+// The unit vector across `up` that is nearest to `direction`; any if that is
+// along `up`.
+function across(up, direction) {
+  const level = (a) => subtract(a, scale(up, dot(a, up)));
+  const wished = level(direction);
+  if (norm(wished) > 1e-6 * norm(direction)) return normalized(wished);
+  return normalized(level(Math.abs(up[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0]));
 }
 
 export class Orbit {
-  constructor({ target, distance, up }) {
+  // `front`: a direction from the target, near which to begin.
+  constructor({ target, distance, up, front }) {
     this.home = { target, distance };
     this.up = up;
-    this.east = across(up);
+    this.east = across(up, front);
     this.north = cross(up, this.east);
     this.reset();
   }
 
   reset() {
-    Object.assign(this, this.home, { yaw: 0.6, pitch: 0.45 });
+    Object.assign(this, this.home, { yaw: 0.5, pitch: 0.4 });
   }
 
   // The eye's axes in the world.

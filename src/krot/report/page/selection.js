@@ -1,5 +1,6 @@
 // The numbers of one camera or point, in both models.
 
+import { findImage, pointIndex, pointPlace } from './data.js';
 import { html, table } from './dom.js';
 import { count, pixels, significant } from './format.js';
 
@@ -7,12 +8,15 @@ function coordinates(place) {
   return place ? place.map((value) => significant(value, 7)).join(' ') : '–';
 }
 
-function distance(a, b) {
-  return a && b ?
-    significant(Math.hypot(...a.map((value, i) => value - b[i])), 4) : '–';
+// Where it is, and how far that is from where it was.
+function position(places) {
+  const [a, b] = places;
+  const moved = a && b ? `, moved by ${
+    significant(Math.hypot(...a.map((value, i) => value - b[i])), 4)}` : '';
+  return coordinates(b ?? a) + moved;
 }
 
-// [name, number before, number after] for every row.
+// [name, number in every model] for every row.
 function panel(title, labels, rows, close) {
   return html('div', { class: 'info', role: 'status' },
     html('h3', {}, title),
@@ -22,9 +26,8 @@ function panel(title, labels, rows, close) {
     html('div', { class: 'scroll' }, table(['', ...labels], rows)));
 }
 
-export function imagePanel(imageId, models, labels, close) {
-  const images = models.map((model) =>
-    model.images.find((image) => image.image_id === imageId));
+export function imagePanel(name, models, labels, close) {
+  const images = models.map((model) => findImage(model, name));
   const known = images[1] ?? images[0];
   const error = (key) => images.map((image) => pixels(image?.pixel_error[key]));
   const rows = [
@@ -34,25 +37,15 @@ export function imagePanel(imageId, models, labels, close) {
     ['RMS, px', ...error('rms')],
     ['Observations', ...images.map((image) => count(image?.pixel_error.count))],
   ];
-  const element = panel(known.name, labels, rows, close);
-  const centers = images.map((image) => image?.center);
+  const element = panel(name, labels, rows, close);
   element.append(html('div', { class: 'note' },
-    `image ${imageId}, camera ${known.camera_id} (${known.camera_model}), ` +
-    `centre ${coordinates(centers[1] ?? centers[0])}, ` +
-    `moved by ${distance(...centers)}`));
+    `image ${known.image_id}, camera ${known.camera_id} ` +
+    `(${known.camera_model}), centre ` +
+    position(images.map((image) => image?.center))));
   return element;
 }
 
-// Its index among the points that the page holds; -1 if it is not one of them.
-export function pointIndex(model, pointId) {
-  return model.points.ids.indexOf(BigInt(pointId));
-}
-
-// Relative to the page's origin.
-export function pointPlace(model, index) {
-  return [...model.points.xyz.slice(3 * index, 3 * index + 3)];
-}
-
+// `models`: those whose points the id is one of, one or two.
 export function pointPanel(pointId, models, labels, close) {
   const indices = models.map((model) => pointIndex(model, pointId));
   const of = (key, format) => models.map((model, i) =>
@@ -65,8 +58,7 @@ export function pointPanel(pointId, models, labels, close) {
   const element = panel(`Point ${pointId}`, labels, rows, close);
   const places = models.map((model, i) => indices[i] < 0 ? null :
     pointPlace(model, indices[i]).map((value, k) => value + model.origin[k]));
-  element.append(html('div', { class: 'note' },
-    `at ${coordinates(places[1] ?? places[0])}, moved by ` +
-    distance(...places)));
+  element.append(html('div', { class: 'note' }, places.some(Boolean) ?
+    `at ${position(places)}` : 'not among the points that this page holds'));
   return element;
 }

@@ -1,3 +1,4 @@
+import { isComparison, modelErrors } from './data.js';
 import { lowerBound, pixels } from './format.js';
 
 function movement(before, after, decimals) {
@@ -24,11 +25,11 @@ function proof(report) {
 
 // What came of it, in a sentence or two, without more than is known.
 export function verdict(report) {
-  const { before, after } = report.pixel_error;
+  const [before, after] = modelErrors(report);
   if (before.max === null || after.max === null) {
     return 'There is no observation with an error to compare.';
   }
-  if (report.command === 'model_comparer') {
+  if (isComparison(report)) {
     return `The largest error of model 1 is ${before.max.toFixed(2)} px, ` +
       `of model 2 ${after.max.toFixed(2)} px.`;
   }

@@ -2,42 +2,51 @@
 
 import { byId, html } from './dom.js';
 import { styleColor, uniformColors } from './colors.js';
-import { largestError } from './data.js';
+import {
+  findImage, largestError, pointIndex, pointPlace,
+} from './data.js';
 import { cameraSize, frame, upDirection } from './framing.js';
 import { frustumLines, kVerticesPerImage, posedImages } from './frusta.js';
 import { Layer } from './layers.js';
 import { Orbit, attachControls } from './orbit.js';
 import { pickLines, pickPoint } from './picking.js';
 import { Renderer } from './renderer.js';
-import {
-  imagePanel, pointIndex, pointPanel, pointPlace,
-} from './selection.js';
+import { imagePanel, pointPanel } from './selection.js';
 import { subtract } from './vectors.js';
 
+// CSS pixels: the more points, the smaller.
+function usualPointSize(numPoints) {
+  return Math.min(3.5, Math.max(1.5, 250 / Math.sqrt(numPoints)));
+}
+
 export class Viewer {
-  // `stage`: the element to fill; `support`: the report's, [] if none. Throws
+  // `stage`: the element to fill; `support`: the report's, [] if none;
+  // `sharesPoints`: whether the models' point ids mean the same points. Throws
   // where the browser has no WebGL 2.
-  constructor(stage, models, labels, support) {
+  constructor(stage, { models, labels, support, sharesPoints }) {
     const canvas = html('canvas', {
       tabindex: 0, 'aria-label': '3D view of cameras and points',
     });
     const gl = canvas.getContext('webgl2', { antialias: true, alpha: true });
     if (!gl) throw new Error('no WebGL 2');
-    stage.append(canvas);
-    Object.assign(this, { stage, canvas, models, labels, support });
+    this.panels = html('div', { class: 'panels' });
+    stage.append(canvas, this.panels);
+    Object.assign(this,
+      { stage, canvas, models, labels, support, sharesPoints });
     this.renderer = new Renderer(gl);
-    const { target, radius } = frame(models[1]);
+    const { target, radius, front } = frame(models[1]);
     this.size = cameraSize(models[1], radius);
     this.orbit = new Orbit({
-      target, distance: 2.6 * radius, up: upDirection(models[1]),
+      target, distance: 2.3 * radius, up: upDirection(models[1]), front,
     });
     this.layers = models.map((model, i) =>
       new Layer(this.renderer, model, ['--before', '--after'][i], this.size));
     this.shown = 'after';
     this.mode = 'rgb';
-    this.pointSize = 2;
+    this.pointSize = usualPointSize(models[1].points.num);
     this.hasSupport = support.length > 0;
     this.marks = [];
+    this.selected = {};
     attachControls(canvas, this.orbit, {
       onChange: () => this.redraw(),
       onClick: (x, y) => this.selectAt(x, y),
@@ -76,16 +85,22 @@ export class Viewer {
     for (const i of this.visible()) {
       const model = this.models[i];
       if (this.hasSupport) lines.push(...this.supportLines(model));
-      const { imageId, pointId } = this.selected ?? {};
-      const image = model.images.find(({ image_id }) => image_id === imageId);
+      const { imageName, pointId } = this.selected;
+      const image = findImage(model, imageName);
       if (image?.center) {
         lines.push(...frustumLines(image, model.origin, 1.3 * this.size));
       }
-      const index = pointId === undefined ? -1 : pointIndex(model, pointId);
+      const index = pointId !== undefined && this.knowsPoint(i) ?
+        pointIndex(model, pointId) : -1;
       if (index >= 0) points.push(...pointPlace(model, index));
     }
     this.mark(gl.LINES, lines);
     this.mark(gl.POINTS, points);
+  }
+
+  // Whether the selected point's id is one of model i's.
+  knowsPoint(i) {
+    return this.sharesPoints || i === this.selected.modelIndex;
   }
 
   mark(mode, places) {
@@ -98,10 +113,8 @@ export class Viewer {
   }
 
   supportLines(model) {
-    const images = new Map(
-      model.images.map((image) => [image.image_id, image]));
-    return this.support.flatMap(({ image_id, point3D_id }) => {
-      const center = images.get(image_id)?.center;
+    return this.support.flatMap(({ image_name, point3D_id }) => {
+      const center = findImage(model, image_name)?.center;
       const index = pointIndex(model, point3D_id);
       if (!center || index < 0) return [];
       return [...subtract(center, model.origin), ...pointPlace(model, index)];
@@ -143,26 +156,29 @@ export class Viewer {
     const image = pickLines(this.layers[i].lines, kVerticesPerImage, screen);
     const point = pickPoint(model.points.xyz, screen);
     if (image && !(point?.depth < image.depth)) {
-      this.select({ imageId: posedImages(model)[image.index].image_id });
+      this.select({ imageName: posedImages(model)[image.index].name });
     } else if (point) {
-      this.select({ pointId: model.points.ids[point.index] });
+      this.select({ pointId: model.points.ids[point.index], modelIndex: i });
     } else {
-      this.select(null);
+      this.select({});
     }
   }
 
-  // { imageId }, { pointId }, both, or null for nothing.
+  // { imageName }, { pointId, modelIndex }, both, or {} for nothing.
   select(selected) {
     this.selected = selected;
-    this.stage.querySelectorAll('.info').forEach((panel) => panel.remove());
-    const close = () => this.select(null);
-    if (selected?.imageId !== undefined) {
-      this.stage.append(
-        imagePanel(selected.imageId, this.models, this.labels, close));
-    } else if (selected) {
-      this.stage.append(
-        pointPanel(selected.pointId, this.models, this.labels, close));
+    const { imageName, pointId } = selected;
+    const close = () => this.select({});
+    const panels = [];
+    if (imageName !== undefined) {
+      panels.push(imagePanel(imageName, this.models, this.labels, close));
     }
+    if (pointId !== undefined) {
+      const known = (_, i) => this.knowsPoint(i);
+      panels.push(pointPanel(pointId, this.models.filter(known),
+        this.labels.filter(known), close));
+    }
+    this.panels.replaceChildren(...panels);
     this.updateMarks();
     this.redraw();
   }

@@ -1,0 +1,263 @@
+"""The report page in a real browser: what it shows is what report.json says.
+
+Usage: page_test.py KROT   (the executable; exit code 77: no browser here)
+"""
+
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import webdriver
+
+KROT = None
+SKIPPED = 77
+
+# Were it taken for markup, it would end the script and make an element.
+HOSTILE_NAME = """</script><b id="injected">&lt;it's "quoted" \\u003c"""
+
+
+# Has the view drawn anew, and reads it in the same frame: later it is gone.
+REDRAW = """
+const canvas = document.querySelector('#scene canvas');
+document.querySelector('#scene input[type=range]')
+    .dispatchEvent(new Event('input'));
+const redrawn = new Promise((resolve) => requestAnimationFrame(resolve));
+"""
+PICTURE = REDRAW + "return redrawn.then(() => canvas.toDataURL());"
+DRAWN = REDRAW + """
+const what = arguments[0];
+const { width, height } = canvas;
+const style = getComputedStyle(document.documentElement);
+const isColor = (pixel, name) => {
+  const hex = style.getPropertyValue(name).trim();
+  return [0, 1, 2].every((i) => Math.abs(
+      pixel[i] - parseInt(hex.slice(2 * i + 1, 2 * i + 3), 16)) < 12);
+};
+const isWanted = (pixel) => pixel[3] === 255 && (what === 'a point' ?
+    !isColor(pixel, '--after') && !isColor(pixel, '--mark') :
+    isColor(pixel, what));
+return redrawn.then(() => {
+  const copy = new OffscreenCanvas(width, height).getContext('2d');
+  copy.drawImage(canvas, 0, 0);
+  const { data } = copy.getImageData(0, 0, width, height);
+  const places = [];
+  for (let i = 0; i < data.length; i += 4) {
+    if (!isWanted(data.subarray(i, i + 4))) continue;
+    places.push([Math.floor((i / 4) % width - width / 2),
+                 Math.floor(i / 4 / width - height / 2)]);
+  }
+  return places;
+});
+"""
+
+
+def run_krot(*arguments):
+    subprocess.run([KROT, *map(str, arguments), "--log_level", "0"],
+                   check=True, stdout=subprocess.DEVNULL)
+
+
+def pixels(value):
+    return "%.4f" % value
+
+
+def rounded_down(value):
+    return "%.4f" % (math.floor(value * 1e4) / 1e4)
+
+
+class PageTest(unittest.TestCase):
+    """A scene with rigs, noise and distortion, solved and opened."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        root = pathlib.Path(cls.folder.name)
+        run_krot("model_synthesizer", "--output_path", root / "input",
+                 "--Scene.num_frames", 8, "--Scene.num_points", 200,
+                 "--Scene.pixel_noise", 1, "--Scene.start_point_noise", 0.002,
+                 "--output_type", "TXT")
+        cls.rename_an_image(root / "input" / "images.txt")
+        run_krot("solver", "--input_path", root / "input",
+                 "--output_path", root / "output",
+                 "--report_path", root / "report.json",
+                 "--html_path", root / "page.html")
+        cls.report = json.loads((root / "report.json").read_text())
+        cls.image_errors = {}
+        cls.point_errors = {}
+        for end, model in (("before", "input"), ("after", "output")):
+            cls.analyze(end, root / model)
+        cls.page = (root / "page.html").as_uri()
+        cls.browser = cls.enterClassContext(webdriver.Browser((1200, 1300)))
+
+    @staticmethod
+    def rename_an_image(file):
+        lines = file.read_text().splitlines(keepends=True)
+        first = next(i for i, line in enumerate(lines) if line[0] != "#")
+        fields = lines[first].split(maxsplit=9)
+        lines[first] = " ".join(fields[:9] + [HOSTILE_NAME]) + "\n"
+        file.write_text("".join(lines))
+
+    @classmethod
+    def analyze(cls, end, model):
+        """Another command's figures of the models, to compare with."""
+        file = pathlib.Path(cls.folder.name) / f"{end}.json"
+        run_krot("model_analyzer", "--path", model, "--report_path", file,
+                 "--num_worst", 1000000)
+        analysis = json.loads(file.read_text())
+        cls.image_errors[end] = {
+            image["image_name"]: image["pixel_error"]
+            for image in analysis["images"]}
+        largest = {}
+        for seen in analysis["worst"]:
+            largest.setdefault(seen["point3D_id"], seen["error_px"])
+        cls.point_errors[end] = largest
+
+    def setUp(self):
+        self.browser.open(self.page)
+
+    def tearDown(self):
+        self.assertEqual(self.browser.console(), [])
+
+    def test_holds_the_report_as_it_was_written(self):
+        held = json.loads(self.browser.text("#krot-report"))
+        self.assertEqual(held, self.report)
+
+    def test_takes_no_name_for_markup(self):
+        self.assertIn(HOSTILE_NAME,
+                      self.browser.texts("#images td:first-child"))
+        self.assertEqual(self.browser.texts("#injected"), [])
+
+    def test_loads_nothing(self):
+        self.assertEqual(self.browser.run(
+            "return performance.getEntriesByType('resource').length"), 0)
+
+    def test_verdict_says_what_was_reached_and_proved(self):
+        errors = self.report["pixel_error"]
+        verdict = self.browser.text("#verdict")
+        self.assertIn("fell from %.2f px to %.2f px" % (
+            errors["before"]["max"], errors["after"]["max"]), verdict)
+        self.assertIn("below %s px (proved)" %
+                      rounded_down(self.report["lower_bound"]), verdict)
+
+    def test_error_table_shows_the_numbers_of_the_report(self):
+        for end in ("before", "after"):
+            for key in ("max", "p99", "mean", "rms"):
+                with self.subTest(key=key, end=end):
+                    self.assertEqual(
+                        self.browser.text(f"#error-{key}-{end}"),
+                        pixels(self.report["pixel_error"][end][key]))
+        self.assertEqual(self.browser.text("#error-cost-before"),
+                         pixels(self.report["cost_initial"]))
+        self.assertEqual(self.browser.text("#error-cost-after"),
+                         pixels(self.report["cost_final"]))
+
+    def test_cards_show_the_bound_and_the_observations(self):
+        self.assertEqual(self.browser.text("#card-bound"),
+                         rounded_down(self.report["lower_bound"]))
+        self.assertEqual(self.browser.text("#card-observations"),
+                         "{:,}".format(self.report["num_observations"]))
+
+    def test_support_is_listed_as_in_the_report(self):
+        rows = self.browser.run("""
+            return [...document.querySelectorAll('#support tbody tr')].map(
+                (row) => [...row.cells].map((cell) => cell.textContent))""")
+        self.assertEqual(
+            [[row[0], row[1], row[2], row[4]] for row in rows],
+            [[seen["image_name"], str(seen["point3D_id"]),
+              str(seen["point2D_idx"]), pixels(seen["error_px"])]
+             for seen in self.report["support"]])
+
+    def test_histogram_counts_every_observation(self):
+        models = json.loads(self.browser.text("#krot-models"))
+        for model in models.values():
+            self.assertEqual(sum(model["histogram"]["counts"]),
+                             model["num_observations"])
+            self.assertEqual(model["tail"][-1][0], model["num_observations"])
+        self.assertEqual(models["after"]["tail"][0][1],
+                         self.report["pixel_error"]["after"]["max"])
+
+    def test_worst_image_has_the_largest_error_of_all(self):
+        first = self.browser.texts("#images tbody tr:first-child td")
+        self.assertEqual(first[3],
+                         pixels(self.report["pixel_error"]["after"]["max"]))
+
+    def test_click_on_a_camera_shows_its_numbers(self):
+        self.switch("#scene input[type=checkbox]")  # no lines of the support
+        place = self.drawn("--after")[0]
+        self.browser.click("#scene canvas", *place)
+        name = self.browser.text(".info h3")
+        self.assertEqual(
+            self.browser.texts(".info tbody tr:first-child td")[1:],
+            [pixels(self.image_errors[end][name]["max"])
+             for end in ("before", "after")])
+        marks = self.drawn("--mark")
+        self.assertLess(min(math.dist(place, mark) for mark in marks), 10)
+        self.assertLess(max(math.dist(place, mark) for mark in marks), 150)
+
+    def test_click_on_a_point_shows_its_numbers(self):
+        self.switch("#scene input[type=checkbox]")
+        self.browser.click("#scene canvas", *self.drawn("a point")[0])
+        title = self.browser.text(".info h3")
+        self.assertRegex(title, r"^Point \d+$")
+        shown = self.browser.texts(".info tbody tr:first-child td")[1:]
+        for end, text in zip(("before", "after"), shown):
+            largest = self.point_errors[end][int(title.split()[1])]
+            self.assertAlmostEqual(float(text), largest, delta=0.6e-4)
+
+    def test_choice_of_a_support_row_shows_its_camera_and_point(self):
+        self.browser.click("#support tbody tr:first-child td:first-child")
+        worst = self.report["support"][0]
+        self.assertEqual(
+            self.browser.texts(".info h3"),
+            [worst["image_name"], "Point %d" % worst["point3D_id"]])
+
+    def test_click_beside_everything_closes_the_numbers(self):
+        self.browser.click("#support tbody tr:first-child td:first-child")
+        time.sleep(1)  # the page scrolls there smoothly
+        self.browser.click("#scene canvas", -500, -200)
+        self.assertEqual(self.browser.texts(".info"), [])
+
+    def test_drag_turns_the_view(self):
+        before = self.picture()
+        self.browser.drag("#scene canvas", (80, 30))
+        self.assertNotEqual(self.picture(), before)
+
+    def test_models_and_colours_can_be_changed(self):
+        seen = {self.picture()}
+        for choice in ("before", "both", "after", "error"):
+            self.switch(f"input[value={choice}]")
+            seen.add(self.picture())
+        self.assertEqual(len(seen), 4)  # after, before, both; after by error
+
+    def switch(self, selector):
+        self.browser.run(
+            "document.querySelector(arguments[0]).click()", selector)
+
+    def picture(self):
+        """What the canvas shows."""
+        return self.browser.run(PICTURE)
+
+    def drawn(self, what):
+        """Where the canvas shows a colour of the style sheet, or "a point":
+        what has another colour than cameras and marks. CSS pixels from its
+        centre."""
+        return self.browser.run(DRAWN, what)
+
+
+def main():
+    global KROT
+    KROT = sys.argv.pop(1)
+    program = webdriver.missing_program()
+    if program is not None:
+        print(f"skipped: there is no {program}")
+        return SKIPPED
+    return 0 if unittest.main(exit=False).result.wasSuccessful() else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
