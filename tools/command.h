@@ -8,6 +8,7 @@ namespace krot {
 // The commands of `krot`, one .cc file each. They return an exit code or
 // throw what tools/krot.cc turns into one.
 int RunSolver(const std::vector<std::string>& arguments);
+int RunBundleAdjuster(const std::vector<std::string>& arguments);
 int RunPointTriangulator(const std::vector<std::string>& arguments);
 int RunModelAnalyzer(const std::vector<std::string>& arguments);
 int RunModelComparer(const std::vector<std::string>& arguments);

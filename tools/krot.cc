@@ -28,6 +28,8 @@ constexpr Command kCommands[] = {
     {"solver", "lower the largest reprojection error of a model", &RunSolver},
     {"point_triangulator", "re-estimate the points, frames fixed",
      &RunPointTriangulator},
+    {"bundle_adjuster", "least squares, below a cap if you want",
+     &RunBundleAdjuster},
     {"model_analyzer", "show what a model's errors look like",
      &RunModelAnalyzer},
     {"model_comparer", "show how two models differ", &RunModelComparer},

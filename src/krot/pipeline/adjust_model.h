@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "krot/adjust/bundle_adjustment.h"
+#include "krot/analysis/pixel_errors.h"
+#include "krot/model/model.h"
+#include "krot/pipeline/solve_model.h"
+
+namespace krot {
+
+// From a COLMAP model to a COLMAP model with a smaller sum of squared
+// reprojection errors, below a cap if asked for: what `krot bundle_adjuster`
+// does between reading and writing.
+
+struct AdjustModelOptions {
+  // With adjustment.max_error, a model whose errors are not all below that is
+  // first brought there by the known rotation problem.
+  BundleAdjustmentOptions adjustment;
+  // Takes the place of adjustment.max_error: the cap is so many times the
+  // largest error of the known rotation problem's solution; > 1.
+  std::optional<double> max_error_factor;
+  // For the known rotation problem; threads and cancellation are those of
+  // `adjustment`.
+  SolveModelOptions start;
+  // A sentence on what is done, and why; may be empty.
+  std::function<void(const std::string&)> on_note;
+};
+
+struct AdjustModelSummary {
+  // kInfeasibleStart: no estimate below the cap was found.
+  BundleAdjustmentSummary adjustment;
+  std::optional<double> max_error;    // the cap, pixels
+  std::optional<SolveSummary> start;  // if there was such a solve
+  // Over all observations of the model.
+  PixelErrorStatistics pixel_error_before;
+  PixelErrorStatistics pixel_error_start;  // where the adjustment began
+  PixelErrorStatistics pixel_error_after;
+};
+
+struct AdjustModelResult {
+  // A copy of the input if there is nothing to adjust or no start.
+  Model model;
+  AdjustModelSummary summary;
+};
+
+// Stored point errors are updated. Requires and throws as AdjustBundle and
+// SolveModel.
+AdjustModelResult AdjustModel(const Model& model,
+                              const AdjustModelOptions& options);
+
+}  // namespace krot

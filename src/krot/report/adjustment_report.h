@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "krot/pipeline/adjust_model.h"
+
+namespace krot {
+
+// What one run of `krot bundle_adjuster` did.
+struct AdjustmentReport {
+  std::string version;  // KROT's
+  AdjustModelSummary summary;
+  double seconds_read = 0;  // wall clock
+  double seconds_write = 0;
+  double seconds_total = 0;
+  int64_t peak_memory_bytes = 0;
+  int threads = 0;
+  uint64_t seed = 0;
+};
+
+// For the terminal: errors before and after, what took part, why it ended.
+std::string AdjustmentTable(const AdjustmentReport& report);
+
+// report.json; the keys are listed in docs/cli.md. What is not known is null.
+std::string AdjustmentJson(const AdjustmentReport& report);
+
+// Why there is no model below the cap, with the bound that proves it if one
+// does. Requires the termination kInfeasibleStart.
+std::string NoModelBelowCapSentence(const AdjustModelSummary& summary);
+
+// "nothing to adjust: ...". Requires the termination kNothingToAdjust.
+std::string NothingToAdjustSentence(const BundleAdjustmentSummary& summary);
+
+// As report.json has it: "converged", "max_iterations", ...
+std::string AdjustmentTerminationName(BundleAdjustmentTermination termination);
+
+}  // namespace krot
