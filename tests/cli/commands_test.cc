@@ -15,9 +15,9 @@ TEST(Krot, PrintsItsVersion) {
 
 TEST(Krot, ListsCommandsAndExitCodesWhenAskedForHelp) {
   const std::string help = RunKrot({"help"}).out;
-  for (const char* command :
-       {"solver", "point_triangulator", "model_analyzer", "model_synthesizer",
-        "help", "certificate was refused", "130  interrupted"}) {
+  for (const char* command : {"solver", "point_triangulator", "model_analyzer",
+                              "model_comparer", "model_synthesizer", "help",
+                              "certificate was refused", "130  interrupted"}) {
     EXPECT_THAT(help, HasSubstr(command));
   }
   EXPECT_EQ(RunKrot({}).out, help);
