@@ -1,8 +1,10 @@
 #include "krot/analysis/model_comparison.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,7 +1,8 @@
 #include "krot/analysis/overlay.h"
 
-#include <cstdlib>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
