@@ -90,11 +90,13 @@ ceres::Problem::Options AdjustmentProblemOptions() {
 
 void BuildAdjustmentProblem(const Model& model,
                             const BundleAdjustmentOptions& options,
-                            ceres::LossFunction* loss, AdjustmentBlocks* blocks,
-                            ceres::Problem* problem) {
+                            const LossOfObservation& loss_of,
+                            AdjustmentBlocks* blocks, ceres::Problem* problem) {
   const double max_error =
       options.max_error.value_or(std::numeric_limits<double>::infinity());
-  for (const AdjustmentObservation& observation : blocks->observations) {
+  for (size_t i = 0; i < blocks->observations.size(); ++i) {
+    const AdjustmentObservation& observation = blocks->observations[i];
+    ceres::LossFunction* loss = loss_of ? loss_of(i) : nullptr;
     VisitCameraModel(model.cameras[observation.camera].model_id,
                      [&](auto camera) {
                        AddObservation<decltype(camera)>(observation, max_error,

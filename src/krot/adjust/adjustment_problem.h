@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
@@ -9,13 +11,16 @@
 
 namespace krot {
 
-// Adds every observation of `blocks` to a problem that does not own the loss
-// (null: none), and holds still what the options do. The blocks are solved in
+// The loss of an observation by its index; may be or return null.
+using LossOfObservation = std::function<ceres::LossFunction*(size_t index)>;
+
+// Adds every observation of `blocks` to a problem that does not own the losses,
+// in their order, and holds still what the options do. The blocks are solved in
 // place and must outlive the problem.
 void BuildAdjustmentProblem(const Model& model,
                             const BundleAdjustmentOptions& options,
-                            ceres::LossFunction* loss, AdjustmentBlocks* blocks,
-                            ceres::Problem* problem);
+                            const LossOfObservation& loss_of,
+                            AdjustmentBlocks* blocks, ceres::Problem* problem);
 
 // What such a problem does not own.
 ceres::Problem::Options AdjustmentProblemOptions();

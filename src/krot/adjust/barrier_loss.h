@@ -6,29 +6,45 @@
 
 namespace krot {
 
-// s - 2 mu log(1 - s / cap^2) of a squared error s < cap^2, so that half its
-// sum is the cost plus the logarithmic barrier of weight mu. At the minimum for
-// a mu the multiplier of s / 2 <= cap^2 / 2 is 2 mu / (cap^2 - s).
+// What all observations of a bounded adjustment share.
+struct Barrier {
+  double cap2 = 0;  // the cap, squared; pixels^2
+  double mu = 0;    // the barrier's weight; pixels^2
+};
+
+// Half of s - 2 mu log(1 - s / cap2) is the cost of a squared error s < cap2
+// with its logarithmic barrier
+//
+//   s / 2 - mu log(h) + const,  h = (cap2 - s) / 2,
+//
+// and mu / h the multiplier of the constraint h >= 0 at the barrier's minimum.
+// The slope is that of the barrier; the curvature is the primal-dual method's,
+// lambda / h in place of mu / h^2, so that a step is Newton's for the
+// perturbed optimality conditions, lambda h = mu, also where lambda is not yet
+// mu / h [Nocedal, Wright 2006, Sec. 19.1].
 class BarrierLoss final : public ceres::LossFunction {
  public:
-  explicit BarrierLoss(double cap) : cap2_(cap * cap) {}
+  explicit BarrierLoss(const Barrier* barrier) : barrier_(barrier) {}
 
-  void set_mu(double mu) { mu_ = mu; }
-
-  double Multiplier(double squared_error) const {
-    return 2 * mu_ / (cap2_ - squared_error);
+  double Slack(double squared_error) const {
+    return (barrier_->cap2 - squared_error) / 2;
   }
 
+  double multiplier() const { return lambda_; }
+  void set_multiplier(double lambda) { lambda_ = lambda; }
+
   void Evaluate(double squared_error, double rho[3]) const override {
-    const double slack = cap2_ - squared_error;
-    rho[0] = squared_error - 2 * mu_ * std::log1p(-squared_error / cap2_);
-    rho[1] = 1 + 2 * mu_ / slack;
-    rho[2] = 2 * mu_ / (slack * slack);
+    const double h = Slack(squared_error);
+    const double mu = barrier_->mu;
+    rho[0] =
+        squared_error - 2 * mu * std::log1p(-squared_error / barrier_->cap2);
+    rho[1] = 1 + mu / h;
+    rho[2] = lambda_ / (2 * h);
   }
 
  private:
-  double cap2_;
-  double mu_ = 0;
+  const Barrier* barrier_;
+  double lambda_ = 0;
 };
 
 }  // namespace krot

@@ -36,9 +36,6 @@ void CheckOptions(const BundleAdjustmentOptions& options) {
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(
     const BundleAdjustmentOptions& options) {
-  if (options.max_error) {
-    return std::make_unique<BarrierLoss>(*options.max_error);
-  }
   switch (options.loss) {
     case RobustLoss::kSoftL1:
       return std::make_unique<ceres::SoftLOneLoss>(options.loss_scale);
@@ -105,32 +102,27 @@ void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
   summary->num_parameters = NumFreeParameters(problem);
 }
 
-double RobustCost(ceres::Problem* problem, int num_threads) {
+// With the losses; none where an error cannot be evaluated.
+std::optional<double> RobustCost(int num_threads, ceres::Problem* problem) {
   ceres::Problem::EvaluateOptions options;
   options.num_threads = num_threads;
   double cost = 0;
-  problem->Evaluate(options, &cost, nullptr, nullptr, nullptr);
+  if (!problem->Evaluate(options, &cost, nullptr, nullptr, nullptr)) {
+    return std::nullopt;
+  }
   return cost;
 }
 
-// Improves the blocks of a problem that has something to adjust.
-void Minimize(const BundleAdjustmentOptions& options, BarrierLoss* barrier,
-              AdjustmentBlocks* blocks, ceres::Problem* problem,
+// Solves a problem without a cap.
+void Minimize(const BundleAdjustmentOptions& options,
+              ceres::Solver::Options solver_options, ceres::Problem* problem,
               BundleAdjustmentSummary* summary) {
-  ceres::Solver::Options solver_options =
-      AdjustmentSolverOptions(options, blocks, *problem);
   IterationObserver observer(options);
   solver_options.callbacks.push_back(&observer);
-  summary->linear_solver = SolverName(solver_options);
-  if (barrier != nullptr) {
-    FollowBarrierPath(options, solver_options, barrier, &observer, problem,
-                      summary);
-  } else {
-    ceres::Solver::Summary solve;
-    ceres::Solve(solver_options, problem, &solve);
-    summary->termination = FromCeres(solve.termination_type);
-    summary->stationarity = Stationarity(solver_options.num_threads, problem);
-  }
+  ceres::Solver::Summary solve;
+  ceres::Solve(solver_options, problem, &solve);
+  summary->termination = FromCeres(solve.termination_type);
+  summary->stationarity = Stationarity(solver_options.num_threads, problem);
   summary->num_iterations = observer.num_iterations();
 }
 
@@ -143,29 +135,45 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   const AdjustmentBlocks before =
       MakeAdjustmentBlocks(model, options.min_track_length);
   AdjustmentBlocks blocks = before;
+
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
-  auto* barrier = dynamic_cast<BarrierLoss*>(loss.get());
-  ceres::Problem problem(AdjustmentProblemOptions());
-  BuildAdjustmentProblem(model, options, loss.get(), &blocks, &problem);
+  Barrier barrier;
+  std::vector<BarrierLoss> barrier_losses;
+  TrialRecorder recorder(&blocks);
+  ceres::Problem::Options problem_options = AdjustmentProblemOptions();
+  LossOfObservation loss_of = [&](size_t) { return loss.get(); };
+  if (options.max_error) {
+    barrier.cap2 = *options.max_error * *options.max_error;
+    barrier_losses.assign(blocks.observations.size(), BarrierLoss(&barrier));
+    problem_options.evaluation_callback = &recorder;
+    loss_of = [&](size_t i) { return &barrier_losses[i]; };
+  }
+  ceres::Problem problem(problem_options);
+  BuildAdjustmentProblem(model, options, loss_of, &blocks, &problem);
 
   BundleAdjustmentResult result;
   BundleAdjustmentSummary& summary = result.summary;
   Count(blocks, problem, &summary);
-  const int num_threads = ResolveNumThreads(options.num_threads);
-  const std::optional<SquaredErrors> errors =
-      EvaluateErrors(num_threads, &problem);
+  const ceres::Solver::Options solver_options =
+      AdjustmentSolverOptions(options, &blocks, problem);
+  summary.linear_solver = SolverName(solver_options);
+  const std::optional<double> cost =
+      RobustCost(solver_options.num_threads, &problem);
   if (summary.num_parameters == 0) {
     summary.termination = BundleAdjustmentTermination::kNothingToAdjust;
-  } else if (!errors) {
+  } else if (!cost) {
     summary.termination = BundleAdjustmentTermination::kInfeasibleStart;
   } else {
-    const auto cost = [&] {
-      return barrier != nullptr ? EvaluateErrors(num_threads, &problem)->cost
-                                : RobustCost(&problem, num_threads);
-    };
-    summary.cost_initial = cost();
-    Minimize(options, barrier, &blocks, &problem, &summary);
-    summary.cost_final = cost();
+    summary.cost_initial = *cost;
+    if (options.max_error) {
+      FollowBarrierPath(
+          options, solver_options,
+          {&problem, &blocks, &barrier, &barrier_losses, &recorder}, &summary);
+      barrier.mu = 0;  // the cost without the barrier
+    } else {
+      Minimize(options, solver_options, &problem, &summary);
+    }
+    summary.cost_final = *RobustCost(solver_options.num_threads, &problem);
     RestoreSimilarity(options, before, &blocks);
   }
   result.model = ApplyBlocks(model, before, blocks);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <functional>
 
 #include <ceres/iteration_callback.h>
 
@@ -15,10 +15,7 @@ class IterationObserver final : public ceres::IterationCallback {
   explicit IterationObserver(const BundleAdjustmentOptions& options)
       : callback_(options.callback), cancel_(options.cancel) {}
 
-  // The iterations to come belong to this weight of the barrier.
-  void set_barrier(double mu) { barrier_ = mu; }
-
-  // Of all solves so far, without their starts.
+  // Without the start.
   int num_iterations() const { return num_iterations_; }
 
   ceres::CallbackReturnType operator()(
@@ -30,7 +27,6 @@ class IterationObserver final : public ceres::IterationCallback {
       iteration.cost = summary.cost;
       iteration.radius = summary.trust_region_radius;
       iteration.is_successful = summary.step_is_successful;
-      iteration.barrier = barrier_;
       iteration.seconds = timer_.Seconds();
       callback_(iteration);
     }
@@ -42,7 +38,6 @@ class IterationObserver final : public ceres::IterationCallback {
   std::function<void(const BundleAdjustmentIteration&)> callback_;
   const CancelFlag* cancel_;
   const Timer timer_;
-  std::optional<double> barrier_;
   int num_iterations_ = 0;
 };
 

@@ -4,22 +4,22 @@
 
 namespace krot {
 
-std::optional<SquaredErrors> EvaluateErrors(int num_threads,
-                                            ceres::Problem* problem) {
+std::optional<std::vector<double>> EvaluateResiduals(int num_threads,
+                                                     ceres::Problem* problem) {
   ceres::Problem::EvaluateOptions options;
   options.apply_loss_function = false;
   options.num_threads = num_threads;
-  SquaredErrors errors;
   std::vector<double> residuals;
-  if (!problem->Evaluate(options, &errors.cost, &residuals, nullptr, nullptr)) {
+  if (!problem->Evaluate(options, nullptr, &residuals, nullptr, nullptr)) {
     return std::nullopt;
   }
-  errors.values.reserve(residuals.size() / 2);
-  for (size_t i = 0; i + 1 < residuals.size(); i += 2) {
-    errors.values.push_back(residuals[i] * residuals[i] +
-                            residuals[i + 1] * residuals[i + 1]);
-  }
-  return errors;
+  return residuals;
+}
+
+double HalfSquaredNorm(const std::vector<double>& residuals) {
+  double sum = 0;
+  for (const double residual : residuals) sum += residual * residual;
+  return sum / 2;
 }
 
 std::optional<double> Stationarity(int num_threads, ceres::Problem* problem) {

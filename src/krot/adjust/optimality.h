@@ -7,15 +7,12 @@
 
 namespace krot {
 
-// Half the sum of the squared errors without any loss, and the squared errors
-// themselves in the order in which their residuals were added (two residuals
-// each). None where the problem cannot be evaluated.
-struct SquaredErrors {
-  double cost = 0;
-  std::vector<double> values;  // pixels^2
-};
-std::optional<SquaredErrors> EvaluateErrors(int num_threads,
-                                            ceres::Problem* problem);
+// The residuals without any loss, in the order in which they were added, two
+// per observation, pixels. None where one cannot be evaluated.
+std::optional<std::vector<double>> EvaluateResiduals(int num_threads,
+                                                     ceres::Problem* problem);
+
+double HalfSquaredNorm(const std::vector<double>& residuals);
 
 // g' D^-1 g / (2 cost), loss included: g is the gradient of the cost by what
 // may move and D the diagonal of J'J, so that g_j^2 / (2 D_j) is what moving
