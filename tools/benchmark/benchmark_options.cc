@@ -1,7 +1,5 @@
 #include "tools/benchmark/benchmark_options.h"
 
-#include <filesystem>
-
 namespace krot {
 
 void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser) {
@@ -36,12 +34,6 @@ void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser) {
 OptionParser MakeBenchmarkParser(const std::string& command,
                                  const std::string& summary) {
   return {command, summary, "krot_benchmark"};
-}
-
-std::string ModelName(const std::string& path) {
-  const std::filesystem::path normal =
-      (std::filesystem::absolute(path) / "").lexically_normal().parent_path();
-  return normal.filename().string();
 }
 
 }  // namespace krot

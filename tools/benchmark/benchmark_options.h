@@ -26,7 +26,4 @@ void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser);
 OptionParser MakeBenchmarkParser(const std::string& command,
                                  const std::string& summary);
 
-// The last part of a path that names a model: "south128".
-std::string ModelName(const std::string& path);
-
 }  // namespace krot

@@ -9,9 +9,10 @@ namespace krot {
 // least one value.
 double Median(std::vector<double> values);
 
-// Median wall-clock seconds of one call of each of `runs`, out of `repeats`
-// rounds in which every one is called in turn, so that what disturbs the
-// machine for a while disturbs all of them alike. What takes less than
+// Median seconds of this thread's processor time of one call of each of `runs`,
+// out of `repeats` rounds in which every one is called in turn, so that what
+// disturbs the machine for a while disturbs all of them alike; processor time,
+// so that others on the machine count for little. What takes less than
 // `min_seconds` is called in a loop that takes at least as long. One round goes
 // ahead unmeasured where there is such a loop.
 std::vector<double> TimeInterleaved(

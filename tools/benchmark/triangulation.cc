@@ -5,12 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "krot/bridge/bridge.h"
 #include "tools/benchmark/benchmark_command.h"
+#include "tools/benchmark/benchmark_model.h"
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/competition.h"
 #include "tools/command_error.h"
-#include "tools/model_files.h"
 
 namespace krot {
 namespace {
@@ -55,12 +54,12 @@ Case SyntheticCase(int num_cameras, Random* random) {
 // At most `max_points` of the model's points, evenly spread over the file;
 // those without two rays that meet in front of all cameras are passed over.
 Case ModelCase(const std::string& path, int max_points, Random* random) {
-  const Model model = ReadValidModel(path);
-  const BuiltProblem built = BuildProblem(model, {});
+  const BenchmarkModel model = ReadBenchmarkModel(path);
+  const BuiltProblem& built = model.built;
   Case result;
-  result.name = ModelName(path);
+  result.name = model.name;
   result.num_points = built.problem.num_points;
-  result.num_images = static_cast<int64_t>(built.problem.views.size());
+  result.num_images = model.num_images;
   const int step = std::max(1, built.problem.num_points / max_points);
   for (int32_t k = 0; k < built.problem.num_points; k += step) {
     std::optional<Subproblem> problem = MakeTriangulation(

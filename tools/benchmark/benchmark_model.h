@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "krot/bridge/bridge.h"
+
+namespace krot {
+
+// A model as the benchmarks meet it: its name, the last part of its path, and
+// its problem with the model's own start.
+struct BenchmarkModel {
+  std::string name;
+  int64_t num_images = 0;
+  BuiltProblem built;
+};
+
+// Reads, validates and builds. Throws ModelError, or CommandError
+// (kExitNothingToSolve) where there are no observations to optimise.
+BenchmarkModel ReadBenchmarkModel(const std::string& path,
+                                  int min_track_length = 2);
+
+}  // namespace krot

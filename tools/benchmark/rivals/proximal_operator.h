@@ -1,0 +1,18 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace krot {
+
+// The proximal operator of the largest norm, in place:
+//
+//   argmin over z   max_i ||z_i||_2 + rho/2 sum_i ||z_i - a_i||^2.
+//
+// Every a_i is shortened to the length t for which
+// sum_i max(0, ||a_i|| - t) = 1 / rho, found by bisection [Eriksson, Isaksson
+// 2014]; all are zero where that sum is smaller at t = 0. rho > 0.
+void ApplyMaxNormProx(double rho, std::vector<Eigen::Vector2d>* a);
+
+}  // namespace krot
