@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/adjust/ceres_log.h"
 #include "krot/model/model_error.h"
 #include "krot/report/write_file.h"
 #include "tools/command.h"
@@ -144,5 +145,6 @@ int Main(const std::vector<std::string>& arguments) {
 }  // namespace krot
 
 int main(int argc, char** argv) {
+  krot::SilenceCeres();
   return krot::Main({argv + std::min(argc, 1), argv + argc});
 }

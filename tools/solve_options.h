@@ -11,6 +11,9 @@ namespace krot {
 // Solver, FastDescent and Problem.
 void AddSolveOptions(SolveModelOptions* options, OptionParser* parser);
 
+// Solver.polish, of `solver` alone.
+void AddPolishOption(SolveModelOptions* options, OptionParser* parser);
+
 // Throws OptionError for pairs of options that contradict each other. To be
 // called after Parse.
 void CheckSolveOptions(const SolveModelOptions& options,

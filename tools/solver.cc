@@ -156,6 +156,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
                  "Where the report goes as a page to look at: figures, charts "
                  "and both models in 3D, in one file");
   AddScheduleOptions(&command.options, &parser);
+  AddPolishOption(&command.options, &parser);
   AddSolveOptions(&command.options, &parser);
   AddResIntOptions(SolveModelOptions(), &command.options.res_int, &parser);
   AddCommonOptions(

@@ -159,6 +159,10 @@ SolveModelResult Solve(const Model& model, const SolveModelOptions& options) {
 
   Certify(model, start, estimate, options, certificate, &summary);
   MeasureGap(options.joint.relative_gap, &summary);
+  if (options.polish != Polish::kNone && !IsCancelled(options.cancel)) {
+    summary.polish = PolishModel(options.polish, options.num_threads,
+                                 options.cancel, &result.model);
+  }
   return result;
 }
 
@@ -182,6 +186,7 @@ SolveModelResult TriangulateModel(const Model& model,
   SolveModelOptions points_only = options;
   points_only.method = SolveMethod::kResInt;
   points_only.init = SolveInit::kModel;
+  points_only.polish = Polish::kNone;
   points_only.res_int.update_frames = false;
   points_only.res_int.max_sweeps = 1;
   return Solve(model, points_only);

@@ -12,6 +12,7 @@
 #include "krot/bridge/certificate_file.h"
 #include "krot/bridge/certificate_support.h"
 #include "krot/model/model.h"
+#include "krot/pipeline/polish.h"
 #include "krot/solver/joint.h"
 #include "krot/solver/res_int.h"
 
@@ -79,6 +80,10 @@ struct SolveSummary {
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
 
+  // The least squares step behind all that, if asked for. The model given back
+  // is the polished one; everything above speaks of the one before.
+  std::optional<PolishSummary> polish;
+
   // What a process that holds the model needs, at its peak; see solve_memory.h.
   int64_t estimated_bytes = 0;
 
@@ -93,6 +98,7 @@ struct SolveModelOptions {
   double init_max_error = 100;        // pixels; > 0; the start's, if kFeasible
   bool describe_certificate = false;  // fill SolveSummary::certificate
   BuildProblemOptions problem;
+  Polish polish = Polish::kNone;  // of SolveModel
 
   // Take the place of those in the stages' own options.
   Norm norm;

@@ -9,7 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "krot/report/adjustment_report.h"
 #include "krot/report/certificate_table.h"
+#include "krot/report/solve_error_table.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -173,6 +175,18 @@ Json ErrorJson(const PixelErrorStatistics& statistics) {
           {"rms", statistics.rms}};
 }
 
+Json PolishJson(const std::optional<PolishSummary>& polish) {
+  if (!polish) return {};
+  const BundleAdjustmentSummary& adjustment = polish->adjustment;
+  return {{"polish", PolishName(polish->polish)},
+          {"termination", AdjustmentTerminationName(adjustment.termination)},
+          {"cost_initial", adjustment.cost_initial},
+          {"cost_final", adjustment.cost_final},
+          {"num_iterations", adjustment.num_iterations},
+          {"pixel_error", ErrorJson(polish->pixel_error)},
+          {"seconds", adjustment.seconds}};
+}
+
 }  // namespace
 
 bool IsZeroUpToRounding(const SolveSummary& summary) {
@@ -222,25 +236,12 @@ std::string NothingToSolveSentence(const SolveSummary& summary) {
 
 std::string SolveTable(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
-  const PixelErrorStatistics& before = summary.pixel_error_before;
   const PixelErrorStatistics& after = summary.pixel_error_after;
-  const auto row = [](const char* name, double from, double to) {
-    return std::vector<std::string>{name, FormatNumber(from, 4),
-                                    FormatNumber(to, 4)};
-  };
-  TextTable table;
-  table.AddRow({"pixels", "before", "after"});
-  table.AddRow(row("max error", before.max, after.max));
-  table.AddRow(row("P99 error", before.p99, after.p99));
-  table.AddRow(row("mean error", before.mean, after.mean));
-  table.AddRow(row("RMS error", before.rms, after.rms));
-  table.AddRow(
-      row("cost (max, linearised)", summary.cost_initial, summary.cost_final));
 
   std::ostringstream text;
   text << "\nReprojection errors, p = " << NormName(summary.norm)
        << " for the cost, Euclidean for the rest\n"
-       << table.ToString() << CountsSentence(summary) << '\n';
+       << SolveErrorTable(summary) << CountsSentence(summary) << '\n';
   if (after.not_finite > 0) {
     text << Counted(after.not_finite, "observation")
          << " without a finite error (behind the camera, no pose, or not "
@@ -296,6 +297,7 @@ std::string SolveJson(const SolveReport& report) {
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"polish", PolishJson(summary.polish)},
       {"sweeps", sweeps},
       {"iterations", IterationsJson(summary.iterations)},
       {"support", SupportJson(summary.support)},

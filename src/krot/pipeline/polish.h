@@ -1,0 +1,32 @@
+#pragma once
+
+#include "krot/adjust/bundle_adjustment.h"
+#include "krot/analysis/pixel_errors.h"
+#include "krot/base/progress.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Least squares after the known rotation problem: a lower mean error, for a
+// maximum that is no longer the lowest.
+enum class Polish {
+  kNone,
+  kRotationsFixed,  // translations and points
+  kFull,            // bundle adjustment with its default options
+};
+
+struct PolishSummary {
+  Polish polish = Polish::kNone;
+  BundleAdjustmentSummary adjustment;
+  PixelErrorStatistics pixel_error;  // over all observations, afterwards
+};
+
+// Adjusts the model in place and updates its stored point errors. `polish` must
+// not be kNone; `cancel` may be null.
+PolishSummary PolishModel(Polish polish, int num_threads,
+                          const CancelFlag* cancel, Model* model);
+
+// As --Solver.polish takes it: "none", "rotations_fixed", "full".
+const char* PolishName(Polish polish);
+
+}  // namespace krot
