@@ -13,6 +13,7 @@
 #include "tools/adjustment_options.h"
 #include "tools/command.h"
 #include "tools/common_options.h"
+#include "tools/html_path.h"
 #include "tools/interrupt.h"
 #include "tools/model_files.h"
 
@@ -83,10 +84,13 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   report.seconds_write = write_timer.Seconds();
   report.seconds_total = total_timer.Seconds();
   report.peak_memory_bytes = PeakMemoryBytes();
+  const std::string report_json = AdjustmentJson(report);
   if (!paths.report_path.empty()) {
     LogLine(common.log, 2, "writing " + paths.report_path);
-    WriteFileAtomically(paths.report_path, AdjustmentJson(report));
+    WriteFileAtomically(paths.report_path, report_json);
   }
+  WriteHtmlPage(paths.html_path, report_json, model, result.model,
+                report.threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
   return kExitDone;
 }

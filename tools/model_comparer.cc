@@ -11,6 +11,7 @@
 #include "krot/report/write_file.h"
 #include "tools/command.h"
 #include "tools/common_options.h"
+#include "tools/html_path.h"
 #include "tools/model_files.h"
 
 namespace krot {
@@ -29,6 +30,7 @@ struct ComparerOptions {
   int num_worst = 10;
   std::string output_path;
   std::string report_path;
+  std::string html_path;
   std::string certificate_path1;
   std::string certificate_path2;
   std::string overlay_path;
@@ -55,6 +57,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
                   "errors_summary.txt (the tables) go; created if need be");
   parser->AddPath("report_path", &options->report_path, false, "a file",
                   "Where the report goes, as JSON");
+  AddHtmlPath(&options->html_path, parser);
   parser->AddPath("certificate_path1", &options->certificate_path1, false,
                   "a file",
                   "A certificate of the first model: show what it proves");
@@ -117,6 +120,7 @@ void CheckPaths(const ComparerOptions& options, const OptionParser& parser) {
     }
   }
   CheckSidePath("report_path", options.report_path, options.overlay_path);
+  CheckHtmlPath(options.html_path, options.report_path, options.overlay_path);
 }
 
 std::optional<CertificateVerdict> Verify(const Model& model,
@@ -201,18 +205,21 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   report.summary = Compare(options, model1, model2);
   const std::string table = ComparisonTable(report, options.num_worst);
 
+  const Model aligned =
+      TransformModel(model2, report.summary.world1_from_world2);
   if (!options.overlay_path.empty()) {
-    const Model aligned =
-        TransformModel(model2, report.summary.world1_from_world2);
     WriteModelTo(OverlayModels(model1, aligned), options.overlay_path,
                  OverlayWriteOptions(options));
   }
   if (!options.output_path.empty()) {
     WriteErrorFiles(options.output_path, report.summary, table);
   }
+  const std::string report_json = ComparisonJson(report);
   if (!options.report_path.empty()) {
-    WriteFileAtomically(options.report_path, ComparisonJson(report));
+    WriteFileAtomically(options.report_path, report_json);
   }
+  WriteHtmlPage(options.html_path, report_json, model1, aligned, -1,
+                options.common.log);
   PrintTable(options.common.log, table);
   return kExitDone;
 }

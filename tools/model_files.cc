@@ -7,6 +7,7 @@
 #include "krot/model/model_error.h"
 #include "krot/model/validate.h"
 #include "krot/report/write_file.h"
+#include "tools/html_path.h"
 
 namespace krot {
 namespace {
@@ -51,6 +52,7 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
   AddOverwrite(&paths->overwrite, parser);
   parser->AddPath("report_path", &paths->report_path, false, "a file",
                   "Where the report goes, as JSON");
+  AddHtmlPath(&paths->html_path, parser);
 }
 
 void AddOverwrite(bool* overwrite, OptionParser* parser) {
@@ -72,6 +74,7 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   options.copy_project_from = paths.input_path;
   CheckModelWritable(paths.output_path, options);
   CheckSidePath("report_path", paths.report_path, paths.output_path);
+  CheckHtmlPath(paths.html_path, paths.report_path, paths.output_path);
   return options;
 }
 

@@ -15,6 +15,7 @@ struct ModelPaths {
   std::string output_type = "auto";
   bool overwrite = false;
   std::string report_path;
+  std::string html_path;
 };
 
 void AddModelPaths(ModelPaths* paths, OptionParser* parser);
@@ -22,7 +23,7 @@ void AddOverwrite(bool* overwrite, OptionParser* parser);
 
 // Throws OptionError where the paths contradict each other, ModelError where
 // no model lies at input_path, CommandError (kExitNotWritten) where the output
-// or the report could not be written. Changes nothing and reads no model.
+// or a report could not be written. Changes nothing and reads no model.
 // Returns how to write.
 WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 

@@ -5,11 +5,11 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
-#include "krot/report/html_page.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 #include "krot/report/write_file.h"
+#include "tools/html_path.h"
 #include "tools/interrupt.h"
 #include "tools/solve_progress.h"
 
@@ -147,7 +147,6 @@ int RunSolveCommand(const SolveCommand& command) {
   const WriteModelOptions write_options = CheckModelPaths(paths);
   CheckSidePath("certificate_path", command.certificate_path,
                 paths.output_path);
-  CheckSidePath("html_path", command.html_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
@@ -176,12 +175,8 @@ int RunSolveCommand(const SolveCommand& command) {
     LogLine(log, 2, "writing " + paths.report_path);
     WriteFileAtomically(paths.report_path, report_json);
   }
-  if (!command.html_path.empty()) {
-    LogLine(log, 2, "writing " + command.html_path);
-    WriteFileAtomically(command.html_path,
-                        HtmlPage(report_json, model, result.model,
-                                 command.options.num_threads));
-  }
+  WriteHtmlPage(paths.html_path, report_json, model, result.model,
+                command.options.num_threads, log);
   WriteCertificate(command, report.summary);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);

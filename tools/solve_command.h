@@ -16,7 +16,6 @@ struct SolveCommand {
   std::string method_name;  // for the report; "": that of the solve
   ModelPaths paths;
   std::string certificate_path;  // "": not wanted
-  std::string html_path;         // likewise
   CommonOptions common;
   SolveModelOptions options;  // its callbacks and flag are set by the run
   SolveModelResult (*solve)(const Model&, const SolveModelOptions&) = nullptr;

@@ -38,7 +38,7 @@ const isColor = (pixel, name) => {
   return [0, 1, 2].every((i) => Math.abs(
       pixel[i] - parseInt(hex.slice(2 * i + 1, 2 * i + 3), 16)) < 12);
 };
-const isWanted = (pixel) => pixel[3] === 255 && (what === 'a point' ?
+const isWanted = (pixel) => pixel[3] > 128 && (what === 'a point' ?
     !isColor(pixel, '--after') && !isColor(pixel, '--mark') :
     isColor(pixel, what));
 return redrawn.then(() => {

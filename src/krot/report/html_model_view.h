@@ -12,7 +12,7 @@ namespace krot {
 
 // What the report page draws of a model.
 
-// So many that a page stays below 10 MB and a browser fluent.
+// So many that they take less than 10 MB of a page that holds two models.
 inline constexpr int64_t kMaxShownPoints = 100'000;
 
 // As JSON:

@@ -2,12 +2,13 @@
 
 import { chart, linear, logarithmic, polyline } from './axes.js';
 import { svg } from './dom.js';
+import { counted } from './format.js';
 
 // Sweeps and iterations in the order in which they ended.
 export function courseOf(report) {
   const steps = [
-    ...(report.sweeps ?? []).map((step) => ({ ...step, lower_bound: null })),
-    ...(report.iterations ?? []),
+    ...report.sweeps.map((step) => ({ ...step, lower_bound: null })),
+    ...report.iterations,
   ];
   return steps.sort((a, b) => a.seconds - b.seconds);
 }
@@ -22,7 +23,7 @@ export function convergenceChart(report) {
   const steps = courseOf(report);
   const costs = [report.cost_initial, ...steps.map(({ cost }) => cost)];
   const bounds = steps
-    .map((step, i) => [i + 1, step.lower_bound ?? null])
+    .map((step, i) => [i + 1, step.lower_bound])
     .filter(([, bound]) => bound !== null && bound > 0);
   const values = [...costs, ...bounds.map(([, bound]) => bound)]
     .filter((value) => value > 0);
@@ -34,8 +35,8 @@ export function convergenceChart(report) {
     legend: [['after', 'cost'], ...(bounds.length ? [['bound', 'bound']] : [])],
     x: linear(0, steps.length),
     y: logarithmic(low / 1.05, high * 1.05),
-    xName: `${(report.sweeps ?? []).length} sweeps and ` +
-      `${(report.iterations ?? []).length} joint iterations, in turn`,
+    xName: `${counted(report.sweeps.length, 'sweep')} and ` +
+      `${counted(report.iterations.length, 'joint iteration')}, in turn`,
     yName: 'px',
     width: 900,
     height: 260,

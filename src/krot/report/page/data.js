@@ -42,6 +42,11 @@ export function isComparison(report) {
   return report.command === 'model_comparer';
 }
 
+// Whether the cost is a largest residual in pixels, and may have a proof.
+export function isMinimax(report) {
+  return 'certified' in report;
+}
+
 // How the two models of a report are called.
 export function modelLabels(report) {
   return isComparison(report) ? ['Model 1', 'Model 2'] : ['Before', 'After'];

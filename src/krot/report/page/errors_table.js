@@ -1,4 +1,4 @@
-import { modelErrors } from './data.js';
+import { isMinimax, modelErrors } from './data.js';
 import { html, table } from './dom.js';
 import { pixels } from './format.js';
 
@@ -26,7 +26,7 @@ export function errorsTable(report, labels) {
   const [before, after] = modelErrors(report);
   const rows = kRows.map(([key, name]) =>
     row(name, key, before[key], after[key]));
-  if ('cost_final' in report) {
+  if (isMinimax(report)) {
     rows.push(row('Cost: maximum, linearised', 'cost', report.cost_initial,
       report.cost_final));
   }

@@ -42,6 +42,7 @@ export function differencesTable(report) {
         ...[max, median, mean, rms].map((value) => significant(value, 4))]));
 }
 
+// Of one model, or of both and what they share.
 function counts(value) {
   return typeof value === 'object' ?
     listed(Object.entries(value), count) : count(value);
@@ -52,7 +53,7 @@ function listed(entries, format) {
     .map(([name, value]) => `${name} ${format(value)}`).join(', ');
 }
 
-// How the run went; a row for what the report knows.
+// How the run went; a row for every figure that the report holds.
 export function factsTable(report) {
   const facts = [
     ['Command', report.command],
@@ -63,6 +64,10 @@ export function factsTable(report) {
     ['Images', counts(report.num_images)],
     ['Points', counts(report.num_points)],
     ['Observations', counts(report.num_observations)],
+    ['Parameters', counts(report.num_parameters)],
+    ['Iterations', counts(report.num_iterations)],
+    ['Linear solver', report.linear_solver],
+    ['Cap on every error, px', report.max_error],
     ['Left out', report.left_out &&
       (listed(Object.entries(report.left_out), count) || 'none')],
     ['Alignment', report.alignment?.kind],
@@ -72,6 +77,6 @@ export function factsTable(report) {
     ['Threads', report.threads],
   ];
   return table(['', ''], facts
-    .filter(([, value]) => value !== undefined && value !== '–')
+    .filter(([, value]) => (value ?? '–') !== '–')
     .map(([name, value]) => [name, String(value)]));
 }

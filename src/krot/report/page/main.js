@@ -4,7 +4,7 @@ import { viewerControls, viewerNotes } from './controls.js';
 import { convergenceChart } from './convergence.js';
 import { histogramChart, imagesChart, tailChart } from './curves.js';
 import {
-  decodeModel, isComparison, modelLabels, readJson,
+  decodeModel, isComparison, isMinimax, modelLabels, readJson,
 } from './data.js';
 import { byId, html } from './dom.js';
 import { errorsTable } from './errors_table.js';
@@ -43,8 +43,7 @@ function showSupport(support, show) {
 }
 
 function showCourse(report) {
-  const chart = (report.sweeps ?? report.iterations) &&
-    'cost_initial' in report ? convergenceChart(report) : null;
+  const chart = isMinimax(report) ? convergenceChart(report) : null;
   if (chart) byId('convergence').append(chart);
   byId('course').hidden = !chart;
 }

@@ -6,7 +6,7 @@ import {
   subtract,
 } from './vectors.js';
 
-const kFieldOfView = 0.8;  // radians, vertical
+const kFieldOfView = 0.8;  // radians, across the smaller side of the canvas
 const kTurn = 0.006;  // radians per CSS pixel
 const kClickSlack = 5;  // CSS pixels
 
@@ -46,8 +46,10 @@ export class Orbit {
   viewProjection(aspect) {
     const { right, up, back } = this.axes();
     const eye = add(this.target, scale(back, this.distance));
+    const vertical = 2 * Math.atan(
+      Math.tan(kFieldOfView / 2) / Math.min(1, aspect));
     return multiply(
-      perspective(kFieldOfView, aspect, this.distance / 100,
+      perspective(vertical, aspect, this.distance / 100,
         this.distance * 100),
       lookAt(eye, right, up, back));
   }
@@ -57,10 +59,10 @@ export class Orbit {
     this.pitch = Math.min(1.55, Math.max(-1.55, this.pitch + kTurn * dy));
   }
 
-  // By pixels of a canvas that is `height` pixels high.
-  shift(dx, dy, height) {
+  // By pixels of a canvas whose smaller side is `side` pixels long.
+  shift(dx, dy, side) {
     const { right, up } = this.axes();
-    const size = 2 * this.distance * Math.tan(kFieldOfView / 2) / height;
+    const size = 2 * this.distance * Math.tan(kFieldOfView / 2) / side;
     this.target = add(this.target,
       add(scale(right, -dx * size), scale(up, dy * size)));
   }
@@ -78,6 +80,7 @@ export function attachControls(canvas, orbit, { onChange, onClick }) {
   const pointers = new Map();
   let travelled = 0;
 
+  const side = () => Math.min(canvas.clientWidth, canvas.clientHeight);
   const span = () => {
     const [a, b] = [...pointers.values()];
     return Math.hypot(a.x - b.x, a.y - b.y);
@@ -98,10 +101,10 @@ export function attachControls(canvas, orbit, { onChange, onClick }) {
     Object.assign(last, { x: event.clientX, y: event.clientY });
     travelled += Math.hypot(dx, dy);
     if (pointers.size === 2) {
-      orbit.shift(dx / 2, dy / 2, canvas.clientHeight);
+      orbit.shift(dx / 2, dy / 2, side());
       orbit.zoom(spanBefore / Math.max(1, span()));
     } else if (event.buttons & 6 || event.shiftKey) {
-      orbit.shift(dx, dy, canvas.clientHeight);
+      orbit.shift(dx, dy, side());
     } else {
       orbit.turn(dx, dy);
     }

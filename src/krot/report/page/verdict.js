@@ -1,4 +1,4 @@
-import { isComparison, modelErrors } from './data.js';
+import { isComparison, isMinimax, modelErrors } from './data.js';
 import { lowerBound, pixels } from './format.js';
 
 function movement(before, after, decimals) {
@@ -23,6 +23,14 @@ function proof(report) {
     `${movement(report.cost_initial, report.cost_final, 4)}; ${bound}.`;
 }
 
+// Least squares lower the mean error; the largest may go either way.
+function adjustmentVerdict(report, before, after) {
+  const cap = report.max_error ?
+    `, below the cap of ${report.max_error.toFixed(2)} px` : '';
+  return `The root mean square error ${movement(before.rms, after.rms, 4)}; ` +
+    `the largest error ${movement(before.max, after.max, 2)}${cap}.`;
+}
+
 // What came of it, in a sentence or two, without more than is known.
 export function verdict(report) {
   const [before, after] = modelErrors(report);
@@ -33,10 +41,10 @@ export function verdict(report) {
     return `The largest error of model 1 is ${before.max.toFixed(2)} px, ` +
       `of model 2 ${after.max.toFixed(2)} px.`;
   }
+  if (!isMinimax(report)) return adjustmentVerdict(report, before, after);
   const sentence = `The largest error ${movement(before.max, after.max, 2)}`;
   if (report.certified) return sentence + proof(report);
-  return 'certified' in report && report.command === 'solver' ?
-    `${sentence}; whether it can be lower was not proved.` : `${sentence}.`;
+  return `${sentence}; whether it can be lower was not proved.`;
 }
 
 // What the verdict holds for.

@@ -27,7 +27,9 @@ export class Viewer {
     const canvas = html('canvas', {
       tabindex: 0, 'aria-label': '3D view of cameras and points',
     });
-    const gl = canvas.getContext('webgl2', { antialias: true, alpha: true });
+    // Where the processor draws, smooth edges cost most of a frame.
+    const antialias = models[1].points.num < 30000;
+    const gl = canvas.getContext('webgl2', { antialias });
     if (!gl) throw new Error('no WebGL 2');
     this.panels = html('div', { class: 'panels' });
     stage.append(canvas, this.panels);
@@ -37,7 +39,7 @@ export class Viewer {
     const { target, radius, front } = frame(models[1]);
     this.size = cameraSize(models[1], radius);
     this.orbit = new Orbit({
-      target, distance: 2.3 * radius, up: upDirection(models[1]), front,
+      target, distance: 1.9 * radius, up: upDirection(models[1]), front,
     });
     this.layers = models.map((model, i) =>
       new Layer(this.renderer, model, ['--before', '--after'][i], this.size));

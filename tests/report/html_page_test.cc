@@ -1,0 +1,214 @@
+#include "krot/report/html_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/model_statistics.h"
+#include "krot/analysis/pixel_errors.h"
+#include "krot/model/image_geometry.h"
+#include "krot/report/html_model_view.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+SyntheticScene SomeScene() {
+  SceneOptions options;
+  options.num_frames = 8;
+  options.num_points = 60;
+  options.pixel_noise = 1;
+  options.start_point_noise = 0.01;
+  return SynthesizeScene(options);
+}
+
+// The text of the element with this id.
+std::string ElementText(const std::string& page, const std::string& id) {
+  const size_t begin = page.find('>', page.find("id=\"" + id + "\"")) + 1;
+  return page.substr(begin, page.find("</script>", begin) - begin);
+}
+
+// The numbers that a text in base64 stands for; by a table, digit by digit.
+template <typename Number>
+std::vector<Number> Decode(const std::string& text) {
+  const std::string digits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::vector<unsigned char> bytes;
+  uint32_t bits = 0;
+  int num_bits = 0;
+  for (const char digit : text.substr(0, text.find('='))) {
+    bits = bits << 6 | static_cast<uint32_t>(digits.find(digit));
+    num_bits += 6;
+    if (num_bits < 8) continue;
+    num_bits -= 8;
+    bytes.push_back(static_cast<unsigned char>(bits >> num_bits));
+  }
+  std::vector<Number> numbers(bytes.size() / sizeof(Number));
+  std::memcpy(numbers.data(), bytes.data(), bytes.size());
+  return numbers;
+}
+
+TEST(HtmlPage, HoldsTheReportAsItIs) {
+  const Model model = SomeScene().model;
+  const std::string report =
+      R"({"command":"<!-- </script> {{models}} & \u0022 é","cost_final":0.1})";
+  const std::string page = HtmlPage(report, model, model);
+  EXPECT_THAT(ElementText(page, "krot-report"), Not(HasSubstr("<")));
+  EXPECT_EQ(json::parse(ElementText(page, "krot-report")), json::parse(report));
+}
+
+TEST(HtmlPage, ReplacesAllItsPlaceholdersAndNamesNothingOutside) {
+  const Model model = SomeScene().model;
+  const std::string page = HtmlPage("{}", model, model);
+  EXPECT_THAT(page, Not(HasSubstr("{{")));
+  EXPECT_THAT(page, Not(HasSubstr("/* style.css */")));
+  EXPECT_THAT(page, Not(HasSubstr("src=")));
+  EXPECT_THAT(page, Not(HasSubstr("https:")));
+  EXPECT_THAT(page, HasSubstr("default-src 'none'"));
+}
+
+TEST(HtmlPage, LetsNoImageNameEndItsElement) {
+  Model model = SomeScene().model;
+  model.images[0].name = "</script><script>alert(1)</script>\xff";
+  const std::string page = HtmlPage("{}", model, model);
+  const json models = json::parse(ElementText(page, "krot-models"));
+  EXPECT_EQ(models["after"]["images"][0]["name"],
+            "</script><script>alert(1)</script>\xef\xbf\xbd");
+}
+
+TEST(HtmlPage, IsTheSameAtAnyNumberOfThreads) {
+  const SyntheticScene scene = SomeScene();
+  EXPECT_EQ(HtmlPage("{}", scene.model, scene.ground_truth, 1),
+            HtmlPage("{}", scene.model, scene.ground_truth, 3));
+}
+
+TEST(ModelViewJson, HoldsEveryPointRelativeToTheOrigin) {
+  const Model model = SomeScene().model;
+  const Eigen::Vector3d origin(1, -2, 3);
+  const json view = json::parse(ModelViewJson(model, origin));
+  const json& points = view["points"];
+  const auto ids = Decode<uint64_t>(points["ids"]);
+  const auto xyz = Decode<float>(points["xyz"]);
+  const auto rgb = Decode<uint8_t>(points["rgb"]);
+  const auto track_length = Decode<uint32_t>(points["track_length"]);
+  ASSERT_EQ(ids.size(), model.points3D.size());
+  for (size_t k = 0; k < ids.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    EXPECT_EQ(ids[k], point.id);
+    EXPECT_EQ(track_length[k], point.track_end - point.track_begin);
+    for (int axis = 0; axis < 3; ++axis) {
+      EXPECT_FLOAT_EQ(xyz[3 * k + axis],
+                      static_cast<float>(point.xyz[axis] - origin[axis]));
+      EXPECT_EQ(rgb[3 * k + axis], point.color[axis]);
+    }
+  }
+}
+
+TEST(ModelViewJson, HoldsTheErrorsOfItsPoints) {
+  const Model model = SomeScene().model;
+  const json view =
+      json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()))["points"];
+  const auto max_error = Decode<float>(view["max_error"]);
+  const auto mean_error = Decode<float>(view["mean_error"]);
+  Model updated = model;  // its points get their mean errors
+  UpdatePointErrors(PixelErrors(model), &updated);
+  for (const WorstObservation& seen :
+       WorstObservations(model, PixelErrors(model), 1000000)) {
+    const auto index = std::find_if(
+        model.points3D.begin(), model.points3D.end(),
+        [&](const Point3D& point) { return point.id == seen.point3D_id; });
+    const auto k = index - model.points3D.begin();
+    EXPECT_GE(max_error[k], static_cast<float>(seen.error_px));
+    EXPECT_FLOAT_EQ(mean_error[k],
+                    static_cast<float>(updated.points3D[k].error));
+  }
+  EXPECT_EQ(*std::max_element(max_error.begin(), max_error.end()),
+            static_cast<float>(Summarize(PixelErrors(model)).max));
+}
+
+TEST(ModelViewJson, HoldsWhereEveryImageStands) {
+  const Model model = SomeScene().model;
+  const json view = json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  for (size_t i = 0; i < geometries.size(); ++i) {
+    const auto center = view["images"][i]["center"].get<std::vector<double>>();
+    const auto axes =
+        view["images"][i]["world_from_cam"].get<std::vector<double>>();
+    // The centre is seen at the origin, a place on the axis at depth 1.
+    const Eigen::Vector3d on_axis(center[0] + axes[2], center[1] + axes[5],
+                                  center[2] + axes[8]);
+    const Eigen::Vector3d x_cam =
+        geometries[i].cam_from_world_rotation * on_axis +
+        geometries[i].cam_from_world_translation;
+    EXPECT_LT((x_cam - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  }
+}
+
+TEST(ModelViewJson, SaysNullForAnImageWithoutPose) {
+  SceneOptions options;
+  options.has_rigs = false;
+  Model model = SynthesizeScene(options).model;
+  model.images[0].cam_from_world.translation.setConstant(
+      std::numeric_limits<double>::quiet_NaN());
+  const json view = json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
+  EXPECT_TRUE(view["images"][0]["center"].is_null());
+  EXPECT_TRUE(view["images"][0]["pixel_error"]["max"].is_null());
+  EXPECT_FALSE(view["images"][1]["center"].is_null());
+}
+
+TEST(ModelViewJson, ThinsItsPointsButNotItsNumbers) {
+  const Model model = SomeScene().model;
+  const json view =
+      json::parse(ModelViewJson(model, Eigen::Vector3d::Zero(), 10));
+  EXPECT_EQ(view["points"]["num"], 10);
+  EXPECT_EQ(Decode<uint64_t>(view["points"]["ids"]).size(), 10u);
+  EXPECT_EQ(view["num_points"], model.points3D.size());
+  EXPECT_EQ(view["tail"].back()[0], model.track_elements.size());
+}
+
+TEST(SelectPoints, TakesAllWhereTheyAreFew) {
+  EXPECT_EQ(SelectPoints({3, 1, 2}, 3), (std::vector<int64_t>{0, 1, 2}));
+  EXPECT_TRUE(SelectPoints({}, 1).empty());
+}
+
+TEST(SelectPoints, KeepsTheWorstAndSpreadsTheOthers) {
+  std::vector<float> max_errors(10000, 0.5f);
+  max_errors[17] = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<int64_t> worst = {4001, 4002, 4003, 9999};
+  for (const int64_t index : worst) max_errors[index] = 3;
+  const std::vector<int64_t> selection = SelectPoints(max_errors, 400);
+  ASSERT_EQ(selection.size(), 400u);
+  EXPECT_TRUE(std::includes(selection.begin(), selection.end(), worst.begin(),
+                            worst.end()));
+  for (size_t k = 1; k < selection.size(); ++k) {
+    EXPECT_GE(selection[k] - selection[k - 1], 1);
+    EXPECT_LE(selection[k] - selection[k - 1], 30);
+  }
+}
+
+TEST(SelectPoints, RefusesToSelectNone) {
+  EXPECT_THROW(SelectPoints({1}, 0), std::invalid_argument);
+}
+
+TEST(SceneOrigin, IsTheMeanOfTheFinitePoints) {
+  Model model;
+  for (const double x : {1.0, 3.0, std::nan("")}) {
+    model.points3D.emplace_back().xyz = Eigen::Vector3d(x, 2 * x, -x);
+  }
+  EXPECT_EQ(SceneOrigin(model), Eigen::Vector3d(2, 4, -2));
+  EXPECT_EQ(SceneOrigin(Model()), Eigen::Vector3d::Zero().eval());
+}
+
+}  // namespace
+}  // namespace krot

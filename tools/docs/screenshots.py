@@ -1,0 +1,34 @@
+"""Pictures of a report page; see screenshots.sh.
+
+Usage: screenshots.py PAGE.html FOLDER
+"""
+
+import pathlib
+import sys
+import time
+
+from webdriver import Browser
+
+
+def show_worst(browser):
+    """Colours by error, and the numbers of the worst camera and point."""
+    browser.run("document.querySelector('input[value=error]').click()")
+    browser.click("#support tbody tr:first-child td:first-child")
+    time.sleep(2)  # the page scrolls there smoothly
+
+
+def main():
+    page = pathlib.Path(sys.argv[1]).resolve().as_uri()
+    folder = pathlib.Path(sys.argv[2])
+    # The height includes what a window has around the page.
+    with Browser((1100, 1180)) as browser:
+        browser.open(page)
+        (folder / "page_desk.png").write_bytes(browser.screenshot())
+    with Browser((400, 860), dark=True, touch=True) as browser:
+        browser.open(page)
+        show_worst(browser)
+        (folder / "page_phone.png").write_bytes(browser.screenshot())
+
+
+if __name__ == "__main__":
+    main()
