@@ -152,9 +152,6 @@ int RunSolver(const std::vector<std::string>& arguments) {
   parser.AddPath("certificate_path", &command.certificate_path, false, "a file",
                  "Where the proof of the lower bound goes, as JSON; see "
                  "certificate_checker");
-  parser.AddPath("html_path", &command.html_path, false, "a file",
-                 "Where the report goes as a page to look at: figures, charts "
-                 "and both models in 3D, in one file");
   AddScheduleOptions(&command.options, &parser);
   AddPolishOption(&command.options, &parser);
   AddSolveOptions(&command.options, &parser);
