@@ -43,6 +43,20 @@ void ExpectSameBits(const Estimate& a, const Estimate& b) {
   EXPECT_EQ(a.points, b.points);
 }
 
+// The largest residual of frame f.
+double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
+                 int32_t f) {
+  double cost = 0;
+  for (int64_t n = problem.frame_begin[f]; n < problem.frame_begin[f + 1];
+       ++n) {
+    const Observation& observation =
+        problem.observations[problem.frame_observations[n]];
+    cost = std::max(cost, ResidualOf(ViewPoint(problem, observation, estimate),
+                                     Norm::L2()));
+  }
+  return cost;
+}
+
 class ResIntTest : public testing::TestWithParam<FastDescentSettings> {
  protected:
   ResIntOptions Options() const {
@@ -190,6 +204,53 @@ TEST(ResInt, NoiseFreeScenesComeOutNearlyExact) {
   const ResIntSummary summary =
       SolveResInt(scene.problem, options, &scene.estimate);
   EXPECT_LT(summary.cost_final, 1e-2 * summary.cost_initial);
+}
+
+// Earlier sweeps may be coarse; the last one ends at every frame's optimum.
+TEST(ResInt, TheLastOfSoManySweepsLeavesFramesAtTheirOptima) {
+  RandomScene scene = MakeScene(6);
+  ResIntOptions options;
+  options.num_threads = 1;
+  options.max_sweeps = 3;
+  SolveResInt(scene.problem, options, &scene.estimate);
+  Estimate again = scene.estimate;
+  BlockSweep(scene.problem, FastDescentOptions{}, Norm::L2(), 1, nullptr)
+      .ResectFrames(&again);
+  for (int32_t f = 0; f < scene.problem.num_frames; ++f) {
+    EXPECT_NEAR(FrameCost(scene.problem, again, f),
+                FrameCost(scene.problem, scene.estimate, f), 1e-9);
+  }
+}
+
+// The same holds where the sweeps end by themselves.
+TEST(ResInt, SweepsThatStallLeaveFramesAtTheirOptima) {
+  RandomScene scene = MakeScene(6);
+  ResIntOptions options;
+  options.num_threads = 1;
+  SolveResInt(scene.problem, options, &scene.estimate);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
+                    nullptr);
+  Estimate again = scene.estimate;
+  blocks.ResectFrames(&again);
+  for (int32_t f = 0; f < scene.problem.num_frames; ++f) {
+    EXPECT_NEAR(FrameCost(scene.problem, again, f),
+                FrameCost(scene.problem, scene.estimate, f), 1e-9);
+  }
+}
+
+TEST(BlockSweep, LeavesBlocksAtTheLevelOfTheGoalWhereTheyAre) {
+  const RandomScene scene = MakeScene(7);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
+                    nullptr);
+  const double level = (1 + 1e-9) * FrameCost(scene.problem, scene.estimate, 0);
+  blocks.SetGoal({1e-11, level});
+  Estimate estimate = scene.estimate;
+  blocks.ResectFrames(&estimate);
+  for (int32_t f = 0; f < scene.problem.num_frames; ++f) {
+    const bool is_above = FrameCost(scene.problem, scene.estimate, f) > level;
+    EXPECT_EQ(estimate.translations[f] != scene.estimate.translations[f],
+              is_above);
+  }
 }
 
 // Every point is then at its own optimum for the frames as they are.

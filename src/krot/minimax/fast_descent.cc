@@ -33,10 +33,18 @@ FastDescent::FastDescent(const FastDescentOptions& options, Norm norm)
 }
 
 DescentSummary FastDescent::Minimize(Eigen::Vector3d* x) {
+  ActiveResiduals none;
+  return Minimize(DescentGoal{}, &none, x);
+}
+
+DescentSummary FastDescent::Minimize(const DescentGoal& goal,
+                                     ActiveResiduals* active,
+                                     Eigen::Vector3d* x) {
   if (options_.settings == FastDescentSettings::kPaper) {
     return MinimizeAsInPaper(x);
   }
-  return newton_.Minimize(&residuals_, norm_, options_.max_iterations, x);
+  return newton_.Minimize(&residuals_, norm_, options_.max_iterations, goal,
+                          active, x);
 }
 
 // [Zhang18, Alg. 2]. The text has no test for a step that fails to lower the

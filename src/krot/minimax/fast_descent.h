@@ -42,6 +42,11 @@ class FastDescent {
   // std::invalid_argument otherwise). Never raises it.
   DescentSummary Minimize(Eigen::Vector3d* x);
 
+  // As far as `goal` says; `*active` is a warm start, and that of the next
+  // descent afterwards. Both are without effect on kPaper.
+  DescentSummary Minimize(const DescentGoal& goal, ActiveResiduals* active,
+                          Eigen::Vector3d* x);
+
  private:
   DescentSummary MinimizeAsInPaper(Eigen::Vector3d* x);
 

@@ -38,34 +38,29 @@ Matrix3d InverseCholesky(const Matrix3d& H) {
 
 }  // namespace
 
-void LocalModel::Clear() {
+void LocalModel::Start(const Vector3d& x_start) {
+  x_start_ = x_start;
   members_.clear();
+  rows_.Clear();
   solution_.size = 0;
 }
 
-void LocalModel::AddMember(int index, const Residual& residual,
-                           double start_depth) {
-  members_.push_back({index, residual, start_depth, 0, 0});
+void LocalModel::AddMember(const ResidualSet& residuals, int index) {
+  members_.push_back({index, 0, 0, 0});
+  rows_.AddFrom(residuals, index);
 }
 
 void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
+  x_ = x;
+  norm_ = norm;
   pieces_.assign(1, {});
   member_of_piece_.assign(1, kNoMember);
-  metric_.setZero();
-  for (size_t m = 0; m < members_.size(); ++m) {
-    const Residual& residual = members_[m].residual;
-    ResidualPiece pieces[kMaxPieces];
-    const int count = ResidualPieces(residual, x, norm, /*share=*/-1, pieces);
-    for (int k = 0; k < count; ++k) {
-      pieces_.push_back(pieces[k]);
-      member_of_piece_.push_back(static_cast<int>(m));
-    }
-    const double w = residual.Depth(x);
-    const Vector3d growth = cost / w * residual.c;
-    metric_ += residual.A.transpose() * (residual.A / (w * w)) +
-               growth * growth.transpose();
+  if (norm.p == 2) {
+    AddSmoothPieces();
+  } else {
+    AddPieces();
   }
-  metric_ /= cost * static_cast<double>(members_.size());
+  SetMetric(cost);
   // A warm start of the next step must not name tangents that are gone.
   const int num_pieces = static_cast<int>(pieces_.size());
   for (int k = 0; k < solution_.size; ++k) {
@@ -73,16 +68,61 @@ void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
   }
 }
 
-LocalModel::Step LocalModel::Minimize(double kappa) {
-  Matrix3d H = kappa * metric_;
-  for (size_t k = 1; k < pieces_.size(); ++k) {
-    const ResidualPiece& piece = pieces_[k];
-    const double weight =
-        members_[member_of_piece_[k]].multiplier * piece.curvature;
-    if (weight > 0) H += weight * piece.bend * piece.bend.transpose();
+// One piece per member, eight at a time.
+void LocalModel::AddSmoothPieces() {
+  gradients_.resize(rows_.num_blocks());
+  EvaluateGradients(rows_.blocks(), rows_.num_blocks(), x_.data(),
+                    gradients_.data());
+  for (size_t m = 0; m < members_.size(); ++m) {
+    const GradientBlock& block = gradients_[m / kResidualLanes];
+    const size_t lane = m % kResidualLanes;
+    pieces_.push_back({block.value[lane],
+                       {block.gradient[0][lane], block.gradient[1][lane],
+                        block.gradient[2][lane]}});
+    member_of_piece_.push_back(static_cast<int>(m));
+    members_[m].depth = block.depth[lane];
   }
+}
+
+void LocalModel::AddPieces() {
+  for (size_t m = 0; m < members_.size(); ++m) {
+    const Residual residual = rows_[static_cast<int>(m)];
+    ResidualPiece pieces[kMaxPieces];
+    const int count = ResidualPieces(residual, x_, norm_, /*share=*/-1, pieces);
+    for (int k = 0; k < count; ++k) {
+      pieces_.push_back({pieces[k].value, pieces[k].gradient});
+      member_of_piece_.push_back(static_cast<int>(m));
+    }
+    members_[m].depth = residual.Depth(x_);
+  }
+}
+
+void LocalModel::SetMetric(double cost) {
+  double sums[6];
+  SumMetric(rows_.blocks(), rows_.num_blocks(), x_.data(), cost, sums);
+  metric_ << sums[0], sums[1], sums[2],  //
+      sums[1], sums[3], sums[4],         //
+      sums[2], sums[4], sums[5];
+  metric_ /= cost * static_cast<double>(members_.size());
+}
+
+// sum_i mu_i c_i b_i b_i'.
+Matrix3d LocalModel::Curvature() const {
+  Matrix3d sum = Matrix3d::Zero();
+  if (norm_.IsPolyhedral()) return sum;  // flat pieces
+  for (size_t m = 0; m < members_.size(); ++m) {
+    const double multiplier = members_[m].multiplier;
+    if (!(multiplier > 0)) continue;
+    ResidualPiece piece;
+    ResidualPieces(rows_[static_cast<int>(m)], x_, norm_, /*share=*/1, &piece);
+    sum += multiplier * piece.curvature * piece.bend * piece.bend.transpose();
+  }
+  return sum;
+}
+
+LocalModel::Step LocalModel::Minimize(double kappa) {
   // With H = L L', the step in L'd has unit curvature.
-  const Matrix3d L_inverse = InverseCholesky(H);
+  const Matrix3d L_inverse = InverseCholesky(kappa * metric_ + Curvature());
   scaled_pieces_.resize(pieces_.size());
   for (size_t k = 0; k < pieces_.size(); ++k) {
     scaled_pieces_[k].value = pieces_[k].value;
@@ -110,6 +150,37 @@ bool LocalModel::UpdateLastMultipliers() {
   return true;
 }
 
+void LocalModel::StartFrom(const ActiveResiduals& active) {
+  double sum = 0;
+  for (int k = 0; k < active.size; ++k) sum += active.multiplier[k];
+  for (int k = 0; k < active.size; ++k) {
+    const int m = FindMember(active.index[k]);
+    members_[m].multiplier = active.multiplier[k] / sum;
+    if (norm_.IsPolyhedral()) continue;  // which of its pieces is not known
+    solution_.index[k] = m + 1;
+    solution_.weight[k] = members_[m].multiplier;
+    solution_.size = k + 1;
+  }
+}
+
+int LocalModel::FindMember(int index) const {
+  int m = 0;
+  while (members_[m].index != index) ++m;
+  return m;
+}
+
+ActiveResiduals LocalModel::Active() {
+  ActiveResiduals active;
+  if (!UpdateLastMultipliers()) return active;
+  for (const Member& member : members_) {
+    if (!(member.last_multiplier > 0)) continue;
+    active.index[active.size] = member.index;
+    active.multiplier[active.size] = static_cast<float>(member.last_multiplier);
+    ++active.size;
+  }
+  return active;
+}
+
 void LocalModel::AdoptMultipliers() {
   if (!UpdateLastMultipliers()) return;
   for (Member& member : members_) member.multiplier = member.last_multiplier;
@@ -125,37 +196,38 @@ bool LocalModel::RaiseMultipliers() {
   return grown;
 }
 
-bool LocalModel::AddTangents(const Vector3d& x, const Vector3d& x_trial,
-                             const double* trial_values, double level,
-                             Norm norm) {
-  if (norm.IsPolyhedral()) return false;  // all its planes are pieces
+bool LocalModel::AddTangents(const Vector3d& x_trial,
+                             const double* trial_values, double level) {
+  if (norm_.IsPolyhedral()) return false;  // all its planes are pieces
   bool added = false;
   for (size_t m = 0; m < members_.size(); ++m) {
     const double value = trial_values[members_[m].index];
     if (!(value > level) || !std::isfinite(value)) continue;
-    pieces_.push_back(TangentPiece(members_[m].residual, x, x_trial, norm));
+    const ResidualPiece tangent =
+        TangentPiece(rows_[static_cast<int>(m)], x_, x_trial, norm_);
+    pieces_.push_back({tangent.value, tangent.gradient});
     member_of_piece_.push_back(static_cast<int>(m));
     added = true;
   }
   return added;
 }
 
-double LocalModel::DepthShare(const Vector3d& x, const Vector3d& d) const {
+double LocalModel::DepthShare(const Vector3d& d) const {
   double share = 1;
-  for (const Member& member : members_) {
-    const double growth = member.residual.c.dot(d);
-    const double room = (1 - kSmallestDepthShare) * member.residual.Depth(x);
+  for (size_t m = 0; m < members_.size(); ++m) {
+    const double growth = rows_[static_cast<int>(m)].c.dot(d);
+    const double room = (1 - kSmallestDepthShare) * members_[m].depth;
     if (room < -share * growth) share = -room / growth;
   }
   return share;
 }
 
-double LocalModel::DepthGrowth(const Vector3d& x) const {
+double LocalModel::DepthGrowth() const {
   double growth = 0;
   for (int k = 0; k < solution_.size; ++k) {
     if (solution_.index[k] == kZeroPiece) continue;
-    const Member& member = members_[member_of_piece_[solution_.index[k]]];
-    growth = std::max(growth, member.residual.Depth(x) / member.start_depth);
+    const int m = member_of_piece_[solution_.index[k]];
+    growth = std::max(growth, members_[m].depth / rows_[m].Depth(x_start_));
   }
   return growth;
 }

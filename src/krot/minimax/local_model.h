@@ -1,13 +1,23 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "krot/math/simplex_qp.h"
 #include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 
 namespace krot {
+
+// The residuals that bear a step, and their multipliers: a warm start for a
+// problem much like theirs.
+struct ActiveResiduals {
+  int32_t size = 0;
+  int32_t index[4] = {};
+  float multiplier[4] = {};  // > 0, sum 1
+};
 
 // What max_i r_i looks like around a point x, from the residuals that matter
 // there (the members): with f_k and g_k the value and gradient of every
@@ -33,12 +43,11 @@ class LocalModel {
     double level;  // max_k (f_k + g_k'd)
   };
 
-  // Forgets the members.
-  void Clear();
+  // Forgets the members. The descent begins at `x_start`.
+  void Start(const Eigen::Vector3d& x_start);
 
-  // Adds the residual that is number `index` of its problem; it counts from
-  // the next Linearize on. `start_depth` is its depth where the descent began.
-  void AddMember(int index, const Residual& residual, double start_depth);
+  // Adds residual number `index`; it counts from the next Linearize on.
+  void AddMember(const ResidualSet& residuals, int index);
 
   // Rebuilds the pieces at x, where the maximum is `cost` > 0; all depths
   // must be positive. Keeps the multipliers.
@@ -46,6 +55,13 @@ class LocalModel {
 
   // The minimiser for kappa > 0. O(members).
   Step Minimize(double kappa);
+
+  // Takes the multipliers of H from those of a problem much like this one; its
+  // active residuals must be members.
+  void StartFrom(const ActiveResiduals& active);
+
+  // The members that bear the last step.
+  ActiveResiduals Active();
 
   // Makes the multipliers of the last step those of H; `RaiseMultipliers`
   // only raises them, for another try from the same x, and returns whether
@@ -58,32 +74,41 @@ class LocalModel {
   // kinks of p < 2, the flats of p > 2, the far side of v = 0, the bend of a
   // residual of small multiplier). `trial_values` are by index. Returns
   // whether there were any.
-  bool AddTangents(const Eigen::Vector3d& x, const Eigen::Vector3d& x_trial,
-                   const double* trial_values, double level, Norm norm);
+  bool AddTangents(const Eigen::Vector3d& x_trial, const double* trial_values,
+                   double level);
 
   // The share of the step d, at most 1, on which no depth of a member falls
   // below a tenth of what it is at x.
-  double DepthShare(const Eigen::Vector3d& x, const Eigen::Vector3d& d) const;
+  double DepthShare(const Eigen::Vector3d& d) const;
 
   // The largest depth at x, relative to its start, of the members that bear
   // the last step.
-  double DepthGrowth(const Eigen::Vector3d& x) const;
+  double DepthGrowth() const;
 
  private:
   struct Member {
     int index;
-    Residual residual;
-    double start_depth;
+    double depth;            // at x
     double multiplier;       // mu_i
     double last_multiplier;  // of the last step
   };
 
+  void AddPieces();
+  void AddSmoothPieces();
+  void SetMetric(double cost);
+  Eigen::Matrix3d Curvature() const;
   bool UpdateLastMultipliers();
+  int FindMember(int index) const;
 
   std::vector<Member> members_;
-  std::vector<ResidualPiece> pieces_;  // 0: no residual falls below zero
+  ResidualSet rows_;  // the members' residuals
+  Norm norm_;
+  Eigen::Vector3d x_start_;
+  Eigen::Vector3d x_;
+  std::vector<LinearPiece> pieces_;  // 0: no residual falls below zero
   std::vector<int> member_of_piece_;
   Eigen::Matrix3d metric_;  // G
+  std::vector<GradientBlock> gradients_;
   std::vector<LinearPiece> scaled_pieces_;
   SimplexQpSolution solution_;
 };

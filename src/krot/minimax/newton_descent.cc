@@ -12,8 +12,6 @@ using Eigen::Vector3d;
 
 // So many residuals become members at a time, the largest first.
 constexpr int kMaxAdded = 8;
-// The last step is one that promises less than this, relative.
-constexpr double kPredictionTolerance = 1e-11;
 // Residuals this small are zero, in pixels.
 constexpr double kZeroPixels = 1e-10;
 // kappa falls by kShrink after a good step and rises by kGrow after a failure.
@@ -42,40 +40,61 @@ bool IsFarAway(double depth_growth, double relative_promise) {
 // Returns whether there were any.
 bool NewtonDescent::AddMembers(const ResidualSet& residuals, double level) {
   const double* values = residuals.values();
-  for (int added = 0; added < kMaxAdded; ++added) {
-    int largest = -1;
-    double value = level;
-    for (int i = 0; i < residuals.size(); ++i) {
-      if (values[i] > value && !is_member_[i]) {
-        value = values[i];
-        largest = i;
-      }
+  int largest[kMaxAdded];  // indices, by falling value
+  int count = 0;
+  for (int i = 0; i < residuals.size(); ++i) {
+    if (!(values[i] > level) || is_member_[i]) continue;
+    int place = count < kMaxAdded ? count++ : kMaxAdded - 1;
+    for (; place > 0 && values[largest[place - 1]] < values[i]; --place) {
+      largest[place] = largest[place - 1];
     }
-    if (largest < 0) return added > 0;
-    is_member_[largest] = true;
-    const Residual residual = residuals[largest];
-    model_.AddMember(largest, residual, residual.Depth(x_start_));
+    largest[place] = i;
+    if (count == kMaxAdded) level = values[largest[kMaxAdded - 1]];
   }
-  return true;
+  for (int k = 0; k < count; ++k) AddMember(residuals, largest[k]);
+  return count > 0;
+}
+
+void NewtonDescent::AddMember(const ResidualSet& residuals, int index) {
+  is_member_[index] = true;
+  model_.AddMember(residuals, index);
+}
+
+// The first multipliers are those given or, without any, of a gradient step.
+void NewtonDescent::StartModel(const ResidualSet& residuals, double cost,
+                               Norm norm, const ActiveResiduals& active,
+                               const Vector3d& x) {
+  model_.Start(x);
+  is_member_.assign(residuals.size(), false);
+  AddMembers(residuals, /*level=*/-1);
+  for (int k = 0; k < active.size; ++k) {
+    if (!is_member_[active.index[k]]) AddMember(residuals, active.index[k]);
+  }
+  model_.Linearize(x, cost, norm);
+  if (active.size > 0) {
+    model_.StartFrom(active);
+  } else {
+    model_.Minimize(/*kappa=*/1);
+    model_.AdoptMultipliers();
+  }
 }
 
 DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
-                                       int max_iterations, Vector3d* x) {
+                                       int max_iterations,
+                                       const DescentGoal& goal,
+                                       ActiveResiduals* active, Vector3d* x) {
   DescentSummary summary;
   double cost = residuals->Evaluate(*x, norm);
   summary.cost_initial = cost;
+  summary.cost = cost;
   CheckArgument(std::isfinite(cost), "cost at the start", cost,
                 "finite: all depths positive");
-  x_start_ = *x;
-  double kappa = kInitialKappa;
-  if (cost > kZeroPixels) {
-    model_.Clear();
-    is_member_.assign(residuals->size(), false);
-    AddMembers(*residuals, /*level=*/-1);
-    model_.Linearize(*x, cost, norm);
-    model_.Minimize(/*kappa=*/1);  // a gradient step: the first multipliers
-    model_.AdoptMultipliers();
+  if (cost <= goal.level) {
+    summary.termination = DescentTermination::kLowEnough;
+    return summary;
   }
+  double kappa = kInitialKappa;
+  if (cost > kZeroPixels) StartModel(*residuals, cost, norm, *active, *x);
   int lessons = 0;  // since the last step taken
   summary.termination = DescentTermination::kMaxIterations;
   while (summary.iterations < max_iterations) {
@@ -85,18 +104,18 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
     }
     LocalModel::Step step = model_.Minimize(kappa);
     const double promise = cost - step.level;
-    const bool is_last = !(promise > kPredictionTolerance * cost);
+    const bool is_last = !(promise > goal.tolerance * cost);
     if (is_last && kappa > kSmallestKappa) {  // small for kappa's sake?
       model_.RaiseMultipliers();
       kappa = kSmallestKappa;
       ++summary.iterations;
       continue;
     }
-    if (IsFarAway(model_.DepthGrowth(*x), promise / cost)) {
+    if (IsFarAway(model_.DepthGrowth(), promise / cost)) {
       summary.termination = DescentTermination::kFarAway;
       break;
     }
-    const double share = model_.DepthShare(*x, step.d);
+    const double share = model_.DepthShare(step.d);
     ++summary.iterations;
     const Vector3d x_trial = *x + share * step.d;
     const double cost_trial = residuals->Evaluate(x_trial, norm);
@@ -109,7 +128,8 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       summary.termination = DescentTermination::kStationary;
       break;
     }
-    const bool overlooked = AddMembers(*residuals, step.level);
+    const bool overlooked =
+        cost_trial > step.level && AddMembers(*residuals, step.level);
     if (kept > kSufficientShare) {
       *x = x_trial;
       cost = cost_trial;
@@ -124,8 +144,7 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       continue;
     }
     bool learned = model_.RaiseMultipliers();
-    learned |=
-        model_.AddTangents(*x, x_trial, residuals->values(), step.level, norm);
+    learned |= model_.AddTangents(x_trial, residuals->values(), step.level);
     if (learned && ++lessons <= kMaxLessons) continue;
     kappa *= kGrow;
     if (kappa > kLargestKappa) {
@@ -134,6 +153,7 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
     }
   }
   summary.cost = cost;
+  if (summary.iterations > 0) *active = model_.Active();
   return summary;
 }
 

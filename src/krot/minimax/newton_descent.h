@@ -13,6 +13,7 @@ enum class DescentTermination {
   kNotRun,
   kStationary,  // no direction lowers the maximum, up to the tolerance
   kZeroCost,    // all residuals vanish
+  kLowEnough,   // the start is at the level of the goal or below it
   kFarAway,     // a depth reached its limit: the infimum lies at infinity
   kNoDecrease,  // the best step does not lower the cost: rounding
   kMaxIterations,
@@ -25,6 +26,14 @@ struct DescentSummary {
   int iterations = 0;  // steps tried
 };
 
+// How far a descent goes. The default is as far as rounding allows.
+struct DescentGoal {
+  // It ends with the step that promises less than this, relative; >= 1e-11.
+  double tolerance = 1e-11;
+  // It does nothing where the cost is this low; pixels, >= 0.
+  double level = 0;
+};
+
 // Minimises max_i r_i(x) by sequential quadratic programming: every step
 // minimises a local model (local_model.h) of the residuals near the maximum.
 // A step that keeps too little of what the model promised teaches the model:
@@ -35,14 +44,17 @@ class NewtonDescent {
  public:
   // See FastDescent::Minimize.
   DescentSummary Minimize(ResidualSet* residuals, Norm norm, int max_iterations,
+                          const DescentGoal& goal, ActiveResiduals* active,
                           Eigen::Vector3d* x);
 
  private:
+  void StartModel(const ResidualSet& residuals, double cost, Norm norm,
+                  const ActiveResiduals& active, const Eigen::Vector3d& x);
   bool AddMembers(const ResidualSet& residuals, double level);
+  void AddMember(const ResidualSet& residuals, int index);
 
   LocalModel model_;
   std::vector<char> is_member_;
-  Eigen::Vector3d x_start_;
 };
 
 }  // namespace krot

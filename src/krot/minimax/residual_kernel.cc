@@ -36,25 +36,30 @@ struct NormLp {
   }
 };
 
+// v and w of (2).
+struct Lane {
+  double v1, v2, w;
+};
+
+inline Lane EvaluateLane(const double (&row)[kResidualRow][kResidualLanes],
+                         int k, const double x[3]) {
+  return {row[0][k] * x[0] + row[1][k] * x[1] + row[2][k] * x[2] + row[3][k],
+          row[4][k] * x[0] + row[5][k] * x[1] + row[6][k] * x[2] + row[7][k],
+          row[8][k] * x[0] + row[9][k] * x[1] + row[10][k] * x[2] + row[11][k]};
+}
+
 template <typename NormFunction>
 double Evaluate(const ResidualBlock* blocks, int64_t num_blocks,
-                NormFunction norm, const double x[3], double* values) {
-  const double x0 = x[0];
-  const double x1 = x[1];
-  const double x2 = x[2];
+                NormFunction norm, const double point[3], double* values) {
+  const double x[3] = {point[0], point[1], point[2]};  // `values` is not it
   double largest[kResidualLanes] = {};
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;
     double* value = values + block * kResidualLanes;
     for (int k = 0; k < kResidualLanes; ++k) {
-      const double v1 =
-          row[0][k] * x0 + row[1][k] * x1 + row[2][k] * x2 + row[3][k];
-      const double v2 =
-          row[4][k] * x0 + row[5][k] * x1 + row[6][k] * x2 + row[7][k];
-      const double w =
-          row[8][k] * x0 + row[9][k] * x1 + row[10][k] * x2 + row[11][k];
-      const double r = norm(v1, v2) / w;  // (2)
-      value[k] = w > 0 ? r : kInfinity;
+      const Lane lane = EvaluateLane(row, k, x);
+      const double r = norm(lane.v1, lane.v2) / lane.w;  // (2)
+      value[k] = lane.w > 0 ? r : kInfinity;
       largest[k] = largest[k] < value[k] ? value[k] : largest[k];
     }
   }
@@ -75,6 +80,60 @@ double EvaluateResiduals(const ResidualBlock* blocks, int64_t num_blocks,
     return Evaluate(blocks, num_blocks, NormLInf(), x, values);
   }
   return Evaluate(blocks, num_blocks, NormLp{p}, x, values);
+}
+
+void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
+                       const double x[3], GradientBlock* gradients) {
+  for (int64_t block = 0; block < num_blocks; ++block) {
+    const auto& row = blocks[block].row;
+    GradientBlock result;
+    for (int k = 0; k < kResidualLanes; ++k) {
+      const Lane lane = EvaluateLane(row, k, x);
+      const double n = NormL2()(lane.v1, lane.v2);
+      const double w_inverse = 1 / lane.w;
+      const double n_inverse = n > 0 ? 1 / n : 0;
+      const double s1 = lane.v1 * n_inverse;
+      const double s2 = lane.v2 * n_inverse;
+      const double value = n * w_inverse;
+      result.value[k] = value;
+      result.depth[k] = lane.w;
+      for (int j = 0; j < 3; ++j) {  // (A's - r c) / w
+        result.gradient[j][k] =
+            (row[j][k] * s1 + row[4 + j][k] * s2 - value * row[8 + j][k]) *
+            w_inverse;
+      }
+    }
+    gradients[block] = result;
+  }
+}
+
+void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
+               const double x[3], double cost, double metric[6]) {
+  double sums[6][kResidualLanes] = {};
+  for (int64_t block = 0; block < num_blocks; ++block) {
+    const auto& row = blocks[block].row;
+    double share[kResidualLanes];
+    double growth[kResidualLanes];
+    for (int k = 0; k < kResidualLanes; ++k) {
+      const double w = EvaluateLane(row, k, x).w;
+      share[k] = 1 / (w * w);
+      growth[k] = cost * cost * share[k];
+    }
+    int entry = 0;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = i; j < 3; ++j, ++entry) {
+        for (int k = 0; k < kResidualLanes; ++k) {
+          sums[entry][k] += share[k] * (row[i][k] * row[j][k] +
+                                        row[4 + i][k] * row[4 + j][k]) +
+                            growth[k] * row[8 + i][k] * row[8 + j][k];
+        }
+      }
+    }
+  }
+  for (int entry = 0; entry < 6; ++entry) {
+    metric[entry] = 0;
+    for (const double sum : sums[entry]) metric[entry] += sum;
+  }
 }
 
 }  // namespace krot

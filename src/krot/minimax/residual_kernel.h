@@ -23,4 +23,22 @@ struct alignas(64) ResidualBlock {
 double EvaluateResiduals(const ResidualBlock* blocks, int64_t num_blocks,
                          double p, const double x[3], double* values);
 
+// Values and gradients of eight residuals side by side, and their depths.
+struct alignas(64) GradientBlock {
+  double value[kResidualLanes];
+  double gradient[3][kResidualLanes];
+  double depth[kResidualLanes];
+};
+
+// For p = 2, all lanes of `num_blocks` blocks and positive depths: r_i(x), its
+// gradient (0 where r_i = 0, which has none) and its depth.
+void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
+                       const double x[3], GradientBlock* gradients);
+
+// The upper triangle, row by row, of
+//   sum_i (A_i'A_i + cost^2 c_i c_i') / w_i^2
+// over all lanes of `num_blocks` blocks; all depths must be positive.
+void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
+               const double x[3], double cost, double metric[6]);
+
 }  // namespace krot

@@ -30,23 +30,17 @@ void ResidualSet::Add(const Residual& residual) {
   Add(row);
 }
 
-Residual ResidualSet::operator[](int i) const {
-  const auto& row = blocks_[i / kResidualLanes].row;
-  const int lane = i % kResidualLanes;
-  Residual residual;
-  for (int k = 0; k < 3; ++k) {
-    residual.A(0, k) = row[k][lane];
-    residual.A(1, k) = row[4 + k][lane];
-    residual.c[k] = row[8 + k][lane];
+void ResidualSet::AddFrom(const ResidualSet& other, int i) {
+  double row[kResidualRow];
+  const ResidualBlock& block = other.blocks_[i / kResidualLanes];
+  for (int k = 0; k < kResidualRow; ++k) {
+    row[k] = block.row[k][i % kResidualLanes];
   }
-  residual.b = {row[3][lane], row[7][lane]};
-  residual.d = row[11][lane];
-  return residual;
+  Add(row);
 }
 
 double ResidualSet::Evaluate(const Eigen::Vector3d& x, Norm norm) {
-  const int num_blocks = (size_ + kResidualLanes - 1) / kResidualLanes;
-  return EvaluateResiduals(blocks_.data(), num_blocks, norm.p, x.data(),
+  return EvaluateResiduals(blocks_.data(), num_blocks(), norm.p, x.data(),
                            values_.data());
 }
 

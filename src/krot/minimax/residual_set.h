@@ -15,14 +15,34 @@ class ResidualSet {
   // A row is a_1, b_1, a_2, b_2, c, d.
   void Add(const double row[kResidualRow]);
   void Add(const Residual& residual);
+  // Number i of `other`.
+  void AddFrom(const ResidualSet& other, int i);
 
   int size() const { return size_; }
-  Residual operator[](int i) const;
+  Residual operator[](int i) const {
+    const auto& row = blocks_[i / kResidualLanes].row;
+    const int lane = i % kResidualLanes;
+    Residual residual;
+    for (int k = 0; k < 3; ++k) {
+      residual.A(0, k) = row[k][lane];
+      residual.A(1, k) = row[4 + k][lane];
+      residual.c[k] = row[8 + k][lane];
+    }
+    residual.b = {row[3][lane], row[7][lane]};
+    residual.d = row[11][lane];
+    return residual;
+  }
 
   // max_i r_i(x), the cost; infinity unless all depths are positive, 0 if
   // empty. values()[i] is r_i(x) afterwards.
   double Evaluate(const Eigen::Vector3d& x, Norm norm);
   const double* values() const { return values_.data(); }
+
+  // In the layout of the kernel; the last block's idle lanes hold r = 0 / 1.
+  const ResidualBlock* blocks() const { return blocks_.data(); }
+  int num_blocks() const {
+    return (size_ + kResidualLanes - 1) / kResidualLanes;
+  }
 
  private:
   int size_ = 0;

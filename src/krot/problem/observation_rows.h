@@ -23,13 +23,16 @@ namespace internal {
 
 inline void AffineRow(const Observation& observation, const Eigen::Matrix3d& R,
                       const Eigen::Vector3d& o, double row[kResidualRow]) {
-  Eigen::Matrix<double, 3, 4> x_cam;  // columns: of x and of 1
-  x_cam << R, o;
-  const Eigen::Matrix<double, 2, 4> v =
-      observation.J *
-      (x_cam.topRows<2>() - observation.u * x_cam.bottomRows<1>());
-  Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> rows(row);
-  rows << v, x_cam.bottomRows<1>();
+  const Eigen::Matrix2d& J = observation.J;
+  const Eigen::Vector2d& u = observation.u;
+  for (int k = 0; k < 4; ++k) {  // columns: of x and of 1
+    const double* x_cam = k < 3 ? &R(0, k) : o.data();
+    const double v1 = x_cam[0] - u[0] * x_cam[2];
+    const double v2 = x_cam[1] - u[1] * x_cam[2];
+    row[k] = J(0, 0) * v1 + J(0, 1) * v2;
+    row[4 + k] = J(1, 0) * v1 + J(1, 1) * v2;
+    row[8 + k] = x_cam[2];
+  }
 }
 
 }  // namespace internal

@@ -9,6 +9,7 @@ namespace {
 // Points are many and small, frames few and large.
 constexpr int64_t kPointsPerChunk = 256;
 constexpr int64_t kFramesPerChunk = 1;
+constexpr int64_t kPrefetchAhead = 16;
 
 }  // namespace
 
@@ -18,7 +19,9 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
     : problem_(problem),
       cancel_(cancel),
       num_threads_(ResolveNumThreads(num_threads)),
-      descents_(num_threads_, FastDescent(options, norm)) {}
+      descents_(num_threads_, FastDescent(options, norm)),
+      point_active_(problem.num_points),
+      frame_active_(problem.num_frames) {}
 
 void BlockSweep::IntersectPoints(Estimate* estimate) {
   ParallelFor(problem_.num_points, kPointsPerChunk, num_threads_,
@@ -53,7 +56,7 @@ void BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
     IntersectionRow(view, observation, estimate->translations[view.frame], row);
     descent->residuals().Add(row);
   }
-  descent->Minimize(&estimate->points[k]);
+  descent->Minimize(goal_, &point_active_[k], &estimate->points[k]);
 }
 
 void BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
@@ -64,13 +67,19 @@ void BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
   double row[kResidualRow];
   descent->residuals().Clear();
   for (int64_t n = begin; n < end; ++n) {
+    // The observations of a frame lie far apart.
+    if (n + kPrefetchAhead < end) {
+      __builtin_prefetch(
+          &problem_
+               .observations[problem_.frame_observations[n + kPrefetchAhead]]);
+    }
     const Observation& observation =
         problem_.observations[problem_.frame_observations[n]];
     ResectionRow(problem_.views[observation.view], observation,
                  estimate->points[observation.point], row);
     descent->residuals().Add(row);
   }
-  descent->Minimize(&estimate->translations[f]);
+  descent->Minimize(goal_, &frame_active_[f], &estimate->translations[f]);
 }
 
 }  // namespace krot

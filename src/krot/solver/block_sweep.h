@@ -19,6 +19,9 @@ class BlockSweep {
              const FastDescentOptions& options, Norm norm, int num_threads,
              const CancelFlag* cancel);
 
+  // How far blocks go from now on; at first, to their optima.
+  void SetGoal(const DescentGoal& goal) { goal_ = goal; }
+
   // Line 3: every point's own optimum, the frames fixed: (Int_k) for all k.
   void IntersectPoints(Estimate* estimate);
 
@@ -32,7 +35,11 @@ class BlockSweep {
   const KnownRotationProblem& problem_;
   const CancelFlag* cancel_;
   int num_threads_;
+  DescentGoal goal_;
   std::vector<FastDescent> descents_;  // one per thread
+  // Every block's warm start.
+  std::vector<ActiveResiduals> point_active_;
+  std::vector<ActiveResiduals> frame_active_;
 };
 
 }  // namespace krot

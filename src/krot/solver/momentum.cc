@@ -47,14 +47,12 @@ Estimate Momentum::NextStart() {
 }
 
 void Momentum::Accept(const Estimate& reached, double cost) {
-  if (!(cost < best_cost_)) {
-    improvements_ = 0;
-    return;
-  }
+  const bool improves = cost < best_cost_;
+  improvements_ = improves ? improvements_ + 1 : 0;
+  if (!improves && cost != best_cost_) return;
   previous_ = std::move(best_);
   best_ = reached;
   best_cost_ = cost;
-  ++improvements_;
 }
 
 }  // namespace krot

@@ -22,7 +22,8 @@ class Momentum {
   // all depths stay positive.
   Estimate NextStart();
 
-  // Takes what the sweep from NextStart() has reached, if it is better.
+  // Takes what the sweep from NextStart() has reached, if it is no worse: one
+  // that leaves the cost where it is may still have moved other blocks.
   void Accept(const Estimate& reached, double cost);
 
   const Estimate& best() const { return best_; }

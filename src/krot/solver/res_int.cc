@@ -11,6 +11,10 @@
 namespace krot {
 namespace {
 
+// How far coarse sweeps take a block: see res_int.h.
+constexpr double kCoarseTolerance = 1e-3;
+constexpr double kCoarseLevel = 0.5;
+
 void CheckOptions(const ResIntOptions& options) {
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
   CheckArgument(options.max_sweeps >= 0, "max_sweeps", options.max_sweeps,
@@ -40,9 +44,15 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
                     options.num_threads, options.cancel);
   Momentum momentum(problem, options.norm, options.num_threads, *estimate,
                     summary.cost_initial);
+  bool is_coarse = !literal && options.update_frames;
   int idle_sweeps = 0;  // in a row
   for (int sweep = 1; sweep <= options.max_sweeps; ++sweep) {
-    Estimate current = literal ? momentum.best() : momentum.NextStart();
+    const bool is_last = sweep == options.max_sweeps;
+    Estimate current =
+        literal || is_last ? momentum.best() : momentum.NextStart();
+    const DescentGoal coarse_goal{kCoarseTolerance,
+                                  kCoarseLevel * momentum.best_cost()};
+    blocks.SetGoal(is_coarse && !is_last ? coarse_goal : DescentGoal{});
     blocks.IntersectPoints(&current);
     if (options.update_frames) blocks.ResectFrames(&current);
     if (IsCancelled(options.cancel)) {
@@ -58,6 +68,10 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
     const bool idle =
         cost_before - cost <= options.sweep_tolerance * cost_before;
     idle_sweeps = idle ? idle_sweeps + 1 : 0;
+    if (is_coarse && idle_sweeps == patience) {
+      is_coarse = false;
+      idle_sweeps = 0;
+    }
     if (idle_sweeps == patience || cost == 0) {
       summary.termination = ResIntTermination::kStalled;
       break;

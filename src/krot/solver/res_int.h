@@ -13,7 +13,11 @@ namespace krot {
 // Resection-Intersection [Zhang18, Alg. 1]: sweeps that minimise every
 // point's own maximum residual with the frames fixed, then every frame's with
 // the points fixed. With `paper` settings of the descent the sweeps are the
-// paper's; with `fast` ones they have momentum (momentum.h).
+// paper's; with `fast` ones they have momentum (momentum.h), and are coarse
+// until they would stop: a block whose maximum is below half of the cost stays
+// where it is, any other ends with the step that promises less than 1e-3 of
+// its maximum. From then on, and in the last of `max_sweeps`, every block goes
+// to its optimum.
 //
 // The result is a fixed point of such sweeps at best. That need not be the
 // optimum, whatever the paper says (docs/method.md).
