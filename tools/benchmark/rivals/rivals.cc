@@ -1,6 +1,8 @@
+#include "tools/benchmark/known_rotation_solver.h"
 #include "tools/benchmark/rivals/bisection.h"
 #include "tools/benchmark/rivals/dai.h"
 #include "tools/benchmark/rivals/dinkelbach.h"
+#include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/rivals/gugat.h"
 #include "tools/benchmark/rivals/polyhedron_collapse.h"
 #include "tools/benchmark/rivals/proximal_splitting.h"
@@ -19,6 +21,15 @@ std::vector<std::unique_ptr<SubproblemSolver>> RivalSolvers(Norm norm) {
   } else {
     solvers.push_back(MakePolyhedronCollapse());
   }
+  return solvers;
+}
+
+std::vector<std::unique_ptr<KnownRotationSolver>> RivalFullSolvers(
+    int num_threads) {
+  std::vector<std::unique_ptr<KnownRotationSolver>> solvers;
+  solvers.push_back(MakeFullGugat());
+  solvers.push_back(MakeFullProximalSplitting(num_threads));
+  solvers.push_back(MakeLeastSquares(num_threads));
   return solvers;
 }
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include "tools/benchmark/benchmark_model.h"
+
+namespace krot {
+
+// The sizes of [Zhang18, Tab. 2].
+struct ModelSize {
+  const char* name;
+  int num_frames;
+  int num_points;
+  int64_t num_observations;
+};
+
+inline constexpr ModelSize kPaperSizes[] = {
+    {"House (S)", 12, 2174, 12037},   {"Lund (S)", 17, 2873, 13629},
+    {"Yard", 133, 23674, 321554},     {"Tower", 172, 14828, 169618},
+    {"UWO (L)", 692, 97326, 1324698}, {"Lund (L)", 1208, 103940, 2002637},
+};
+inline constexpr int kNumPaperSizes = 6;
+
+// A synthetic model of about that size (its tracks are random), named
+// "synthetic House (S)": a street, as what is photographed in so many images is
+// seen by few of them at a time; an orbit up to 20 frames. Pinhole cameras,
+// noise of 1 pixel, a start off the truth by a percent of the viewing distance.
+BenchmarkModel SyntheticModel(const ModelSize& size, uint64_t seed);
+
+}  // namespace krot
