@@ -21,17 +21,24 @@ SKIPPED = 77
 HOSTILE_NAME = """</script><b id="injected">&lt;it's "quoted" \\u003c"""
 
 
-# Has the view drawn anew, and reads it in the same frame: later it is gone.
-REDRAW = """
+# Has the view drawn anew, once it has its size, and reads it in the same frame,
+# since later it is gone. `copy`: a canvas with what it shows.
+COPY = """
 const canvas = document.querySelector('#scene canvas');
-document.querySelector('#scene input[type=range]')
-    .dispatchEvent(new Event('input'));
-const redrawn = new Promise((resolve) => requestAnimationFrame(resolve));
-"""
-PICTURE = REDRAW + "return redrawn.then(() => canvas.toDataURL());"
-DRAWN = REDRAW + """
-const what = arguments[0];
+const slider = document.querySelector('#scene input[type=range]');
+const frame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+await frame();
+slider.dispatchEvent(new Event('input'));
+await frame();
 const { width, height } = canvas;
+const copy = document.createElement('canvas');
+Object.assign(copy, { width, height });
+const context = copy.getContext('2d');
+context.drawImage(canvas, 0, 0);
+"""
+PICTURE = COPY + "return copy.toDataURL();"
+DRAWN = COPY + """
+const what = arguments[0];
 const style = getComputedStyle(document.documentElement);
 const isColor = (pixel, name) => {
   const hex = style.getPropertyValue(name).trim();
@@ -41,18 +48,14 @@ const isColor = (pixel, name) => {
 const isWanted = (pixel) => pixel[3] > 128 && (what === 'a point' ?
     !isColor(pixel, '--after') && !isColor(pixel, '--mark') :
     isColor(pixel, what));
-return redrawn.then(() => {
-  const copy = new OffscreenCanvas(width, height).getContext('2d');
-  copy.drawImage(canvas, 0, 0);
-  const { data } = copy.getImageData(0, 0, width, height);
-  const places = [];
-  for (let i = 0; i < data.length; i += 4) {
-    if (!isWanted(data.subarray(i, i + 4))) continue;
-    places.push([Math.floor((i / 4) % width - width / 2),
-                 Math.floor(i / 4 / width - height / 2)]);
-  }
-  return places;
-});
+const { data } = context.getImageData(0, 0, width, height);
+const places = [];
+for (let i = 0; i < data.length; i += 4) {
+  if (!isWanted(data.subarray(i, i + 4))) continue;
+  places.push([Math.floor((i / 4) % width - width / 2),
+               Math.floor(i / 4 / width - height / 2)]);
+}
+return places;
 """
 
 

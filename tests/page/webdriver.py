@@ -80,10 +80,11 @@ class Browser:
         self._request("POST", "/url", {"url": url})
 
     def run(self, script, *arguments):
-        """The value of a function body; `arguments[i]` are its arguments. A
-        promise is waited for."""
-        return self._request("POST", "/execute/sync",
-                             {"script": script, "args": list(arguments)})
+        """The value of the body of an async function, of which `arguments` are
+        the arguments."""
+        body = "return (async function () {%s}).apply(null, arguments)"
+        return self._request("POST", "/execute/sync", {
+            "script": body % script, "args": list(arguments)})
 
     def text(self, selector):
         return self.run(
