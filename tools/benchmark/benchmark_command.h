@@ -9,5 +9,8 @@ namespace krot {
 // code or throw what krot_benchmark.cc turns into one.
 int RunTriangulationBenchmark(const std::vector<std::string>& arguments);
 int RunKnownRotationBenchmark(const std::vector<std::string>& arguments);
+int RunSweepBenchmark(const std::vector<std::string>& arguments);
+int RunScalingBenchmark(const std::vector<std::string>& arguments);
+int RunJointBenchmark(const std::vector<std::string>& arguments);
 
 }  // namespace krot

@@ -26,6 +26,10 @@ constexpr Command kCommands[] = {
      &RunTriangulationBenchmark},
     {"known_rotation", "the whole problem against its rivals [Tab. 2]",
      &RunKnownRotationBenchmark},
+    {"sweep", "the cost of a sweep per observation, and its floor",
+     &RunSweepBenchmark},
+    {"scaling", "cost per observation as models grow", &RunScalingBenchmark},
+    {"joint", "krot solver against colmap bundle_adjuster", &RunJointBenchmark},
 };
 
 void PrintHelp() {

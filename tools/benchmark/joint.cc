@@ -1,0 +1,153 @@
+// krot_benchmark joint: `krot solver` to a certified gap against COLMAP's
+// `bundle_adjuster`, start to exit, on the same models in the same run.
+
+#include <algorithm>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "krot/base/parallel_for.h"
+#include "tools/benchmark/benchmark_command.h"
+#include "tools/benchmark/benchmark_model.h"
+#include "tools/benchmark/benchmark_report.h"
+#include "tools/benchmark/process.h"
+#include "tools/benchmark/timing.h"
+#include "tools/command_error.h"
+
+namespace krot {
+namespace {
+
+struct JointBenchmarkOptions {
+  BenchmarkOptions common;
+  std::string krot_path;
+  std::string colmap_path = "colmap";
+  std::string method = "auto";
+  double relative_gap = 1e-4;
+  int num_threads = -1;
+};
+
+// What krot's report says of its last run.
+struct Proof {
+  double cost = 0;
+  bool is_reached = false;
+  size_t iterations = 0;
+};
+
+Proof ReadProof(const std::string& report_path, double relative_gap) {
+  std::ifstream stream(report_path);
+  const auto json = nlohmann::json::parse(stream);
+  Proof proof;
+  proof.cost = json.at("cost_final");
+  proof.iterations = json.at("iterations").size();
+  proof.is_reached = json.at("certified").get<bool>() &&
+                     json.at("relative_gap").get<double>() <= relative_gap;
+  return proof;
+}
+
+struct Race {
+  std::vector<double> krot_seconds;
+  std::vector<double> colmap_seconds;  // empty: it failed
+  Proof proof;
+};
+
+Race RunRace(const JointBenchmarkOptions& options, const std::string& path) {
+  const ScratchFolder folder;
+  const std::string threads =
+      std::to_string(ResolveNumThreads(options.num_threads));
+  const std::vector<std::string> krot = {
+      options.krot_path,       "solver",
+      "--input_path",          path,
+      "--output_path",         folder / "krot",
+      "--overwrite",           "1",
+      "--log_level",           "0",
+      "--report_path",         folder / "report.json",
+      "--Solver.method",       options.method,
+      "--Solver.relative_gap", NumberText(options.relative_gap),
+      "--Solver.num_threads",  threads};
+  std::filesystem::create_directory(folder / "colmap");
+  const std::vector<std::string> colmap = {
+      options.colmap_path, "bundle_adjuster", "--input_path", path,
+      "--output_path",     folder / "colmap"};
+  Race race;
+  for (int repeat = 0; repeat < options.common.repeats; ++repeat) {
+    const ProcessResult ours = RunProcess(krot);
+    if (ours.exit_code != kExitDone) {
+      throw CommandError(kExitInternal,
+                         options.krot_path + " solver ended with exit code " +
+                             std::to_string(ours.exit_code) + " on " + path);
+    }
+    race.krot_seconds.push_back(ours.seconds);
+    const ProcessResult theirs = RunProcess(colmap);
+    if (theirs.exit_code == 0) race.colmap_seconds.push_back(theirs.seconds);
+  }
+  race.proof = ReadProof(folder / "report.json", options.relative_gap);
+  return race;
+}
+
+}  // namespace
+
+int RunJointBenchmark(const std::vector<std::string>& arguments) {
+  JointBenchmarkOptions options;
+  options.common.repeats = 3;
+  options.krot_path = SiblingExecutable("krot");
+  OptionParser parser = MakeBenchmarkParser(
+      "joint", "times krot solver against COLMAP's bundle_adjuster");
+  AddBenchmarkOptions(&options.common, &parser);
+  parser.AddPath("krot_path", &options.krot_path, false, "an executable",
+                 "The krot to run; by default the one beside this program");
+  parser.AddPath("colmap_path", &options.colmap_path, false, "an executable",
+                 "The colmap to run");
+  parser.AddChoice("method", &options.method, {"auto", "joint"},
+                   "krot's --Solver.method");
+  parser.AddReal("relative_gap", &options.relative_gap, Above(0.0),
+                 "The gap to prove");
+  parser.AddInteger("num_threads", &options.num_threads, AtLeast(-1),
+                    "krot's threads; -1 or 0: all. COLMAP takes all");
+  if (!parser.Parse(arguments)) {
+    PrintTable(options.common.log, parser.Help());
+    return kExitDone;
+  }
+  if (options.common.input_paths.empty()) {
+    throw OptionError("--input_path is required");
+  }
+  CheckReportPaths(options.common);
+  ResultTable table;
+  table.name = "joint";
+  table.caption = "Wall-clock seconds, start to exit: krot solver (" +
+                  options.method + ") to a certified gap of " +
+                  NumberText(options.relative_gap) +
+                  ", and colmap bundle_adjuster";
+  table.columns = {"model", "observations", "krot",        "colmap",
+                   "ratio", "maximum (px)", "gap reached", "iterations"};
+  std::vector<double> ratios;
+  for (const std::string& path : options.common.input_paths) {
+    LogLine(options.common.log, 1, path);
+    const BenchmarkModel model = ReadBenchmarkModel(path);
+    const Race race = RunRace(options, path);
+    const double ours = Median(race.krot_seconds);
+    Cell theirs = MissingCell();
+    Cell ratio = MissingCell();
+    if (!race.colmap_seconds.empty()) {
+      theirs = SizedCell(Median(race.colmap_seconds));
+      ratios.push_back(ours / Median(race.colmap_seconds));
+      ratio = SizedCell(ratios.back());
+    }
+    table.rows.push_back(
+        {TextCell(model.name),
+         CountCell(
+             static_cast<int64_t>(model.built.problem.observations.size())),
+         SizedCell(ours), theirs, ratio, RealCell(race.proof.cost, 4),
+         TextCell(race.proof.is_reached ? "yes" : "no"),
+         CountCell(static_cast<int64_t>(race.proof.iterations))});
+  }
+  if (!ratios.empty()) {
+    table.notes = {"Median ratio " + SizedCell(Median(ratios)).text + "."};
+  }
+  BenchmarkReport report;
+  report.command = "joint";
+  report.tables = {std::move(table)};
+  PublishReport(report, options.common);
+  return kExitDone;
+}
+
+}  // namespace krot
