@@ -72,7 +72,8 @@ TEST_P(Documentation, SaysWhatHelpSays) {
 
 INSTANTIATE_TEST_SUITE_P(Commands, Documentation,
                          ::testing::Values("solver", "point_triangulator",
-                                           "model_analyzer", "model_comparer",
+                                           "bundle_adjuster", "model_analyzer",
+                                           "model_comparer",
                                            "certificate_checker",
                                            "model_synthesizer"),
                          [](const auto& test) {

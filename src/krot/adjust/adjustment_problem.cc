@@ -148,14 +148,20 @@ ceres::Solver::Options AdjustmentSolverOptions(
     solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
     solver.preconditioner_type = ceres::SCHUR_JACOBI;
   }
-  std::vector<double*> all;
-  problem.GetParameterBlocks(&all);
+  // One group per camera: within a group Ceres goes by addresses, which for
+  // blocks of separate vectors differ from run to run.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (double* block : all) ordering->AddElementToGroup(block, 1);
-  for (Eigen::Vector3d& point : blocks->points) {
-    if (problem.HasParameterBlock(point.data())) {
-      ordering->AddElementToGroup(point.data(), 0);
+  const auto add = [&](double* block, int group) {
+    if (problem.HasParameterBlock(block)) {
+      ordering->AddElementToGroup(block, group);
     }
+  };
+  for (Eigen::Vector3d& point : blocks->points) add(point.data(), 0);
+  for (PoseBlock& frame : blocks->frames) add(frame.data(), 1);
+  for (PoseBlock& sensor : blocks->sensors) add(sensor.data(), 2);
+  int group = 3;
+  for (std::vector<double>& camera : blocks->cameras) {
+    add(camera.data(), group++);
   }
   solver.linear_solver_ordering = std::move(ordering);
   return solver;

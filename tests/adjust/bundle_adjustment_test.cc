@@ -1,0 +1,300 @@
+#include "krot/adjust/bundle_adjustment.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/model_error.h"
+#include "krot/model/validate.h"
+#include "krot/synthetic/scene.h"
+#include "tests/testing/model_matchers.h"
+
+namespace krot {
+namespace {
+
+SceneOptions SmallScene() {
+  SceneOptions options;
+  options.num_frames = 8;
+  options.num_points = 80;
+  options.track_length = 5;
+  options.pixel_noise = 0.5;
+  options.start_translation_noise = 0.003;
+  options.start_point_noise = 0.003;
+  options.rotation_noise_deg = 0.05;
+  options.random_seed = 5;
+  return options;
+}
+
+// Half the sum of the squared true errors, from scratch.
+double CostOf(const Model& model) {
+  double sum = 0;
+  for (const double error_px : PixelErrors(model, 1)) {
+    sum += error_px * error_px;
+  }
+  return sum / 2;
+}
+
+BundleAdjustmentOptions Exact() {
+  BundleAdjustmentOptions options;
+  options.function_tolerance = 0;
+  options.gradient_tolerance = 1e-7;
+  options.num_threads = 1;
+  return options;
+}
+
+BundleAdjustmentOptions RotationsFixed() {
+  BundleAdjustmentOptions options = Exact();
+  options.constant_rig_from_world_rotation = true;
+  options.refine_focal_length = false;
+  options.refine_extra_params = false;
+  return options;
+}
+
+// The textbook residual of a SIMPLE_RADIAL camera with a fixed rotation, for
+// automatic differentiation.
+struct FixedRotationResidual {
+  Eigen::Matrix3d R;
+  std::vector<double> camera;
+  Eigen::Vector2d pixel;
+
+  template <typename T>
+  bool operator()(const T* translation, const T* point, T* residual) const {
+    T x[3];
+    for (int i = 0; i < 3; ++i) {
+      x[i] = translation[i] + R(i, 0) * point[0] + R(i, 1) * point[1] +
+             R(i, 2) * point[2];
+    }
+    const T u = x[0] / x[2], v = x[1] / x[2];
+    const T stretch = T(1) + camera[3] * (u * u + v * v);
+    residual[0] = camera[0] * stretch * u + camera[1] - pixel.x();
+    residual[1] = camera[0] * stretch * v + camera[2] - pixel.y();
+    return true;
+  }
+};
+
+double IndependentFixedRotationCost(const Model& model,
+                                    ceres::LossFunction* loss) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const auto image_indices = ImageIndices(model);
+  std::vector<Eigen::Vector3d> translations, points;
+  for (const ImageGeometry& geometry : geometries) {
+    translations.push_back(geometry.cam_from_world_translation);
+  }
+  ceres::Problem::Options problem_options;
+  problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(problem_options);
+  for (const Point3D& point : model.points3D) points.push_back(point.xyz);
+  for (size_t k = 0; k < points.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      const int32_t n = image_indices.at(element.image_id);
+      const Point2D& pixel = model.images[n].points2D[element.point2D_idx];
+      problem.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<FixedRotationResidual, 2, 3, 3>(
+              new FixedRotationResidual{
+                  geometries[n].cam_from_world_rotation,
+                  model.cameras[geometries[n].camera].params,
+                  {pixel.x, pixel.y}}),
+          loss, translations[n].data(), points[k].data());
+    }
+  }
+  problem.SetParameterBlockConstant(translations[0].data());
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-15;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  return summary.final_cost;
+}
+
+TEST(AdjustBundle, WithFixedRotationsEndsWhereAnIndependentProblemDoes) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  const BundleAdjustmentResult result = AdjustBundle(model, RotationsFixed());
+  const double expected = IndependentFixedRotationCost(model, nullptr);
+  EXPECT_NEAR(result.summary.cost_final, expected, 1e-8 * expected);
+  EXPECT_NEAR(CostOf(result.model), expected, 1e-8 * expected);
+  EXPECT_LT(*result.summary.stationarity, 1e-9);
+  for (size_t f = 0; f < model.frames.size(); ++f) {
+    EXPECT_EQ(result.model.frames[f].rig_from_world.quaternion_wxyz,
+              model.frames[f].rig_from_world.quaternion_wxyz);
+  }
+}
+
+TEST(AdjustBundle, WithARobustLossEndsWhereAnIndependentProblemDoes) {
+  SceneOptions scene = SmallScene();
+  scene.outlier_ratio = 0.02;
+  const Model model = SynthesizeScene(scene).model;
+  BundleAdjustmentOptions options = RotationsFixed();
+  options.max_num_iterations = 300;
+  const auto expect_same = [&](RobustLoss kind, ceres::LossFunction* loss) {
+    options.loss = kind;
+    options.loss_scale = 2;
+    const double expected = IndependentFixedRotationCost(model, loss);
+    EXPECT_NEAR(AdjustBundle(model, options).summary.cost_final, expected,
+                1e-4 * expected);
+  };
+  ceres::HuberLoss huber(2);
+  ceres::SoftLOneLoss soft_l1(2);
+  expect_same(RobustLoss::kHuber, &huber);
+  expect_same(RobustLoss::kSoftL1, &soft_l1);
+}
+
+TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {
+  for (int id = 0; id < 17; ++id) {
+    SCOPED_TRACE(id);
+    SceneOptions scene = SmallScene();
+    scene.camera_model_id = id;
+    scene.sensors_per_rig = 2;
+    scene.pixel_noise = 0;
+    const Model model = SynthesizeScene(scene).model;
+    EXPECT_GT(CostOf(model), 10);
+    const BundleAdjustmentResult result = AdjustBundle(model, Exact());
+    EXPECT_LT(CostOf(result.model), 1e-6);
+    ValidateModel(result.model);
+  }
+}
+
+TEST(AdjustBundle, LeavesTheBitsOfWhatIsHeldStill) {
+  SceneOptions scene = SmallScene();
+  scene.sensors_per_rig = 2;
+  const Model model = SynthesizeScene(scene).model;
+  BundleAdjustmentOptions options = Exact();
+  options.refine_rig_from_world = false;
+  options.refine_sensor_from_rig = false;
+  options.refine_focal_length = false;
+  options.refine_extra_params = false;
+  const Model points_only = AdjustBundle(model, options).model;
+  EXPECT_LT(CostOf(points_only), CostOf(model));
+  Ignoring ignoring;
+  ignoring.coordinates = true;
+  EXPECT_EQ(ModelComparison(ignoring).FirstDifference(model, points_only), "");
+
+  options.refine_points3D = false;
+  const BundleAdjustmentResult nothing = AdjustBundle(model, options);
+  EXPECT_EQ(nothing.summary.termination,
+            BundleAdjustmentTermination::kNothingToAdjust);
+  EXPECT_EQ(ModelComparison({}).FirstDifference(model, nothing.model), "");
+}
+
+TEST(AdjustBundle, RefinesOneGroupOfIntrinsicsAtATime) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  for (int group = 0; group < 3; ++group) {
+    BundleAdjustmentOptions options = Exact();
+    options.refine_focal_length = group == 0;
+    options.refine_principal_point = group == 1;
+    options.refine_extra_params = group == 2;
+    const std::vector<double> before = model.cameras[0].params;
+    const std::vector<double> after =
+        AdjustBundle(model, options).model.cameras[0].params;
+    // SIMPLE_RADIAL: f, cx, cy, k
+    const std::vector<bool> may_move = {group == 0, group == 1, group == 1,
+                                        group == 2};
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_EQ(after[i] != before[i], may_move[i]) << group << ", " << i;
+    }
+  }
+}
+
+TEST(AdjustBundle, LeavesShortTracksAndEmptyImagesWhereTheyAre) {
+  Model model = SynthesizeScene(SmallScene()).model;
+  // The first point keeps one observation.
+  Point3D& point = model.points3D[0];
+  for (uint64_t e = point.track_begin + 1; e < point.track_end; ++e) {
+    const TrackElement& element = model.track_elements[e];
+    for (Image& image : model.images) {
+      if (image.id != element.image_id) continue;
+      image.points2D[element.point2D_idx].point3D_id = kInvalidPoint3DId;
+    }
+  }
+  const uint64_t removed = point.track_end - point.track_begin - 1;
+  model.track_elements.erase(
+      model.track_elements.begin() + point.track_begin + 1,
+      model.track_elements.begin() + point.track_end);
+  point.track_end -= removed;
+  for (size_t k = 1; k < model.points3D.size(); ++k) {
+    model.points3D[k].track_begin -= removed;
+    model.points3D[k].track_end -= removed;
+  }
+  ValidateModel(model);
+  const BundleAdjustmentResult result = AdjustBundle(model, Exact());
+  EXPECT_EQ(result.summary.num_short_track, 1);
+  EXPECT_EQ(result.model.points3D[0].xyz, model.points3D[0].xyz);
+  EXPECT_EQ(result.model.points3D.size(), model.points3D.size());
+}
+
+TEST(AdjustBundle, LeavesOutWhatIsBehindItsCamera) {
+  Model model = SynthesizeScene(SmallScene()).model;
+  model.points3D[0].xyz *= -1e3;
+  const int64_t num_behind =
+      static_cast<int64_t>(Summarize(PixelErrors(model, 1)).not_finite);
+  ASSERT_GT(num_behind, 0);
+  EXPECT_EQ(AdjustBundle(model, Exact()).summary.num_behind, num_behind);
+}
+
+TEST(AdjustBundle, GivesTheSameBitsAgainOnOneThread) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model a = AdjustBundle(model, Exact()).model;
+  const Model b = AdjustBundle(model, Exact()).model;
+  EXPECT_EQ(ModelComparison({}).FirstDifference(a, b), "");
+}
+
+TEST(AdjustBundle, ReachesTheSameCostWithEveryLinearSolver) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  BundleAdjustmentOptions options = Exact();
+  const BundleAdjustmentSummary dense = AdjustBundle(model, options).summary;
+  EXPECT_EQ(dense.linear_solver, "dense_schur");
+  options.max_num_images_direct_dense = 0;
+  const BundleAdjustmentSummary sparse = AdjustBundle(model, options).summary;
+  EXPECT_EQ(sparse.linear_solver, "sparse_schur");
+  options.max_num_images_direct_sparse = 0;
+  const BundleAdjustmentSummary iterative =
+      AdjustBundle(model, options).summary;
+  EXPECT_EQ(iterative.linear_solver, "iterative_schur");
+  EXPECT_NEAR(sparse.cost_final, dense.cost_final, 1e-7 * dense.cost_final);
+  EXPECT_NEAR(iterative.cost_final, dense.cost_final, 1e-5 * dense.cost_final);
+}
+
+TEST(AdjustBundle, StopsWhenCancelled) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  BundleAdjustmentOptions options = Exact();
+  CancelFlag cancel{false};
+  options.cancel = &cancel;
+  int num_calls = 0;
+  options.callback = [&](const BundleAdjustmentIteration&) {
+    if (++num_calls == 2) cancel = true;
+  };
+  const BundleAdjustmentResult result = AdjustBundle(model, options);
+  EXPECT_EQ(result.summary.termination,
+            BundleAdjustmentTermination::kInterrupted);
+  EXPECT_EQ(num_calls, 2);
+  EXPECT_LT(CostOf(result.model), CostOf(model));
+}
+
+TEST(AdjustBundle, RefusesPanoramasAndOptionsOutOfRange) {
+  Model model = SynthesizeScene(SmallScene()).model;
+  BundleAdjustmentOptions options;
+  options.loss_scale = 0;
+  EXPECT_THROW(AdjustBundle(model, options), std::invalid_argument);
+  options = {};
+  options.max_error = 3;
+  options.loss = RobustLoss::kHuber;
+  EXPECT_THROW(AdjustBundle(model, options), std::invalid_argument);
+  model.cameras[0].model_id = 17;
+  model.cameras[0].params = {1024, 512};
+  EXPECT_THROW(AdjustBundle(model, {}), ModelError);
+}
+
+}  // namespace
+}  // namespace krot
