@@ -252,6 +252,85 @@ class PageTest(unittest.TestCase):
         return self.browser.run(DRAWN, what)
 
 
+class OtherCommandsTest(unittest.TestCase):
+    """The pages of the commands that solve nothing."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.root = pathlib.Path(folder.name)
+        run_krot("model_synthesizer", "--output_path", cls.root / "input",
+                 "--ground_truth_path", cls.root / "truth",
+                 "--Scene.num_frames", 8, "--Scene.num_points", 60,
+                 "--Scene.pixel_noise", 1, "--Scene.start_point_noise", 0.002)
+        cls.browser = cls.enterClassContext(webdriver.Browser())
+
+    def open_page_of(self, *arguments):
+        page = self.root / "page.html"
+        report = self.root / "report.json"
+        run_krot(*arguments, "--html_path", page, "--report_path", report)
+        self.browser.open(page.as_uri())
+        self.assertEqual(self.browser.console(), [])
+        return json.loads(report.read_text())
+
+    def assert_errors_are(self, before, after):
+        for end, errors in (("before", before), ("after", after)):
+            for key in ("max", "p99", "mean", "rms"):
+                self.assertEqual(self.browser.text(f"#error-{key}-{end}"),
+                                 pixels(errors[key]))
+
+    def test_bundle_adjuster_shows_how_both_errors_moved(self):
+        report = self.open_page_of(
+            "bundle_adjuster", "--input_path", self.root / "input",
+            "--output_path", self.root / "adjusted")
+        before, after = (report["pixel_error"][end]
+                         for end in ("before", "after"))
+        self.assertIn("error fell from %.4f px to %.4f px" %
+                      (before["rms"], after["rms"]),
+                      self.browser.text("#verdict"))
+        self.assert_errors_are(before, after)
+
+    def test_solver_shows_the_polished_model_where_that_is_written(self):
+        report = self.open_page_of(
+            "solver", "--input_path", self.root / "input", "--output_path",
+            self.root / "polished", "--Solver.polish", "rotations_fixed")
+        polished = report["polish"]["pixel_error"]
+        self.assertIn("polish by least squares: the largest error",
+                      self.browser.text("#verdict"))
+        self.assert_errors_are(report["pixel_error"]["before"], polished)
+        models = json.loads(self.browser.text("#krot-models"))
+        self.assertAlmostEqual(models["after"]["tail"][0][1], polished["max"],
+                               delta=1e-12)
+
+    def test_model_comparer_shows_both_models_and_their_differences(self):
+        report = self.open_page_of(
+            "model_comparer", "--input_path1", self.root / "input",
+            "--input_path2", self.root / "truth")
+        first, second = (report["pixel_error"][model]
+                         for model in ("model1", "model2"))
+        self.assertEqual(
+            self.browser.text("#verdict"),
+            "The largest error of model 1 is %.2f px, of model 2 %.2f px." %
+            (first["max"], second["max"]))
+        self.assert_errors_are(first, second)
+        shown = self.browser.texts("#differences td:nth-child(3)")
+        for text, key in zip(shown, ("rotation_deg", "center", "point")):
+            self.assertAlmostEqual(float(text), report[key]["max"],
+                                   delta=1e-3 * report[key]["max"])
+
+
+class PathTest(unittest.TestCase):
+    def test_page_does_not_take_the_place_of_the_report(self):
+        run = subprocess.run(
+            [KROT, "model_comparer", "--input_path1", ".", "--input_path2",
+             ".", "--html_path", "same", "--report_path", "same"],
+            capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 1)
+        self.assertIn("--html_path = same, must not be --report_path",
+                      run.stderr)
+
+
 def main():
     global KROT
     KROT = sys.argv.pop(1)

@@ -49,14 +49,17 @@ export function isMinimax(report) {
 
 // How the two models of a report are called.
 export function modelLabels(report) {
-  return isComparison(report) ? ['Model 1', 'Model 2'] : ['Before', 'After'];
+  if (isComparison(report)) return ['Model 1', 'Model 2'];
+  return ['Before', report.polish ? 'Polished' : 'After'];
 }
 
-// The statistics of the true errors of both.
+// The statistics of the true errors of both. What is written after a solve is
+// the polished model, if there was a polish.
 export function modelErrors(report) {
   const errors = report.pixel_error;
   return isComparison(report) ?
-    [errors.model1, errors.model2] : [errors.before, errors.after];
+    [errors.model1, errors.model2] :
+    [errors.before, report.polish?.pixel_error ?? errors.after];
 }
 
 export function findImage(model, name) {

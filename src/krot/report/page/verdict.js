@@ -31,9 +31,18 @@ function adjustmentVerdict(report, before, after) {
     `the largest error ${movement(before.max, after.max, 2)}${cap}.`;
 }
 
+// What least squares made of the solve's result.
+function polishSentence(report) {
+  if (!report.polish) return '';
+  return ` Then the polish by least squares: the largest error ${movement(
+    report.pixel_error.after.max, report.polish.pixel_error.max, 2)}.`;
+}
+
 // What came of it, in a sentence or two, without more than is known.
 export function verdict(report) {
-  const [before, after] = modelErrors(report);
+  const [before, after] = isMinimax(report) ?
+    [report.pixel_error.before, report.pixel_error.after] :
+    modelErrors(report);
   if (before.max === null || after.max === null) {
     return 'There is no observation with an error to compare.';
   }
@@ -43,8 +52,8 @@ export function verdict(report) {
   }
   if (!isMinimax(report)) return adjustmentVerdict(report, before, after);
   const sentence = `The largest error ${movement(before.max, after.max, 2)}`;
-  if (report.certified) return sentence + proof(report);
-  return `${sentence}; whether it can be lower was not proved.`;
+  return sentence + (report.certified ? proof(report) :
+    '; whether it can be lower was not proved.') + polishSentence(report);
 }
 
 // What the verdict holds for.
