@@ -1,0 +1,156 @@
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "tests/cli/colmap.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+namespace krot {
+namespace {
+
+using Words = std::vector<std::string>;
+using Json = nlohmann::json;
+
+class BundleAdjuster : public ::testing::Test {
+ protected:
+  BundleAdjuster() { Save(SmallLegacyModel(), folder_ / "input"); }
+
+  KrotResult Adjust(const Words& more) const {
+    Words words = {"bundle_adjuster",
+                   "--input_path",
+                   folder_ / "input",
+                   "--output_path",
+                   folder_ / "output",
+                   "--overwrite",
+                   "1",
+                   "--report_path",
+                   folder_ / "report.json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return RunKrot(words);
+  }
+
+  Json Report() const {
+    return Json::parse(ReadBytes(folder_ / "report.json"));
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(BundleAdjuster, LowersTheRmsErrorAndReportsIt) {
+  const KrotResult result = Adjust({});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("Converged after"));
+  EXPECT_THAT(result.err, ::testing::HasSubstr("iteration 1: cost "));
+  const Json report = Report();
+  EXPECT_EQ(report["termination"], "converged");
+  const PixelErrorStatistics errors =
+      Summarize(PixelErrors(Load(folder_ / "output")));
+  EXPECT_NEAR(report["pixel_error"]["after"]["rms"], errors.rms, 1e-12);
+  EXPECT_LT(report["pixel_error"]["after"]["rms"],
+            report["pixel_error"]["before"]["rms"]);
+  EXPECT_TRUE(report["max_error"].is_null());
+}
+
+TEST_F(BundleAdjuster, AgreesWithColmap) {
+  if (!HasColmap()) GTEST_SKIP() << "no colmap";
+  ASSERT_EQ(Adjust({}).exit_code, 0);
+  const double ours = Report()["cost_final"];
+  std::filesystem::create_directory(folder_ / "colmap");
+  ASSERT_TRUE(RunColmap({"bundle_adjuster", "--input_path", folder_ / "input",
+                         "--output_path", folder_ / "colmap"},
+                        folder_ / "log"));
+  const PixelErrorStatistics theirs =
+      Summarize(PixelErrors(Load(folder_ / "colmap")));
+  const double cost =
+      theirs.rms * theirs.rms / 2 * static_cast<double>(theirs.count);
+  EXPECT_NEAR(ours, cost, 1e-3 * cost);
+}
+
+TEST_F(BundleAdjuster, StaysBelowACapThatIsAFactor) {
+  const KrotResult result =
+      Adjust({"--BundleAdjustment.max_error_factor", "1.1"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Report();
+  EXPECT_EQ(report["termination"], "cap_converged");
+  EXPECT_NEAR(report["max_error"],
+              1.1 * report["pixel_error"]["start"]["max"].get<double>(), 1e-12);
+  const PixelErrorStatistics errors =
+      Summarize(PixelErrors(Load(folder_ / "output")));
+  EXPECT_LT(errors.max, report["max_error"]);
+}
+
+TEST_F(BundleAdjuster, SaysWhichBoundForbidsACap) {
+  const KrotResult result =
+      Adjust({"--BundleAdjustment.max_error", "0.01", "--log_level", "0"});
+  EXPECT_EQ(result.exit_code, 7);
+  EXPECT_THAT(result.err, IsOneSentence("krot bundle_adjuster",
+                                        "it is proved that none is below"));
+  EXPECT_EQ(FileNames(folder_.path()), (Words{"input"}));
+}
+
+TEST_F(BundleAdjuster, HasNothingToAdjustWhereAllIsHeldStill) {
+  const KrotResult result =
+      Adjust({"--BundleAdjustment.refine_extrinsics", "0",
+              "--BundleAdjustment.refine_points3D", "0",
+              "--BundleAdjustment.refine_focal_length", "0",
+              "--BundleAdjustment.refine_extra_params", "0"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, IsOneSentence("krot bundle_adjuster",
+                                        "everything is held still"));
+}
+
+TEST_F(BundleAdjuster, RefusesOptionsOutOfRangeAndThatContradictEachOther) {
+  const std::string cap = "--BundleAdjustment.max_error";
+  const std::string ceres = "--BundleAdjustmentCeres.";
+  const std::vector<std::pair<Words, std::string>> wrong = {
+      {{cap, "0"}, "must be a number > 0, pixels"},
+      {{cap + "_factor", "1"}, "must be a number > 1"},
+      {{cap, "3", cap + "_factor", "2"}, "are the same; give one"},
+      {{cap, "3", ceres + "loss_function_type", "HUBER"}, "TRIVIAL"},
+      {{ceres + "loss_function_type", "TUKEY"}, "must be one of"},
+      {{ceres + "loss_function_scale", "2"}, "has no effect"},
+      {{ceres + "max_num_iterations", "3",
+        "--BundleAdjustment.max_num_iterations", "3"},
+       "are the same; give one"},
+      {{"--BundleAdjustment.refine_extrinsics", "0",
+        "--BundleAdjustment.refine_rig_from_world", "0"},
+       "are the same; give one"},
+      {{"--BundleAdjustment.refine_rig_from_world", "0",
+        "--BundleAdjustment.constant_rig_from_world_rotation", "1"},
+       "has no effect"},
+      {{"--BundleAdjustment.min_track_length", "0"}, "must be"},
+      {{ceres + "num_threads", "0"}, "must be"},
+  };
+  for (const auto& [options, part] : wrong) {
+    SCOPED_TRACE(options[0]);
+    const KrotResult result = Adjust(options);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, IsOneSentence("krot bundle_adjuster", part));
+  }
+  EXPECT_EQ(FileNames(folder_.path()), (Words{"input"}));
+}
+
+TEST_F(BundleAdjuster, PolishesWhatTheSolverFound) {
+  for (const char* kind : {"rotations_fixed", "full"}) {
+    const KrotResult result =
+        RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
+                 folder_ / "output", "--overwrite", "1", "--report_path",
+                 folder_ / "report.json", "--Solver.polish", kind});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, ::testing::HasSubstr("polished"));
+    const Json report = Report();
+    const PixelErrorStatistics errors =
+        Summarize(PixelErrors(Load(folder_ / "output")));
+    EXPECT_EQ(report["polish"]["polish"], kind);
+    EXPECT_NEAR(report["polish"]["pixel_error"]["rms"], errors.rms, 1e-12);
+    EXPECT_LT(errors.rms, report["pixel_error"]["after"]["rms"]);
+    EXPECT_GT(errors.max, report["lower_bound"]);
+  }
+}
+
+}  // namespace
+}  // namespace krot
