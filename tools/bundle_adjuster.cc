@@ -2,7 +2,6 @@
 #include <utility>
 #include <vector>
 
-#include "krot/adjust/ceres_log.h"
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/pipeline/adjust_model.h"
@@ -114,7 +113,6 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
     PrintTable(common.log, parser.Help());
     return kExitDone;
   }
-  SilenceCeres();
   return Run(paths, common, options.Resolve(parser));
 }
 
