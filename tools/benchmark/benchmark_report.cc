@@ -11,7 +11,8 @@ Json ToJson(const Machine& machine) {
   return {{"cpu", machine.cpu},
           {"cores", machine.cores},
           {"compiler", machine.compiler},
-          {"flags", machine.flags}};
+          {"flags", machine.flags},
+          {"load", machine.load}};
 }
 
 std::string Print(const BenchmarkReport& report, const Machine& machine,
@@ -21,8 +22,11 @@ std::string Print(const BenchmarkReport& report, const Machine& machine,
   for (const ResultTable& table : report.tables) {
     text += (is_markdown ? ToMarkdown(table) : ToText(table)) + "\n";
   }
-  return text + "Medians of " + std::to_string(options.repeats) +
-         " interleaved runs on " + MachineLine(machine) + ".\n";
+  const std::string runs =
+      options.repeats == 1 ? "Single runs"
+                           : "Medians of " + std::to_string(options.repeats) +
+                                 " interleaved runs";
+  return text + runs + " on " + MachineLine(machine) + ".\n";
 }
 
 }  // namespace
@@ -35,7 +39,7 @@ void CheckReportPaths(const BenchmarkOptions& options) {
 
 void PublishReport(const BenchmarkReport& report,
                    const BenchmarkOptions& options) {
-  const Machine machine = ThisMachine();
+  const Machine machine = ThisMachine();  // under this benchmark's own load
   PrintTable(options.log, Print(report, machine, options));
   if (!options.report_path.empty()) {
     Json tables = Json::array();

@@ -45,7 +45,8 @@ std::vector<Standing> Compete(
     standing.name = solvers[s]->Name();
     standing.seconds = seconds[s] / count;
     for (size_t i = 0; i < instances.size(); ++i) {
-      const double excess = lowest[i] > 0 ? costs[s][i] / lowest[i] - 1 : 0;
+      const double excess =
+          (costs[s][i] - lowest[i]) / std::max(lowest[i], kSmallCost);
       standing.max_excess = std::max(standing.max_excess, excess);
       standing.mean_excess += excess / count;
     }

@@ -12,10 +12,15 @@ namespace krot {
 struct Standing {
   std::string name;
   double seconds = 0;  // per instance: median over rounds of the mean
-  // How far its costs are above the lowest of any solver, relative.
+  // How far its costs are above the lowest of any solver, relative to that or
+  // to kSmallCost, whichever is larger.
   double max_excess = 0;
   double mean_excess = 0;
 };
+
+// Below this, pixels, costs are compared absolutely: many a track of two or
+// three rays can be met exactly.
+inline constexpr double kSmallCost = 1e-3;
 
 // A cost this little above the lowest, relative, is the same optimum.
 inline constexpr double kSameOptimum = 1e-5;

@@ -1,5 +1,7 @@
 #include "tools/benchmark/machine.h"
 
+#include <stdlib.h>
+
 #include <fstream>
 
 #include "krot/base/parallel_for.h"
@@ -32,12 +34,14 @@ Machine ThisMachine() {
   machine.compiler = "GCC " __VERSION__;
 #endif
   machine.flags = KROT_BUILD_FLAGS;
+  getloadavg(&machine.load, 1);
   return machine;
 }
 
 std::string MachineLine(const Machine& machine) {
-  return machine.cpu + ", " + Counted(machine.cores, "core") + "; " +
-         machine.compiler + ", " + machine.flags;
+  return machine.cpu + ", " + Counted(machine.cores, "core") + ", load " +
+         FormatNumber(machine.load, 1) + "; " + machine.compiler + ", " +
+         machine.flags;
 }
 
 }  // namespace krot

@@ -10,11 +10,12 @@ struct Machine {
   int cores = 0;    // hardware threads
   std::string compiler;
   std::string flags;  // of the build
+  double load = 0;    // runnable processes, mean of the last minute
 };
 
 Machine ThisMachine();
 
-// "AMD EPYC, 2 cores; GCC 12.2.0, -O3".
+// "AMD EPYC, 2 cores, load 1.0; GCC 12.2.0, Release".
 std::string MachineLine(const Machine& machine);
 
 }  // namespace krot

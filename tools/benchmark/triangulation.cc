@@ -125,7 +125,8 @@ void RunFigure4(const TriangulationOptions& options, Norm norm,
   ResultTable table;
   table.name = "figure4";
   table.caption =
-      "Microseconds per triangulation, random cameras, sigma = 5 "
+      "Microseconds of processor time per triangulation, random cameras, sigma "
+      "= 5 "
       "px, p = " +
       options.norm;
   table.columns = {"cameras"};
@@ -163,7 +164,9 @@ void RunTable1(const TriangulationOptions& options, Norm norm,
   ResultTable table;
   table.name = "table1";
   table.caption =
-      "Microseconds per triangulation of a model's points, p = " + options.norm;
+      "Microseconds of processor time per triangulation of a model's points, p "
+      "= " +
+      options.norm;
   table.columns = {"model", "points", "images", "measured", "mean L"};
   table.columns.insert(table.columns.end(), names.begin(), names.end());
   table.notes = {kMissNote};

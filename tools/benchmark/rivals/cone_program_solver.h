@@ -176,6 +176,10 @@ class ConeProgramSolver {
     }
     FindDirection(rho_, dual_residual, &dy);
     MaxSteps(1 / 0.99, &primal, &dual);
+    // One length for both until the dual is feasible: tau could run away.
+    if (dual_residual.template lpNorm<Eigen::Infinity>() > kDualTolerance) {
+      primal = dual = std::min(primal, dual);
+    }
     primal *= 0.99;
     dual *= 0.99;
     if (!dy.allFinite() || std::max(primal, dual) < kShortest) return false;
