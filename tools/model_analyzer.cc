@@ -1,6 +1,10 @@
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include "krot/analysis/error_colors.h"
+#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
@@ -17,6 +21,9 @@ struct AnalyzerOptions {
   std::string input_path;
   std::string report_path;
   std::string certificate_path;
+  std::string error_colors_path;
+  double error_colors_top = 4;
+  bool overwrite = false;
   int num_worst = 10;
   CommonOptions common;
 };
@@ -34,6 +41,15 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "a file",
                   "A certificate of this model: show what it proves, and the "
                   "observations that set the maximum");
+  parser->AddPath("error_colors_path", &options->error_colors_path, false,
+                  "a folder",
+                  "Where a copy of the model goes whose points are coloured by "
+                  "their largest error, for COLMAP's GUI; created if need be");
+  parser->AddReal("error_colors_top", &options->error_colors_top,
+                  Above(0.0, "pixels"),
+                  "The error from which on the copy's points are dark red; "
+                  "those without error are blue");
+  AddOverwrite(&options->overwrite, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
 }
@@ -49,6 +65,45 @@ std::string ModelPath(const AnalyzerOptions& options,
         "--path is required (krot model_analyzer -h lists the options)");
   }
   return parser.IsGiven("path") ? options.path : options.input_path;
+}
+
+WriteModelOptions CopyOptions(const AnalyzerOptions& options,
+                              const std::string& input_path) {
+  WriteModelOptions write_options;
+  write_options.overwrite = options.overwrite;
+  write_options.copy_project_from = input_path;
+  return write_options;
+}
+
+// What can be known before the model is read.
+void CheckPaths(const AnalyzerOptions& options, const std::string& input_path,
+                const OptionParser& parser) {
+  CheckSidePath("report_path", options.report_path, options.error_colors_path);
+  if (!options.error_colors_path.empty()) {
+    std::error_code error;
+    if (std::filesystem::equivalent(input_path, options.error_colors_path,
+                                    error)) {
+      throw OptionError("--error_colors_path = " + options.error_colors_path +
+                        ", must not be the model itself");
+    }
+    CheckModelWritable(options.error_colors_path,
+                       CopyOptions(options, input_path));
+    return;
+  }
+  for (const char* name : {"error_colors_top", "overwrite"}) {
+    if (!parser.IsGiven(name)) continue;
+    throw OptionError("--" + std::string(name) +
+                      " speaks of the copy; give --error_colors_path, too");
+  }
+}
+
+void WriteColoredCopy(const AnalyzerOptions& options,
+                      const std::string& input_path, Model model) {
+  const std::vector<double> errors_px = PixelErrors(model);
+  UpdatePointErrors(errors_px, &model);
+  ColorPointsByError(errors_px, options.error_colors_top, &model);
+  WriteModelTo(model, options.error_colors_path,
+               CopyOptions(options, input_path));
 }
 
 // What the certificate says of the model; "" if none is given.
@@ -76,10 +131,13 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   const std::string path = ModelPath(options, parser);
-  CheckSidePath("report_path", options.report_path);
+  CheckPaths(options, path, parser);
   const Model model = ReadValidModel(path);
   const std::string certificate = CertificateText(options, model);
   const ModelReport report = AnalyzeModel(model, options.num_worst);
+  if (!options.error_colors_path.empty()) {
+    WriteColoredCopy(options, path, model);
+  }
   if (!options.report_path.empty()) {
     WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));
   }

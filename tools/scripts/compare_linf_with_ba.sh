@@ -9,9 +9,9 @@
 #   --max_error_factor F  the cap of bounded bundle adjustment, as a multiple
 #                         of the lowest maximum; 1.1 if not given
 #
-# FOLDER takes the models (colmap_ba, linf, ba, ba_rotations, bounded), and in
-# FOLDER/reports what each command said and a report of each comparison. Results
-# already there are replaced. Needs colmap, jq and krot: the one that the
+# FOLDER takes the models (colmap_ba, ba, cauchy, ba_rotations, bounded, linf),
+# and in FOLDER/reports what each command said and a report of each comparison.
+# Results already there are replaced. Needs colmap, jq and krot: the one that the
 # environment's KROT names, that is built here, or that is installed.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/common.sh"
@@ -45,6 +45,7 @@ adjust colmap_ba colmap bundle_adjuster
 adjust linf "$krot" solver --overwrite 1 \
   --certificate_path "$reports/certificate.json"
 adjust ba "${krot_ba[@]}"
+adjust cauchy "${krot_ba[@]}" --BundleAdjustmentCeres.loss_function_type CAUCHY
 adjust ba_rotations "${krot_ba[@]}" \
   --BundleAdjustment.constant_rig_from_world_rotation 1 \
   --BundleAdjustment.refine_focal_length 0 \
@@ -77,6 +78,7 @@ printf '%-30s %8s %7s %7s %7s  %9s %9s %8s\n' \
 row "$input" input "input"
 row "$output/colmap_ba" colmap_ba "colmap bundle_adjuster"
 row "$output/ba" ba "bundle adjustment"
+row "$output/cauchy" cauchy "  Cauchy loss"
 row "$output/ba_rotations" ba_rotations "  rotations, intrinsics kept"
 row "$output/bounded" bounded "  bounded, $factor x the lowest"
 row "$output/linf" linf "lowest maximum"

@@ -25,8 +25,17 @@ for name in cameras images points3D; do
     [[ ! -e $model/$name.$type ]] || die "$model already holds $name.$type"
   done
 done
-mkdir -p "$model" || die "cannot write to $model"
-awk -v cameras="$model/cameras.txt" -v images="$model/images.txt" \
+for file in "${files[@]}"; do
+  [[ -s $file ]] || die "$file is empty"
+done
+
+# Complete, or not there.
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+export LC_ALL=C  # numbers with points
+awk -v cameras="$work/cameras.txt" -v images="$work/images.txt" \
   -f "$here/strecha_to_colmap.awk" "${files[@]}"
-: >"$model/points3D.txt"
+: >"$work/points3D.txt"
+mkdir -p "$model" || die "cannot write to $model"
+mv "$work"/*.txt "$model"
 echo "Wrote ${#files[@]} cameras to $model"
