@@ -11,20 +11,20 @@
 #include "krot/problem/components.h"
 #include "krot/problem/restrict.h"
 #include "krot/solver/certificate_input.h"
-#include "krot/solver/verified_solution.h"
+#include "krot/solver/verified_blocks.h"
+#include "krot/solver/verified_dense.h"
 
 // How (1) is proved. Let M = [A_i' lambda_i]_i, without the rows of one frame
 // per connected component: with R_f the frames' rotations, sum_f R_f' (rows of
 // t_f) = sum_k (rows of s_k) for A and c alike, as a translation moves nothing,
 // so these rows vanish once all others do. Let g be what the other rows of (1)
 // miss. With M a = -g (verified_solution.h), y_i + lambda_i a_i satisfies (1)
-// exactly; divided by rho = max_i (|y_i|_dual / lambda_i + |a_i|_dual) it is
-// dual feasible and proves delta / rho.
+// exactly; divided by rho = max_i |y_i|_dual / lambda_i + max_i |a_i|_dual it
+// is dual feasible and proves delta / rho.
 
 namespace krot {
 namespace {
 
-using Eigen::MatrixXd;
 using Real = long double;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Matrix23 = Eigen::Matrix<Real, 2, 3>;
@@ -33,9 +33,9 @@ using Vector3 = Eigen::Matrix<Real, 3, 1>;
 
 constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
 constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
-constexpr int64_t kMaxUnknowns = 6000;
 // Covers a few roundings of non-negative bounds, and their cast to double.
 constexpr double kOutward = 1 + 1e-9;
+constexpr double kRootTwo = 1.4142135623730952;  // above it
 // Smaller multipliers, relative, might underflow.
 constexpr double kSmallestShare = 1e-100;
 
@@ -54,6 +54,14 @@ Matrix23 NumeratorTerms(const Observation& observation) {
   return observation.J.cast<Real>().cwiseAbs() * rows;
 }
 
+// Three rows of g, what they may be wrong by, and the sums of their terms'
+// absolute values.
+struct RowsOfG {
+  Vector3 sum = Vector3::Zero();
+  Vector3 error = Vector3::Zero();
+  Vector3 terms = Vector3::Zero();
+};
+
 class Checker {
  public:
   Checker(const KnownRotationProblem& problem, Norm norm,
@@ -67,7 +75,7 @@ class Checker {
 
  private:
   std::optional<std::string> Restrict();
-  void NumberUnknowns();
+  void NumberFrames();
   UncertainSystem Assemble() const;
   // Of sums over the support, relative to the sum of absolute values: every
   // term goes through at most 12 roundings, and each sum adds one.
@@ -77,11 +85,6 @@ class Checker {
   std::optional<std::string> CheckConstants() const;
   void BoundRho();
 
-  // Calls visit(first row, R, error of R) for the two unknowns of observation
-  // i.
-  template <typename Visit>
-  void ForUnknowns(int64_t i, const Visit& visit) const;
-
   const KnownRotationProblem& whole_;
   const Norm norm_;
   const Certificate& certificate_;
@@ -90,10 +93,10 @@ class Checker {
   std::vector<Real> lambda_;  // of part_, scaled to a maximum in [1/2, 1)
   std::vector<Vector2> y_;
 
-  // The row of an unknown in (1); -1 for frames whose rows are omitted.
-  std::vector<int64_t> row_of_frame_;
-  int64_t num_rows_ = 0;
-  Eigen::VectorXd a_bound_;  // bounds |a|
+  // The number of a frame among those whose rows are not omitted; -1: omitted.
+  std::vector<int32_t> number_of_frame_;
+  int32_t num_numbered_ = 0;
+  double a_length_ = 0;  // bounds every |a_i|_2
   double rho_ = 0;
 };
 
@@ -116,38 +119,28 @@ std::optional<std::string> Checker::Restrict() {
                   std::ldexp(Real{o.y[1]}, -exponent)});
   }
   if (auto refusal = RefuseRotations(part_.problem)) return refusal;
-  NumberUnknowns();
-  if (num_rows_ > kMaxUnknowns) return "its support is too large to be checked";
-  if (num_rows_ > 2 * static_cast<int64_t>(lambda_.size())) {
+  NumberFrames();
+  if (num_numbered_ > kMaxVerifiedFrames) {
+    return "its support has too many frames to be checked";
+  }
+  if (3 * (int64_t{part_.problem.num_points} + num_numbered_) >
+      2 * static_cast<int64_t>(lambda_.size())) {
     return "its support is flexible: it has more unknowns than equations";
   }
   return std::nullopt;
 }
 
-void Checker::NumberUnknowns() {
+// Omits the first frame of every connected component.
+void Checker::NumberFrames() {
   const Components components = FindComponents(part_.problem);
-  num_rows_ = 3 * int64_t{part_.problem.num_points};
-  row_of_frame_.assign(part_.problem.num_frames, -1);
+  number_of_frame_.assign(part_.problem.num_frames, -1);
   int32_t num_seen = 0;  // components are numbered by their first frame
   for (int32_t f = 0; f < part_.problem.num_frames; ++f) {
     if (components.of_frame[f] == num_seen) {
       ++num_seen;
-      continue;
+    } else {
+      number_of_frame_[f] = num_numbered_++;
     }
-    row_of_frame_[f] = num_rows_;
-    num_rows_ += 3;
-  }
-}
-
-template <typename Visit>
-void Checker::ForUnknowns(int64_t i, const Visit& visit) const {
-  const Observation& observation = part_.problem.observations[i];
-  const View& view = part_.problem.views[observation.view];
-  visit(3 * int64_t{observation.point},
-        Matrix3(view.cam_from_world_rotation.cast<Real>()), kRotationError);
-  const int64_t row = row_of_frame_[view.frame];
-  if (row >= 0) {
-    visit(row, Matrix3(view.cam_from_rig_rotation.cast<Real>()), 0.0);
   }
 }
 
@@ -155,40 +148,53 @@ void Checker::ForUnknowns(int64_t i, const Visit& visit) const {
 // counts as known to kRotationError, a frame's R_sr as exact: then the two are
 // those of some R_rw, as the argument about the omitted rows needs.
 UncertainSystem Checker::Assemble() const {
+  const KnownRotationProblem& problem = part_.problem;
   const int64_t count = static_cast<int64_t>(lambda_.size());
   const Real delta = certificate_.lower_bound;
   UncertainSystem system;
-  system.M = MatrixXd::Zero(num_rows_, 2 * count);
-  system.M_error = MatrixXd::Zero(num_rows_, 2 * count);
-  using Column = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  Column g = Column::Zero(num_rows_);
-  Column g_error = Column::Zero(num_rows_);
-  Column g_terms = Column::Zero(num_rows_);  // sum of absolute values
+  std::vector<RowsOfG> g_point(problem.num_points);
+  std::vector<RowsOfG> g_frame(num_numbered_);
   for (int64_t i = 0; i < count; ++i) {
-    const Matrix23 E = NumeratorRows(part_.problem.observations[i]);
-    const Matrix23 E_terms = NumeratorTerms(part_.problem.observations[i]);
-    ForUnknowns(i, [&](int64_t row, const Matrix3& R, double rotation_error) {
+    const Observation& observation = problem.observations[i];
+    const View& view = problem.views[observation.view];
+    const Matrix23 E = NumeratorRows(observation);
+    const Matrix23 E_terms = NumeratorTerms(observation);
+    UncertainSystem::Columns columns;
+    const auto add = [&](const Eigen::Matrix3d& rotation, double rotation_error,
+                         UncertainSystem::Block* rows,
+                         UncertainSystem::BlockError* error, RowsOfG* g) {
+      const Matrix3 R = rotation.cast<Real>();
       const Matrix23 A = E * R;
       const Matrix23 A_terms = E_terms * R.cwiseAbs();
       const Vector2 A_error = rotation_error * E_terms.rowwise().sum();
       const Vector3 c = R.row(2).transpose();
-      g.segment<3>(row) += A.transpose() * y_[i] + delta * lambda_[i] * c;
-      g_terms.segment<3>(row) += A_terms.transpose() * y_[i].cwiseAbs() +
-                                 delta * lambda_[i] * c.cwiseAbs();
-      g_error.segment<3>(row).array() +=
+      g->sum += A.transpose() * y_[i] + delta * lambda_[i] * c;
+      g->terms += A_terms.transpose() * y_[i].cwiseAbs() +
+                  delta * lambda_[i] * c.cwiseAbs();
+      g->error.array() +=
           A_error.dot(y_[i].cwiseAbs()) + delta * lambda_[i] * rotation_error;
-      system.M.block<3, 2>(row, 2 * i) =
-          (lambda_[i] * A.transpose()).cast<double>();
-      system.M_error.block<3, 2>(row, 2 * i) =
-          (lambda_[i] * A_terms.transpose() *
-               (2 * kUnitRoundoff + 12 * kRealRoundoff) +
-           lambda_[i] * Vector3::Ones() * A_error.transpose())
-              .cast<double>();
-    });
+      *rows = lambda_[i] * A.transpose();
+      *error = (lambda_[i] * A_terms.transpose() * (12 * kRealRoundoff) +
+                lambda_[i] * Vector3::Ones() * A_error.transpose())
+                   .cast<double>();
+    };
+    columns.point = observation.point;
+    add(view.cam_from_world_rotation, kRotationError, &columns.point_rows,
+        &columns.point_error, &g_point[observation.point]);
+    columns.frame = number_of_frame_[view.frame];
+    if (columns.frame >= 0) {
+      add(view.cam_from_rig_rotation, 0, &columns.frame_rows,
+          &columns.frame_error, &g_frame[columns.frame]);
+    }
+    system.columns.push_back(columns);
   }
-  system.g_bound =
-      ((g.cwiseAbs() + g_error + SumError() * g_terms) * Real{kOutward})
-          .cast<double>();
+  const auto bound = [&](const RowsOfG& g) -> Eigen::Vector3d {
+    return ((g.sum.cwiseAbs() + g.error + SumError() * g.terms) *
+            Real{kOutward})
+        .cast<double>();
+  };
+  for (const RowsOfG& g : g_point) system.point_bound.push_back(bound(g));
+  for (const RowsOfG& g : g_frame) system.frame_bound.push_back(bound(g));
   return system;
 }
 
@@ -221,24 +227,26 @@ std::optional<std::string> Checker::CheckConstants() const {
     const Vector2 b = NumeratorRows(observation) * o;
     const Matrix23 E_terms = NumeratorTerms(observation);
     const Vector2 b_error = E_terms.rowwise().sum() * (2 * o_error);
-    const Vector2 a = a_bound_.segment<2>(2 * i).cast<Real>();
     const Real delta = certificate_.lower_bound;
     kappa += y_[i].dot(b) + delta * lambda_[i] * o[2];
     kappa_error += y_[i].cwiseAbs().dot(b_error) +
                    delta * lambda_[i] * 2 * o_error +
                    SumError() * (y_[i].cwiseAbs().dot(E_terms * o.cwiseAbs()) +
                                  delta * lambda_[i] * std::abs(o[2])) +
-                   lambda_[i] * a.dot(b.cwiseAbs() + b_error);
+                   lambda_[i] * a_length_ * (b.cwiseAbs() + b_error).sum();
   }
   if (kappa + kappa_error * Real{kOutward} <= 0) return std::nullopt;
   return "the constants of its rig rows do not keep their sign";
 }
 
+// Of all a_i of this length, the one along the diagonal has the longest dual
+// norm: sqrt(2) of it.
 void Checker::BoundRho() {
+  const Real longest_a = norm_.p == 1 || norm_.p == 2
+                             ? Real{a_length_}
+                             : Real{kRootTwo * a_length_};
   for (size_t i = 0; i < lambda_.size(); ++i) {
-    const Vector2 a =
-        a_bound_.segment<2>(2 * static_cast<int64_t>(i)).cast<Real>();
-    const Real rho = DualNorm(y_[i], norm_) / lambda_[i] + DualNorm(a, norm_);
+    const Real rho = DualNorm(y_[i], norm_) / lambda_[i] + longest_a;
     rho_ = std::max(rho_, static_cast<double>(rho) * (1 + 4 * kUnitRoundoff));
   }
 }
@@ -246,11 +254,16 @@ void Checker::BoundRho() {
 std::optional<std::string> Checker::Run() {
   if (auto refusal = RefuseNumbers(whole_, norm_, certificate_)) return refusal;
   if (auto refusal = Restrict()) return refusal;
-  const std::optional<Eigen::VectorXd> a_bound = BoundSolution(Assemble());
-  if (!a_bound) {
+  const UncertainSystem system = Assemble();
+  std::optional<double> a_length = BoundSolutionByBlocks(system);
+  if (!a_length) {
+    a_length = BoundSolutionByInverse(system);
+    if (a_length) *a_length *= kRootTwo;  // of its entries
+  }
+  if (!a_length) {
     return "its support is flexible, or too nearly so for this arithmetic";
   }
-  a_bound_ = *a_bound;
+  a_length_ = *a_length;
   if (auto refusal = CheckConstants()) return refusal;
   BoundRho();
   const double defect = rho_ - 1;

@@ -2,32 +2,32 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
-#include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 #include "krot/problem/restrict.h"
-#include "krot/solver/feasible_start.h"
+#include "krot/solver/block_sweep.h"
+#include "krot/solver/certified_solve.h"
+#include "krot/solver/working_set.h"
 
 namespace krot {
 namespace {
 
-// A certificate is tried once the interior point's own gap is as small as the
-// one asked for, and again whenever it has fallen by this factor.
-constexpr double kGapBetweenCertificates = 0.3;
-// Where rounding ends the interior point anyway.
-constexpr double kSmallestGap = 1e-10;
-// Iterations after which a start is given up if the gap is still large. Most
-// models take 10 to 50 in all; a start whose points hug the boundary of the
-// cones can hold the interior point back for hundreds.
-constexpr int kIterationsPerStart = 60;
-constexpr double kLargeGap = 0.1;
-// A fresh start is looked for at these shares of the cost.
-constexpr double kRestartShares[] = {0.25, 0.5, 0.75, 0.9, 0.97};
-constexpr int kMaxRestarts = 4;
-constexpr double kHopelessGap = 1e-2;
+// The working set starts with the points above this share of the cost, and as
+// many observations of every frame.
+constexpr double kShareOfCost = 0.8;
+constexpr int kTiesPerFrame = 20;
+// Then it takes in the points that do not fit in below this share of the bound,
+// the worst first, and grows by this factor at most.
+constexpr double kShareOfBound = 0.9;
+constexpr double kMaxGrowth = 1.5;
+// After so many rounds it takes in everything.
+constexpr int kMaxRounds = 12;
 
 void CheckOptions(const JointOptions& options) {
   CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
@@ -38,126 +38,154 @@ void CheckOptions(const JointOptions& options) {
                 options.max_iterations, ">= 1");
 }
 
-// A connected component on its way to its certified optimum.
+// A part's certificate as one of the whole.
+Certificate InWhole(const RestrictedProblem& part, Certificate certificate) {
+  for (CertifiedObservation& o : certificate.observations) {
+    o.observation = part.observation_of[o.observation];
+  }
+  return certificate;
+}
+
+// A connected component on its way to its certified optimum, by way of the
+// optima of growing working sets.
 class ComponentSolve {
  public:
   ComponentSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Estimate& start)
-      : problem_(problem), options_(options), estimate_(start) {
-    cost_ = Cost(problem, start, options.norm, options.num_threads);
+      : problem_(problem), options_(options), set_(problem), estimate_(start) {
+    cost_ = CostOf(start);
   }
 
   // `report` is called after every iteration with the interior point's gap.
   JointTermination Run(const std::function<void(double gap)>& report);
 
   const Estimate& estimate() const { return estimate_; }
-  double cost() const { return cost_; }
+  double cost() const { return std::min(cost_, reached_); }
   double lower_bound() const { return lower_bound_; }
   const std::optional<Certificate>& certificate() const { return certificate_; }
+  int64_t num_working_observations() const { return num_working_observations_; }
 
  private:
+  double CostOf(const Estimate& estimate) const {
+    return Cost(problem_, estimate, options_.norm, options_.num_threads);
+  }
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
-  InteriorPointTermination RunFromEstimate(
-      const std::function<void(double gap)>& report);
-  bool FindFreshStart();
-  void TryCertificate(const ConicIterate& iterate);
+  JointTermination SolveWorkingSet(
+      const std::function<void(double gap)>& report, Estimate* candidate);
+  JointTermination SolvePart(const RestrictedProblem& part,
+                             const std::function<void(double gap)>& report,
+                             Estimate* candidate);
+  void PlaceOthers(double level, Estimate* candidate) const;
 
   const KnownRotationProblem& problem_;
   const JointOptions& options_;
-  Estimate estimate_;
+  WorkingSet set_;
+  Estimate estimate_;  // the best so far
   double cost_ = 0;
+  // By a solve of all points that is under way.
+  double reached_ = std::numeric_limits<double>::infinity();
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
   int iterations_ = 0;
+  int64_t num_working_observations_ = 0;
 };
 
-void ComponentSolve::TryCertificate(const ConicIterate& iterate) {
-  CertificateOptions options;
-  options.sufficient_bound = (1 - options_.relative_gap) * cost_;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
-  std::optional<Certificate> certificate =
-      MakeCertificate(problem_, options_.norm, *iterate.estimate, iterate.gamma,
-                      *iterate.multipliers, options);
-  if (!certificate) return;
-  const CertificateCheck check =
-      CheckCertificate(problem_, options_.norm, *certificate);
-  if (check.is_accepted && check.proved_bound > lower_bound_) {
-    lower_bound_ = check.proved_bound;
-    certificate_ = std::move(certificate);
+JointTermination ComponentSolve::SolvePart(
+    const RestrictedProblem& part,
+    const std::function<void(double gap)>& report, Estimate* candidate) {
+  const Estimate start = RestrictEstimate(part, estimate_);
+  CertifiedSolve solve(part.problem, options_, start);
+  // What is below another part's bound already is good enough.
+  if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
+  if (iterations_ >= options_.max_iterations) {
+    return JointTermination::kMaxIterations;
   }
+  const JointTermination termination =
+      solve.Run(options_.max_iterations - iterations_, [&](double gap) {
+        if (set_.IsAll()) reached_ = std::min(reached_, solve.cost());
+        report(gap);
+      });
+  iterations_ += solve.iterations();
+  if (solve.lower_bound() > lower_bound_) {
+    lower_bound_ = solve.lower_bound();
+    certificate_ = InWhole(part, *solve.certificate());
+  }
+  Estimate optimum = solve.estimate();
+  RestoreGauge(part.problem, start, &optimum);
+  ReplaceEstimate(part, optimum, candidate);
+  return termination;
 }
 
-InteriorPointTermination ComponentSolve::RunFromEstimate(
-    const std::function<void(double gap)>& report) {
-  InteriorPointOptions options;
-  options.norm = options_.norm;
-  options.max_iterations = options_.max_iterations - iterations_;
-  options.smallest_gap = std::min(kSmallestGap, options_.relative_gap);
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
-  double next_gap = options_.relative_gap;
-  options.stop = [&](const ConicIterate& iterate) {
-    ++iterations_;
-    if (iterate.cost < cost_) {
-      cost_ = iterate.cost;
-      estimate_ = *iterate.estimate;
-    }
-    if (iterate.gap <= next_gap) {
-      TryCertificate(iterate);
-      next_gap = kGapBetweenCertificates * iterate.gap;
-    }
-    report(iterate.gap);
-    return IsGapReached() || (iterate.iteration >= kIterationsPerStart &&
-                              iterate.gap > kLargeGap);
-  };
-  std::vector<Multiplier> multipliers;
-  Estimate last = estimate_;
-  return MinimizeJointly(problem_, options, &last, &multipliers).termination;
+JointTermination ComponentSolve::SolveWorkingSet(
+    const std::function<void(double gap)>& report, Estimate* candidate) {
+  const std::vector<int64_t> observations = set_.Observations();
+  num_working_observations_ = static_cast<int64_t>(observations.size());
+  JointTermination worst = JointTermination::kGapReached;
+  for (const std::vector<int64_t>& part :
+       SplitIntoComponents(problem_, observations)) {
+    const JointTermination termination =
+        SolvePart(RestrictProblem(problem_, part), report, candidate);
+    if (termination == JointTermination::kGapReached) continue;
+    worst = termination;
+    if (termination != JointTermination::kStalled) break;
+  }
+  return worst;
 }
 
-// An estimate of lower cost, far from the boundary of the cones.
-bool ComponentSolve::FindFreshStart() {
-  FeasibleStartOptions options;
-  options.norm = options_.norm;
-  options.hopeless_gap = kHopelessGap;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
-  for (const double share : kRestartShares) {
-    if (share * cost_ <= lower_bound_) continue;
-    if (FindEstimateBelow(problem_, share * cost_, options, &estimate_,
-                          &iterations_) ==
-        InteriorPointTermination::kFeasible) {
-      LowerByFeasibility(problem_, options, &estimate_, &iterations_);
-      cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
-      return true;
+// Points outside the working set stay where they are if that is good enough,
+// and otherwise take their own optimum. Those behind a camera are left to the
+// next working set.
+void ComponentSolve::PlaceOthers(double level, Estimate* candidate) const {
+  std::vector<int64_t> observations;
+  for (int32_t k = 0; k < problem_.num_points; ++k) {
+    if (set_.Contains(k)) continue;
+    const double cost = PointCost(problem_, *candidate, options_.norm, k);
+    if (cost <= level || !std::isfinite(cost)) continue;
+    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+         ++i) {
+      observations.push_back(i);
     }
   }
-  return false;
+  if (observations.empty()) return;
+  const RestrictedProblem part = RestrictProblem(problem_, observations);
+  Estimate placed = RestrictEstimate(part, *candidate);
+  BlockSweep(part.problem, FastDescentOptions(), options_.norm,
+             options_.num_threads, options_.cancel)
+      .IntersectPoints(&placed);
+  ReplaceEstimate(part, placed, candidate);
 }
 
 JointTermination ComponentSolve::Run(
     const std::function<void(double gap)>& report) {
   if (!(cost_ > 0)) return JointTermination::kGapReached;
-  for (int restart = 0; restart <= kMaxRestarts; ++restart) {
-    const InteriorPointTermination termination = RunFromEstimate(report);
+  set_.AddAbove(estimate_, options_.norm, kShareOfCost * cost_,
+                problem_.num_points);
+  set_.AddTies(kTiesPerFrame);
+  for (int round = 1;; ++round) {
+    Estimate candidate = estimate_;
+    const JointTermination termination = SolveWorkingSet(report, &candidate);
+    const double level = lower_bound_ / (1 - options_.relative_gap);
+    PlaceOthers(level, &candidate);
+    const double cost = CostOf(candidate);
+    if (cost <= cost_) {
+      cost_ = cost;
+      estimate_ = candidate;
+    }
     if (IsGapReached()) return JointTermination::kGapReached;
-    if (termination == InteriorPointTermination::kInterrupted) {
-      return JointTermination::kInterrupted;
+    if (set_.IsAll() || termination == JointTermination::kInterrupted ||
+        termination == JointTermination::kMaxIterations) {
+      return termination;
     }
-    if (iterations_ >= options_.max_iterations) {
-      return JointTermination::kMaxIterations;
-    }
-    const bool is_fresh = FindFreshStart();
-    if (IsCancelled(options_.cancel)) return JointTermination::kInterrupted;
-    if (!is_fresh) break;
-    if (iterations_ >= options_.max_iterations) {
-      return JointTermination::kMaxIterations;
+    const int64_t num_added = set_.AddAbove(
+        candidate, options_.norm, kShareOfBound * level,
+        static_cast<int64_t>((kMaxGrowth - 1) * set_.num_points()) + 1);
+    if (termination != JointTermination::kGapReached || num_added == 0 ||
+        round == kMaxRounds) {
+      set_.AddAll();
     }
   }
-  return JointTermination::kStalled;
 }
 
 }  // namespace
@@ -198,13 +226,10 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
     });
     ReplaceEstimate(part, solve.estimate(), estimate);
     cost_of_solved = std::max(cost_of_solved, solve.cost());
+    summary.num_working_observations += solve.num_working_observations();
     if (solve.certificate() && solve.lower_bound() > summary.lower_bound) {
       summary.lower_bound = solve.lower_bound();
-      summary.certificate = solve.certificate();
-      for (CertifiedObservation& observation :
-           summary.certificate->observations) {
-        observation.observation = part.observation_of[observation.observation];
-      }
+      summary.certificate = InWhole(part, *solve.certificate());
     }
     if (termination != JointTermination::kGapReached) {
       summary.termination = termination;

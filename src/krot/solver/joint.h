@@ -49,6 +49,8 @@ struct JointSummary {
   std::optional<Certificate> certificate;
   double lower_bound = 0;  // pixels, what the certificate proves; 0 if none
   int32_t num_components = 0;
+  // Of the working sets whose optima were the whole's in the end.
+  int64_t num_working_observations = 0;
   std::vector<JointIteration> iterations;
 
   double RelativeGap() const {

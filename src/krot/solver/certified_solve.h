@@ -1,0 +1,53 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/solver/certificate.h"
+#include "krot/solver/joint.h"
+
+namespace krot {
+
+// The interior point on a connected problem, from an estimate to the certified
+// gap: it tries certificates on the way and leaves starts that hold it back.
+// Internal to SolveJoint.
+class CertifiedSolve {
+ public:
+  // Keeps references. All depths of `start` are positive.
+  CertifiedSolve(const KnownRotationProblem& problem,
+                 const JointOptions& options, const Estimate& start);
+
+  // Takes at most `max_iterations`; `report` is called after each with the
+  // interior point's own gap.
+  JointTermination Run(int max_iterations,
+                       const std::function<void(double gap)>& report);
+
+  // The best so far, never worse than the start, and its cost in pixels.
+  const Estimate& estimate() const { return estimate_; }
+  double cost() const { return cost_; }
+  // What the certificate proves, pixels; 0 if there is none.
+  double lower_bound() const { return lower_bound_; }
+  const std::optional<Certificate>& certificate() const { return certificate_; }
+  int iterations() const { return iterations_; }
+
+ private:
+  bool IsGapReached() const {
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+  }
+  InteriorPointTermination RunFromEstimate(
+      const std::function<void(double gap)>& report);
+  bool FindFreshStart();
+  void TryCertificate(const ConicIterate& iterate);
+
+  const KnownRotationProblem& problem_;
+  const JointOptions& options_;
+  Estimate estimate_;
+  double cost_ = 0;
+  double lower_bound_ = 0;
+  std::optional<Certificate> certificate_;
+  int iterations_ = 0;
+  int max_iterations_ = 0;
+};
+
+}  // namespace krot

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// The points of a problem, with all their observations, that the joint solver
+// looks at: those whose residuals come near the maximum, and enough others to
+// tie every frame. The optimum of a working set is a lower bound on that of
+// the whole, and equals it as soon as the other points fit in below.
+class WorkingSet {
+ public:
+  // Empty. Keeps a reference to `problem`.
+  explicit WorkingSet(const KnownRotationProblem& problem);
+
+  // Adds the points with a residual above `level`, pixels, the worst first and
+  // at most `max_points` of them; returns how many. O(observations).
+  int64_t AddAbove(const Estimate& estimate, Norm norm, double level,
+                   int64_t max_points);
+
+  // Adds points, the longest tracks first, until every frame has `count`
+  // observations in the set or all it has. O(observations).
+  void AddTies(int count);
+
+  void AddAll();
+
+  bool Contains(int32_t point) const { return contains_[point] != 0; }
+  bool IsAll() const { return num_points_ == problem_.num_points; }
+  int32_t num_points() const { return num_points_; }
+  std::vector<int64_t> Observations() const;  // ascending
+
+ private:
+  void Add(int32_t point);
+
+  const KnownRotationProblem& problem_;
+  std::vector<char> contains_;  // per point
+  int32_t num_points_ = 0;
+};
+
+// The largest residual of a point, pixels; infinity if it is behind a camera.
+double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
+                 Norm norm, int32_t point);
+
+}  // namespace krot
