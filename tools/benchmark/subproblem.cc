@@ -16,6 +16,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr int kMaxPairs = 50;
+constexpr double kSmallestSine = 8.7e-3;  // of half a degree
 
 Residual FromRow(const double row[kResidualRow]) {
   Residual residual;
@@ -69,8 +70,9 @@ std::optional<Vector3d> MidPoint(const Residual& a, const Residual& b) {
   NormalizeRay(a, A.topRows<2>(), rhs.head<2>());
   NormalizeRay(b, A.bottomRows<2>(), rhs.tail<2>());
   const Matrix3d normal = A.transpose() * A;
-  // det = 2 sin^2 of the angle between the rays, twice over.
-  if (!(normal.determinant() > 1e-12)) return std::nullopt;
+  // The eigenvalues are 2 and 1 +- the cosine of the rays' angle.
+  const double sine_squared = normal.determinant() / 2;
+  if (!(sine_squared > kSmallestSine * kSmallestSine)) return std::nullopt;
   return normal.llt().solve(-A.transpose() * rhs);
 }
 

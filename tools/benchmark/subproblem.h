@@ -23,7 +23,8 @@ struct Subproblem {
 };
 
 // The point in the middle of the shortest line between the rays of two
-// residuals, v = 0 [Hartley, Schaffalitzky 2004]; none if they are parallel.
+// residuals, v = 0 [Hartley, Schaffalitzky 2004]; none if they are parallel to
+// half a degree: where they meet then is chance.
 std::optional<Eigen::Vector3d> MidPoint(const Residual& a, const Residual& b);
 
 // The triangulation of `residuals`, which starts, as in [Zhang18, Sec. 4.1], at

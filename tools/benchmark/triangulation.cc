@@ -52,7 +52,8 @@ Case SyntheticCase(int num_cameras, Random* random) {
 }
 
 // At most `max_points` of the model's points, evenly spread over the file;
-// those without two rays that meet in front of all cameras are passed over.
+// those without two rays that meet, at half a degree or more and in front of
+// all cameras, are passed over.
 Case ModelCase(const std::string& path, int max_points, Random* random) {
   const BenchmarkModel model = ReadBenchmarkModel(path);
   const BuiltProblem& built = model.built;
