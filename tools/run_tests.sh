@@ -11,7 +11,7 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
   coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
   chromium:chromium chromedriver:chromium-driver
-build_krot -DKROT_BUILD_TESTS=ON
+build_krot -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=ON
 
 say "Testing"
 ctest --test-dir "$root/build" --output-on-failure -j2

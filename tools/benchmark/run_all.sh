@@ -17,7 +17,7 @@ mkdir -p "$output"
 if [[ -z ${BUILD:-} ]]; then
   # shellcheck source=tools/setup.sh
   source "$here/../setup.sh"
-  install_missing "${build_needs[@]}" libceres-dev
+  install_missing "${build_needs[@]}"
   build_krot -DKROT_BUILD_BENCHMARKS=ON
   BUILD=$root/build
 fi
