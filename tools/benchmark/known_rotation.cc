@@ -76,7 +76,7 @@ class Contest {
       costs_.columns.push_back(Title(*solver));
     }
     seconds_.notes = {
-        "\\* ends more than 1e-3 above the lowest cost, relative (next table): "
+        "* ends more than 1e-3 above the lowest cost, relative (next table): "
         "its time is not that of the optimum. n/a: not finished within the "
         "time limit, or not run on so many observations."};
   }

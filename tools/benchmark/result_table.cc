@@ -68,7 +68,10 @@ std::string ToMarkdown(const ResultTable& table) {
   for (const std::vector<Cell>& row : table.rows) {
     text += MarkdownRow(Texts(row));
   }
-  for (const std::string& note : table.notes) text += "\n" + note + "\n";
+  for (const std::string& note : table.notes) {
+    const bool looks_like_a_list = note.rfind("* ", 0) == 0;
+    text += (looks_like_a_list ? "\n\\" : "\n") + note + "\n";
+  }
   return text;
 }
 
