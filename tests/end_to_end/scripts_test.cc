@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/analysis/pixel_errors.h"
 #include "krot/model/model.h"
 #include "krot/synthetic/random.h"
 #include "tests/cli/krot_process.h"
@@ -102,6 +103,35 @@ TEST_F(Scripts, PassShellcheck) {
                             .c_str()),
             0)
       << ReadBytes(log);
+}
+
+TEST_F(Scripts, CompareWithTheInputWhereNoTruthIsGiven) {
+  for (const char* program : {"colmap", "jq"}) {
+    if (std::system(("command -v " + std::string(program) + " >/dev/null 2>&1")
+                        .c_str()) != 0) {
+      GTEST_SKIP() << program << " is not installed";
+    }
+  }
+  const fs::path output = folder_ / "compared";
+  const ScriptResult result =
+      RunScript("compare_linf_with_ba.sh", {"--input_path", folder_ / "model",
+                                            "--output_path=" + output.string(),
+                                            "--max_error_factor", "1.3"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::StartsWith("Cameras: against the input"));
+  EXPECT_THAT(result.out, ::testing::HasSubstr("bounded, 1.3 x the lowest"));
+
+  // The largest error of a result, recomputed from its files.
+  const auto max_error = [&output](const std::string& name) {
+    return Summarize(PixelErrors(Load(output / name))).max;
+  };
+  EXPECT_LE(max_error("bounded"), 1.3 * max_error("linf"));
+  for (const char* name : {"colmap_ba", "ba", "cauchy", "ba_rotations"}) {
+    EXPECT_LT(max_error("linf"), max_error(name)) << name;
+    std::ostringstream number;
+    number << std::fixed << std::setprecision(4) << max_error(name);
+    EXPECT_THAT(result.out, ::testing::HasSubstr(number.str())) << name;
+  }
 }
 
 // A camera file of Strecha et al.: K, no distortion, the camera's axes in the

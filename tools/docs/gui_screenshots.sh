@@ -122,6 +122,8 @@ shoot_model() {
 open "$sample" 14
 show_all_points
 choose_error_colors
+apply 613
+sleep 2
 shoot gui_render_options.png
 close
 shoot_model "$work/before" 14 gui_errors_before.png
