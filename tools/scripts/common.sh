@@ -77,12 +77,12 @@ find_krot() {
     die "$krot is not installed; build it, or name it in KROT"
 }
 
-# quietly LOG COMMAND... runs a command with its words in LOG, and shows them
-# only if it fails.
+# quietly LOG COMMAND... runs a command with its words in LOG, and ends the
+# script if it fails.
 quietly() {
   local log=$1
   shift
-  "$@" >"$log" 2>&1 || { tail -n 20 "$log" >&2; die "failed: $*"; }
+  "$@" >"$log" 2>&1 || die "failed, as $log says: $*"
 }
 
 export QT_QPA_PLATFORM=${QT_QPA_PLATFORM:-offscreen}  # colmap links Qt.
