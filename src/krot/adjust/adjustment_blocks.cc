@@ -154,6 +154,7 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
   }
   for (const Camera& camera : model.cameras) {
     blocks.cameras.push_back(camera.params);
+    blocks.camera_models.push_back(camera.model_id);
   }
   for (const Point3D& point : model.points3D) {
     blocks.points.push_back(point.xyz);

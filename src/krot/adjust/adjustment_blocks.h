@@ -34,6 +34,7 @@ struct AdjustmentBlocks {
   std::vector<PoseBlock> frames;   // rig_from_world; per image if !has_rigs
   std::vector<PoseBlock> sensors;  // sensor_from_rig, rig by rig
   std::vector<std::vector<double>> cameras;
+  std::vector<int> camera_models;  // their ids
   std::vector<Eigen::Vector3d> points;
   std::vector<AdjustmentObservation> observations;  // point by point
 

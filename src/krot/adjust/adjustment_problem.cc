@@ -1,8 +1,8 @@
 #include "krot/adjust/adjustment_problem.h"
 
-#include <limits>
 #include <memory>
-#include <numeric>
+#include <utility>
+#include <vector>
 
 #include <ceres/manifold.h>
 #include <ceres/product_manifold.h>
@@ -23,23 +23,18 @@ using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
 // it to rounding whether they are positive definite.
 constexpr double kMaxRadius = 1e8;
 
-template <typename Camera>
-void AddObservation(const AdjustmentObservation& observation, double max_error,
-                    ceres::LossFunction* loss, AdjustmentBlocks* blocks,
-                    ceres::Problem* problem) {
-  double* point = blocks->points[observation.point].data();
-  double* frame = blocks->frames[observation.frame].data();
-  double* camera = blocks->cameras[observation.camera].data();
-  if (observation.sensor < 0) {
-    problem->AddResidualBlock(
-        new ReprojectionCost<Camera, false>(observation.pixel, max_error), loss,
-        point, frame, camera);
-  } else {
-    double* sensor = blocks->sensors[observation.sensor].data();
-    problem->AddResidualBlock(
-        new ReprojectionCost<Camera, true>(observation.pixel, max_error), loss,
-        point, frame, sensor, camera);
-  }
+std::unique_ptr<ceres::CostFunction> MakeProjection(
+    const AdjustmentObservation& observation, int camera_model) {
+  return VisitCameraModel(
+      camera_model, [&](auto camera) -> std::unique_ptr<ceres::CostFunction> {
+        using Camera = decltype(camera);
+        if (observation.sensor < 0) {
+          return std::make_unique<ReprojectionCost<Camera, false>>(
+              observation.pixel);
+        }
+        return std::make_unique<ReprojectionCost<Camera, true>>(
+            observation.pixel);
+      });
 }
 
 // Those that stay, in COLMAP's order: focal length(s), principal point, others.
@@ -88,20 +83,23 @@ ceres::Problem::Options AdjustmentProblemOptions() {
   return options;
 }
 
-void BuildAdjustmentProblem(const Model& model,
-                            const BundleAdjustmentOptions& options,
-                            const LossOfObservation& loss_of,
-                            AdjustmentBlocks* blocks, ceres::Problem* problem) {
-  const double max_error =
-      options.max_error.value_or(std::numeric_limits<double>::infinity());
+void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
+                            const CostOfObservation& cost_of,
+                            ceres::LossFunction* loss, AdjustmentBlocks* blocks,
+                            ceres::Problem* problem) {
   for (size_t i = 0; i < blocks->observations.size(); ++i) {
     const AdjustmentObservation& observation = blocks->observations[i];
-    ceres::LossFunction* loss = loss_of ? loss_of(i) : nullptr;
-    VisitCameraModel(model.cameras[observation.camera].model_id,
-                     [&](auto camera) {
-                       AddObservation<decltype(camera)>(observation, max_error,
-                                                        loss, blocks, problem);
-                     });
+    std::unique_ptr<ceres::CostFunction> cost =
+        MakeProjection(observation, blocks->camera_models[observation.camera]);
+    if (cost_of) cost = cost_of(i, std::move(cost));
+    std::vector<double*> parameters = {
+        blocks->points[observation.point].data(),
+        blocks->frames[observation.frame].data()};
+    if (observation.sensor >= 0) {
+      parameters.push_back(blocks->sensors[observation.sensor].data());
+    }
+    parameters.push_back(blocks->cameras[observation.camera].data());
+    problem->AddResidualBlock(cost.release(), loss, parameters);
   }
   for (PoseBlock& frame : blocks->frames) {
     ParameterizePose(options.refine_rig_from_world,
@@ -112,7 +110,7 @@ void BuildAdjustmentProblem(const Model& model,
     ParameterizePose(options.refine_sensor_from_rig, true, &sensor, problem);
   }
   for (size_t c = 0; c < blocks->cameras.size(); ++c) {
-    const CameraModelInfo& info = *FindCameraModel(model.cameras[c].model_id);
+    const CameraModelInfo& info = *FindCameraModel(blocks->camera_models[c]);
     HoldStill(blocks->cameras[c].data(), info.num_params,
               ConstantParams(info, options), problem);
   }

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 
+#include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
@@ -11,16 +13,17 @@
 
 namespace krot {
 
-// The loss of an observation by its index; may be or return null.
-using LossOfObservation = std::function<ceres::LossFunction*(size_t index)>;
+// Puts something around the projection of an observation, given by its index.
+using CostOfObservation = std::function<std::unique_ptr<ceres::CostFunction>(
+    size_t index, std::unique_ptr<ceres::CostFunction> projection)>;
 
-// Adds every observation of `blocks` to a problem that does not own the losses,
-// in their order, and holds still what the options do. The blocks are solved in
-// place and must outlive the problem.
-void BuildAdjustmentProblem(const Model& model,
-                            const BundleAdjustmentOptions& options,
-                            const LossOfObservation& loss_of,
-                            AdjustmentBlocks* blocks, ceres::Problem* problem);
+// Adds every observation of `blocks` to a problem that does not own the loss,
+// in their order, and holds still what the options do. `cost_of` may be empty,
+// `loss` null. The blocks are solved in place and must outlive the problem.
+void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
+                            const CostOfObservation& cost_of,
+                            ceres::LossFunction* loss, AdjustmentBlocks* blocks,
+                            ceres::Problem* problem);
 
 // What such a problem does not own.
 ceres::Problem::Options AdjustmentProblemOptions();

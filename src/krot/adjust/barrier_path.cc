@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "krot/adjust/optimality.h"
+#include "krot/adjust/projected_errors.h"
 #include "krot/base/timer.h"
 
 namespace krot {
@@ -17,13 +18,22 @@ constexpr double kStationarityTolerance = 1e-6;
 constexpr double kBoundaryShare = 0.01;
 // Multipliers stay within this factor of mu / h.
 constexpr double kMultiplierRange = 100;
-// The weight falls by no more than this factor per step.
-constexpr double kMinCentering = 0.1;
+// The weight falls by this factor after a step at least this long: after
+// shorter ones its minimum is still far, and slacks that fall behind the weight
+// make all further steps short.
+constexpr double kCentering = 0.2;
+constexpr double kFallingStep = 0.5;
+// A step that leads too far is shortened by this factor.
+constexpr double kShortening = 0.7;
+// The trust region shrinks after a step of less than this share of what the
+// linearised errors promised.
+constexpr double kPoorShare = 0.3;
 // Trust regions: no larger, and smaller no more.
 constexpr double kMaxRadius = 1e6;
 constexpr double kMinRadius = 1e-6;
 // Where the derivative of the errors along a step is taken.
 constexpr double kProbe = 1e-4;
+constexpr double kShortestProbe = 1e-12;
 constexpr double kShortestStep = 1e-6;
 // What a step may add to the barrier cost by rounding, relative.
 constexpr double kCostRounding = 1e-12;
@@ -57,16 +67,15 @@ void Interpolate(const AdjustmentBlocks& a, const AdjustmentBlocks& b,
 
 class BarrierPath {
  public:
-  BarrierPath(const BundleAdjustmentOptions& options,
-              const ceres::Solver::Options& solver_options,
+  // Requires errors below the cap.
+  BarrierPath(const ceres::Solver::Options& solver_options,
               const BarrierProblem& bounded)
-      : options_(options), solver_options_(solver_options), bounded_(bounded) {
+      : solver_options_(solver_options), bounded_(bounded) {
     solver_options_.max_num_iterations = 1;
     solver_options_.update_state_every_iteration = false;
-    Residuals residuals = *EvaluateResiduals();
-    cost_ = HalfSquaredNorm(residuals);
+    errors_ = *ProjectBlocks();
+    cost_ = HalfSquaredNorm(errors_);
     set_mu(cost_ / count());
-    residuals_ = std::move(residuals);
     CenterMultipliers();
   }
 
@@ -84,64 +93,65 @@ class BarrierPath {
   double radius() const { return radius_; }
   double gap() const { return cost_ > 0 ? count() * mu() / cost_ : 0; }
   std::optional<double> MeasureStationarity() const {
-    return Stationarity(solver_options_.num_threads, bounded_.problem);
+    return Stationarity(solver_options_.num_threads, cost_, bounded_.problem);
   }
   int64_t NumActive() const;
 
  private:
-  using Residuals = std::vector<double>;  // two per observation
+  using Errors = std::vector<ProjectedError>;
 
   void set_mu(double mu) { bounded_.barrier->mu = mu; }
-  std::vector<BarrierLoss>& losses() const { return *bounded_.losses; }
-  double count() const { return static_cast<double>(losses().size()); }
+  std::vector<double>& multipliers() const { return *bounded_.multipliers; }
+  double count() const { return static_cast<double>(multipliers().size()); }
+  double cap2() const { return bounded_.barrier->cap2; }
+  double Slack(const ProjectedError& error) const {
+    return bounded_.barrier->Slack(error.r.squaredNorm());
+  }
 
-  double Slack(const Residuals& residuals, size_t i) const {
-    return losses()[i].Slack(residuals[2 * i] * residuals[2 * i] +
-                             residuals[2 * i + 1] * residuals[2 * i + 1]);
-  }
-  // Half the sum of the losses.
-  double BarrierCost(const Residuals& residuals) const;
+  double BarrierCost(const Errors& errors) const;
   // None where an error reaches the cap.
-  std::optional<Residuals> EvaluateResiduals() const {
-    return krot::EvaluateResiduals(solver_options_.num_threads,
-                                   bounded_.problem);
+  std::optional<Errors> ProjectBlocks() const {
+    return ProjectErrors(*bounded_.blocks, std::sqrt(cap2()),
+                         solver_options_.num_threads);
   }
-  std::optional<Residuals> EvaluateAt(const AdjustmentBlocks& from,
-                                      const AdjustmentBlocks& to,
-                                      double step) const {
+  std::optional<Errors> ProjectAt(const AdjustmentBlocks& from,
+                                  const AdjustmentBlocks& to,
+                                  double step) const {
     Interpolate(from, to, step, bounded_.blocks);
-    return EvaluateResiduals();
+    return ProjectBlocks();
   }
 
   // Where Newton's step leads.
   std::optional<AdjustmentBlocks> FindTrial();
+  // The derivatives of errors and depths on the way to the trial.
+  std::optional<Errors> FindSlopes(const AdjustmentBlocks& from,
+                                   const AdjustmentBlocks& trial) const;
   // The longest step at most 1 that the linearised errors allow.
-  double LongestStep(const Residuals& slopes) const;
+  double LongestStep(const Errors& slopes) const;
   // mu / h, what they are at the minimum of the barrier.
   void CenterMultipliers() {
-    for (size_t i = 0; i < losses().size(); ++i) {
-      losses()[i].set_multiplier(mu() / Slack(residuals_, i));
+    for (size_t i = 0; i < errors_.size(); ++i) {
+      multipliers()[i] = mu() / Slack(errors_[i]);
     }
   }
-  void UpdateMultipliers(const Residuals& slopes, const Residuals& stepped);
+  void UpdateMultipliers(const Errors& slopes, const Errors& stepped);
+  // After a step that was this share of the longest.
+  void UpdateRadius(double share);
 
-  const BundleAdjustmentOptions& options_;
   ceres::Solver::Options solver_options_;
   BarrierProblem bounded_;
-  Residuals residuals_;  // at the blocks
-  double cost_ = 0;      // half their squared norm
+  Errors errors_;    // at the blocks
+  double cost_ = 0;  // half their squared norm
   double radius_ = kMaxRadius;
 };
 
-double BarrierPath::BarrierCost(const Residuals& residuals) const {
+double BarrierPath::BarrierCost(const Errors& errors) const {
   double sum = 0;
-  for (size_t i = 0; i < losses().size(); ++i) {
-    double rho[3];
-    const double x = residuals[2 * i], y = residuals[2 * i + 1];
-    losses()[i].Evaluate(x * x + y * y, rho);
-    sum += rho[0];
+  for (const ProjectedError& error : errors) {
+    const double squared = error.r.squaredNorm();
+    sum += squared / 2 - mu() * std::log1p(-squared / cap2());
   }
-  return sum / 2;
+  return sum;
 }
 
 std::optional<AdjustmentBlocks> BarrierPath::FindTrial() {
@@ -152,67 +162,73 @@ std::optional<AdjustmentBlocks> BarrierPath::FindTrial() {
   return bounded_.recorder->Stop();
 }
 
-double BarrierPath::LongestStep(const Residuals& slopes) const {
-  // |r + step slope|^2 = cap2
+std::optional<BarrierPath::Errors> BarrierPath::FindSlopes(
+    const AdjustmentBlocks& from, const AdjustmentBlocks& trial) const {
+  for (double probe = kProbe; probe > kShortestProbe; probe /= 100) {
+    std::optional<Errors> slopes = ProjectAt(from, trial, probe);
+    if (!slopes) continue;
+    for (size_t i = 0; i < slopes->size(); ++i) {
+      ProjectedError& slope = (*slopes)[i];
+      slope.r = (slope.r - errors_[i].r) / probe;
+      slope.w = (slope.w - errors_[i].w) / probe;
+    }
+    return slopes;
+  }
+  return std::nullopt;
+}
+
+double BarrierPath::LongestStep(const Errors& slopes) const {
   double longest = 1;
-  for (size_t i = 0; i < losses().size(); ++i) {
-    const Eigen::Map<const Eigen::Vector2d> r(&residuals_[2 * i]);
-    const Eigen::Map<const Eigen::Vector2d> slope(&slopes[2 * i]);
-    const double a = slope.squaredNorm();
-    if (a == 0) continue;
-    const double half_b = r.dot(slope);
-    const double slack = 2 * Slack(residuals_, i);
-    const double root = std::sqrt(half_b * half_b + a * slack);
-    const double to_cap =
-        half_b > 0 ? slack / (half_b + root) : (root - half_b) / a;
-    longest = std::min(longest, (1 - kBoundaryShare) * to_cap);
+  for (size_t i = 0; i < errors_.size(); ++i) {
+    // w r and w are nearly affine: |r + step v| = cap (1 + step u)
+    const double u = slopes[i].w / errors_[i].w;
+    const Eigen::Vector2d v = slopes[i].r + u * errors_[i].r;
+    const double a = cap2() * u * u - v.squaredNorm();
+    const double b = cap2() * u - errors_[i].r.dot(v);
+    const double c = 2 * Slack(errors_[i]);
+    const double discriminant = b * b - a * c;
+    if (discriminant < 0) continue;
+    const double denominator = std::sqrt(discriminant) - b;
+    if (denominator <= 0) continue;
+    longest = std::min(longest, (1 - kBoundaryShare) * c / denominator);
   }
   return longest;
 }
 
-void BarrierPath::UpdateMultipliers(const Residuals& slopes,
-                                    const Residuals& stepped) {
-  for (size_t i = 0; i < losses().size(); ++i) {
-    const double h = Slack(residuals_, i);
-    const double h_change = -(residuals_[2 * i] * slopes[2 * i] +
-                              residuals_[2 * i + 1] * slopes[2 * i + 1]);
-    const double lambda = losses()[i].multiplier();
+void BarrierPath::UpdateMultipliers(const Errors& slopes,
+                                    const Errors& stepped) {
+  for (size_t i = 0; i < errors_.size(); ++i) {
+    const double h = Slack(errors_[i]);
+    const double h_change = h * slopes[i].w / errors_[i].w -
+                            errors_[i].r.dot(slopes[i].r);  // w h, by w
+    const double lambda = multipliers()[i];
     // lambda h + h dlambda + lambda dh = mu
     const double newton = (mu() - lambda * h_change) / h;
-    const double central = mu() / Slack(stepped, i);
-    losses()[i].set_multiplier(
+    const double central = mu() / Slack(stepped[i]);
+    multipliers()[i] =
         std::clamp(std::max(newton, kBoundaryShare * lambda),
-                   central / kMultiplierRange, central * kMultiplierRange));
+                   central / kMultiplierRange, central * kMultiplierRange);
   }
 }
 
 double BarrierPath::Step() {
   const AdjustmentBlocks from = *bounded_.blocks;
+  const double highest = BarrierCost(errors_) + kCostRounding * cost_;
   while (radius_ >= kMinRadius) {
     const std::optional<AdjustmentBlocks> trial = FindTrial();
-    double probe = kProbe;
-    std::optional<Residuals> slopes;
-    while (trial && !slopes && probe > 1e-12) {
-      slopes = EvaluateAt(from, *trial, probe);
-      if (!slopes) probe /= 100;
+    const std::optional<Errors> slopes =
+        trial ? FindSlopes(from, *trial) : std::nullopt;
+    const double longest = slopes ? LongestStep(*slopes) : 0;
+    for (double step = longest; step > kShortestStep; step *= kShortening) {
+      std::optional<Errors> stepped = ProjectAt(from, *trial, step);
+      if (!stepped || !(BarrierCost(*stepped) <= highest)) continue;
+      UpdateMultipliers(*slopes, *stepped);
+      errors_ = std::move(*stepped);
+      cost_ = HalfSquaredNorm(errors_);
+      UpdateRadius(step / longest);
+      return step;
     }
-    if (slopes) {
-      for (size_t i = 0; i < slopes->size(); ++i) {
-        (*slopes)[i] = ((*slopes)[i] - residuals_[i]) / probe;
-      }
-      const double highest = (1 + kCostRounding) * BarrierCost(residuals_);
-      for (double step = LongestStep(*slopes); step > kShortestStep;
-           step /= 2) {
-        std::optional<Residuals> stepped = EvaluateAt(from, *trial, step);
-        if (!stepped || !(BarrierCost(*stepped) <= highest)) continue;
-        UpdateMultipliers(*slopes, *stepped);
-        residuals_ = std::move(*stepped);
-        cost_ = HalfSquaredNorm(residuals_);
-        radius_ = std::min(10 * radius_, kMaxRadius);
-        return step;
-      }
-    }
-    Interpolate(from, from, 0, bounded_.blocks);
+    *bounded_.blocks = from;
     radius_ /= 100;
   }
   radius_ = kMaxRadius;
@@ -220,21 +236,24 @@ double BarrierPath::Step() {
   return 0;
 }
 
-void BarrierPath::LowerWeight(double step) {
-  double complementarity = 0;
-  for (size_t i = 0; i < losses().size(); ++i) {
-    complementarity += losses()[i].multiplier() * Slack(residuals_, i);
+void BarrierPath::UpdateRadius(double share) {
+  if (share < kPoorShare) {
+    radius_ = std::max(radius_ / 10, std::min(radius_, 1.0));
+  } else if (share > 0.5) {
+    radius_ = std::min(10 * radius_, kMaxRadius);
   }
-  complementarity /= count();
-  const double centering = std::max(kMinCentering, (1 - step) * (1 - step));
+}
+
+void BarrierPath::LowerWeight(double step) {
+  if (step < kFallingStep) return;
   const double last = 0.5 * kGapTolerance * cost_ / count();
-  set_mu(std::max(last, std::min(mu(), centering * complementarity)));
+  set_mu(std::max(last, kCentering * mu()));
 }
 
 int64_t BarrierPath::NumActive() const {
   int64_t count = 0;
-  for (size_t i = 0; i < losses().size(); ++i) {
-    if (mu() / Slack(residuals_, i) > kActiveMultiplier) ++count;
+  for (const ProjectedError& error : errors_) {
+    if (mu() / Slack(error) > kActiveMultiplier) ++count;
   }
   return count;
 }
@@ -246,7 +265,7 @@ void FollowBarrierPath(const BundleAdjustmentOptions& options,
                        const BarrierProblem& bounded,
                        BundleAdjustmentSummary* summary) {
   const Timer timer;
-  BarrierPath path(options, solver_options, bounded);
+  BarrierPath path(solver_options, bounded);
   summary->termination = BundleAdjustmentTermination::kMaxIterations;
   for (int& n = summary->num_iterations; n < options.max_num_iterations; ++n) {
     if (IsCancelled(options.cancel)) {

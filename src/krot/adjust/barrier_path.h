@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <ceres/evaluation_callback.h>
@@ -7,7 +9,7 @@
 #include <ceres/solver.h>
 
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/adjust/barrier_loss.h"
+#include "krot/adjust/barrier_cost.h"
 #include "krot/adjust/bundle_adjustment.h"
 
 namespace krot {
@@ -40,14 +42,14 @@ class TrialRecorder final : public ceres::EvaluationCallback {
   std::optional<AdjustmentBlocks> trial_;
 };
 
-// What a bounded adjustment works on. `losses` are those of the observations,
-// in their order, and refer to `barrier`; `recorder` is the problem's
-// evaluation callback.
+// What a bounded adjustment works on. The problem's costs are BarrierCosts that
+// refer to `barrier` and to `multipliers`, one per observation in their order;
+// `recorder` is its evaluation callback.
 struct BarrierProblem {
   ceres::Problem* problem;
   AdjustmentBlocks* blocks;
   Barrier* barrier;
-  std::vector<BarrierLoss>* losses;
+  std::vector<double>* multipliers;
   TrialRecorder* recorder;
 };
 

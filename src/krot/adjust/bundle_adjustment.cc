@@ -2,17 +2,21 @@
 
 #include <algorithm>
 #include <cctype>
+#include <limits>
 #include <memory>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include <ceres/solver.h>
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/adjustment_problem.h"
-#include "krot/adjust/barrier_loss.h"
+#include "krot/adjust/barrier_cost.h"
 #include "krot/adjust/barrier_path.h"
 #include "krot/adjust/iteration_observer.h"
 #include "krot/adjust/optimality.h"
+#include "krot/adjust/projected_errors.h"
 #include "krot/adjust/restore_similarity.h"
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
@@ -102,15 +106,24 @@ void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
   summary->num_parameters = NumFreeParameters(problem);
 }
 
-// With the losses; none where an error cannot be evaluated.
-std::optional<double> RobustCost(int num_threads, ceres::Problem* problem) {
-  ceres::Problem::EvaluateOptions options;
-  options.num_threads = num_threads;
-  double cost = 0;
-  if (!problem->Evaluate(options, &cost, nullptr, nullptr, nullptr)) {
-    return std::nullopt;
+// Half the sum of the squared errors under the loss, if there is one; none
+// where an error is not finite or reaches the cap.
+std::optional<double> RobustCost(const BundleAdjustmentOptions& options,
+                                 const ceres::LossFunction* loss,
+                                 const AdjustmentBlocks& blocks) {
+  const auto errors = ProjectErrors(
+      blocks,
+      options.max_error.value_or(std::numeric_limits<double>::infinity()),
+      options.num_threads);
+  if (!errors) return std::nullopt;
+  if (loss == nullptr) return HalfSquaredNorm(*errors);
+  double sum = 0;
+  for (const ProjectedError& error : *errors) {
+    double rho[3];
+    loss->Evaluate(error.r.squaredNorm(), rho);
+    sum += rho[0];
   }
-  return cost;
+  return sum / 2;
 }
 
 // Solves a problem without a cap.
@@ -122,7 +135,6 @@ void Minimize(const BundleAdjustmentOptions& options,
   ceres::Solver::Summary solve;
   ceres::Solve(solver_options, problem, &solve);
   summary->termination = FromCeres(solve.termination_type);
-  summary->stationarity = Stationarity(solver_options.num_threads, problem);
   summary->num_iterations = observer.num_iterations();
 }
 
@@ -138,18 +150,21 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
   Barrier barrier;
-  std::vector<BarrierLoss> barrier_losses;
+  std::vector<double> multipliers;
   TrialRecorder recorder(&blocks);
   ceres::Problem::Options problem_options = AdjustmentProblemOptions();
-  LossOfObservation loss_of = [&](size_t) { return loss.get(); };
+  CostOfObservation cost_of;
   if (options.max_error) {
     barrier.cap2 = *options.max_error * *options.max_error;
-    barrier_losses.assign(blocks.observations.size(), BarrierLoss(&barrier));
+    multipliers.resize(blocks.observations.size());
     problem_options.evaluation_callback = &recorder;
-    loss_of = [&](size_t i) { return &barrier_losses[i]; };
+    cost_of = [&](size_t i, std::unique_ptr<ceres::CostFunction> projection) {
+      return std::make_unique<BarrierCost>(std::move(projection), &barrier,
+                                           &multipliers[i]);
+    };
   }
   ceres::Problem problem(problem_options);
-  BuildAdjustmentProblem(model, options, loss_of, &blocks, &problem);
+  BuildAdjustmentProblem(options, cost_of, loss.get(), &blocks, &problem);
 
   BundleAdjustmentResult result;
   BundleAdjustmentSummary& summary = result.summary;
@@ -157,8 +172,7 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   const ceres::Solver::Options solver_options =
       AdjustmentSolverOptions(options, &blocks, problem);
   summary.linear_solver = SolverName(solver_options);
-  const std::optional<double> cost =
-      RobustCost(solver_options.num_threads, &problem);
+  const std::optional<double> cost = RobustCost(options, loss.get(), blocks);
   if (summary.num_parameters == 0) {
     summary.termination = BundleAdjustmentTermination::kNothingToAdjust;
   } else if (!cost) {
@@ -166,14 +180,17 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   } else {
     summary.cost_initial = *cost;
     if (options.max_error) {
-      FollowBarrierPath(
-          options, solver_options,
-          {&problem, &blocks, &barrier, &barrier_losses, &recorder}, &summary);
-      barrier.mu = 0;  // the cost without the barrier
+      FollowBarrierPath(options, solver_options,
+                        {&problem, &blocks, &barrier, &multipliers, &recorder},
+                        &summary);
     } else {
       Minimize(options, solver_options, &problem, &summary);
     }
-    summary.cost_final = *RobustCost(solver_options.num_threads, &problem);
+    summary.cost_final = *RobustCost(options, loss.get(), blocks);
+    if (!options.max_error) {
+      summary.stationarity = Stationarity(solver_options.num_threads,
+                                          summary.cost_final, &problem);
+    }
     RestoreSimilarity(options, before, &blocks);
   }
   result.model = ApplyBlocks(model, before, blocks);

@@ -101,7 +101,7 @@ struct DifferentiatedPixel {
 //   x_cam = sensor_from_rig (rig_from_world x)
 //
 // Evaluation fails, and Ceres rejects the step, where x_cam is not in front of
-// the camera or the error is `max_error` or more.
+// the camera or has no finite pixel.
 template <typename Camera, bool kHasSensor>
 struct ReprojectionCostBase;
 template <typename Camera>
@@ -117,8 +117,7 @@ template <typename Camera, bool kHasSensor>
 class ReprojectionCost final
     : public ReprojectionCostBase<Camera, kHasSensor>::Type {
  public:
-  ReprojectionCost(const Eigen::Vector2d& pixel, double max_error)
-      : pixel_(pixel), max_error_(max_error) {}
+  explicit ReprojectionCost(const Eigen::Vector2d& pixel) : pixel_(pixel) {}
 
   bool Evaluate(double const* const* blocks, double* residuals,
                 double** jacobians) const override {
@@ -169,7 +168,7 @@ class ReprojectionCost final
     if (jacobians == nullptr) {
       Camera::Project(params, ray.x(), ray.y(), &residual.x(), &residual.y());
       residual -= pixel_;
-      return residual.norm() < max_error_;
+      return residual.allFinite();
     }
     const bool wants_params = jacobians[kCamera] != nullptr;
     const DifferentiatedPixel<Camera> projected(params, ray, wants_params);
@@ -177,7 +176,7 @@ class ReprojectionCost final
     if (wants_params) StoreJacobian(projected.J_params, jacobians[kCamera]);
     *J_cam << projected.J_ray, -projected.J_ray * ray;
     *J_cam /= x_cam.z();
-    return residual.norm() < max_error_;
+    return residual.allFinite();
   }
 
   static void ChainToWorld(const RigidTransform& rig_from_world,
@@ -191,7 +190,6 @@ class ReprojectionCost final
   }
 
   Eigen::Vector2d pixel_;
-  double max_error_;
 };
 
 }  // namespace krot
