@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace krot {
@@ -19,7 +20,8 @@ struct Comparison {
   std::string table;  // what the script printed
   std::string words;  // what it said on stderr
   double scene_radius = 0;
-  double lower_bound = 0;  // of the certificate, pixels
+  // Of the certificate, pixels; none if the solver could not have one.
+  std::optional<double> lower_bound;
   std::map<std::string, Result> results;
 };
 

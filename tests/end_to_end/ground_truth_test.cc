@@ -157,8 +157,9 @@ TEST_F(EndToEnd, AllResultsFromSharpPhotosAreNearTheTruth) {
   ExpectAllWithin(comparison, 0.02);
   // The bound is for the input's rotations and intrinsics, which least squares
   // kept; residuals of a rendered pinhole camera are all but linear.
+  ASSERT_TRUE(comparison.lower_bound.has_value());
   EXPECT_GE(comparison.results.at("ba_rotations").max_error,
-            comparison.lower_bound * (1 - 1e-3));
+            *comparison.lower_bound * (1 - 1e-3));
 }
 
 TEST_F(EndToEnd, AllResultsFromNoisyPhotosAreNearTheTruth) {

@@ -42,6 +42,7 @@ adjust() {
 
 krot_ba=("$krot" bundle_adjuster --overwrite 1)
 adjust colmap_ba colmap bundle_adjuster
+rm -f "$reports/certificate.json"  # there may be none this time
 adjust linf "$krot" solver --overwrite 1 \
   --certificate_path "$reports/certificate.json"
 adjust ba "${krot_ba[@]}"
