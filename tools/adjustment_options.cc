@@ -95,9 +95,7 @@ void AdjustmentOptions::AddCeres(OptionParser* parser) {
         prefix == kPlain ? "; COLMAP 3.8's name" : std::string();
     parser->AddInteger(prefix + kMoved[0], &options->max_num_iterations,
                        AtLeast(0),
-                       "Iterations after which to stop in any case; with a "
-                       "cap, per weight of the barrier" +
-                           suffix);
+                       "Iterations after which to stop in any case" + suffix);
     parser->AddInteger(prefix + kMoved[1],
                        &options->max_linear_solver_iterations, AtLeast(1),
                        "Those of conjugate gradients within one" + suffix);

@@ -55,6 +55,25 @@ TEST_F(BundleAdjuster, LowersTheRmsErrorAndReportsIt) {
   EXPECT_TRUE(report["max_error"].is_null());
 }
 
+TEST_F(BundleAdjuster, ReportsItsCourse) {
+  for (const Words& cap :
+       {Words{}, Words{"--BundleAdjustment.max_error_factor", "1.1"}}) {
+    const KrotResult result = Adjust(cap);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const Json report = Report();
+    const Json& iterations = report["iterations"];
+    ASSERT_EQ(iterations.size(), report["num_iterations"]);
+    ASSERT_FALSE(iterations.empty());
+    const double end = iterations.back()["cost"];
+    EXPECT_NEAR(end, report["cost_final"], 1e-9 * end);
+    for (const Json& iteration : iterations) {
+      EXPECT_EQ(iteration["barrier"].is_null(), cap.empty());
+      EXPECT_TRUE(iteration["is_successful"].is_boolean());
+      EXPECT_LE(iteration["seconds"], report["seconds"]["adjust"]);
+    }
+  }
+}
+
 TEST_F(BundleAdjuster, AgreesWithColmap) {
   if (!HasColmap()) GTEST_SKIP() << "no colmap";
   ASSERT_EQ(Adjust({}).exit_code, 0);

@@ -76,5 +76,35 @@ TEST_F(Interrupt, ByKillLeavesTheOldModel) {
   ExpectNothingChanged();
 }
 
+// An adjustment of thousands of steps: no tolerance ends it.
+class InterruptAdjustment : public Interrupt,
+                            public ::testing::WithParamInterface<const char*> {
+};
+
+TEST_P(InterruptAdjustment, EndsWith130AndWritesNothing) {
+  const std::string ceres = "--BundleAdjustmentCeres.";
+  KrotProcess process({"bundle_adjuster", "--input_path", folder_ / "model",
+                       "--output_path", folder_ / "model", "--overwrite", "1",
+                       "--report_path", folder_ / "report.json", "--html_path",
+                       folder_ / "page.html", ceres + "max_num_iterations",
+                       "1000000", ceres + "function_tolerance", "0",
+                       ceres + "gradient_tolerance", "0", GetParam(), "1000"});
+  process.WaitForErrorText("iteration 1:");
+  process.Signal(SIGINT);
+  const KrotResult result = process.Wait();
+  EXPECT_EQ(result.exit_code, 130);
+  EXPECT_THAT(result.err,
+              ::testing::EndsWith("krot bundle_adjuster: interrupted, nothing "
+                                  "was written\n"));
+  EXPECT_EQ(result.out, "");
+  ExpectNothingChanged();
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Kinds, InterruptAdjustment,
+    ::testing::Values("--BundleAdjustmentCeres.max_linear_solver_iterations",
+                      "--BundleAdjustment.max_error"),
+    [](const auto& test) { return test.index == 0 ? "Plain" : "Bounded"; });
+
 }  // namespace
 }  // namespace krot

@@ -3,6 +3,7 @@
 Usage: page_test.py KROT   (the executable; exit code 77: no browser here)
 """
 
+import itertools
 import json
 import math
 import pathlib
@@ -290,6 +291,25 @@ class OtherCommandsTest(unittest.TestCase):
                       (before["rms"], after["rms"]),
                       self.browser.text("#verdict"))
         self.assert_errors_are(before, after)
+
+    def test_bundle_adjuster_shows_how_its_cost_fell(self):
+        for cap in ([], ["--BundleAdjustment.max_error_factor", 1.1]):
+            with self.subTest(cap=cap):
+                report = self.open_page_of(
+                    "bundle_adjuster", "--input_path", self.root / "input",
+                    "--output_path", self.root / "adjusted",
+                    "--overwrite", 1, *cap)
+                costs = [report["cost_initial"]] + [
+                    step["cost"] for step in report["iterations"]]
+                heights = self.browser.run("""
+                    return [...document.querySelectorAll(
+                        '#convergence circle.after.step')].map(
+                            (step) => Number(step.getAttribute('cy')))""")
+                self.assertEqual(len(heights), len(costs))
+                self.assertEqual(len(heights), report["num_iterations"] + 1)
+                for i, j in itertools.permutations(range(len(costs)), 2):
+                    if costs[i] > costs[j] * (1 + 1e-9):
+                        self.assertLess(heights[i], heights[j])
 
     def test_solver_shows_the_polished_model_where_that_is_written(self):
         report = self.open_page_of(

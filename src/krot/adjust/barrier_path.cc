@@ -267,14 +267,15 @@ void FollowBarrierPath(const BundleAdjustmentOptions& options,
   const Timer timer;
   BarrierPath path(solver_options, bounded);
   summary->termination = BundleAdjustmentTermination::kMaxIterations;
-  for (int& n = summary->num_iterations; n < options.max_num_iterations; ++n) {
+  for (int& n = summary->num_iterations; n < options.max_num_iterations;) {
     if (IsCancelled(options.cancel)) {
       summary->termination = BundleAdjustmentTermination::kInterrupted;
       break;
     }
     const double step = path.Step();
+    ++n;
     if (options.callback) {
-      options.callback({n + 1, path.cost(), path.radius(), step > 0, path.mu(),
+      options.callback({n, path.cost(), path.radius(), step > 0, path.mu(),
                         timer.Seconds()});
     }
     if (path.IsGapReached()) {

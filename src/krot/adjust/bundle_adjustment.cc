@@ -126,6 +126,18 @@ std::optional<double> RobustCost(const BundleAdjustmentOptions& options,
   return sum / 2;
 }
 
+// The options with a callback that also keeps the iterations in the summary.
+BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
+                                         BundleAdjustmentSummary* summary) {
+  BundleAdjustmentOptions recorded = options;
+  recorded.callback = [summary, callback = options.callback](
+                          const BundleAdjustmentIteration& iteration) {
+    if (iteration.iteration > 0) summary->iterations.push_back(iteration);
+    if (callback) callback(iteration);
+  };
+  return recorded;
+}
+
 // Solves a problem without a cap.
 void Minimize(const BundleAdjustmentOptions& options,
               ceres::Solver::Options solver_options, ceres::Problem* problem,
@@ -179,12 +191,14 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
     summary.termination = BundleAdjustmentTermination::kInfeasibleStart;
   } else {
     summary.cost_initial = *cost;
+    const BundleAdjustmentOptions recorded =
+        RecordIterations(options, &summary);
     if (options.max_error) {
-      FollowBarrierPath(options, solver_options,
+      FollowBarrierPath(recorded, solver_options,
                         {&problem, &blocks, &barrier, &multipliers, &recorder},
                         &summary);
     } else {
-      Minimize(options, solver_options, &problem, &summary);
+      Minimize(recorded, solver_options, &problem, &summary);
     }
     summary.cost_final = *RobustCost(options, loss.get(), blocks);
     if (!options.max_error) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "krot/base/progress.h"
 #include "krot/model/model.h"
@@ -18,7 +19,9 @@ enum class RobustLoss { kTrivial, kSoftL1, kCauchy, kHuber };
 
 struct BundleAdjustmentIteration {
   int iteration = 0;  // 0: the start
-  double cost = 0;    // half the sum of the robust squared errors, pixels^2
+  // Half the sum of the robust squared errors, pixels^2; after a step that is
+  // not taken, that of before.
+  double cost = 0;
   double radius = 0;  // of the trust region
   bool is_successful = false;
   std::optional<double> barrier;  // pixels^2; with a max_error
@@ -94,7 +97,8 @@ struct BundleAdjustmentSummary {
   double cost_initial = 0;
   double cost_final = 0;
   int num_iterations = 0;
-  std::string linear_solver;  // "dense_schur", ...
+  std::vector<BundleAdjustmentIteration> iterations;  // without the start
+  std::string linear_solver;                          // "dense_schur", ...
 
   // At the end: g'D^-1 g / (2 cost), the share of the cost that the unknowns
   // would remove, each moved by itself (g the gradient, D the diagonal of J'J).

@@ -21,10 +21,13 @@ class IterationObserver final : public ceres::IterationCallback {
   ceres::CallbackReturnType operator()(
       const ceres::IterationSummary& summary) override {
     if (summary.iteration > 0) ++num_iterations_;
+    if (summary.step_is_successful || summary.iteration == 0) {
+      cost_ = summary.cost;
+    }
     if (callback_) {
       BundleAdjustmentIteration iteration;
       iteration.iteration = num_iterations_;
-      iteration.cost = summary.cost;
+      iteration.cost = cost_;
       iteration.radius = summary.trust_region_radius;
       iteration.is_successful = summary.step_is_successful;
       iteration.seconds = timer_.Seconds();
@@ -39,6 +42,7 @@ class IterationObserver final : public ceres::IterationCallback {
   const CancelFlag* cancel_;
   const Timer timer_;
   int num_iterations_ = 0;
+  double cost_ = 0;  // where the solve is
 };
 
 }  // namespace krot

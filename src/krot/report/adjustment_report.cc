@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 #include <sstream>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -25,6 +26,17 @@ Json ErrorJson(const PixelErrorStatistics& statistics) {
           {"p99", number(statistics.p99)},
           {"mean", number(statistics.mean)},
           {"rms", number(statistics.rms)}};
+}
+
+Json IterationsJson(const std::vector<BundleAdjustmentIteration>& iterations) {
+  Json array = Json::array();
+  for (const BundleAdjustmentIteration& iteration : iterations) {
+    array.push_back({{"cost", iteration.cost},
+                     {"is_successful", iteration.is_successful},
+                     {"barrier", NumberOrNull(iteration.barrier)},
+                     {"seconds", iteration.seconds}});
+  }
+  return array;
 }
 
 std::string ErrorTable(const AdjustModelSummary& summary) {
@@ -230,6 +242,7 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
       {"cost_initial", adjustment.cost_initial},
       {"cost_final", adjustment.cost_final},
       {"num_iterations", adjustment.num_iterations},
+      {"iterations", IterationsJson(adjustment.iterations)},
       {"linear_solver", adjustment.linear_solver},
       {"stationarity", NumberOrNull(adjustment.stationarity)},
       {"max_error", NumberOrNull(summary.max_error)},

@@ -1,15 +1,16 @@
 // How the cost fell and the bound rose, step by step.
 
 import { chart, linear, logarithmic, polyline } from './axes.js';
+import { isMinimax } from './data.js';
 import { svg } from './dom.js';
 import { counted } from './format.js';
 
 // Sweeps and iterations in the order in which they ended.
 export function courseOf(report) {
   const steps = [
-    ...report.sweeps.map((step) => ({ ...step, lower_bound: null })),
+    ...(report.sweeps ?? []),
     ...report.iterations,
-  ];
+  ].map((step) => ({ lower_bound: null, ...step }));
   return steps.sort((a, b) => a.seconds - b.seconds);
 }
 
@@ -17,6 +18,13 @@ function curve(name, places) {
   return [svg('path', { class: `${name} line`, d: polyline(places) }),
     ...places.map(([cx, cy]) =>
       svg('circle', { class: `${name} step`, cx, cy, r: 2.5 }))];
+}
+
+function stepsText(report) {
+  return isMinimax(report) ?
+    `${counted(report.sweeps.length, 'sweep')} and ` +
+      `${counted(report.iterations.length, 'joint iteration')}, in turn` :
+    counted(report.iterations.length, 'iteration');
 }
 
 export function convergenceChart(report) {
@@ -31,13 +39,14 @@ export function convergenceChart(report) {
   const low = values.reduce((a, b) => Math.min(a, b));
   const high = values.reduce((a, b) => Math.max(a, b));
   const { figure, at, add } = chart({
-    caption: 'Cost, and the lower bound proved so far, after every step',
+    caption: isMinimax(report) ?
+      'Cost, and the lower bound proved so far, after every step' :
+      'Cost, half the sum of the squared errors, after every step',
     legend: [['after', 'cost'], ...(bounds.length ? [['bound', 'bound']] : [])],
     x: linear(0, steps.length),
     y: logarithmic(low / 1.05, high * 1.05),
-    xName: `${counted(report.sweeps.length, 'sweep')} and ` +
-      `${counted(report.iterations.length, 'joint iteration')}, in turn`,
-    yName: 'px',
+    xName: stepsText(report),
+    yName: isMinimax(report) ? 'px' : 'px²',
     width: 900,
     height: 260,
   });

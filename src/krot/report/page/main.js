@@ -3,9 +3,7 @@
 import { viewerControls, viewerNotes } from './controls.js';
 import { convergenceChart } from './convergence.js';
 import { histogramChart, imagesChart, tailChart } from './curves.js';
-import {
-  decodeModel, isComparison, isMinimax, modelLabels, readJson,
-} from './data.js';
+import { decodeModel, isComparison, modelLabels, readJson } from './data.js';
 import { byId, html } from './dom.js';
 import { errorsTable } from './errors_table.js';
 import { cards, differencesTable, factsTable } from './facts.js';
@@ -43,7 +41,7 @@ function showSupport(support, show) {
 }
 
 function showCourse(report) {
-  const chart = isMinimax(report) ? convergenceChart(report) : null;
+  const chart = report.iterations ? convergenceChart(report) : null;
   if (chart) byId('convergence').append(chart);
   byId('course').hidden = !chart;
 }
