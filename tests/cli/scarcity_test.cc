@@ -35,7 +35,7 @@ TEST_F(Scarcity, OfMemoryEndsWithASentence) {
   const KrotResult result =
       RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
                folder_ / "output"},
-              60 * kMegabyte);
+              100 * kMegabyte);
   EXPECT_EQ(result.exit_code, 6);
   EXPECT_THAT(result.err, IsOneSentence("krot solver", "out of memory"));
   EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"input"});
@@ -56,7 +56,7 @@ TEST_F(Scarcity, OfThreadsChangesNothing) {
     return ReadBytes(folder_ / output / "points3D.bin");
   };
   // The stacks alone of 1000 threads would take 8 GB.
-  EXPECT_EQ(solve("many", "1000", 60 * kMegabyte), solve("one", "1", 0));
+  EXPECT_EQ(solve("many", "1000", 100 * kMegabyte), solve("one", "1", 0));
 }
 
 }  // namespace

@@ -115,8 +115,8 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "version", "command", "method", "norm", "termination", "num_frames",
           "num_images", "num_points", "num_observations", "left_out",
           "cost_initial", "cost_final", "lower_bound", "relative_gap",
-          "certified", "pixel_error", "sweeps", "iterations", "support",
-          "seconds", "peak_memory_bytes", "threads", "seed"));
+          "certified", "pixel_error", "polish", "sweeps", "iterations",
+          "support", "seconds", "peak_memory_bytes", "threads", "seed"));
   EXPECT_EQ(
       Keys(report["left_out"]),
       (std::vector<std::string>{"behind", "no_pose", "off_axis", "short_track",
