@@ -37,6 +37,23 @@ SolveProgress::Goals ProgressGoals(const SolveModelOptions& options) {
   return goals;
 }
 
+std::string ProblemWords(const SolveSummary& summary) {
+  return Counted(summary.num_images, "image") + ", " +
+         Counted(summary.num_points, "point") + ", " +
+         Counted(summary.num_observations, "observation") +
+         (summary.num_components > 1
+              ? " in " + std::to_string(summary.num_components) + " components"
+              : std::string());
+}
+
+std::string MemoryWords(const SolveSummary& summary) {
+  return "about " + FormatBytes(summary.likely_bytes) + " will be needed" +
+         (summary.largest_bytes > summary.likely_bytes
+              ? ", at most " + FormatBytes(summary.largest_bytes) +
+                    " if the joint solver has to take in every observation"
+              : std::string());
+}
+
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
 SolveModelResult Solve(const SolveCommand& command, const Model& model,
@@ -61,16 +78,7 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
     if (summary.num_observations == 0) {
       throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
     }
-    LogLine(log, 1,
-            Counted(summary.num_images, "image") + ", " +
-                Counted(summary.num_points, "point") + ", " +
-                Counted(summary.num_observations, "observation") +
-                (summary.num_components > 1
-                     ? " in " + std::to_string(summary.num_components) +
-                           " components"
-                     : std::string()) +
-                "; about " + FormatBytes(summary.estimated_bytes) +
-                " will be needed");
+    LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
   SolveModelResult result = command.solve(model, options);
   progress.Finish();

@@ -37,14 +37,20 @@ void SolveProgress::Update(int sweep, const Sweep& state) {
 }
 
 void SolveProgress::Update(int iteration, const JointIteration& state) {
+  const std::string name = "iteration " + std::to_string(iteration) + ": ";
+  const std::string seconds = ", " + FormatNumber(state.seconds, 2) + " s";
+  if (state.target) {
+    Enter(Stage::kStart);
+    Show(0,
+         name + "looking for a start below " + Pixels(*state.target) + seconds);
+    return;
+  }
   Enter(Stage::kIterations);
   const std::string bound =
       state.lower_bound ? Pixels(*state.lower_bound) : "not yet known";
   Show(IterationFraction(state),
-       "iteration " + std::to_string(iteration) + ": cost " +
-           Pixels(state.cost) + ", proved bound " + bound + ", estimated gap " +
-           Scientific(state.gap) + ", " + FormatNumber(state.seconds, 2) +
-           " s");
+       name + "cost " + Pixels(*state.cost) + ", proved bound " + bound +
+           ", estimated gap " + Scientific(*state.gap) + seconds);
 }
 
 void SolveProgress::Finish() {
@@ -87,10 +93,11 @@ double SolveProgress::SweepFraction(int sweep, double cost) {
 }
 
 double SolveProgress::IterationFraction(const JointIteration& state) const {
-  const double gap =
-      state.lower_bound && state.cost > 0
-          ? std::min(state.gap, (state.cost - *state.lower_bound) / state.cost)
-          : state.gap;
+  const double cost = *state.cost;
+  double gap = *state.gap;
+  if (state.lower_bound && cost > 0) {
+    gap = std::min(gap, (cost - *state.lower_bound) / cost);
+  }
   return LogFraction(std::min(gap, 1.0), goals_.relative_gap);
 }
 

@@ -20,7 +20,8 @@ class SolveProgress {
   // kBar where stderr is a terminal.
   static Style StyleOfStderr();
 
-  // What fills the bar of a stage: the gain of a sweep falling to the
+  // What fills the bar of a stage, except for the way to a start, whose end is
+  // not known: the gain of a sweep falling to the
   // tolerance or the sweeps' number rising to the maximum; the gap of the
   // iterations falling to the one asked for.
   struct Goals {
@@ -36,13 +37,13 @@ class SolveProgress {
   SolveProgress& operator=(const SolveProgress&) = delete;
 
   void Update(int sweep, const Sweep& state);
-  void Update(int iteration, const JointIteration& state);
+  void Update(int iteration, const JointIteration& state);  // or to a start
 
   // Ends the line of the bar.
   void Finish();
 
  private:
-  enum class Stage { kNone, kSweeps, kIterations };
+  enum class Stage { kNone, kSweeps, kStart, kIterations };
 
   // Begins a new line and an empty bar if `stage` is new.
   void Enter(Stage stage);

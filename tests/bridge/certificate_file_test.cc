@@ -71,17 +71,75 @@ TEST_P(CertificateOfModel, IsAcceptedAfterAWalkThroughItsFile) {
   EXPECT_EQ(CertificateJson(file), json);
   const CertificateVerdict verdict = VerifyCertificateFile(solved_.model, file);
   EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
-  EXPECT_GE(verdict.relative_gap, -1e-12);
-  EXPECT_LE(verdict.relative_gap, 1e-6);
+  ASSERT_TRUE(verdict.cost && verdict.relative_gap);
+  EXPECT_GE(*verdict.relative_gap, -1e-12);
+  EXPECT_LE(*verdict.relative_gap, 1e-6);
   EXPECT_EQ(verdict.support.size(), file.observations.size());
-  EXPECT_NEAR(verdict.support.front().error_px, verdict.cost, 1e-12);
+  EXPECT_NEAR(verdict.support.front().error_px, *verdict.cost, 1e-12);
 }
 
 TEST_P(CertificateOfModel, HoldsForAnyTranslationsAndPoints) {
   const CertificateVerdict verdict =
       VerifyCertificateFile(MakeModel(GetParam()), solved_.file);
   EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
-  EXPECT_GT(verdict.relative_gap, 1e-3);
+  ASSERT_TRUE(verdict.relative_gap);
+  EXPECT_GT(*verdict.relative_gap, 1e-3);
+}
+
+// Every frame at the origin, on which no camera looks any more.
+Model WithoutTranslations(Model model) {
+  for (Image& image : model.images) {
+    image.cam_from_world.translation.setZero();
+  }
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.translation.setZero();
+  }
+  return model;
+}
+
+Model WithUnknownTranslations(Model model) {
+  for (Image& image : model.images) {
+    image.cam_from_world.translation[1] = std::nan("");
+  }
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.translation[1] = std::nan("");
+  }
+  return model;
+}
+
+TEST_P(CertificateOfModel, HoldsWhereTheModelSeesNothingOfTheSupport) {
+  for (const Model& model : {WithoutTranslations(solved_.model),
+                             WithUnknownTranslations(solved_.model)}) {
+    ASSERT_LT(BuildProblem(model, {}).problem.observations.size(),
+              BuildProblem(solved_.model, {}).problem.observations.size());
+    const CertificateVerdict verdict =
+        VerifyCertificateFile(model, solved_.file);
+    EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+    EXPECT_EQ(verdict.lower_bound,
+              VerifyCertificateFile(solved_.model, solved_.file).lower_bound);
+    EXPECT_FALSE(verdict.cost);
+    EXPECT_FALSE(verdict.relative_gap);
+    EXPECT_EQ(verdict.support.size(), solved_.file.observations.size());
+  }
+}
+
+TEST_P(CertificateOfModel, IsRefusedWithoutTranslationsOnceItChanges) {
+  const Model model = WithoutTranslations(solved_.model);
+  const auto expect_refused =
+      [&](const std::function<void(CertificateFile*)>& change) {
+        CertificateFile file = solved_.file;
+        change(&file);
+        EXPECT_FALSE(VerifyCertificateFile(model, file).is_accepted);
+      };
+  expect_refused([](CertificateFile* f) { f->lower_bound *= 1 + 1e-6; });
+  expect_refused([](CertificateFile* f) { f->model_sha256[5] ^= 1; });
+  expect_refused([](CertificateFile* f) { f->observations.pop_back(); });
+  expect_refused([](CertificateFile* f) { f->observations[0].image_id = 400; });
+  expect_refused([](CertificateFile* f) { ++f->observations[0].point3D_id; });
+  expect_refused([](CertificateFile* f) { f->observations[0].u[1] += 1e-6; });
+  expect_refused([](CertificateFile* f) { f->observations[0].J *= 2; });
+  expect_refused([](CertificateFile* f) { f->observations[0].lambda *= 2; });
+  expect_refused([](CertificateFile* f) { f->observations[0].y *= 0.5; });
 }
 
 TEST_P(CertificateOfModel, IsRefusedForAnotherModel) {

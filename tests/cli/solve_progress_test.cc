@@ -18,8 +18,8 @@ std::string ErrorTextOf(const SolveProgress::Style style,
   progress.Update(1, Sweep{8.0, 0.5});
   progress.Update(2, Sweep{7.92, 1.0});  // a gain of 1e-2: half way to 1e-4
   // A gap of 1e-2: half way to 1e-4.
-  progress.Update(1, JointIteration{7.5, std::nullopt, 1e-2, 1.5});
-  progress.Update(2, JointIteration{7.0, 6.9999, 1e-3, 2.0});
+  progress.Update(1, JointIteration{7.5, {}, 1e-2, 1.5, {}});
+  progress.Update(2, JointIteration{7.0, 6.9999, 1e-3, 2.0, {}});
   progress.Finish();
   return testing::internal::GetCapturedStderr();
 }
@@ -32,6 +32,14 @@ TEST(SolveProgress, PrintsOneLinePerStepWhereNoTerminalIs) {
             "estimated gap 1.0e-02, 1.50 s\n"
             "iteration 2: cost 7.000000 px, proved bound 6.999900 px, "
             "estimated gap 1.0e-03, 2.00 s\n");
+}
+
+TEST(SolveProgress, SaysWhatAStartIsToMeet) {
+  testing::internal::CaptureStderr();
+  SolveProgress progress({}, {1e-4, 100, 1e-4}, SolveProgress::Style::kLines);
+  progress.Update(1, JointIteration{{}, {}, {}, 0.25, 100.0});
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "iteration 1: looking for a start below 100.000000 px, 0.25 s\n");
 }
 
 TEST(SolveProgress, RewritesOneLineWithABarOnATerminal) {

@@ -72,8 +72,32 @@ TEST(SolveModel, ProvesTheGapOfTheModelItGives) {
         VerifyCertificateFile(result.model, *summary.certificate);
     ASSERT_TRUE(verdict.is_accepted) << verdict.refusal;
     EXPECT_EQ(verdict.lower_bound, *summary.lower_bound);
-    EXPECT_NEAR(verdict.cost, summary.cost_final, 1e-9);
+    EXPECT_NEAR(verdict.cost.value(), summary.cost_final, 1e-9);
   }
+}
+
+TEST(SolveModel, CountsIterationsAndSecondsOverAllStages) {
+  SolveModelOptions options;
+  options.init = SolveInit::kFeasible;
+  int calls = 0;
+  options.joint.callback = [&](int iteration, const JointIteration&) {
+    EXPECT_EQ(iteration, ++calls);
+  };
+  const SolveSummary summary =
+      SolveModel(SynthesizeScene({}).model, options).summary;
+  EXPECT_EQ(static_cast<int>(summary.iterations.size()), calls);
+  const auto is_joint = [](const JointIteration& state) {
+    return !state.target;
+  };
+  const auto first_joint = std::find_if(summary.iterations.begin(),
+                                        summary.iterations.end(), is_joint);
+  EXPECT_NE(first_joint, summary.iterations.begin());
+  ASSERT_NE(first_joint, summary.iterations.end());
+  EXPECT_LE((first_joint - 1)->seconds, summary.sweeps.front().seconds);
+  EXPECT_LE(summary.sweeps.front().seconds, first_joint->seconds);
+  ASSERT_TRUE(summary.num_working_observations);
+  EXPECT_GT(*summary.num_working_observations, 0);
+  EXPECT_LE(*summary.num_working_observations, summary.num_observations);
 }
 
 TEST(SolveModel, ListsTheSupportWorstFirstWithMultipliersOfSumOne) {
@@ -296,6 +320,23 @@ struct PoselessScene {
   double cost = 0;               // the optimum of all observations
   int64_t num_observations = 0;  // of the image
 };
+
+TEST(SolveModel, IsInterruptedOnItsWayToAStart) {
+  const Model model = SynthesizeScene({}).model;
+  SolveModelOptions options;
+  options.init = SolveInit::kFeasible;
+  CancelFlag is_cancelled = false;
+  options.cancel = &is_cancelled;
+  options.joint.callback = [&](int iteration, const JointIteration& state) {
+    EXPECT_TRUE(state.target);
+    if (iteration == 2) is_cancelled = true;
+  };
+  const SolveModelResult result = SolveModel(model, options);
+  EXPECT_EQ(result.summary.termination, SolveTermination::kInterrupted);
+  EXPECT_EQ(result.summary.iterations.size(), 2u);
+  EXPECT_FALSE(result.summary.num_working_observations);
+  EXPECT_THAT(result.model, IsModel(model));
+}
 
 TEST(SolveModel, StartsFromNothingWhereTheModelLeavesObservationsOut) {
   const PoselessScene scene;

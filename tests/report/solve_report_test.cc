@@ -77,7 +77,11 @@ SolveReport CertifiedReport() {
   summary.lower_bound = 3.10105;
   summary.relative_gap = 3.2e-6;
   summary.seconds_certify = 0.25;
-  summary.iterations = {{4, std::nullopt, 0.5, 1}, {3.5, 3.0, 0.1, 2}};
+  summary.num_observations = 1000;
+  summary.num_working_observations = 39;
+  summary.iterations = {{std::nullopt, std::nullopt, std::nullopt, 0.5, 100.0},
+                        {4, std::nullopt, 0.5, 1, std::nullopt},
+                        {3.5, 3.0, 0.1, 2, std::nullopt}};
   for (uint32_t n = 0; n < 12; ++n) {
     summary.support.push_back({n + 1, "image\xff.jpg", n, 70 + n, 1 / 12.0, 3});
   }
@@ -92,13 +96,20 @@ TEST(SolveJson, HoldsBoundIterationsAndSupport) {
   EXPECT_EQ(json["lower_bound"], 3.10105);
   EXPECT_EQ(json["relative_gap"], 3.2e-6);
   EXPECT_EQ(json["seconds"]["certify"], 0.25);
-  ASSERT_EQ(json["iterations"].size(), 2u);
-  EXPECT_EQ(json["iterations"][0]["method"], "joint");
-  EXPECT_TRUE(json["iterations"][0]["lower_bound"].is_null());
-  EXPECT_EQ(json["iterations"][1]["lower_bound"], 3.0);
-  EXPECT_EQ(json["iterations"][1]["cost"], 3.5);
-  EXPECT_EQ(json["iterations"][1]["gap"], 0.1);
-  EXPECT_EQ(json["iterations"][1]["seconds"], 2);
+  EXPECT_EQ(json["working_observations"], 39);
+  ASSERT_EQ(json["iterations"].size(), 3u);
+  EXPECT_EQ(json["iterations"][0]["method"], "feasible_start");
+  EXPECT_EQ(json["iterations"][0]["target"], 100);
+  for (const char* key : {"cost", "lower_bound", "gap"}) {
+    EXPECT_TRUE(json["iterations"][0].at(key).is_null());
+  }
+  EXPECT_EQ(json["iterations"][1]["method"], "joint");
+  EXPECT_TRUE(json["iterations"][1]["lower_bound"].is_null());
+  EXPECT_TRUE(json["iterations"][1].at("target").is_null());
+  EXPECT_EQ(json["iterations"][2]["lower_bound"], 3.0);
+  EXPECT_EQ(json["iterations"][2]["cost"], 3.5);
+  EXPECT_EQ(json["iterations"][2]["gap"], 0.1);
+  EXPECT_EQ(json["iterations"][2]["seconds"], 2);
   ASSERT_EQ(json["support"].size(), 12u);
   EXPECT_EQ(json["support"][11]["image_id"], 12);
   EXPECT_EQ(json["support"][11]["point2D_idx"], 11);
@@ -114,8 +125,21 @@ TEST(SolveTable, GivesTheVerdictAndTheTenWorstOfTheSupport) {
   EXPECT_THAT(table, HasSubstr("12 observations, worst first; the first 10"));
   EXPECT_THAT(table, HasSubstr("  79  "));
   EXPECT_THAT(table, Not(HasSubstr("  80  ")));
-  EXPECT_THAT(table, HasSubstr("after 2 joint iterations and 2 sweeps"));
+  EXPECT_THAT(table, HasSubstr("Ended after 1 iteration to a start, 2 joint "
+                               "iterations on 3 % of the observations and 2 "
+                               "sweeps with the gap"));
   EXPECT_THAT(table, HasSubstr("falls into 2 components"));
+}
+
+TEST(SolveTable, SaysHowMuchTheJointSolverLookedAt) {
+  SolveReport report = CertifiedReport();
+  report.summary.num_working_observations = 9;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("on less than 1 % of the observations"));
+  report.summary.num_working_observations = report.summary.num_observations;
+  EXPECT_THAT(SolveTable(report), HasSubstr("on all observations and"));
+  report.summary.num_working_observations.reset();
+  EXPECT_THAT(SolveTable(report), HasSubstr("2 joint iterations and"));
 }
 
 TEST(SolveTable, SaysWhereAllErrorsAreZero) {

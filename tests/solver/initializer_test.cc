@@ -70,7 +70,7 @@ TEST_P(FindStartTest, MeetsTheBoundFromNothing) {
       const InitializerSummary summary =
           FindStart(scene.problem, options, &estimate);
       ExpectFeasible(scene.problem, options, estimate, summary);
-      EXPECT_GT(summary.iterations, 0);
+      EXPECT_FALSE(summary.iterations.empty());
     }
   }
 }
@@ -197,6 +197,51 @@ TEST(FindStart, ChangesNothingWhenInterrupted) {
     EXPECT_FALSE(summary.certificate);
     EXPECT_EQ(scene.estimate.points, before.points);
     EXPECT_EQ(scene.estimate.translations, before.translations);
+  }
+}
+
+TEST(FindStart, ReportsEveryIterationWithTheBoundThatItSeeks) {
+  const RandomScene scene = Glue(MakeSmallScene(35), MakeSmallScene(36));
+  InitializerOptions options = Options(Norm::L2(), 100);
+  int calls = 0;
+  options.callback = [&](int iteration, const JointIteration& state) {
+    EXPECT_EQ(iteration, ++calls);
+    ASSERT_TRUE(state.target);
+    EXPECT_LE(*state.target, 100);
+    EXPECT_FALSE(state.cost);
+    EXPECT_FALSE(state.gap);
+  };
+  Estimate estimate;
+  const InitializerSummary summary =
+      FindStart(scene.problem, options, &estimate);
+  EXPECT_GT(calls, 2);
+  ASSERT_EQ(static_cast<int>(summary.iterations.size()), calls);
+  EXPECT_EQ(summary.iterations.front().target, 100);
+  EXPECT_LT(summary.iterations.back().target, 100);  // lowered
+}
+
+TEST(FindStart, IsInterruptedAtAnyIteration) {
+  const RandomScene scene = MakeSmallScene(33);
+  for (const double max_error : {100.0, 1e-3}) {
+    Estimate estimate;
+    const size_t num_iterations =
+        FindStart(scene.problem, Options(Norm::L2(), max_error), &estimate)
+            .iterations.size();
+    ASSERT_GT(num_iterations, 4u);
+    for (size_t last = 1; last < num_iterations; ++last) {
+      CancelFlag is_cancelled = false;
+      InitializerOptions options = Options(Norm::L2(), max_error);
+      options.cancel = &is_cancelled;
+      options.callback = [&](int iteration, const JointIteration&) {
+        if (iteration == static_cast<int>(last)) is_cancelled = true;
+      };
+      Estimate unwritten;
+      const InitializerSummary summary =
+          FindStart(scene.problem, options, &unwritten);
+      EXPECT_EQ(summary.termination, InitializerTermination::kInterrupted);
+      EXPECT_EQ(summary.iterations.size(), last);
+      EXPECT_TRUE(unwritten.points.empty());
+    }
   }
 }
 

@@ -62,6 +62,17 @@ Estimate Shake(const RandomScene& scene, double size) {
   }
 }
 
+// Sweeps after a rough start push points against their cones.
+Estimate HugTheBoundary(const RandomScene& scene, Norm norm) {
+  Estimate estimate = Shake(scene, 3);
+  ResIntOptions sweeps;
+  sweeps.norm = norm;
+  sweeps.max_sweeps = 5;
+  sweeps.sweep_tolerance = 1e-9;
+  SolveResInt(scene.problem, sweeps, &estimate);
+  return estimate;
+}
+
 class SolveJointTest : public testing::TestWithParam<double> {
  protected:
   Norm norm() const { return {GetParam()}; }
@@ -121,17 +132,11 @@ TEST_P(SolveJointTest, EndsAtTheSameOptimumFromAnyStart) {
   }
 }
 
-// Sweeps after a rough start push points against their cones.
 TEST_P(SolveJointTest, LeavesStartsThatHugTheBoundary) {
   for (unsigned seed = 31; seed <= 36; ++seed) {
     SCOPED_TRACE(seed);
     const RandomScene scene = MakeSmallScene(seed);
-    Estimate estimate = Shake(scene, 3);
-    ResIntOptions sweeps;
-    sweeps.norm = norm();
-    sweeps.max_sweeps = 5;
-    sweeps.sweep_tolerance = 1e-9;
-    SolveResInt(scene.problem, sweeps, &estimate);
+    Estimate estimate = HugTheBoundary(scene, norm());
     const JointSummary summary =
         SolveJoint(scene.problem, Options(norm()), &estimate);
     ExpectCertified(scene.problem, norm(), estimate, summary);
@@ -263,6 +268,27 @@ TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
     EXPECT_LE(summary.cost_final, summary.cost_initial);
     EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
   }
+}
+
+// With a start from which the interior point gets nowhere.
+TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
+  const RandomScene scene = MakeSmallScene(31);
+  const Estimate start = HugTheBoundary(scene, Norm::L2());
+  CancelFlag is_cancelled = false;
+  JointOptions options = Options(Norm::L2());
+  options.cancel = &is_cancelled;
+  options.callback = [&](int, const JointIteration& state) {
+    if (!state.target) return;
+    EXPECT_LT(*state.target, *state.cost);
+    EXPECT_FALSE(state.gap);
+    is_cancelled = true;
+  };
+  Estimate estimate = start;
+  const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+  ASSERT_TRUE(summary.iterations.back().target);
+  EXPECT_EQ(summary.termination, JointTermination::kInterrupted);
+  EXPECT_LE(summary.cost_final, summary.cost_initial);
+  EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
 }
 
 TEST(SolveJoint, OfNothingIsDone) {

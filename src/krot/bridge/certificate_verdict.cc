@@ -1,5 +1,6 @@
 #include "krot/bridge/certificate_verdict.h"
 
+#include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
@@ -28,6 +29,7 @@ bool IsSameRay(const CertificateFile::SupportObservation& o,
 // The certificate in terms of the problem, into which the file's u and J go.
 struct Translation {
   std::string refusal;
+  bool is_unseen = false;  // the problem has not all of its observations
   Certificate certificate;
 };
 
@@ -66,6 +68,7 @@ Translation Translate(const Model& model, const CertificateFile& file,
         {static_cast<int64_t>(i), o.lambda, o.y});
   }
   if (!by_key.empty()) {
+    translation.is_unseen = true;
     translation.refusal = NameOf(*by_key.begin()->second) +
                           " is not among those that can be used";
   }
@@ -84,7 +87,13 @@ CertificateVerdict VerifyCertificateFile(const Model& model,
     return verdict;
   }
   BuiltProblem built = BuildProblem(model, {});
-  const Translation translation = Translate(model, file, &built);
+  Translation translation = Translate(model, file, &built);
+  if (translation.is_unseen) {
+    BuildProblemOptions rays_alone;
+    rays_alone.ignore_translations = true;
+    built = BuildProblem(model, rays_alone);
+    translation = Translate(model, file, &built);
+  }
   verdict.refusal = translation.refusal;
   if (!verdict.refusal.empty()) return verdict;
 
@@ -96,8 +105,11 @@ CertificateVerdict VerifyCertificateFile(const Model& model,
   verdict.is_accepted = true;
   verdict.lower_bound = check.proved_bound;
   verdict.defect = check.defect;
-  verdict.cost = Cost(built.problem, built.start, file.norm, -1);
-  verdict.relative_gap = (verdict.cost - verdict.lower_bound) / verdict.cost;
+  const double cost = Cost(built.problem, built.start, file.norm, -1);
+  if (std::isfinite(cost)) {
+    verdict.cost = cost;
+    verdict.relative_gap = (cost - verdict.lower_bound) / cost;
+  }
   verdict.support = ListSupport(model, built, built.start, file.norm,
                                 translation.certificate);
   return verdict;

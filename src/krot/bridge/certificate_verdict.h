@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,18 +15,22 @@ struct CertificateVerdict {
   bool is_accepted = false;
   std::string refusal;  // one sentence; empty if accepted
   // The rest is meaningful only if accepted.
-  double lower_bound = 0;   // proved, linearised pixels
-  double cost = 0;          // of the model as it is, linearised pixels
-  double relative_gap = 0;  // (cost - lower_bound) / cost
-  double defect = 0;        // what rounding takes from the stated bound
+  double lower_bound = 0;  // proved, linearised pixels
+  // Of the model as it is, linearised pixels; none where that puts an
+  // observation behind its camera.
+  std::optional<double> cost;
+  std::optional<double> relative_gap;  // (cost - lower_bound) / cost
+  double defect = 0;  // what rounding takes from the stated bound
   std::vector<SupportObservation> support;  // worst first
 };
 
 // Accepts if the digest of the model agrees, every observation is one of the
 // problem that BuildProblem makes of the model, its u and J are those of the
 // model to 1e-9, and CheckCertificate accepts the multipliers for the problem
-// with the file's u and J. Requires a valid model; throws what BuildProblem
-// does. O(observations), and CheckCertificate.
+// with the file's u and J. Translations and points do not enter into that:
+// where they keep BuildProblem from using an observation of the certificate,
+// it ignores them. Requires a valid model; throws what BuildProblem does.
+// O(observations), and CheckCertificate.
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "krot/base/timer.h"
+#include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/cost.h"
 #include "krot/solver/block_sweep.h"
@@ -51,10 +51,11 @@ SolveTermination FromJoint(JointTermination termination) {
 class Schedule {
  public:
   Schedule(const KnownRotationProblem& problem,
-           const SolveModelOptions& options, Estimate* estimate,
-           SolveSummary* summary)
+           const SolveModelOptions& options, const Timer& timer,
+           Estimate* estimate, SolveSummary* summary)
       : problem_(problem),
         options_(options),
+        timer_(timer),
         estimate_(*estimate),
         summary_(*summary) {}
 
@@ -79,9 +80,9 @@ class Schedule {
 
   const KnownRotationProblem& problem_;
   const SolveModelOptions& options_;
+  const Timer& timer_;
   Estimate& estimate_;
   SolveSummary& summary_;
-  const Timer timer_;
 };
 
 void Schedule::Sweeps(ResIntOptions res_int) {
@@ -108,16 +109,11 @@ std::optional<Certificate> Schedule::Joint() {
   joint.num_threads = options_.num_threads;
   joint.cancel = options_.cancel;
   joint.relative_gap *= kShareOfGap;
-  const double seconds_before = timer_.Seconds();
-  joint.callback = [&](int iteration, const JointIteration& state) {
-    summary_.iterations.push_back(state);
-    summary_.iterations.back().seconds += seconds_before;
-    if (!options_.joint.callback) return;
-    options_.joint.callback(iteration, summary_.iterations.back());
-  };
+  joint.callback = LogIterations(options_, timer_, &summary_);
   const JointSummary result = SolveJoint(problem_, joint, &estimate_);
   summary_.termination = FromJoint(result.termination);
   summary_.cost_final = result.cost_final;
+  summary_.num_working_observations = result.num_working_observations;
   return result.certificate;
 }
 
@@ -146,7 +142,8 @@ void Schedule::StartAfresh() {
   if (options_.on_note) {
     options_.on_note("the start is a rough one; looking for a better");
   }
-  FoundStart found = FindFeasibleStart(problem_, options_);
+  FoundStart found = FindFeasibleStart(
+      problem_, options_, LogIterations(options_, timer_, &summary_));
   if (found.termination == SolveTermination::kInterrupted) {
     summary_.termination = SolveTermination::kInterrupted;
   }
@@ -162,12 +159,13 @@ void Schedule::StartAfresh() {
 
 std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
                                        const SolveModelOptions& options,
-                                       SolveMethod method, Estimate* estimate,
+                                       SolveMethod method, const Timer& timer,
+                                       Estimate* estimate,
                                        SolveSummary* summary) {
   summary->cost_initial =
       Cost(problem, *estimate, options.norm, options.num_threads);
   summary->cost_final = summary->cost_initial;
-  Schedule schedule(problem, options, estimate, summary);
+  Schedule schedule(problem, options, timer, estimate, summary);
   switch (method) {
     case SolveMethod::kResInt:
       schedule.Sweeps(options.res_int);

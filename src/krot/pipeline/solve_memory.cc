@@ -3,6 +3,9 @@
 #include <algorithm>
 
 #include "krot/conic/interior_point.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/restrict.h"
+#include "krot/solver/working_set.h"
 
 namespace krot {
 namespace {
@@ -32,29 +35,56 @@ int64_t EstimateBytes(const KnownRotationProblem& problem) {
   return 24 * (int64_t{problem.num_points} + problem.num_frames);
 }
 
+// Of an interior point on the observations of `problem` as a copy of them.
+int64_t JointBytes(const KnownRotationProblem& problem, Norm norm) {
+  return ProblemBytes(problem) + EstimateInteriorPointMemory(problem, norm);
+}
+
+// What a working set is likely to grow to: that of the start, once more.
+KnownRotationProblem LikelyWorkingProblem(const BuiltProblem& built,
+                                          Norm norm) {
+  const KnownRotationProblem& problem = built.problem;
+  WorkingSet set = FirstWorkingSet(problem, built.start, norm,
+                                   Cost(problem, built.start, norm, 1));
+  return RestrictProblem(problem, set.Observations()).problem;
+}
+
 }  // namespace
 
-int64_t EstimateSolveBytes(const Model& model,
-                           const KnownRotationProblem& problem,
-                           SolveMethod method, Norm norm) {
-  constexpr int64_t kProcess = 8000000;  // code and libraries
+SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
+                                const SolveSummary& summary) {
+  constexpr int64_t kProcess = 12000000;  // code and libraries
   // The record of a block, in sweeps.
   constexpr int64_t kBytesPerBlock = 200;
   // The start, the estimate, and those that sweeps and iterations compare.
   constexpr int64_t kEstimates = 5;
+  const KnownRotationProblem& problem = built.problem;
   const int64_t held = kProcess + ModelBytes(model) + ProblemBytes(problem) +
                        kEstimates * EstimateBytes(problem);
   const int64_t sweeps =
       kBytesPerBlock * (int64_t{problem.num_points} + problem.num_frames);
-  // The joint solver works on a copy, one connected component at a time.
-  const int64_t joint =
-      method == SolveMethod::kResInt
-          ? 0
-          : ProblemBytes(problem) + EstimateInteriorPointMemory(problem, norm);
   // In the end, the model that is given back and the pixel errors.
   const int64_t result =
       ModelBytes(model) + Size(model.track_elements.size(), 2 * sizeof(double));
-  return held + std::max({sweeps, joint, result});
+  SolveMemory memory;
+  memory.likely = memory.at_most = held + std::max(sweeps, result);
+  if (summary.method == SolveMethod::kResInt &&
+      summary.init == SolveInit::kModel) {
+    return memory;
+  }
+  memory.at_most =
+      std::max(memory.at_most, held + ProblemBytes(problem) +
+                                   JointBytes(problem, summary.norm));
+  if (summary.init == SolveInit::kFeasible) {
+    memory.likely = memory.at_most;
+    return memory;
+  }
+  const KnownRotationProblem working =
+      LikelyWorkingProblem(built, summary.norm);
+  memory.likely =
+      std::max(memory.likely, held + ProblemBytes(problem) +
+                                  JointBytes(working, summary.norm));
+  return memory;
 }
 
 }  // namespace krot

@@ -4,6 +4,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
+#include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/schedule.h"
 #include "krot/pipeline/solve_memory.h"
 #include "krot/pipeline/start.h"
@@ -38,8 +39,9 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->num_components = FindComponents(problem).count;
   summary->left_out = built.left_out;
   summary->num_retriangulated_points = built.num_retriangulated_points;
-  summary->estimated_bytes =
-      EstimateSolveBytes(model, problem, summary->method, summary->norm);
+  const SolveMemory memory = EstimateSolveMemory(model, built, *summary);
+  summary->likely_bytes = memory.likely;
+  summary->largest_bytes = memory.at_most;
 }
 
 // Checks the certificate once more, apart from the solver that made it, and
@@ -85,12 +87,14 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
 // Finds the estimate to start from; false, and the termination why, if there
 // is none.
 bool FindEstimate(const Model& model, const SolveModelOptions& options,
-                  Start* start, Estimate* estimate, SolveSummary* summary) {
+                  const Timer& timer, Start* start, Estimate* estimate,
+                  SolveSummary* summary) {
   if (start->init == SolveInit::kModel) {
     *estimate = start->built.start;
     return true;
   }
-  FoundStart found = FindFeasibleStart(start->built.problem, options);
+  FoundStart found = FindFeasibleStart(start->built.problem, options,
+                                       LogIterations(options, timer, summary));
   summary->termination = found.termination;
   if (found.termination == SolveTermination::kNotRun) {
     *estimate = std::move(found.estimate);
@@ -137,14 +141,14 @@ SolveModelResult Solve(const Model& model, const SolveModelOptions& options) {
 
   const Timer solve_timer;
   Estimate estimate;
-  if (!FindEstimate(model, options, &start, &estimate, &summary)) {
+  if (!FindEstimate(model, options, solve_timer, &start, &estimate, &summary)) {
     summary.seconds_solve = solve_timer.Seconds();
     result.model = model;
     return result;
   }
   const KnownRotationProblem& problem = start.built.problem;
-  const std::optional<Certificate> certificate =
-      RunSchedule(problem, options, summary.method, &estimate, &summary);
+  const std::optional<Certificate> certificate = RunSchedule(
+      problem, options, summary.method, solve_timer, &estimate, &summary);
   if (options.res_int.update_frames) {
     RestoreGauge(problem, start.built.start, &estimate);
     summary.cost_final =

@@ -66,7 +66,10 @@ struct SolveSummary {
   double cost_initial = 0;
   double cost_final = 0;
   std::vector<Sweep> sweeps;  // the leading and the finishing ones
+  // Of the joint solver, and towards a start; seconds since the solve's start.
   std::vector<JointIteration> iterations;
+  // That the joint solver looked at in the end; none if it did not run.
+  std::optional<int64_t> num_working_observations;
 
   // What a certificate proves that CheckCertificate accepted in the end.
   bool is_certified = false;
@@ -84,8 +87,10 @@ struct SolveSummary {
   // is the polished one; everything above speaks of the one before.
   std::optional<PolishSummary> polish;
 
-  // What a process that holds the model needs, at its peak; see solve_memory.h.
-  int64_t estimated_bytes = 0;
+  // What a process that holds the model is likely to need at its peak, and at
+  // most; see solve_memory.h.
+  int64_t likely_bytes = 0;
+  int64_t largest_bytes = 0;
 
   double seconds_build = 0;  // wall clock
   double seconds_solve = 0;
@@ -113,7 +118,8 @@ struct SolveModelOptions {
   // a few joint iterations, and do little for a good one.
   int max_leading_sweeps = 10;            // >= 0
   double leading_sweep_tolerance = 0.05;  // relative; >= 0
-  JointOptions joint;                     // kAuto, kJoint
+  // kAuto, kJoint. Its callback is also told of iterations towards a start.
+  JointOptions joint;
 
   // A sentence on what was chosen, and why; may be empty.
   std::function<void(const std::string&)> on_note;

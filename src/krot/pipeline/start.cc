@@ -90,12 +90,14 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
 }
 
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
-                             const SolveModelOptions& options) {
+                             const SolveModelOptions& options,
+                             const JointCallback& log) {
   InitializerOptions initializer;
   initializer.norm = options.norm;
   initializer.max_error = options.init_max_error;
   initializer.num_threads = options.num_threads;
   initializer.cancel = options.cancel;
+  initializer.callback = log;
   FoundStart start;
   InitializerSummary summary = FindStart(problem, initializer, &start.estimate);
   switch (summary.termination) {

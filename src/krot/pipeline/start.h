@@ -30,8 +30,10 @@ struct FoundStart {
   std::optional<Certificate> certificate;  // kInfeasible
 };
 
-// One whose residuals are below options.init_max_error.
+// One whose residuals are below options.init_max_error. Iterations are told to
+// `log`.
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
-                             const SolveModelOptions& options);
+                             const SolveModelOptions& options,
+                             const JointCallback& log);
 
 }  // namespace krot

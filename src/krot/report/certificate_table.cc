@@ -31,8 +31,11 @@ std::string CertificateTable(const CertificateVerdict& verdict,
   // Downwards: more than this is not claimed.
   bounds.AddRow({"lower bound",
                  FormatNumber(std::floor(verdict.lower_bound * 1e6) / 1e6, 6)});
-  bounds.AddRow({"this model", FormatNumber(verdict.cost, 6)});
-  bounds.AddRow({"relative gap", Scientific(verdict.relative_gap)});
+  bounds.AddRow({"this model", verdict.cost ? FormatNumber(*verdict.cost, 6)
+                                            : "behind a camera"});
+  bounds.AddRow({"relative gap", verdict.relative_gap
+                                     ? Scientific(*verdict.relative_gap)
+                                     : "-"});
   return "The certificate holds: whatever the translations and points, the "
          "largest error is at least\nthe lower bound. Linearised pixels\n" +
          bounds.ToString() + SupportTable(verdict.support, max_observations);

@@ -74,11 +74,15 @@ Json WorstPointsJson(const std::vector<PointDifference>& points) {
   return json;
 }
 
+Json NumberOrNull(const std::optional<double>& value) {
+  return value ? Json(*value) : Json();
+}
+
 Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
   if (!verdict) return Json();
   return {{"lower_bound", verdict->lower_bound},
-          {"cost", verdict->cost},
-          {"relative_gap", verdict->relative_gap},
+          {"cost", NumberOrNull(verdict->cost)},
+          {"relative_gap", NumberOrNull(verdict->relative_gap)},
           {"num_support", verdict->support.size()}};
 }
 

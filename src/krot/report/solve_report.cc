@@ -1,5 +1,6 @@
 #include "krot/report/solve_report.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -64,16 +65,40 @@ std::string Verdict(const SolveSummary& summary) {
          FormatNumber(bound, 4) + " px.";
 }
 
-std::string TerminationSentence(const SolveSummary& summary) {
+// " on 3 % of the observations"; empty where the joint solver did not run.
+std::string WorkingSetWords(const SolveSummary& summary) {
+  if (!summary.num_working_observations) return "";
+  const int64_t count = *summary.num_working_observations;
+  if (count == summary.num_observations) return " on all observations";
+  const double percent = 100 * static_cast<double>(count) /
+                         static_cast<double>(summary.num_observations);
+  return " on " +
+         (percent < 1 ? std::string("less than 1")
+                      : FormatNumber(std::floor(percent), 0)) +
+         " % of the observations";
+}
+
+// " after 12 joint iterations on 3 % of the observations and 4 sweeps".
+std::string StepsWords(const SolveSummary& summary) {
   const std::string sweeps =
       Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
-  const std::string after =
-      " after " +
-      (summary.method == SolveMethod::kResInt
-           ? sweeps
-           : Counted(static_cast<int64_t>(summary.iterations.size()),
-                     "joint iteration") +
-                 " and " + sweeps);
+  const auto num_starting = std::count_if(
+      summary.iterations.begin(), summary.iterations.end(),
+      [](const JointIteration& state) { return state.target.has_value(); });
+  const int64_t num_joint =
+      static_cast<int64_t>(summary.iterations.size()) - num_starting;
+  const std::string starting =
+      num_starting > 0 ? Counted(num_starting, "iteration") + " to a start, "
+                       : "";
+  if (summary.method == SolveMethod::kResInt) {
+    return " after " + starting + sweeps;
+  }
+  return " after " + starting + Counted(num_joint, "joint iteration") +
+         WorkingSetWords(summary) + " and " + sweeps;
+}
+
+std::string TerminationSentence(const SolveSummary& summary) {
+  const std::string after = StepsWords(summary);
   switch (summary.termination) {
     case SolveTermination::kGapReached:
       return "Ended" + after + " with the gap asked for.";
@@ -140,10 +165,11 @@ Json NumberOrNull(const std::optional<double>& value) {
 Json IterationsJson(const std::vector<JointIteration>& iterations) {
   Json json = Json::array();
   for (const JointIteration& iteration : iterations) {
-    json.push_back({{"method", "joint"},
-                    {"cost", iteration.cost},
+    json.push_back({{"method", iteration.target ? "feasible_start" : "joint"},
+                    {"cost", NumberOrNull(iteration.cost)},
                     {"lower_bound", NumberOrNull(iteration.lower_bound)},
-                    {"gap", iteration.gap},
+                    {"gap", NumberOrNull(iteration.gap)},
+                    {"target", NumberOrNull(iteration.target)},
                     {"seconds", iteration.seconds}});
   }
   return json;
@@ -288,6 +314,9 @@ std::string SolveJson(const SolveReport& report) {
       {"num_images", summary.num_images},
       {"num_points", summary.num_points},
       {"num_observations", summary.num_observations},
+      {"working_observations", summary.num_working_observations
+                                   ? Json(*summary.num_working_observations)
+                                   : Json()},
       {"left_out", left_out},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},

@@ -53,7 +53,7 @@ void CertifiedSolve::TryCertificate(const ConicIterate& iterate) {
 }
 
 InteriorPointTermination CertifiedSolve::RunFromEstimate(
-    const std::function<void(double gap)>& report) {
+    const IterationReport& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
   options.max_iterations = max_iterations_ - iterations_;
@@ -71,7 +71,9 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
       TryCertificate(iterate);
       next_gap = kGapBetweenCertificates * iterate.gap;
     }
-    report(iterate.gap);
+    JointIteration iteration;
+    iteration.gap = iterate.gap;
+    report(iteration);
     return IsGapReached() || (iterate.iteration >= kIterationsPerStart &&
                               iterate.gap > kLargeGap);
   };
@@ -81,18 +83,23 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
 }
 
 // An estimate of lower cost, far from the boundary of the cones.
-bool CertifiedSolve::FindFreshStart() {
+bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
   FeasibleStartOptions options;
   options.norm = options_.norm;
   options.hopeless_gap = kHopelessGap;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
+  options.callback = [&](double target) {
+    ++iterations_;
+    JointIteration iteration;
+    iteration.target = target;
+    report(iteration);
+  };
   for (const double share : kRestartShares) {
     if (share * cost_ <= lower_bound_) continue;
-    if (FindEstimateBelow(problem_, share * cost_, options, &estimate_,
-                          &iterations_) ==
+    if (FindEstimateBelow(problem_, share * cost_, options, &estimate_) ==
         InteriorPointTermination::kFeasible) {
-      LowerByFeasibility(problem_, options, &estimate_, &iterations_);
+      LowerByFeasibility(problem_, options, &estimate_);
       cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
       return true;
     }
@@ -100,8 +107,8 @@ bool CertifiedSolve::FindFreshStart() {
   return false;
 }
 
-JointTermination CertifiedSolve::Run(
-    int max_iterations, const std::function<void(double gap)>& report) {
+JointTermination CertifiedSolve::Run(int max_iterations,
+                                     const IterationReport& report) {
   max_iterations_ = max_iterations;
   if (!(cost_ > 0)) return JointTermination::kGapReached;
   for (int restart = 0; restart <= kMaxRestarts; ++restart) {
@@ -113,7 +120,7 @@ JointTermination CertifiedSolve::Run(
     if (iterations_ >= max_iterations_) {
       return JointTermination::kMaxIterations;
     }
-    const bool is_fresh = FindFreshStart();
+    const bool is_fresh = FindFreshStart(report);
     if (IsCancelled(options_.cancel)) return JointTermination::kInterrupted;
     if (!is_fresh) break;
     if (iterations_ >= max_iterations_) {

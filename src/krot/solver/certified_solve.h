@@ -9,6 +9,9 @@
 
 namespace krot {
 
+// Told of every iteration, of which only gap and target are filled in.
+using IterationReport = std::function<void(const JointIteration&)>;
+
 // The interior point on a connected problem, from an estimate to the certified
 // gap: it tries certificates on the way and leaves starts that hold it back.
 // Internal to SolveJoint.
@@ -18,10 +21,9 @@ class CertifiedSolve {
   CertifiedSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Estimate& start);
 
-  // Takes at most `max_iterations`; `report` is called after each with the
-  // interior point's own gap.
-  JointTermination Run(int max_iterations,
-                       const std::function<void(double gap)>& report);
+  // Takes at most `max_iterations`, except for those towards a fresh start,
+  // which it ends once begun.
+  JointTermination Run(int max_iterations, const IterationReport& report);
 
   // The best so far, never worse than the start, and its cost in pixels.
   const Estimate& estimate() const { return estimate_; }
@@ -29,15 +31,15 @@ class CertifiedSolve {
   // What the certificate proves, pixels; 0 if there is none.
   double lower_bound() const { return lower_bound_; }
   const std::optional<Certificate>& certificate() const { return certificate_; }
+  // Those towards a fresh start included.
   int iterations() const { return iterations_; }
 
  private:
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
-  InteriorPointTermination RunFromEstimate(
-      const std::function<void(double gap)>& report);
-  bool FindFreshStart();
+  InteriorPointTermination RunFromEstimate(const IterationReport& report);
+  bool FindFreshStart(const IterationReport& report);
   void TryCertificate(const ConicIterate& iterate);
 
   const KnownRotationProblem& problem_;

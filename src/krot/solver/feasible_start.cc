@@ -26,33 +26,32 @@ double UnitDepth(const KnownRotationProblem& problem) {
 InteriorPointTermination FindEstimateBelow(const KnownRotationProblem& problem,
                                            double bound,
                                            const FeasibleStartOptions& options,
-                                           Estimate* estimate,
-                                           int* iterations) {
+                                           Estimate* estimate) {
   InteriorPointOptions conic;
   conic.norm = options.norm;
   conic.max_iterations = options.max_iterations;
   conic.num_threads = options.num_threads;
   conic.cancel = options.cancel;
   conic.stop = [&](const ConicIterate& iterate) {
+    if (options.callback) options.callback(bound);
     return iterate.gamma > 1 && iterate.gap < options.hopeless_gap;
   };
   std::vector<Multiplier> multipliers;
-  const InteriorPointSummary summary = FindFeasible(
-      problem, conic, bound, UnitDepth(problem), estimate, &multipliers);
-  *iterations += summary.iterations;
-  return summary.termination;
+  return FindFeasible(problem, conic, bound, UnitDepth(problem), estimate,
+                      &multipliers)
+      .termination;
 }
 
 bool LowerByFeasibility(const KnownRotationProblem& problem,
-                        FeasibleStartOptions options, Estimate* estimate,
-                        int* iterations) {
+                        const FeasibleStartOptions& options,
+                        Estimate* estimate) {
   bool is_lower = false;
   for (;;) {
     const double cost =
         Cost(problem, *estimate, options.norm, options.num_threads);
     if (!(cost > 0) ||
-        FindEstimateBelow(problem, kShare * cost, options, estimate,
-                          iterations) != InteriorPointTermination::kFeasible) {
+        FindEstimateBelow(problem, kShare * cost, options, estimate) !=
+            InteriorPointTermination::kFeasible) {
       return is_lower;
     }
     is_lower = true;

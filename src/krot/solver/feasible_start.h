@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "krot/conic/interior_point.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -14,23 +16,26 @@ struct FeasibleStartOptions {
   double hopeless_gap = 0;
   int num_threads = -1;
   const CancelFlag* cancel = nullptr;  // may be null
+  // Called after every iteration with the bound that it is to meet, pixels; may
+  // be empty.
+  std::function<void(double bound)> callback;
 };
 
 // An estimate of a connected problem whose residuals are all below `bound`,
 // pixels, from nothing: FindFeasible with a unit of depth that suits the
 // problem's baselines. As that starts from the centre of the cones, the
 // estimate is a good start for MinimizeJointly. `*estimate` is only written if
-// one is found (kFeasible). Adds to `*iterations`.
+// one is found (kFeasible).
 InteriorPointTermination FindEstimateBelow(const KnownRotationProblem& problem,
                                            double bound,
                                            const FeasibleStartOptions& options,
-                                           Estimate* estimate, int* iterations);
+                                           Estimate* estimate);
 
 // Lowers an estimate by FindEstimateBelow at a quarter of its cost, again and
 // again as long as there is one; returns whether there was. Takes some five
 // iterations each.
 bool LowerByFeasibility(const KnownRotationProblem& problem,
-                        FeasibleStartOptions options, Estimate* estimate,
-                        int* iterations);
+                        const FeasibleStartOptions& options,
+                        Estimate* estimate);
 
 }  // namespace krot

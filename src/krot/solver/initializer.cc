@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/base/timer.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/restrict.h"
 #include "krot/solver/feasible_start.h"
@@ -20,15 +21,6 @@ constexpr double kLargestBound = 1e7;  // pixels
 // When lowering a start that already meets the bound is given up.
 constexpr double kHopelessGap = 1e-2;
 
-FeasibleStartOptions StartOptions(const InitializerOptions& options) {
-  FeasibleStartOptions start;
-  start.norm = options.norm;
-  start.max_iterations = options.max_iterations;
-  start.num_threads = options.num_threads;
-  start.cancel = options.cancel;
-  return start;
-}
-
 // Scales the estimate to a median depth of one.
 void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
   std::vector<double> depths;
@@ -43,46 +35,102 @@ void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
   for (Eigen::Vector3d& s : estimate->points) s /= *median;
 }
 
-// Where no estimate of a component was found at the bound, its optimum decides:
-// sought from an estimate that misses the bound, it proves that there is none,
-// or meets the bound itself.
-InitializerTermination DecideByOptimum(const RestrictedProblem& part,
-                                       const InitializerOptions& options,
-                                       Estimate* estimate,
-                                       InitializerSummary* summary) {
-  for (double bound = kBoundGrowth * options.max_error; bound <= kLargestBound;
+// A component's way to a start.
+class StartSearch {
+ public:
+  // Keeps references. Adds iterations to `summary`, and what was proved.
+  StartSearch(const RestrictedProblem& part, const InitializerOptions& options,
+              const Timer& timer, InitializerSummary* summary)
+      : part_(part), options_(options), timer_(timer), summary_(*summary) {}
+
+  // `*start` is meaningful if feasible.
+  InitializerTermination Run(Estimate* start);
+
+ private:
+  FeasibleStartOptions StartOptions(double hopeless_gap);
+  InitializerTermination DecideByOptimum(Estimate* estimate);
+  void Record(JointIteration iteration);
+
+  const RestrictedProblem& part_;
+  const InitializerOptions& options_;
+  const Timer& timer_;
+  InitializerSummary& summary_;
+};
+
+void StartSearch::Record(JointIteration iteration) {
+  iteration.seconds = timer_.Seconds();
+  summary_.iterations.push_back(iteration);
+  if (!options_.callback) return;
+  options_.callback(static_cast<int>(summary_.iterations.size()), iteration);
+}
+
+FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
+  FeasibleStartOptions start;
+  start.norm = options_.norm;
+  start.max_iterations = options_.max_iterations;
+  start.hopeless_gap = hopeless_gap;
+  start.num_threads = options_.num_threads;
+  start.cancel = options_.cancel;
+  start.callback = [this](double bound) {
+    JointIteration iteration;
+    iteration.target = bound;
+    Record(iteration);
+  };
+  return start;
+}
+
+// Where no estimate was found at the bound, the optimum decides: sought from an
+// estimate that misses the bound, it proves that there is none, or meets the
+// bound itself.
+InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
+  for (double bound = kBoundGrowth * options_.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
     const InteriorPointTermination found =
-        FindEstimateBelow(part.problem, bound, StartOptions(options), estimate,
-                          &summary->iterations);
+        FindEstimateBelow(part_.problem, bound, StartOptions(0), estimate);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
     if (found != InteriorPointTermination::kFeasible) continue;
     JointOptions joint;
-    joint.norm = options.norm;
-    joint.max_iterations = options.max_iterations;
-    joint.num_threads = options.num_threads;
-    joint.cancel = options.cancel;
-    const JointSummary optimum = SolveJoint(part.problem, joint, estimate);
-    summary->iterations += static_cast<int>(optimum.iterations.size());
-    summary->cost = optimum.cost_final;
-    if (optimum.certificate && optimum.lower_bound > options.max_error) {
-      summary->certificate = optimum.certificate;
-      for (CertifiedObservation& o : summary->certificate->observations) {
-        o.observation = part.observation_of[o.observation];
+    joint.norm = options_.norm;
+    joint.max_iterations = options_.max_iterations;
+    joint.num_threads = options_.num_threads;
+    joint.cancel = options_.cancel;
+    joint.callback = [this](int, const JointIteration& iteration) {
+      Record(iteration);
+    };
+    const JointSummary optimum = SolveJoint(part_.problem, joint, estimate);
+    if (optimum.certificate && optimum.lower_bound > options_.max_error) {
+      summary_.certificate = optimum.certificate;
+      for (CertifiedObservation& o : summary_.certificate->observations) {
+        o.observation = part_.observation_of[o.observation];
       }
-      summary->lower_bound = optimum.lower_bound;
+      summary_.lower_bound = optimum.lower_bound;
       return InitializerTermination::kInfeasible;
     }
     if (optimum.termination == JointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
-    return optimum.cost_final < options.max_error
+    return optimum.cost_final < options_.max_error
                ? InitializerTermination::kFeasible
                : InitializerTermination::kFailed;
   }
   return InitializerTermination::kFailed;
+}
+
+InitializerTermination StartSearch::Run(Estimate* start) {
+  const InteriorPointTermination found = FindEstimateBelow(
+      part_.problem, options_.max_error, StartOptions(0), start);
+  if (found == InteriorPointTermination::kInterrupted) {
+    return InitializerTermination::kInterrupted;
+  }
+  if (found != InteriorPointTermination::kFeasible) {
+    const InitializerTermination decision = DecideByOptimum(start);
+    if (decision != InitializerTermination::kFeasible) return decision;
+  }
+  LowerByFeasibility(part_.problem, StartOptions(kHopelessGap), start);
+  return IsCancelled(options_.cancel) ? InitializerTermination::kInterrupted
+                                      : InitializerTermination::kFeasible;
 }
 
 }  // namespace
@@ -91,6 +139,7 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
                              Estimate* estimate) {
   CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
+  const Timer timer;
   InitializerSummary summary;
   Estimate found = *estimate;
   found.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
@@ -101,22 +150,11 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
        SplitIntoComponents(problem, all)) {
     const RestrictedProblem part = RestrictProblem(problem, observations);
     Estimate start;
-    const InteriorPointTermination termination =
-        FindEstimateBelow(part.problem, options.max_error,
-                          StartOptions(options), &start, &summary.iterations);
-    if (termination == InteriorPointTermination::kInterrupted) {
-      summary.termination = InitializerTermination::kInterrupted;
+    summary.termination =
+        StartSearch(part, options, timer, &summary).Run(&start);
+    if (summary.termination != InitializerTermination::kFeasible) {
       return summary;
     }
-    if (termination != InteriorPointTermination::kFeasible) {
-      summary.termination = DecideByOptimum(part, options, &start, &summary);
-      if (summary.termination != InitializerTermination::kFeasible) {
-        return summary;
-      }
-    }
-    FeasibleStartOptions lower = StartOptions(options);
-    lower.hopeless_gap = kHopelessGap;
-    LowerByFeasibility(part.problem, lower, &start, &summary.iterations);
     if (!HasBaseline(part.problem)) NormalizeScale(part.problem, &start);
     ReplaceEstimate(part, start, &found);
   }

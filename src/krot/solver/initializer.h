@@ -7,6 +7,7 @@
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/solver/certificate.h"
+#include "krot/solver/joint.h"
 
 namespace krot {
 
@@ -19,6 +20,7 @@ struct InitializerOptions {
   int max_iterations = 200;  // per component; >= 1
   int num_threads = -1;
   const CancelFlag* cancel = nullptr;  // may be null
+  JointCallback callback;  // counts over all components; may be empty
 };
 
 enum class InitializerTermination {
@@ -32,7 +34,7 @@ enum class InitializerTermination {
 struct InitializerSummary {
   InitializerTermination termination = InitializerTermination::kNotRun;
   double cost = 0;  // pixels, of the estimate if feasible
-  int iterations = 0;
+  std::vector<JointIteration> iterations;
   // kInfeasible: proves lower_bound > max_error.
   std::optional<Certificate> certificate;
   double lower_bound = 0;  // pixels, what it proves

@@ -18,12 +18,8 @@
 namespace krot {
 namespace {
 
-// The working set starts with the points above this share of the cost, and as
-// many observations of every frame.
-constexpr double kShareOfCost = 0.8;
-constexpr int kTiesPerFrame = 20;
-// Then it takes in the points that do not fit in below this share of the bound,
-// the worst first, and grows by this factor at most.
+// A working set takes in the points that do not fit in below this share of the
+// bound, the worst first, and grows by this factor at most.
 constexpr double kShareOfBound = 0.9;
 constexpr double kMaxGrowth = 1.5;
 // After so many rounds it takes in everything.
@@ -52,12 +48,14 @@ class ComponentSolve {
  public:
   ComponentSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Estimate& start)
-      : problem_(problem), options_(options), set_(problem), estimate_(start) {
-    cost_ = CostOf(start);
-  }
+      : problem_(problem),
+        options_(options),
+        estimate_(start),
+        cost_(CostOf(start)),
+        set_(FirstWorkingSet(problem, start, options.norm, cost_)) {}
 
-  // `report` is called after every iteration with the interior point's gap.
-  JointTermination Run(const std::function<void(double gap)>& report);
+  // `report` is called after every iteration, with gap and target filled in.
+  JointTermination Run(const IterationReport& report);
 
   const Estimate& estimate() const { return estimate_; }
   double cost() const { return std::min(cost_, reached_); }
@@ -72,18 +70,18 @@ class ComponentSolve {
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
-  JointTermination SolveWorkingSet(
-      const std::function<void(double gap)>& report, Estimate* candidate);
+  JointTermination SolveWorkingSet(const IterationReport& report,
+                                   Estimate* candidate);
   JointTermination SolvePart(const RestrictedProblem& part,
-                             const std::function<void(double gap)>& report,
+                             const IterationReport& report,
                              Estimate* candidate);
   void PlaceOthers(double level, Estimate* candidate) const;
 
   const KnownRotationProblem& problem_;
   const JointOptions& options_;
-  WorkingSet set_;
   Estimate estimate_;  // the best so far
   double cost_ = 0;
+  WorkingSet set_;
   // By a solve of all points that is under way.
   double reached_ = std::numeric_limits<double>::infinity();
   double lower_bound_ = 0;
@@ -92,9 +90,9 @@ class ComponentSolve {
   int64_t num_working_observations_ = 0;
 };
 
-JointTermination ComponentSolve::SolvePart(
-    const RestrictedProblem& part,
-    const std::function<void(double gap)>& report, Estimate* candidate) {
+JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
+                                           const IterationReport& report,
+                                           Estimate* candidate) {
   const Estimate start = RestrictEstimate(part, estimate_);
   CertifiedSolve solve(part.problem, options_, start);
   // What is below another part's bound already is good enough.
@@ -103,10 +101,13 @@ JointTermination ComponentSolve::SolvePart(
     return JointTermination::kMaxIterations;
   }
   const JointTermination termination =
-      solve.Run(options_.max_iterations - iterations_, [&](double gap) {
-        if (set_.IsAll()) reached_ = std::min(reached_, solve.cost());
-        report(gap);
-      });
+      solve.Run(options_.max_iterations - iterations_,
+                [&](const JointIteration& iteration) {
+                  if (set_.IsAll()) {
+                    reached_ = std::min(reached_, solve.cost());
+                  }
+                  report(iteration);
+                });
   iterations_ += solve.iterations();
   if (solve.lower_bound() > lower_bound_) {
     lower_bound_ = solve.lower_bound();
@@ -118,8 +119,8 @@ JointTermination ComponentSolve::SolvePart(
   return termination;
 }
 
-JointTermination ComponentSolve::SolveWorkingSet(
-    const std::function<void(double gap)>& report, Estimate* candidate) {
+JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
+                                                 Estimate* candidate) {
   const std::vector<int64_t> observations = set_.Observations();
   num_working_observations_ = static_cast<int64_t>(observations.size());
   JointTermination worst = JointTermination::kGapReached;
@@ -157,12 +158,8 @@ void ComponentSolve::PlaceOthers(double level, Estimate* candidate) const {
   ReplaceEstimate(part, placed, candidate);
 }
 
-JointTermination ComponentSolve::Run(
-    const std::function<void(double gap)>& report) {
+JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (!(cost_ > 0)) return JointTermination::kGapReached;
-  set_.AddAbove(estimate_, options_.norm, kShareOfCost * cost_,
-                problem_.num_points);
-  set_.AddTies(kTiesPerFrame);
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
@@ -211,19 +208,19 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
     const RestrictedProblem part = RestrictProblem(problem, observations);
     ComponentSolve solve(part.problem, options,
                          RestrictEstimate(part, *estimate));
-    const JointTermination termination = solve.Run([&](double gap) {
-      JointIteration iteration;
-      iteration.cost = std::max(cost_of_solved, solve.cost());
-      const double bound = std::max(summary.lower_bound, solve.lower_bound());
-      if (bound > 0) iteration.lower_bound = bound;
-      iteration.gap = gap;
-      iteration.seconds = timer.Seconds();
-      summary.iterations.push_back(iteration);
-      if (options.callback) {
-        options.callback(static_cast<int>(summary.iterations.size()),
-                         iteration);
-      }
-    });
+    const JointTermination termination =
+        solve.Run([&](JointIteration iteration) {
+          iteration.cost = std::max(cost_of_solved, solve.cost());
+          const double bound =
+              std::max(summary.lower_bound, solve.lower_bound());
+          if (bound > 0) iteration.lower_bound = bound;
+          iteration.seconds = timer.Seconds();
+          summary.iterations.push_back(iteration);
+          if (options.callback) {
+            options.callback(static_cast<int>(summary.iterations.size()),
+                             iteration);
+          }
+        });
     ReplaceEstimate(part, solve.estimate(), estimate);
     cost_of_solved = std::max(cost_of_solved, solve.cost());
     summary.num_working_observations += solve.num_working_observations();

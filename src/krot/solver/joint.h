@@ -16,12 +16,21 @@ namespace krot {
 // for itself, until a certificate that CheckCertificate accepts shows the
 // relative gap.
 
+// An iteration of the interior point: on the problem, or, with a `target`, on
+// the way to a start.
 struct JointIteration {
-  double cost = 0;                    // pixels, the best so far
+  std::optional<double> cost;  // pixels, the best so far, if there is one
   std::optional<double> lower_bound;  // pixels, certified so far
-  double gap = 0;  // of the interior point: an estimate, not a bound
-  double seconds = 0;
+  // Of the interior point on the problem: an estimate, not a bound.
+  std::optional<double> gap;
+  double seconds = 0;  // since the call
+  // Pixels: a start is looked for whose residuals are all below.
+  std::optional<double> target = std::nullopt;
 };
+
+// Called after every iteration, counted from 1.
+using JointCallback =
+    std::function<void(int iteration, const JointIteration& state)>;
 
 struct JointOptions {
   Norm norm;                   // p = 1, 2 or infinity
@@ -29,8 +38,7 @@ struct JointOptions {
   int max_iterations = 300;    // per component; >= 1
   int num_threads = -1;
   const CancelFlag* cancel = nullptr;  // may be null
-  // After every iteration, counted from 1 over all components; may be empty.
-  std::function<void(int iteration, const JointIteration&)> callback;
+  JointCallback callback;  // counts over all components; may be empty
 };
 
 enum class JointTermination {

@@ -6,6 +6,12 @@
 #include "krot/problem/cost.h"
 
 namespace krot {
+namespace {
+
+constexpr double kShareOfCost = 0.8;
+constexpr int kTiesPerFrame = 20;
+
+}  // namespace
 
 double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
                  Norm norm, int32_t point) {
@@ -88,6 +94,14 @@ std::vector<int64_t> WorkingSet::Observations() const {
     }
   }
   return observations;
+}
+
+WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
+                           const Estimate& estimate, Norm norm, double cost) {
+  WorkingSet set(problem);
+  set.AddAbove(estimate, norm, kShareOfCost * cost, problem.num_points);
+  set.AddTies(kTiesPerFrame);
+  return set;
 }
 
 }  // namespace krot

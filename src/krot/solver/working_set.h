@@ -41,6 +41,12 @@ class WorkingSet {
   int32_t num_points_ = 0;
 };
 
+// The one that the joint solver begins with at an estimate of positive depths:
+// the points above some share of `cost`, pixels, which is the estimate's, and
+// ties of every frame. O(observations).
+WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
+                           const Estimate& estimate, Norm norm, double cost);
+
 // The largest residual of a point, pixels; infinity if it is behind a camera.
 double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
                  Norm norm, int32_t point);

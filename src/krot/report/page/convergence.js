@@ -5,11 +5,16 @@ import { isMinimax } from './data.js';
 import { svg } from './dom.js';
 import { counted } from './format.js';
 
+// All but those on the way to a start, which have no cost.
+function iterationsOf(report) {
+  return report.iterations.filter(({ method }) => method !== 'feasible_start');
+}
+
 // Sweeps and iterations in the order in which they ended.
 export function courseOf(report) {
   const steps = [
     ...(report.sweeps ?? []),
-    ...report.iterations,
+    ...iterationsOf(report),
   ].map((step) => ({ lower_bound: null, ...step }));
   return steps.sort((a, b) => a.seconds - b.seconds);
 }
@@ -23,7 +28,7 @@ function curve(name, places) {
 function stepsText(report) {
   return isMinimax(report) ?
     `${counted(report.sweeps.length, 'sweep')} and ` +
-      `${counted(report.iterations.length, 'joint iteration')}, in turn` :
+      `${counted(iterationsOf(report).length, 'joint iteration')}, in turn` :
     counted(report.iterations.length, 'iteration');
 }
 

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "krot/base/timer.h"
+#include "krot/pipeline/solve_model.h"
+
+namespace krot {
+
+// For the stages of a solve that iterate: appends every iteration to
+// `summary->iterations`, with the seconds of the solve's `timer`, and hands it
+// on to options.joint.callback, counted over all stages. Keeps references.
+JointCallback LogIterations(const SolveModelOptions& options,
+                            const Timer& timer, SolveSummary* summary);
+
+}  // namespace krot
