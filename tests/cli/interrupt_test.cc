@@ -41,6 +41,15 @@ class Interrupt : public ::testing::Test {
             "paper"};
   }
 
+  KrotResult SignalOnTheWayToAStart() const {
+    KrotProcess process({"solver", "--input_path", folder_ / "model",
+                         "--output_path", folder_ / "model", "--overwrite", "1",
+                         "--Solver.init", "feasible"});
+    process.WaitForErrorText("iteration 1: looking for a start below");
+    process.Signal(SIGINT);
+    return process.Wait();
+  }
+
   KrotResult SignalAfterFirstSweep(int signal) const {
     KrotProcess process(Arguments());
     process.WaitForErrorText("sweep 1:");
@@ -68,6 +77,13 @@ TEST_F(Interrupt, FromTheKeyboardEndsWith130AndWritesNothing) {
 
 TEST_F(Interrupt, ByTerminationDoesTheSame) {
   EXPECT_EQ(SignalAfterFirstSweep(SIGTERM).exit_code, 130);
+  ExpectNothingChanged();
+}
+
+TEST_F(Interrupt, OnTheWayToAStartDoesTheSame) {
+  const KrotResult result = SignalOnTheWayToAStart();
+  EXPECT_EQ(result.exit_code, 130);
+  EXPECT_THAT(result.err, ::testing::Not(::testing::HasSubstr("sweep 1:")));
   ExpectNothingChanged();
 }
 

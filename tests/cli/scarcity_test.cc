@@ -1,7 +1,9 @@
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -57,6 +59,36 @@ TEST_F(Scarcity, OfThreadsChangesNothing) {
   };
   // The stacks alone of 1000 threads would take 8 GB.
   EXPECT_EQ(solve("many", "1000", 100 * kMegabyte), solve("one", "1", 0));
+}
+
+// "about 81.0 MB will be needed" on stderr, in bytes.
+double AnnouncedBytes(const std::string& err) {
+  const size_t begin = err.find("about ") + 6;
+  std::istringstream text(err.substr(begin));
+  double value = 0;
+  std::string unit;
+  text >> value >> unit;
+  EXPECT_EQ(unit, "MB") << err;
+  return 1e6 * value;
+}
+
+TEST_F(Scarcity, IsAnnouncedToThirtyPercent) {
+  SceneOptions options = SmallScene();
+  options.num_frames = 30;
+  options.num_points = 20000;
+  options.pixel_noise = 0.5;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  for (const char* method : {"auto", "joint", "res_int"}) {
+    SCOPED_TRACE(method);
+    const KrotResult result =
+        RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
+                 folder_ / "output", "--overwrite", "1", "--report_path",
+                 folder_ / "report.json", "--Solver.method", method});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const double peak = nlohmann::json::parse(
+        ReadBytes(folder_ / "report.json"))["peak_memory_bytes"];
+    EXPECT_NEAR(AnnouncedBytes(result.err), peak, 0.3 * peak);
+  }
 }
 
 }  // namespace

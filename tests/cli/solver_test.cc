@@ -109,14 +109,14 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
                 .exit_code,
             0);
   const Json report = Report();
-  EXPECT_THAT(
-      Keys(report),
-      ::testing::UnorderedElementsAre(
-          "version", "command", "method", "norm", "termination", "num_frames",
-          "num_images", "num_points", "num_observations", "left_out",
-          "cost_initial", "cost_final", "lower_bound", "relative_gap",
-          "certified", "pixel_error", "polish", "sweeps", "iterations",
-          "support", "seconds", "peak_memory_bytes", "threads", "seed"));
+  EXPECT_THAT(Keys(report),
+              ::testing::UnorderedElementsAre(
+                  "version", "command", "method", "norm", "termination",
+                  "num_frames", "num_images", "num_points", "num_observations",
+                  "working_observations", "left_out", "cost_initial",
+                  "cost_final", "lower_bound", "relative_gap", "certified",
+                  "pixel_error", "polish", "sweeps", "iterations", "support",
+                  "seconds", "peak_memory_bytes", "threads", "seed"));
   EXPECT_EQ(
       Keys(report["left_out"]),
       (std::vector<std::string>{"behind", "no_pose", "off_axis", "short_track",
@@ -145,7 +145,9 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
   ASSERT_FALSE(report["iterations"].empty());
   EXPECT_EQ(Keys(report["iterations"][0]),
             (std::vector<std::string>{"cost", "gap", "lower_bound", "method",
-                                      "seconds"}));
+                                      "seconds", "target"}));
+  EXPECT_GT(report["working_observations"], 0);
+  EXPECT_LE(report["working_observations"], report["num_observations"]);
   ASSERT_FALSE(report["support"].empty());
   EXPECT_EQ(
       Keys(report["support"][0]),

@@ -270,25 +270,31 @@ TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
   }
 }
 
-// With a start from which the interior point gets nowhere.
+// With starts from most of which the interior point gets nowhere.
 TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
-  const RandomScene scene = MakeSmallScene(31);
-  const Estimate start = HugTheBoundary(scene, Norm::L2());
-  CancelFlag is_cancelled = false;
-  JointOptions options = Options(Norm::L2());
-  options.cancel = &is_cancelled;
-  options.callback = [&](int, const JointIteration& state) {
-    if (!state.target) return;
-    EXPECT_LT(*state.target, *state.cost);
-    EXPECT_FALSE(state.gap);
-    is_cancelled = true;
-  };
-  Estimate estimate = start;
-  const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
-  ASSERT_TRUE(summary.iterations.back().target);
-  EXPECT_EQ(summary.termination, JointTermination::kInterrupted);
-  EXPECT_LE(summary.cost_final, summary.cost_initial);
-  EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
+  int num_interrupted = 0;
+  for (const unsigned seed : {35, 47, 61, 80}) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeSmallScene(seed);
+    Estimate estimate = HugTheBoundary(scene, Norm::L2());
+    CancelFlag is_cancelled = false;
+    JointOptions options = Options(Norm::L2());
+    options.cancel = &is_cancelled;
+    options.callback = [&](int, const JointIteration& state) {
+      if (!state.target) return;
+      EXPECT_LT(*state.target, *state.cost);
+      EXPECT_FALSE(state.gap);
+      is_cancelled = true;
+      ++num_interrupted;
+    };
+    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    EXPECT_EQ(summary.termination == JointTermination::kInterrupted,
+              is_cancelled);
+    EXPECT_EQ(summary.iterations.back().target.has_value(), is_cancelled);
+    EXPECT_LE(summary.cost_final, summary.cost_initial);
+    EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
+  }
+  EXPECT_GT(num_interrupted, 0);
 }
 
 TEST(SolveJoint, OfNothingIsDone) {

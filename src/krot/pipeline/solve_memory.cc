@@ -35,17 +35,16 @@ int64_t EstimateBytes(const KnownRotationProblem& problem) {
   return 24 * (int64_t{problem.num_points} + problem.num_frames);
 }
 
-// Of an interior point on the observations of `problem` as a copy of them.
-int64_t JointBytes(const KnownRotationProblem& problem, Norm norm) {
-  return ProblemBytes(problem) + EstimateInteriorPointMemory(problem, norm);
+// Some of a problem's observations, as a problem, and their indices.
+int64_t PartBytes(const KnownRotationProblem& problem) {
+  return ProblemBytes(problem) + Size(problem.observations.size(), 8);
 }
 
-// What a working set is likely to grow to: that of the start, once more.
-KnownRotationProblem LikelyWorkingProblem(const BuiltProblem& built,
-                                          Norm norm) {
+// The points that the joint solver looks at first, as a problem.
+KnownRotationProblem FirstWorkingProblem(const BuiltProblem& built, Norm norm) {
   const KnownRotationProblem& problem = built.problem;
-  WorkingSet set = FirstWorkingSet(problem, built.start, norm,
-                                   Cost(problem, built.start, norm, 1));
+  const double cost = Cost(problem, built.start, norm, /*num_threads=*/1);
+  const WorkingSet set = FirstWorkingSet(problem, built.start, norm, cost);
   return RestrictProblem(problem, set.Observations()).problem;
 }
 
@@ -72,18 +71,25 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
       summary.init == SolveInit::kModel) {
     return memory;
   }
-  memory.at_most =
-      std::max(memory.at_most, held + ProblemBytes(problem) +
-                                   JointBytes(problem, summary.norm));
+  // The largest component, the lists of which observation is in which, and all
+  // or some of it as a problem for the interior point.
+  const int64_t component =
+      held + PartBytes(problem) + Size(problem.observations.size(), 16);
+  memory.at_most = std::max(
+      memory.at_most, component + PartBytes(problem) +
+                          EstimateInteriorPointMemory(problem, summary.norm));
   if (summary.init == SolveInit::kFeasible) {
     memory.likely = memory.at_most;
     return memory;
   }
-  const KnownRotationProblem working =
-      LikelyWorkingProblem(built, summary.norm);
-  memory.likely =
-      std::max(memory.likely, held + ProblemBytes(problem) +
-                                  JointBytes(working, summary.norm));
+  // The allocator keeps what the interior point has freed when the points that
+  // it did not look at become a problem in turn.
+  const KnownRotationProblem working = FirstWorkingProblem(built, summary.norm);
+  memory.likely = std::max(
+      memory.likely, component + PartBytes(working) +
+                         EstimateInteriorPointMemory(working, summary.norm) +
+                         PartBytes(problem));
+  memory.at_most = std::max(memory.at_most, memory.likely);
   return memory;
 }
 

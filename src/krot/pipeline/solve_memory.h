@@ -9,13 +9,12 @@
 namespace krot {
 
 // The largest resident set, in bytes, of a process that holds `model` and runs
-// SolveModel on it.
+// SolveModel on it. How near that comes is measured in docs/method.md, "The
+// schedule of auto".
 struct SolveMemory {
-  // As long as the joint solver gets by with few points beside those that are
-  // large at the start; to 30 % on what was measured (docs/method.md).
+  // If the joint solver gets by with the points that it looks at first.
   int64_t likely = 0;
-  // If it takes in every observation, as an interior point on its way to a
-  // start always does: an upper bound.
+  // If it takes in every observation, as it does on its way to a start.
   int64_t at_most = 0;
 };
 
