@@ -2,6 +2,7 @@
 
 #include "krot/minimax/residual_kernel.h"
 
+#include <algorithm>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -36,7 +37,11 @@ TEST(ResidualKernel, GradientsAreThoseOfThePieces) {
       for (int k = 0; k < 3; ++k) {
         EXPECT_NEAR(block.gradient[k][lane], piece.gradient[k],
                     1e-11 * piece.gradient.norm());
+        EXPECT_NEAR(block.bend[k][lane], piece.bend[k],
+                    1e-11 * piece.bend.norm());
       }
+      EXPECT_NEAR(block.curvature[lane], piece.curvature,
+                  1e-12 * piece.curvature);
     }
   }
 }
@@ -53,6 +58,33 @@ TEST(ResidualKernel, AResidualThatIsZeroHasGradientZero) {
   EvaluateGradients(set.blocks(), 1, x.data(), &block);
   EXPECT_EQ(block.value[0], 0);
   for (const auto& gradient : block.gradient) EXPECT_EQ(gradient[0], 0);
+}
+
+// The whole step if no depth falls too far; else up to where the first does.
+TEST(ResidualKernel, ADepthShareKeepsAllDepthsAboveTheLowest) {
+  ProblemGenerator generator(23);
+  ResidualSet set;
+  const double lowest = 0.1;
+  for (const int count : kCounts) {
+    const ResidualProblem problem = generator.Triangulation(count, 5);
+    Fill(problem, &set);
+    const Vector3d x = generator.Start(problem, 0.5);
+    for (const double length : {0.1, 1.0, 10.0, 1000.0}) {
+      const Vector3d d = length * generator.Normal3();
+      const double share = DepthShare(set.blocks(), set.num_blocks(), x.data(),
+                                      d.data(), lowest);
+      double least = 1;  // depth at the end of the share, relative to its start
+      for (const Residual& residual : problem.residuals) {
+        least =
+            std::min(least, residual.Depth(x + share * d) / residual.Depth(x));
+      }
+      EXPECT_GE(least, lowest - 1e-12);
+      EXPECT_LE(share, 1);
+      if (share < 1) {
+        EXPECT_NEAR(least, lowest, 1e-12);
+      }
+    }
+  }
 }
 
 TEST(ResidualKernel, MetricIsTheSumOverAllResiduals) {

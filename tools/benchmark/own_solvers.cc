@@ -6,8 +6,9 @@ namespace {
 
 class OwnSolver : public SubproblemSolver {
  public:
-  OwnSolver(std::string name, const FastDescentOptions& options, Norm norm)
-      : name_(std::move(name)), descent_(options, norm) {}
+  OwnSolver(std::string name, const FastDescentOptions& options,
+            const DescentGoal& goal, Norm norm)
+      : name_(std::move(name)), goal_(goal), descent_(options, norm) {}
 
   std::string Name() const override { return name_; }
 
@@ -17,12 +18,14 @@ class OwnSolver : public SubproblemSolver {
       descent_.residuals().Add(residual);
     }
     Eigen::Vector3d x = problem.start;
-    descent_.Minimize(&x);
+    ActiveResiduals none;
+    descent_.Minimize(goal_, &none, &x);
     return x;
   }
 
  private:
   std::string name_;
+  DescentGoal goal_;
   FastDescent descent_;
 };
 
@@ -32,9 +35,13 @@ std::vector<std::unique_ptr<SubproblemSolver>> OwnSolvers(Norm norm) {
   FastDescentOptions paper;
   paper.settings = FastDescentSettings::kPaper;
   std::vector<std::unique_ptr<SubproblemSolver>> solvers;
-  solvers.push_back(
-      std::make_unique<OwnSolver>("KROT fast", FastDescentOptions{}, norm));
-  solvers.push_back(std::make_unique<OwnSolver>("FDM (paper)", paper, norm));
+  const auto add = [&](const char* name, const FastDescentOptions& options,
+                       const DescentGoal& goal) {
+    solvers.push_back(std::make_unique<OwnSolver>(name, options, goal, norm));
+  };
+  add("KROT fast", {}, {});
+  add("fast, 1e-6", {}, {kRivalTolerance, /*level=*/0});
+  add("FDM (paper)", paper, {});
   return solvers;
 }
 

@@ -119,13 +119,41 @@ double MoveWeights(const double direction[], double limit,
   return step;
 }
 
+// As ActiveHull::Minimize for two pieces; `false` if they are dependent.
+bool MinimizeOverTwo(const LinearPiece& first, const LinearPiece& second,
+                     double scale, double weights[4]) {
+  const Eigen::Vector3d difference = second.gradient - first.gradient;
+  const double squared = difference.squaredNorm();
+  const double smallest = kDependence * scale;
+  if (!(squared > smallest * smallest)) return false;
+  weights[1] =
+      (second.value - first.value - difference.dot(first.gradient)) / squared;
+  weights[0] = 1 - weights[1];
+  return true;
+}
+
+// The weights that solve the QP on the affine hull of the active gradients,
+// two or more; `false` if those are dependent.
+bool MinimizeOverHull(const LinearPiece* pieces,
+                      const SimplexQpSolution& active, double scale,
+                      double weights[4]) {
+  if (active.size == 2) {
+    return MinimizeOverTwo(pieces[active.index[0]], pieces[active.index[1]],
+                           scale, weights);
+  }
+  const ActiveHull hull(pieces, active, scale);
+  if (hull.independent()) hull.Minimize(weights);
+  return hull.independent();
+}
+
 // Brings the weights to the minimiser on the convex hull of a subset of the
 // active pieces.
 void MinimizeOverActive(const LinearPiece* pieces, double scale,
                         SimplexQpSolution* active) {
   while (active->size > 1) {
-    const ActiveHull hull(pieces, *active, scale);
-    if (!hull.independent()) {  // by rounding only: give up the last piece
+    double direction[4] = {};
+    if (!MinimizeOverHull(pieces, *active, scale, direction)) {
+      // By rounding only: give up the last piece.
       --active->size;
       double sum = 0;
       for (int k = 0; k < active->size; ++k) sum += active->weight[k];
@@ -133,8 +161,6 @@ void MinimizeOverActive(const LinearPiece* pieces, double scale,
       for (int k = 0; k < active->size; ++k) active->weight[k] /= sum;
       continue;
     }
-    double direction[4] = {};
-    hull.Minimize(direction);
     for (int k = 0; k < active->size; ++k) direction[k] -= active->weight[k];
     const int size = active->size;
     MoveWeights(direction, /*limit=*/1, active);

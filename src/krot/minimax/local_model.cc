@@ -73,13 +73,16 @@ void LocalModel::AddSmoothPieces() {
   gradients_.resize(rows_.num_blocks());
   EvaluateGradients(rows_.blocks(), rows_.num_blocks(), x_.data(),
                     gradients_.data());
+  pieces_.resize(members_.size() + 1);
+  member_of_piece_.resize(members_.size() + 1);
   for (size_t m = 0; m < members_.size(); ++m) {
     const GradientBlock& block = gradients_[m / kResidualLanes];
     const size_t lane = m % kResidualLanes;
-    pieces_.push_back({block.value[lane],
-                       {block.gradient[0][lane], block.gradient[1][lane],
-                        block.gradient[2][lane]}});
-    member_of_piece_.push_back(static_cast<int>(m));
+    pieces_[m + 1].value = block.value[lane];
+    for (int j = 0; j < 3; ++j) {
+      pieces_[m + 1].gradient[j] = block.gradient[j][lane];
+    }
+    member_of_piece_[m + 1] = static_cast<int>(m);
     members_[m].depth = block.depth[lane];
   }
 }
@@ -106,6 +109,19 @@ void LocalModel::SetMetric(double cost) {
   metric_ /= cost * static_cast<double>(members_.size());
 }
 
+// c_i and b_i of the member m.
+LocalModel::Bend LocalModel::BendOf(size_t m) const {
+  if (norm_.p == 2) {
+    const GradientBlock& block = gradients_[m / kResidualLanes];
+    const size_t lane = m % kResidualLanes;
+    return {block.curvature[lane],
+            {block.bend[0][lane], block.bend[1][lane], block.bend[2][lane]}};
+  }
+  ResidualPiece piece;
+  ResidualPieces(rows_[static_cast<int>(m)], x_, norm_, /*share=*/1, &piece);
+  return {piece.curvature, piece.bend};
+}
+
 // sum_i mu_i c_i b_i b_i'.
 Matrix3d LocalModel::Curvature() const {
   Matrix3d sum = Matrix3d::Zero();
@@ -113,9 +129,9 @@ Matrix3d LocalModel::Curvature() const {
   for (size_t m = 0; m < members_.size(); ++m) {
     const double multiplier = members_[m].multiplier;
     if (!(multiplier > 0)) continue;
-    ResidualPiece piece;
-    ResidualPieces(rows_[static_cast<int>(m)], x_, norm_, /*share=*/1, &piece);
-    sum += multiplier * piece.curvature * piece.bend * piece.bend.transpose();
+    const Bend bend = BendOf(m);
+    const Vector3d weighted = multiplier * bend.curvature * bend.direction;
+    sum.noalias() += weighted * bend.direction.transpose();
   }
   return sum;
 }
@@ -130,7 +146,8 @@ LocalModel::Step LocalModel::Minimize(double kappa) {
   }
   SolveSimplexQp(scaled_pieces_.data(), static_cast<int>(scaled_pieces_.size()),
                  &solution_);
-  return {L_inverse.transpose() * solution_.step, solution_.level};
+  return {L_inverse.transpose() * solution_.step, solution_.level,
+          solution_.step.squaredNorm()};
 }
 
 // Over the residuals alone and with sum 1: at a positive optimum the zero
@@ -213,13 +230,8 @@ bool LocalModel::AddTangents(const Vector3d& x_trial,
 }
 
 double LocalModel::DepthShare(const Vector3d& d) const {
-  double share = 1;
-  for (size_t m = 0; m < members_.size(); ++m) {
-    const double growth = rows_[static_cast<int>(m)].c.dot(d);
-    const double room = (1 - kSmallestDepthShare) * members_[m].depth;
-    if (room < -share * growth) share = -room / growth;
-  }
-  return share;
+  return krot::DepthShare(rows_.blocks(), rows_.num_blocks(), x_.data(),
+                          d.data(), kSmallestDepthShare);
 }
 
 double LocalModel::DepthGrowth() const {

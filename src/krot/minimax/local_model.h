@@ -40,7 +40,8 @@ class LocalModel {
   // What the minimiser of the model does.
   struct Step {
     Eigen::Vector3d d;
-    double level;  // max_k (f_k + g_k'd)
+    double level;      // max_k (f_k + g_k'd)
+    double held_back;  // d'Hd
   };
 
   // Forgets the members. The descent begins at `x_start`.
@@ -93,9 +94,15 @@ class LocalModel {
     double last_multiplier;  // of the last step
   };
 
+  struct Bend {
+    double curvature;           // c_i
+    Eigen::Vector3d direction;  // b_i
+  };
+
   void AddPieces();
   void AddSmoothPieces();
   void SetMetric(double cost);
+  Bend BendOf(size_t m) const;
   Eigen::Matrix3d Curvature() const;
   bool UpdateLastMultipliers();
   int FindMember(int index) const;

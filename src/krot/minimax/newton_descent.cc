@@ -24,6 +24,8 @@ constexpr double kGrow = 10;
 // A trial is taken if it keeps this share of its promise, and good from:
 constexpr double kSufficientShare = 0.1;
 constexpr double kGoodShare = 0.5;
+// Promises below this, relative, are rounding if the trial does not keep them.
+constexpr double kRounding = 1e-10;
 // So often a failed trial may teach the model before kappa rises.
 constexpr int kMaxLessons = 5;
 
@@ -32,6 +34,12 @@ constexpr int kMaxLessons = 5;
 // more, and long before that little is left to gain.
 bool IsFarAway(double depth_growth, double relative_promise) {
   return depth_growth > 1e6 || (depth_growth > 1e3 && relative_promise < 1e-8);
+}
+
+// What a Newton step leaves for the next one, to first order: what the trial
+// misses of the level, and what the quadratic term held back.
+double LeftAfter(const LocalModel::Step& step, double cost_trial) {
+  return std::max(cost_trial - step.level, step.held_back);
 }
 
 }  // namespace
@@ -120,7 +128,14 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
     const Vector3d x_trial = *x + share * step.d;
     const double cost_trial = residuals->Evaluate(x_trial, norm);
     const double kept = (cost - cost_trial) / (share * promise);
-    if (is_last) {
+    // The pieces of polyhedral norms lack the curvature of Newton's step.
+    const bool is_newton =
+        !norm.IsPolyhedral() && kappa <= kSmallestKappa && share == 1;
+    const bool arrives =
+        is_newton && LeftAfter(step, cost_trial) <= goal.tolerance * cost;
+    const bool is_rounding =
+        is_newton && !(kept > kSufficientShare) && promise <= kRounding * cost;
+    if (is_last || arrives || is_rounding) {
       if (cost_trial < cost) {
         *x = x_trial;
         cost = cost_trial;

@@ -28,7 +28,8 @@ struct DescentSummary {
 
 // How far a descent goes. The default is as far as rounding allows.
 struct DescentGoal {
-  // It ends with the step that promises less than this, relative; >= 1e-11.
+  // It ends with the step that promises less than this or, so far as the step
+  // itself can tell, leaves less than this to the next; relative, >= 1e-11.
   double tolerance = 1e-11;
   // It does nothing where the cost is this low; pixels, >= 0.
   double level = 0;

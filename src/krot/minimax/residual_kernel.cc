@@ -97,7 +97,9 @@ void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
       const double value = n * w_inverse;
       result.value[k] = value;
       result.depth[k] = lane.w;
-      for (int j = 0; j < 3; ++j) {  // (A's - r c) / w
+      result.curvature[k] = n_inverse * w_inverse;
+      for (int j = 0; j < 3; ++j) {  // A's_perp, (A's - r c) / w
+        result.bend[j][k] = row[4 + j][k] * s1 - row[j][k] * s2;
         result.gradient[j][k] =
             (row[j][k] * s1 + row[4 + j][k] * s2 - value * row[8 + j][k]) *
             w_inverse;
@@ -105,6 +107,25 @@ void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
     }
     gradients[block] = result;
   }
+}
+
+double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
+                  const double x[3], const double d[3], double lowest) {
+  double shares[kResidualLanes];
+  for (double& share : shares) share = 1;
+  for (int64_t block = 0; block < num_blocks; ++block) {
+    const auto& row = blocks[block].row;
+    for (int k = 0; k < kResidualLanes; ++k) {
+      const double fall =
+          -(row[8][k] * d[0] + row[9][k] * d[1] + row[10][k] * d[2]);
+      const double room = (1 - lowest) * EvaluateLane(row, k, x).w;
+      const double share = room < fall ? room / fall : 1;
+      shares[k] = share < shares[k] ? share : shares[k];
+    }
+  }
+  double result = 1;
+  for (const double share : shares) result = share < result ? share : result;
+  return result;
 }
 
 void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,

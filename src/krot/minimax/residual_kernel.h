@@ -23,17 +23,25 @@ struct alignas(64) ResidualBlock {
 double EvaluateResiduals(const ResidualBlock* blocks, int64_t num_blocks,
                          double p, const double x[3], double* values);
 
-// Values and gradients of eight residuals side by side, and their depths.
+// Eight residuals side by side, differentiated.
 struct alignas(64) GradientBlock {
   double value[kResidualLanes];
   double gradient[3][kResidualLanes];
   double depth[kResidualLanes];
+  // The Hessian for the depth held fixed is curvature * bend * bend'.
+  double curvature[kResidualLanes];
+  double bend[3][kResidualLanes];
 };
 
-// For p = 2, all lanes of `num_blocks` blocks and positive depths: r_i(x), its
-// gradient (0 where r_i = 0, which has none) and its depth.
+// For p = 2, all lanes of `num_blocks` blocks and positive depths: r_i(x) and
+// its derivatives (0 where r_i = 0, which has none).
 void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
                        const double x[3], GradientBlock* gradients);
+
+// The largest share of the step d, at most 1, on which no depth falls below
+// `lowest` of what it is at x; all must be positive. 0 <= lowest < 1.
+double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
+                  const double x[3], const double d[3], double lowest);
 
 // The upper triangle, row by row, of
 //   sum_i (A_i'A_i + cost^2 c_i c_i') / w_i^2
