@@ -149,8 +149,7 @@ bool FrameSystem::Factorize(int num_threads) {
     if (is_dense_) {
       dense_[0].diagonal() *= 1 + regularization;
       dense_[0].diagonal().array() += kTiny;
-      dense_factor_.compute(dense_[0]);
-      if (dense_factor_.info() == Eigen::Success) return true;
+      if (dense_factor_.Factorize(dense_[0], num_threads)) return true;
     } else {
       for (int64_t column = 0; column < num_columns_; ++column) {
         double& diagonal = sparse_.coeffRef(column, column);
@@ -165,7 +164,7 @@ bool FrameSystem::Factorize(int num_threads) {
 
 Eigen::VectorXd FrameSystem::Solve(const Eigen::VectorXd& rhs) const {
   if (num_columns_ == 0) return rhs;
-  return is_dense_ ? Eigen::VectorXd(dense_factor_.solve(rhs))
+  return is_dense_ ? dense_factor_.Solve(rhs)
                    : Eigen::VectorXd(sparse_factor_.solve(rhs));
 }
 

@@ -3,12 +3,12 @@
 #include <cstdint>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
 #include "krot/conic/block_structure.h"
+#include "krot/conic/dense_cholesky.h"
 
 namespace krot {
 
@@ -51,7 +51,7 @@ class FrameSystem {
   std::vector<int32_t> column_of_frame_;
   // Dense.
   std::vector<Eigen::MatrixXd> dense_;  // per part; lower triangle
-  Eigen::LLT<Eigen::MatrixXd> dense_factor_;
+  DenseCholesky dense_factor_;
   // Sparse: the block columns of the lower triangle.
   std::vector<int64_t> block_begin_;
   std::vector<int32_t> block_row_;

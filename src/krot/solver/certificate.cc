@@ -15,6 +15,8 @@ constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
 // Of the sub-problems.
 constexpr double kSmallestGap = 1e-9;
 constexpr int kMaxIterations = 100;
+// Larger ones are given up as soon as they cannot prove enough.
+constexpr int64_t kLargeUnknowns = 1500;
 constexpr double kEqualBounds = 1e-7;  // relative
 constexpr int kMaxReductions = 4;
 // The defect that a certificate states allows for another machine's
@@ -37,10 +39,11 @@ class Maker {
         const CertificateOptions& options)
       : problem_(problem), norm_(norm), options_(options) {}
 
-  // Tries the sub-problem of these observations, connected, from `estimate`
-  // of the whole, then that of what sets its maximum, and so on.
+  // Tries the multipliers of these observations, connected, as they are; then
+  // those of their sub-problem, solved from `estimate` of the whole; then that
+  // of what sets its maximum, and so on.
   void Try(const std::vector<int64_t>& observations, const Estimate& estimate,
-           double threshold, int num_reductions);
+           const std::vector<Multiplier>& multipliers, double threshold);
 
   bool IsEnough() const {
     return IsCancelled(options_.cancel) ||
@@ -53,10 +56,11 @@ class Maker {
   }
 
  private:
-  bool IsTooLarge(const KnownRotationProblem& part) const {
-    return 3 * (int64_t{part.num_points} + part.num_frames - 1) >
-           options_.max_unknowns;
+  static int64_t NumUnknowns(const KnownRotationProblem& part) {
+    return 3 * (int64_t{part.num_points} + part.num_frames - 1);
   }
+  void SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
+                      double threshold, int num_reductions);
   void Offer(const RestrictedProblem& part, const Estimate& estimate,
              const std::vector<Multiplier>& multipliers);
 
@@ -67,39 +71,58 @@ class Maker {
 };
 
 void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
-                double threshold, int num_reductions) {
+                const std::vector<Multiplier>& multipliers, double threshold) {
   const RestrictedProblem part = RestrictProblem(problem_, observations);
-  if (IsTooLarge(part.problem)) return;
+  std::vector<Multiplier> known;
+  for (const int64_t i : observations) known.push_back(multipliers[i]);
+  Offer(part, RestrictEstimate(part, whole), known);
+  if (!IsEnough()) SolveAndReduce(part, whole, threshold, kMaxReductions);
+}
+
+void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
+                           double threshold, int num_reductions) {
+  if (NumUnknowns(part.problem) > options_.max_unknowns) return;
   InteriorPointOptions options;
   options.norm = norm_;
   options.smallest_gap = kSmallestGap;
   options.max_iterations = kMaxIterations;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
+  if (NumUnknowns(part.problem) > kLargeUnknowns) {
+    // Its optimum is below every cost it reaches.
+    options.stop = [this](const ConicIterate& iterate) {
+      return iterate.cost < options_.sufficient_bound;
+    };
+  }
   Estimate estimate = RestrictEstimate(part, whole);
   std::vector<Multiplier> multipliers;
   const InteriorPointSummary summary =
       MinimizeJointly(part.problem, options, &estimate, &multipliers);
+  if (summary.termination == InteriorPointTermination::kStopped) return;
   Offer(part, estimate, multipliers);
 
   const std::vector<int64_t> support = SelectSupport(
       part.problem,
       SupportScores(part.problem, norm_, estimate, summary.gamma, multipliers),
       threshold);
-  if (num_reductions == 0 || support.size() == observations.size()) return;
+  if (num_reductions == 0 ||
+      support.size() == part.problem.observations.size()) {
+    return;
+  }
   for (const std::vector<int64_t>& component :
        SplitIntoComponents(part.problem, support)) {
     if (IsEnough()) return;
     std::vector<int64_t> rest;
     for (const int64_t i : component) rest.push_back(part.observation_of[i]);
-    Try(rest, whole, threshold, num_reductions - 1);
+    SolveAndReduce(RestrictProblem(problem_, rest), whole, threshold,
+                   num_reductions - 1);
   }
 }
 
 void Maker::Offer(const RestrictedProblem& part, const Estimate& estimate,
                   const std::vector<Multiplier>& multipliers) {
-  std::optional<Certificate> certificate = RepairMultipliers(
-      part.problem, norm_, estimate, multipliers, options_.max_unknowns);
+  std::optional<Certificate> certificate =
+      RepairMultipliers(part.problem, norm_, estimate, multipliers);
   if (!certificate || !IsBetter(*certificate, best_)) return;
   for (CertifiedObservation& o : certificate->observations) {
     o.observation = part.observation_of[o.observation];
@@ -135,7 +158,7 @@ std::optional<Certificate> MakeCertificate(
     previous = support;
     for (const std::vector<int64_t>& component :
          SplitIntoComponents(problem, support)) {
-      maker.Try(component, estimate, threshold, kMaxReductions);
+      maker.Try(component, estimate, multipliers, threshold);
       if (maker.IsEnough()) return maker.best();
     }
   }

@@ -53,6 +53,7 @@ void CertifiedSolve::TryCertificate(const ConicIterate& iterate) {
 }
 
 InteriorPointTermination CertifiedSolve::RunFromEstimate(
+    const IsWorthProving& is_worth_proving,
     const IterationReport& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
@@ -68,14 +69,16 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
       estimate_ = *iterate.estimate;
     }
     if (iterate.gap <= next_gap) {
-      TryCertificate(iterate);
+      is_given_up_ = !is_worth_proving(estimate_, cost_);
+      if (!is_given_up_) TryCertificate(iterate);
       next_gap = kGapBetweenCertificates * iterate.gap;
     }
     JointIteration iteration;
     iteration.gap = iterate.gap;
     report(iteration);
-    return IsGapReached() || (iterate.iteration >= kIterationsPerStart &&
-                              iterate.gap > kLargeGap);
+    return is_given_up_ || IsGapReached() ||
+           (iterate.iteration >= kIterationsPerStart &&
+            iterate.gap > kLargeGap);
   };
   std::vector<Multiplier> multipliers;
   Estimate last = estimate_;
@@ -107,13 +110,16 @@ bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
   return false;
 }
 
-JointTermination CertifiedSolve::Run(int max_iterations,
-                                     const IterationReport& report) {
+JointTermination CertifiedSolve::Run(
+    int max_iterations, const IsWorthProving& is_worth_proving,
+    const IterationReport& report) {
   max_iterations_ = max_iterations;
   if (!(cost_ > 0)) return JointTermination::kGapReached;
   for (int restart = 0; restart <= kMaxRestarts; ++restart) {
-    const InteriorPointTermination termination = RunFromEstimate(report);
+    const InteriorPointTermination termination =
+        RunFromEstimate(is_worth_proving, report);
     if (IsGapReached()) return JointTermination::kGapReached;
+    if (is_given_up_) return JointTermination::kStalled;
     if (termination == InteriorPointTermination::kInterrupted) {
       return JointTermination::kInterrupted;
     }

@@ -17,13 +17,20 @@ using IterationReport = std::function<void(const JointIteration&)>;
 // Internal to SolveJoint.
 class CertifiedSolve {
  public:
+  // Whether it is worth while to prove that an estimate of this cost, pixels,
+  // is optimal.
+  using IsWorthProving = std::function<bool(const Estimate&, double cost)>;
+
   // Keeps references. All depths of `start` are positive.
   CertifiedSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Estimate& start);
 
   // Takes at most `max_iterations`, except for those towards a fresh start,
-  // which it ends once begun.
-  JointTermination Run(int max_iterations, const IterationReport& report);
+  // which it ends once begun. Asks before every certificate that it tries, and
+  // ends as kStalled if it is not worth while.
+  JointTermination Run(int max_iterations,
+                       const IsWorthProving& is_worth_proving,
+                       const IterationReport& report);
 
   // The best so far, never worse than the start, and its cost in pixels.
   const Estimate& estimate() const { return estimate_; }
@@ -38,7 +45,8 @@ class CertifiedSolve {
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
-  InteriorPointTermination RunFromEstimate(const IterationReport& report);
+  InteriorPointTermination RunFromEstimate(
+      const IsWorthProving& is_worth_proving, const IterationReport& report);
   bool FindFreshStart(const IterationReport& report);
   void TryCertificate(const ConicIterate& iterate);
 
@@ -50,6 +58,7 @@ class CertifiedSolve {
   std::optional<Certificate> certificate_;
   int iterations_ = 0;
   int max_iterations_ = 0;
+  bool is_given_up_ = false;
 };
 
 }  // namespace krot

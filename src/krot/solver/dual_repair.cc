@@ -9,7 +9,6 @@
 namespace krot {
 namespace {
 
-using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
@@ -92,6 +91,15 @@ Dual MakeDual(const KnownRotationProblem& problem, const Estimate& estimate,
   return dual;
 }
 
+// The changes of eta among those of all multipliers.
+VectorXd WithoutScalings(const VectorXd& x) {
+  VectorXd eta(x.size() / 3 * 2);
+  for (int64_t i = 0; i < eta.size() / 2; ++i) {
+    eta.segment<2>(2 * i) = x.segment<2>(3 * i);
+  }
+  return eta;
+}
+
 // The best dual with these lambda.
 struct Repaired {
   double bound = 0;  // 0: none
@@ -100,12 +108,15 @@ struct Repaired {
 
 Repaired RepairEta(const DualSystem& system, const VectorXd& eta0, Norm norm) {
   LeastNormSolver solver;
-  if (!solver.Factorize(system.TransposedColumns())) return {};
+  if (!solver.Factorize(system.Equations())) return {};
+  const auto solve = [&](const DualSystem::VectorXr& rhs) {
+    return WithoutScalings(solver.Solve(rhs.cast<double>()));
+  };
   // eta(theta) = theta p + q satisfies M eta = -c for every theta, p being
   // eta0 without its part in the row space of M. It proves the bound
   // 1 / max |eta_i|_dual, whose inverse is convex in theta = 1 / delta.
-  const VectorXd p = eta0 - solver.Solve(system.Multiply(eta0));
-  const VectorXd q = solver.Solve(-system.c());
+  const VectorXd p = eta0 - solve(system.Multiply(eta0));
+  const VectorXd q = solve(-system.c());
   const auto inverse_bound = [&](double theta) {
     return LargestDualNorm(theta * p + q, norm);
   };
@@ -125,9 +136,8 @@ Repaired RepairEta(const DualSystem& system, const VectorXd& eta0, Norm norm) {
     const double shrink = (1 - kBoundMargin) / longest;
     repaired.bound *= shrink;
     repaired.eta *= shrink;
-    repaired.eta +=
-        solver.Solve(-DualSystem::Real{repaired.bound} * system.c() -
-                     system.Multiply(repaired.eta));
+    repaired.eta += solve(-DualSystem::Real{repaired.bound} * system.c() -
+                          system.Multiply(repaired.eta));
   }
   return repaired;
 }
@@ -137,10 +147,8 @@ Repaired RepairEta(const DualSystem& system, const VectorXd& eta0, Norm norm) {
 // it leaves lambda > 0.
 bool Polish(const DualSystem& system, Dual* dual) {
   const int64_t count = static_cast<int64_t>(dual->lambda.size());
-  MatrixXd transposed(3 * count, system.num_rows());
-  transposed.topRows(2 * count) = system.TransposedColumns();
-  transposed.bottomRows(count) =
-      system.TransposedScalings(dual->eta, dual->delta);
+  LeastNormProblem equations =
+      system.EquationsWithScalings(dual->eta, dual->delta);
   // Turn the columns of eta_i to (along it, across it).
   std::vector<Eigen::Matrix2d> axes(count);
   for (int64_t i = 0; i < count; ++i) {
@@ -148,19 +156,24 @@ bool Polish(const DualSystem& system, Dual* dual) {
         dual->eta.segment<2>(2 * i).normalized() / kLengthWeight;
     axes[i].row(0) = along;
     axes[i].row(1) = kLengthWeight * Vector2d(-along[1], along[0]);
-    transposed.middleRows<2>(2 * i) =
-        axes[i] * transposed.middleRows<2>(2 * i).eval();
+    LeastNormProblem::Columns& columns = equations.columns[i];
+    columns.point_rows.topRows<2>() =
+        axes[i] * columns.point_rows.topRows<2>().eval();
+    columns.frame_rows.topRows<2>() =
+        axes[i] * columns.frame_rows.topRows<2>().eval();
+    columns.last_row.head<2>() = axes[i] * columns.last_row.head<2>().eval();
   }
   LeastNormSolver solver;
-  if (!solver.Factorize(std::move(transposed))) return false;
-  const VectorXd step = solver.Solve(
-      -DualSystem::Real{dual->delta} * system.c() - system.Multiply(dual->eta));
+  if (!solver.Factorize(std::move(equations))) return false;
+  const DualSystem::VectorXr rest =
+      -DualSystem::Real{dual->delta} * system.c() - system.Multiply(dual->eta);
+  const VectorXd step = solver.Solve(rest.cast<double>());
   for (int64_t i = 0; i < count; ++i) {
-    const double growth = step[2 * count + i];
+    const double growth = step[3 * i + 2];
     if (!(std::abs(growth) < 0.5)) return false;
     dual->lambda[i] *= 1 + growth;
     dual->eta.segment<2>(2 * i) +=
-        axes[i].transpose() * step.segment<2>(2 * i) / (1 + growth);
+        axes[i].transpose() * step.segment<2>(3 * i) / (1 + growth);
   }
   return true;
 }
@@ -181,10 +194,8 @@ Certificate MakeCertificate(const Dual& dual, const Repaired& repaired) {
 
 std::optional<Certificate> RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
-    const std::vector<Multiplier>& multipliers, int max_unknowns) {
-  if (multipliers.empty() || DualSystem::NumRows(problem) > max_unknowns) {
-    return std::nullopt;
-  }
+    const std::vector<Multiplier>& multipliers) {
+  if (multipliers.empty()) return std::nullopt;
   Dual dual = MakeDual(problem, estimate, multipliers);
   std::optional<Certificate> best;
   for (int n = 0; n <= kNumPolishes; ++n) {

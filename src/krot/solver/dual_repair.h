@@ -18,12 +18,12 @@ namespace krot {
 //
 // Requires one connected problem, an estimate whose depths are positive (it
 // only says what size (2) has) and one multiplier per observation, all
-// lambda > 0. None if the unknowns are more than `max_unknowns` or than twice
-// the observations, or if parts of the problem are flexible. The certificate's
-// observations are those of `problem`; its defect is 0, nothing is verified.
-// O(unknowns^2 observations).
+// lambda > 0. None if the unknowns are more than twice the observations, or if
+// parts of the problem are flexible. The certificate's observations are those
+// of `problem`; its defect is 0, nothing is verified. See least_norm.h for the
+// cost.
 std::optional<Certificate> RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
-    const std::vector<Multiplier>& multipliers, int max_unknowns);
+    const std::vector<Multiplier>& multipliers);
 
 }  // namespace krot

@@ -1,16 +1,14 @@
 #include "krot/solver/dual_system.h"
 
-#include <limits>
-
 #include <Eigen/LU>
 
 namespace krot {
 
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 DualSystem::DualSystem(const KnownRotationProblem& problem,
-                       const std::vector<double>& lambda) {
+                       const std::vector<double>& lambda)
+    : num_points_(problem.num_points), num_frames_(problem.num_frames) {
   std::vector<const View*> first_view(problem.num_frames, nullptr);
   for (size_t i = 0; i < problem.observations.size(); ++i) {
     const Observation& observation = problem.observations[i];
@@ -75,52 +73,36 @@ DualSystem::VectorXr DualSystem::Multiply(const VectorXd& eta) const {
   return product;
 }
 
-MatrixXd DualSystem::TransposedColumns() const {
-  MatrixXd columns =
-      MatrixXd::Zero(2 * static_cast<int64_t>(blocks_.size()), num_rows_);
+LeastNormProblem DualSystem::Equations() const {
+  LeastNormProblem equations{num_points_, num_frames_, has_constants_, {}};
+  for (const Block& block : blocks_) {
+    LeastNormProblem::Columns columns;
+    columns.point = static_cast<int32_t>(block.point_row / 3);
+    columns.frame = static_cast<int32_t>(
+        block.frame_row < 0 ? 0 : block.frame_row / 3 - num_points_ + 1);
+    columns.point_rows.topRows<2>() = block.point.topRows<2>().cast<double>();
+    columns.frame_rows.topRows<2>() = block.frame.topRows<2>().cast<double>();
+    columns.last_row.head<2>() = block.constants.head<2>().cast<double>();
+    equations.columns.push_back(columns);
+  }
+  return equations;
+}
+
+LeastNormProblem DualSystem::EquationsWithScalings(const VectorXd& eta,
+                                                   double delta) const {
+  LeastNormProblem equations = Equations();
   for (size_t i = 0; i < blocks_.size(); ++i) {
-    ForRows(blocks_[i], [&](int64_t row, const Vector3r& entry) {
-      columns.block<2, 1>(2 * static_cast<int64_t>(i), row) =
-          entry.head<2>().cast<double>();
-    });
+    const Block& block = blocks_[i];
+    const int64_t n = 2 * static_cast<int64_t>(i);
+    const Vector3r weights(eta[n], eta[n + 1], delta);
+    LeastNormProblem::Columns& columns = equations.columns[i];
+    columns.point_rows.row(2) =
+        (weights.transpose() * block.point).cast<double>();
+    columns.frame_rows.row(2) =
+        (weights.transpose() * block.frame).cast<double>();
+    columns.last_row[2] = static_cast<double>(weights.dot(block.constants));
   }
-  return columns;
-}
-
-MatrixXd DualSystem::TransposedScalings(const VectorXd& eta,
-                                        double delta) const {
-  MatrixXd columns =
-      MatrixXd::Zero(static_cast<int64_t>(blocks_.size()), num_rows_);
-  for (int64_t i = 0; i < columns.rows(); ++i) {
-    const Vector3r weights(eta[2 * i], eta[2 * i + 1], delta);
-    ForRows(blocks_[i], [&](int64_t row, const Vector3r& entry) {
-      columns(i, row) = static_cast<double>(entry.dot(weights));
-    });
-  }
-  return columns;
-}
-
-bool LeastNormSolver::Factorize(MatrixXd transposed) {
-  if (transposed.cols() > transposed.rows()) return false;
-  scale_ = transposed.colwise().norm().cwiseInverse();
-  if (!scale_.allFinite()) return false;
-  transposed *= scale_.asDiagonal();
-  qr_.compute(transposed);
-  const VectorXd diagonal = qr_.matrixQR().diagonal().cwiseAbs();
-  return diagonal.minCoeff() >
-         std::numeric_limits<double>::epsilon() * diagonal.maxCoeff();
-}
-
-VectorXd LeastNormSolver::Solve(const DualSystem::VectorXr& rhs) const {
-  const int64_t rows = scale_.size();
-  VectorXd padded = VectorXd::Zero(qr_.rows());
-  padded.head(rows) =
-      qr_.matrixQR()
-          .topRows(rows)
-          .triangularView<Eigen::Upper>()
-          .transpose()
-          .solve(VectorXd(rhs.cast<double>().cwiseProduct(scale_)));
-  return qr_.householderQ() * padded;
+  return equations;
 }
 
 }  // namespace krot

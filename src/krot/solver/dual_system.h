@@ -4,9 +4,9 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/solver/least_norm.h"
 
 namespace krot {
 
@@ -34,11 +34,11 @@ class DualSystem {
   // sum_i lambda_i c_i.
   const VectorXr& c() const { return c_; }
 
-  // The columns of M, and of M eta + delta c by each log lambda_i, transposed:
-  // one row per column.
-  Eigen::MatrixXd TransposedColumns() const;
-  Eigen::MatrixXd TransposedScalings(const Eigen::VectorXd& eta,
-                                     double delta) const;
+  // The equations M x = rhs, and those that also let the lambda_i change by
+  // x_i lambda_i, which adds lambda_i (A_i'eta_i + delta c_i) x_i.
+  LeastNormProblem Equations() const;
+  LeastNormProblem EquationsWithScalings(const Eigen::VectorXd& eta,
+                                         double delta) const;
 
   int64_t num_rows() const { return num_rows_; }
   static int64_t NumRows(const KnownRotationProblem& problem) {
@@ -61,24 +61,12 @@ class DualSystem {
   template <typename Visit>
   void ForRows(const Block& block, const Visit& visit) const;
 
+  int32_t num_points_;
+  int32_t num_frames_;
   std::vector<Block> blocks_;
   bool has_constants_ = false;
   int64_t num_rows_ = 0;
   VectorXr c_;
-};
-
-// Solutions of least norm of under-determined equations, whose rows are scaled
-// to length 1.
-class LeastNormSolver {
- public:
-  // `transposed`: a column per equation. False if the equations may have no
-  // solution.
-  bool Factorize(Eigen::MatrixXd transposed);
-  Eigen::VectorXd Solve(const DualSystem::VectorXr& rhs) const;
-
- private:
-  Eigen::VectorXd scale_;
-  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
 };
 
 }  // namespace krot

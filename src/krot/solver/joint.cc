@@ -18,9 +18,9 @@
 namespace krot {
 namespace {
 
-// A working set takes in the points that do not fit in below this share of the
-// bound, the worst first, and grows by this factor at most.
-constexpr double kShareOfBound = 0.9;
+// A working set takes in the points that do not fit in below this share of its
+// optimum, the worst first, and grows by this factor at most.
+constexpr double kShareOfLevel = 0.9;
 constexpr double kMaxGrowth = 1.5;
 // After so many rounds it takes in everything.
 constexpr int kMaxRounds = 12;
@@ -75,7 +75,7 @@ class ComponentSolve {
   JointTermination SolvePart(const RestrictedProblem& part,
                              const IterationReport& report,
                              Estimate* candidate);
-  void PlaceOthers(double level, Estimate* candidate) const;
+  bool DoOthersFit(double level, Estimate* candidate) const;
 
   const KnownRotationProblem& problem_;
   const JointOptions& options_;
@@ -84,15 +84,18 @@ class ComponentSolve {
   WorkingSet set_;
   // By a solve of all points that is under way.
   double reached_ = std::numeric_limits<double>::infinity();
+  double level_ = 0;  // the cost of the working set's solution, pixels
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
   int iterations_ = 0;
   int64_t num_working_observations_ = 0;
 };
 
-JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
-                                           const IterationReport& report,
-                                           Estimate* candidate) {
+// A working set whose optimum leaves other points above it is not worth a
+// proof, but more points.
+JointTermination ComponentSolve::SolvePart(
+    const RestrictedProblem& part,
+    const IterationReport& report, Estimate* candidate) {
   const Estimate start = RestrictEstimate(part, estimate_);
   CertifiedSolve solve(part.problem, options_, start);
   // What is below another part's bound already is good enough.
@@ -100,22 +103,28 @@ JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
   if (iterations_ >= options_.max_iterations) {
     return JointTermination::kMaxIterations;
   }
-  const JointTermination termination =
-      solve.Run(options_.max_iterations - iterations_,
-                [&](const JointIteration& iteration) {
-                  if (set_.IsAll()) {
-                    reached_ = std::min(reached_, solve.cost());
-                  }
-                  report(iteration);
-                });
+  const auto replace = [&](Estimate optimum) {
+    RestoreGauge(part.problem, start, &optimum);
+    ReplaceEstimate(part, optimum, candidate);
+  };
+  const JointTermination termination = solve.Run(
+      options_.max_iterations - iterations_,
+      [&](const Estimate& estimate, double cost) {
+        replace(estimate);
+        level_ = std::max(level_, cost);
+        return DoOthersFit(level_, candidate);
+      },
+      [&](const JointIteration& iteration) {
+        if (set_.IsAll()) reached_ = std::min(reached_, solve.cost());
+        report(iteration);
+      });
   iterations_ += solve.iterations();
   if (solve.lower_bound() > lower_bound_) {
     lower_bound_ = solve.lower_bound();
     certificate_ = InWhole(part, *solve.certificate());
   }
-  Estimate optimum = solve.estimate();
-  RestoreGauge(part.problem, start, &optimum);
-  ReplaceEstimate(part, optimum, candidate);
+  replace(solve.estimate());
+  level_ = std::max(level_, solve.cost());
   return termination;
 }
 
@@ -137,34 +146,38 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
 
 // Points outside the working set stay where they are if that is good enough,
 // and otherwise take their own optimum. Those behind a camera are left to the
-// next working set.
-void ComponentSolve::PlaceOthers(double level, Estimate* candidate) const {
+// next working set. Whether all are below `level` then.
+bool ComponentSolve::DoOthersFit(double level, Estimate* candidate) const {
   std::vector<int64_t> observations;
+  bool is_behind = false;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
     if (set_.Contains(k)) continue;
     const double cost = PointCost(problem_, *candidate, options_.norm, k);
+    is_behind |= !std::isfinite(cost);
     if (cost <= level || !std::isfinite(cost)) continue;
     for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
          ++i) {
       observations.push_back(i);
     }
   }
-  if (observations.empty()) return;
+  if (observations.empty()) return !is_behind;
   const RestrictedProblem part = RestrictProblem(problem_, observations);
   Estimate placed = RestrictEstimate(part, *candidate);
   BlockSweep(part.problem, FastDescentOptions(), options_.norm,
              options_.num_threads, options_.cancel)
       .IntersectPoints(&placed);
   ReplaceEstimate(part, placed, candidate);
+  return !is_behind && Cost(part.problem, placed, options_.norm,
+                            options_.num_threads) <= level;
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (!(cost_ > 0)) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
+    level_ = 0;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
-    const double level = lower_bound_ / (1 - options_.relative_gap);
-    PlaceOthers(level, &candidate);
+    const bool do_others_fit = DoOthersFit(level_, &candidate);
     const double cost = CostOf(candidate);
     if (cost <= cost_) {
       cost_ = cost;
@@ -176,12 +189,9 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
       return termination;
     }
     const int64_t num_added = set_.AddAbove(
-        candidate, options_.norm, kShareOfBound * level,
+        candidate, options_.norm, kShareOfLevel * level_,
         static_cast<int64_t>((kMaxGrowth - 1) * set_.num_points()) + 1);
-    if (termination != JointTermination::kGapReached || num_added == 0 ||
-        round == kMaxRounds) {
-      set_.AddAll();
-    }
+    if (do_others_fit || num_added == 0 || round == kMaxRounds) set_.AddAll();
   }
 }
 

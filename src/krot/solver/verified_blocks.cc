@@ -12,26 +12,25 @@
 namespace krot {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::MatrixXd;
-using Eigen::Vector3d;
 using Real = long double;
-using Matrix3 = Eigen::Matrix<Real, 3, 3>;
-using Block = Eigen::Matrix<double, 3, 2>;
+template <typename Scalar>
+using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+template <typename Scalar>
+using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+using Vector3 = Eigen::Matrix<Real, 3, 1>;
+using Block = UncertainSystem::Block;
 using Columns = UncertainSystem::Columns;
 
-constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
-constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
+constexpr Real kUnitRoundoff = std::numeric_limits<Real>::epsilon() / 2;
 // Covers the roundings of sums and products of non-negative bounds.
-constexpr double kOutward = 1 + 1e-9;
+constexpr Real kOutward = 1 + 1e-9L;
 // Twice what the theory asks for: factorisations may multiply by reciprocals.
-constexpr double kSafety = 2;
-// The c that are tried.
-constexpr double kLargestShift = 1e-1;
-constexpr double kSmallestShift = 1e-13;
-constexpr double kShiftRatio = 1e-1;
+constexpr Real kSafety = 2;
+// The c that are tried, as shares of an estimate of lambda_min.
+constexpr double kShiftShares[] = {0.3, 0.05, 0.005};
+constexpr int kPowerIterations = 20;
 
-// The columns of T M in double precision, as they are used from here on.
+// The columns of T M, as they are used from here on.
 struct ScaledColumns {
   int32_t point;
   int32_t frame;
@@ -39,19 +38,19 @@ struct ScaledColumns {
   Block frame_rows;
 };
 
-bool IsInvertible(const Matrix3& T) {
+bool IsInvertible(const Matrix3<Real>& T) {
   // Lower triangular.
   return T.allFinite() && T(0, 0) != 0 && T(1, 1) != 0 && T(2, 2) != 0;
 }
 
 // T with T G T' = I up to rounding, for G = L L': L^-1; not finite if there is
 // none.
-Matrix3 Whiten(const Matrix3& gram) {
-  const Eigen::LLT<Matrix3> llt(gram);
+Matrix3<Real> Whiten(const Matrix3<Real>& gram) {
+  const Eigen::LLT<Matrix3<Real>> llt(gram);
   if (llt.info() != Eigen::Success) {
-    return Matrix3::Constant(std::numeric_limits<Real>::quiet_NaN());
+    return Matrix3<Real>::Constant(std::numeric_limits<Real>::quiet_NaN());
   }
-  return llt.matrixL().solve(Matrix3::Identity());
+  return llt.matrixL().solve(Matrix3<Real>::Identity());
 }
 
 class Verifier {
@@ -66,10 +65,12 @@ class Verifier {
  private:
   bool FindScaling();
   bool Scale();
-  void FormFrames();
+  template <typename Scalar>
+  bool EliminatePoints(double shift, Matrix<Scalar>* frames) const;
+  std::optional<double> EstimateSmallest() const;
   bool IsAbove(double shift) const;
-  double RoundingOfH() const;
-  double LengthOfG() const;
+  Real RoundingOfH() const;
+  Real LengthOfG() const;
 
   // Calls visit(begin, end) for the columns of every point.
   template <typename Visit>
@@ -78,11 +79,10 @@ class Verifier {
   const UncertainSystem& system_;
   const size_t num_points_;
   const size_t num_frames_;
-  std::vector<Matrix3> T_point_;
-  std::vector<Matrix3> T_frame_;
+  std::vector<Matrix3<Real>> T_point_;
+  std::vector<Matrix3<Real>> T_frame_;
   std::vector<ScaledColumns> columns_;
-  double matrix_error_ = 0;  // Frobenius norm of what T M is not known by
-  MatrixXd frames_;          // the frames' part of H, lower triangle
+  Real matrix_error_ = 0;  // Frobenius norm of what T M is not known by
 };
 
 template <typename Visit>
@@ -106,19 +106,19 @@ bool Verifier::ForPoints(const Visit& visit) const {
 bool Verifier::FindScaling() {
   T_point_.resize(num_points_);
   T_frame_.resize(num_frames_);
-  std::vector<Matrix3> left(num_frames_, Matrix3::Zero());
+  std::vector<Matrix3<Real>> left(num_frames_, Matrix3<Real>::Zero());
   const bool has_points = ForPoints([&](size_t begin, size_t end) {
     const Columns* columns = system_.columns.data();
-    Matrix3 gram = Matrix3::Zero();
+    Matrix3<Real> gram = Matrix3<Real>::Zero();
     for (size_t i = begin; i < end; ++i) {
       gram += columns[i].point_rows * columns[i].point_rows.transpose();
     }
     // Twice: what one pass leaves of a badly scaled matrix is well scaled.
-    Matrix3& T = T_point_[columns[begin].point];
+    Matrix3<Real>& T = T_point_[columns[begin].point];
     T = Whiten(gram);
     gram.setZero();
     for (size_t i = begin; i < end; ++i) {
-      const UncertainSystem::Block P = T * columns[i].point_rows;
+      const Block P = T * columns[i].point_rows;
       gram += P * P.transpose();
     }
     T = Whiten(gram) * T;
@@ -126,7 +126,7 @@ bool Verifier::FindScaling() {
     for (size_t i = begin; i < end; ++i) {
       const Columns& c = columns[i];
       if (c.frame < 0) continue;
-      const Matrix3 G = (T * c.point_rows) * c.frame_rows.transpose();
+      const Matrix3<Real> G = (T * c.point_rows) * c.frame_rows.transpose();
       left[c.frame] +=
           c.frame_rows * c.frame_rows.transpose() - G.transpose() * G;
     }
@@ -140,18 +140,15 @@ bool Verifier::FindScaling() {
   return true;
 }
 
-// Rounds T M to doubles and sums up what that and the system's own uncertainty
-// amount to.
+// And sums up what its rounding and the system's own uncertainty amount to.
 bool Verifier::Scale() {
   Real sum = 0;
-  const auto scale = [&](const Matrix3& T, const UncertainSystem::Block& rows,
-                         const UncertainSystem::BlockError& error) {
-    const UncertainSystem::Block exact = T * rows;
-    const UncertainSystem::Block terms =
-        T.cwiseAbs() *
-        (rows.cwiseAbs() * (8 * kRealRoundoff) + error.cast<Real>());
-    sum += (terms + exact.cwiseAbs() * Real{kUnitRoundoff}).squaredNorm();
-    return Block(exact.cast<double>());
+  const auto scale = [&](const Matrix3<Real>& T, const Block& rows,
+                         const UncertainSystem::BlockError& error) -> Block {
+    const Block terms = T.cwiseAbs() * (rows.cwiseAbs() * (8 * kUnitRoundoff) +
+                                        error.cast<Real>());
+    sum += terms.squaredNorm();
+    return T * rows;
   };
   columns_.reserve(system_.columns.size());
   for (const Columns& c : system_.columns) {
@@ -162,18 +159,8 @@ bool Verifier::Scale() {
     }
     columns_.push_back(scaled);
   }
-  matrix_error_ = static_cast<double>(std::sqrt(sum)) * kOutward;
+  matrix_error_ = std::sqrt(sum) * kOutward;
   return std::isfinite(matrix_error_);
-}
-
-void Verifier::FormFrames() {
-  const int64_t size = 3 * static_cast<int64_t>(num_frames_);
-  frames_ = MatrixXd::Zero(size, size);
-  for (const ScaledColumns& c : columns_) {
-    if (c.frame < 0) continue;
-    frames_.block<3, 3>(3 * c.frame, 3 * c.frame) +=
-        c.frame_rows * c.frame_rows.transpose();
-  }
 }
 
 // How far, at most, lambda_min of the exact H is below a shift whose
@@ -182,19 +169,19 @@ void Verifier::FormFrames() {
 // | |T M| |T M|' |_2 is at most the largest column sum times the largest row
 // sum. A row of the factor with n entries adds (n + 2) u times its diagonal
 // entry of H.
-double Verifier::RoundingOfH() const {
-  std::vector<Vector3d> point_sum(num_points_, Vector3d::Zero());
-  std::vector<Vector3d> frame_sum(num_frames_, Vector3d::Zero());
-  std::vector<Vector3d> point_diagonal(num_points_, Vector3d::Zero());
-  std::vector<Vector3d> frame_diagonal(num_frames_, Vector3d::Zero());
-  std::vector<double> point_count(num_points_, 0);
-  std::vector<double> frame_count(num_frames_, 0);
-  double column_sum = 0;
+Real Verifier::RoundingOfH() const {
+  std::vector<Vector3> point_sum(num_points_, Vector3::Zero());
+  std::vector<Vector3> frame_sum(num_frames_, Vector3::Zero());
+  std::vector<Vector3> point_diagonal(num_points_, Vector3::Zero());
+  std::vector<Vector3> frame_diagonal(num_frames_, Vector3::Zero());
+  std::vector<Real> point_count(num_points_, 0);
+  std::vector<Real> frame_count(num_frames_, 0);
+  Real column_sum = 0;
   for (const ScaledColumns& c : columns_) {
     point_sum[c.point] += c.point_rows.cwiseAbs().rowwise().sum();
     point_diagonal[c.point] += c.point_rows.rowwise().squaredNorm();
     point_count[c.point] += 2;
-    Eigen::RowVector2d sum = c.point_rows.cwiseAbs().colwise().sum();
+    Eigen::Matrix<Real, 1, 2> sum = c.point_rows.cwiseAbs().colwise().sum();
     if (c.frame >= 0) {
       frame_sum[c.frame] += c.frame_rows.cwiseAbs().rowwise().sum();
       frame_diagonal[c.frame] += c.frame_rows.rowwise().squaredNorm();
@@ -203,9 +190,9 @@ double Verifier::RoundingOfH() const {
     }
     column_sum = std::max(column_sum, sum.maxCoeff());
   }
-  double row_sum = 0;
-  double count = 0;
-  double factor = 0;
+  Real row_sum = 0;
+  Real count = 0;
+  Real factor = 0;
   for (size_t k = 0; k < num_points_; ++k) {
     row_sum = std::max(row_sum, point_sum[k].maxCoeff());
     count = std::max(count, point_count[k]);
@@ -215,58 +202,87 @@ double Verifier::RoundingOfH() const {
     row_sum = std::max(row_sum, frame_sum[f].maxCoeff());
     count = std::max(count, frame_count[f]);
     // A point, seen twice or once, has three entries in a frame's row.
-    factor +=
-        (1.5 * frame_count[f] + 3 * static_cast<double>(num_frames_) + 2) *
-        frame_diagonal[f].sum();
+    factor += (1.5L * frame_count[f] + 3 * static_cast<Real>(num_frames_) + 2) *
+              frame_diagonal[f].sum();
   }
   return kSafety * kUnitRoundoff *
          ((count + 2) * column_sum * row_sum + factor) * kOutward;
 }
 
-// Whether H - shift I has a Cholesky factor, the points' rows first.
-bool Verifier::IsAbove(double shift) const {
-  MatrixXd left = frames_;
-  left.diagonal().array() -= shift;
-  const bool has_points = ForPoints([&](size_t begin, size_t end) {
-    Matrix3d H = Matrix3d::Zero();
-    for (size_t i = begin; i < end; ++i) {
-      H += columns_[i].point_rows * columns_[i].point_rows.transpose();
-    }
-    H.diagonal().array() -= shift;
-    const Eigen::LLT<Matrix3d> llt(H);
-    if (llt.info() != Eigen::Success) return false;
+// The frames' part of H - shift I once the points are eliminated, its lower
+// triangle; false if the points' part has no Cholesky factor.
+template <typename Scalar>
+bool Verifier::EliminatePoints(double shift, Matrix<Scalar>* frames) const {
+  const int64_t size = 3 * static_cast<int64_t>(num_frames_);
+  frames->setZero(size, size);
+  frames->diagonal().array() -= shift;
+  return ForPoints([&](size_t begin, size_t end) {
+    Matrix3<Scalar> H = Matrix3<Scalar>::Zero();
     // One block per frame: a frame may see the point several times.
-    std::vector<std::pair<int32_t, Matrix3d>> blocks;  // L^-1 H_kf
+    std::vector<std::pair<int32_t, Matrix3<Scalar>>> blocks;  // L^-1 H_kf
     for (size_t i = begin; i < end; ++i) {
       const ScaledColumns& c = columns_[i];
+      const Eigen::Matrix<Scalar, 3, 2> P = c.point_rows.cast<Scalar>();
+      H += P * P.transpose();
       if (c.frame < 0) continue;
-      const Matrix3d product = c.point_rows * c.frame_rows.transpose();
+      const Eigen::Matrix<Scalar, 3, 2> F = c.frame_rows.cast<Scalar>();
+      frames->template block<3, 3>(3 * c.frame, 3 * c.frame) +=
+          F * F.transpose();
       const auto same = std::find_if(
           blocks.begin(), blocks.end(),
           [&](const auto& block) { return block.first == c.frame; });
       if (same == blocks.end()) {
-        blocks.emplace_back(c.frame, product);
+        blocks.emplace_back(c.frame, P * F.transpose());
       } else {
-        same->second += product;
+        same->second += P * F.transpose();
       }
     }
-    for (auto& [frame, block] : blocks) llt.matrixL().solveInPlace(block);
+    H.diagonal().array() -= shift;
+    const Eigen::LLT<Matrix3<Scalar>> llt(H);
+    if (llt.info() != Eigen::Success) return false;
+    for (auto& block : blocks) llt.matrixL().solveInPlace(block.second);
     for (const auto& [f, block_f] : blocks) {
       for (const auto& [g, block_g] : blocks) {
         if (f < g) continue;
-        left.block<3, 3>(3 * f, 3 * g).noalias() -=
+        frames->template block<3, 3>(3 * f, 3 * g).noalias() -=
             block_f.transpose() * block_g;
       }
     }
     return true;
   });
-  if (!has_points) return false;
-  if (num_frames_ == 0) return true;
-  const Eigen::LLT<Eigen::Ref<MatrixXd>> llt(left);
-  return llt.info() == Eigen::Success && left.diagonal().allFinite();
 }
 
-double Verifier::LengthOfG() const {
+// About lambda_min of the frames' part, by inverse iteration in double
+// precision. None if that says that it is not positive.
+std::optional<double> Verifier::EstimateSmallest() const {
+  Matrix<double> frames;
+  if (!EliminatePoints(0, &frames)) return std::nullopt;
+  if (num_frames_ == 0) return 1;
+  const Eigen::LLT<Eigen::Ref<Matrix<double>>> llt(frames);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  Eigen::VectorXd x(frames.rows());
+  for (int64_t i = 0; i < x.size(); ++i) {
+    x[i] = 1 + 0.5 * std::sin(static_cast<double>(i));
+  }
+  double growth = 1;
+  for (int n = 0; n < kPowerIterations; ++n) {
+    x.normalize();
+    llt.solveInPlace(x);
+    growth = x.norm();
+  }
+  return std::min(1.0, 1 / growth);
+}
+
+// Whether H - shift I has a Cholesky factor, the points' rows first.
+bool Verifier::IsAbove(double shift) const {
+  Matrix<Real> frames;
+  if (!EliminatePoints(shift, &frames)) return false;
+  if (num_frames_ == 0) return true;
+  const Eigen::LLT<Eigen::Ref<Matrix<Real>>> llt(frames);
+  return llt.info() == Eigen::Success && frames.diagonal().allFinite();
+}
+
+Real Verifier::LengthOfG() const {
   Real sum = 0;
   for (size_t k = 0; k < num_points_; ++k) {
     sum += (T_point_[k].cwiseAbs() * system_.point_bound[k].cast<Real>())
@@ -276,7 +292,7 @@ double Verifier::LengthOfG() const {
     sum += (T_frame_[f].cwiseAbs() * system_.frame_bound[f].cast<Real>())
                .squaredNorm();
   }
-  return static_cast<double>(std::sqrt(sum)) * kOutward;
+  return std::sqrt(sum) * kOutward;
 }
 
 std::optional<double> Verifier::Run() {
@@ -284,18 +300,19 @@ std::optional<double> Verifier::Run() {
       !Scale()) {
     return std::nullopt;
   }
-  FormFrames();
-  const double rounding = RoundingOfH();
-  for (double shift = kLargestShift; shift >= kSmallestShift;
-       shift *= kShiftRatio) {
-    const double sigma =
-        std::sqrt(std::max(0.0, shift - rounding)) * (1 - 4 * kUnitRoundoff) -
-        matrix_error_;
+  const std::optional<double> smallest = EstimateSmallest();
+  if (!smallest) return std::nullopt;
+  const Real rounding = RoundingOfH();
+  for (const double share : kShiftShares) {
+    const double shift = share * *smallest;
+    const Real sigma = std::sqrt(std::max(Real{0}, shift - rounding)) *
+                           (1 - 4 * kUnitRoundoff) -
+                       matrix_error_;
     if (!(sigma > 0)) break;
     if (!IsAbove(shift)) continue;
-    const double length = LengthOfG() / sigma * kOutward;
+    const Real length = LengthOfG() / sigma * kOutward;
     if (!std::isfinite(length)) break;
-    return length;
+    return static_cast<double>(length) * (1 + 1e-15);
   }
   return std::nullopt;
 }

@@ -16,13 +16,14 @@ namespace krot {
 // make the blocks of H = T M M'T' on the diagonal, points eliminated for the
 // frames', nearly the identity. sigma_min(T M)^2 = lambda_min(H) > c is proved
 // by a Cholesky factorisation of H - c I that runs to its end [Rump 2006], for
-// the largest c of a few; what T M is not known by is taken off.
+// c a share of an estimate; what T M is not known by is taken off. In long
+// double, as the theory's bound on the roundings grows with frames^2.
 //
-// None if no sigma_min above some 1e-6 can be shown, or if there are more than
+// None if no sigma_min above some 1e-7 can be shown, or if there are more than
 // kMaxVerifiedFrames frames.
-// O(observations track_length + frames^3), 72 bytes per pair of frames.
+// O(observations track_length + frames^3), 144 bytes per pair of frames.
 std::optional<double> BoundSolutionByBlocks(const UncertainSystem& system);
 
-inline constexpr int64_t kMaxVerifiedFrames = 2500;
+inline constexpr int64_t kMaxVerifiedFrames = 1500;
 
 }  // namespace krot

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/QR>
+
+#include "krot/conic/block_structure.h"
+#include "krot/conic/point_elimination.h"
+
+namespace krot {
+
+// Under-determined equations M x = rhs with the structure of bundle adjustment:
+// three equations per point, three per frame but frame 0, and perhaps one more
+// that concerns everything. An observation has three unknowns (those that no
+// equation mentions stay 0), which meet the equations of its point and of its
+// frame.
+struct LeastNormProblem {
+  struct Columns {
+    int32_t point = 0;
+    int32_t frame = 0;
+    // By unknown (row) and equation (column).
+    Eigen::Matrix3d point_rows = Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d frame_rows = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d last_row = Eigen::Vector3d::Zero();
+  };
+  int32_t num_points = 0;
+  int32_t num_frames = 0;
+  bool has_last_row = false;
+  std::vector<Columns> columns;  // in the order of their points
+
+  int64_t num_rows() const {
+    return 3 * (int64_t{num_points} + num_frames - 1) + has_last_row;
+  }
+};
+
+// Their solutions of least norm: dense, by Householder's reflections, where
+// that is affordable, as supports may be nearly flexible; beyond kMaxDenseRows
+// rows by eliminating points.
+class LeastNormSolver {
+ public:
+  // False if the equations may have no solution.
+  bool Factorize(LeastNormProblem problem);
+
+  // Three unknowns per observation.
+  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
+
+ private:
+  bool FactorizeDense();
+  bool FactorizeByPoints();
+  Eigen::VectorXd SolveByPoints(const Eigen::VectorXd& rhs) const;
+
+  LeastNormProblem problem_;
+  // Dense: QR of the transposed equations, each of which is scaled to length 1.
+  Eigen::VectorXd scale_;
+  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
+  // By points.
+  BlockStructure structure_;
+  std::unique_ptr<PointElimination<3>> elimination_;
+  Eigen::VectorXd last_row_;  // without its part in the span of the others
+  double last_row_norm2_ = 0;
+};
+
+}  // namespace krot
