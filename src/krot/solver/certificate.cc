@@ -30,7 +30,10 @@ bool IsBetter(const Certificate& a, const Certificate& b) {
   if (a.observations.size() < b.observations.size()) {
     return a.lower_bound > b.lower_bound - margin;
   }
-  return a.lower_bound > b.lower_bound + margin;
+  if (a.observations.size() > b.observations.size()) {
+    return a.lower_bound > b.lower_bound + margin;
+  }
+  return a.lower_bound > b.lower_bound;
 }
 
 class Maker {
@@ -73,6 +76,7 @@ class Maker {
 void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
                 const std::vector<Multiplier>& multipliers, double threshold) {
   const RestrictedProblem part = RestrictProblem(problem_, observations);
+  if (NumUnknowns(part.problem) > options_.max_unknowns) return;
   std::vector<Multiplier> known;
   for (const int64_t i : observations) known.push_back(multipliers[i]);
   Offer(part, RestrictEstimate(part, whole), known);
@@ -81,7 +85,6 @@ void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
 
 void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
                            double threshold, int num_reductions) {
-  if (NumUnknowns(part.problem) > options_.max_unknowns) return;
   InteriorPointOptions options;
   options.norm = norm_;
   options.smallest_gap = kSmallestGap;

@@ -15,7 +15,7 @@ namespace krot {
 struct CertificateOptions {
   // The first certificate that proves as much will do, pixels.
   double sufficient_bound = std::numeric_limits<double>::infinity();
-  // Sub-problems with more unknowns are not solved; >= 1.
+  // Supports with more unknowns are not tried; >= 1.
   int max_unknowns = 15000;
   int num_threads = -1;                // -1: all
   const CancelFlag* cancel = nullptr;  // may be null
