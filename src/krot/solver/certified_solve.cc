@@ -53,8 +53,7 @@ void CertifiedSolve::TryCertificate(const ConicIterate& iterate) {
 }
 
 InteriorPointTermination CertifiedSolve::RunFromEstimate(
-    const IsWorthProving& is_worth_proving,
-    const IterationReport& report) {
+    const IsWorthProving& is_worth_proving, const IterationReport& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
   options.max_iterations = max_iterations_ - iterations_;
@@ -110,9 +109,9 @@ bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
   return false;
 }
 
-JointTermination CertifiedSolve::Run(
-    int max_iterations, const IsWorthProving& is_worth_proving,
-    const IterationReport& report) {
+JointTermination CertifiedSolve::Run(int max_iterations,
+                                     const IsWorthProving& is_worth_proving,
+                                     const IterationReport& report) {
   max_iterations_ = max_iterations;
   if (!(cost_ > 0)) return JointTermination::kGapReached;
   for (int restart = 0; restart <= kMaxRestarts; ++restart) {

@@ -93,9 +93,9 @@ class ComponentSolve {
 
 // A working set whose optimum leaves other points above it is not worth a
 // proof, but more points.
-JointTermination ComponentSolve::SolvePart(
-    const RestrictedProblem& part,
-    const IterationReport& report, Estimate* candidate) {
+JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
+                                           const IterationReport& report,
+                                           Estimate* candidate) {
   const Estimate start = RestrictEstimate(part, estimate_);
   CertifiedSolve solve(part.problem, options_, start);
   // What is below another part's bound already is good enough.
