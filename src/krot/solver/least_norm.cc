@@ -9,11 +9,10 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int64_t kMaxDenseRows = 1500;
 // A last row that keeps less than this of its length (squared) follows from
 // the others.
 constexpr double kSmallestLastRow = 1e-20;
-// The check refuses larger systems anyway.
+// A factorisation takes seconds at most.
 constexpr int kNumThreads = 1;
 
 }  // namespace
@@ -24,8 +23,8 @@ bool LeastNormSolver::Factorize(LeastNormProblem problem) {
   if (problem_.num_rows() > 3 * static_cast<int64_t>(problem_.columns.size())) {
     return false;
   }
-  return problem_.num_rows() <= kMaxDenseRows ? FactorizeDense()
-                                              : FactorizeByPoints();
+  return problem_.num_rows() <= max_dense_rows_ ? FactorizeDense()
+                                                : FactorizeByPoints();
 }
 
 VectorXd LeastNormSolver::Solve(const VectorXd& rhs) const {

@@ -37,10 +37,13 @@ struct LeastNormProblem {
 };
 
 // Their solutions of least norm: dense, by Householder's reflections, where
-// that is affordable, as supports may be nearly flexible; beyond kMaxDenseRows
-// rows by eliminating points.
+// that is affordable, as supports may be nearly flexible; beyond
+// `max_dense_rows` by eliminating points.
 class LeastNormSolver {
  public:
+  explicit LeastNormSolver(int64_t max_dense_rows = 1500)
+      : max_dense_rows_(max_dense_rows) {}
+
   // False if the equations may have no solution.
   bool Factorize(LeastNormProblem problem);
 
@@ -52,6 +55,7 @@ class LeastNormSolver {
   bool FactorizeByPoints();
   Eigen::VectorXd SolveByPoints(const Eigen::VectorXd& rhs) const;
 
+  const int64_t max_dense_rows_;
   LeastNormProblem problem_;
   // Dense: QR of the transposed equations, each of which is scaled to length 1.
   Eigen::VectorXd scale_;
