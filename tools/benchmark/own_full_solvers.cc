@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "krot/base/timer.h"
 #include "krot/pipeline/schedule.h"
 #include "krot/solver/joint.h"
 #include "krot/solver/res_int.h"
@@ -21,7 +22,7 @@ class Schedule : public KnownRotationSolver {
     SolveModelOptions options;
     options.num_threads = num_threads_;
     SolveSummary summary;
-    RunSchedule(problem, options, method_, estimate, &summary);
+    RunSchedule(problem, options, method_, Timer(), estimate, &summary);
     return true;
   }
 

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
+
+#include "krot/solver/scaled_system.h"
 
 namespace krot {
 namespace {
@@ -18,8 +19,6 @@ using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
 template <typename Scalar>
 using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
 using Vector3 = Eigen::Matrix<Real, 3, 1>;
-using Block = UncertainSystem::Block;
-using Columns = UncertainSystem::Columns;
 
 constexpr Real kUnitRoundoff = std::numeric_limits<Real>::epsilon() / 2;
 // Covers the roundings of sums and products of non-negative bounds.
@@ -30,138 +29,28 @@ constexpr Real kSafety = 2;
 constexpr double kShiftShares[] = {0.3, 0.05, 0.005};
 constexpr int kPowerIterations = 20;
 
-// The columns of T M, as they are used from here on.
-struct ScaledColumns {
-  int32_t point;
-  int32_t frame;
-  Block point_rows;
-  Block frame_rows;
-};
-
-bool IsInvertible(const Matrix3<Real>& T) {
-  // Lower triangular.
-  return T.allFinite() && T(0, 0) != 0 && T(1, 1) != 0 && T(2, 2) != 0;
-}
-
-// T with T G T' = I up to rounding, for G = L L': L^-1; not finite if there is
-// none.
-Matrix3<Real> Whiten(const Matrix3<Real>& gram) {
-  const Eigen::LLT<Matrix3<Real>> llt(gram);
-  if (llt.info() != Eigen::Success) {
-    return Matrix3<Real>::Constant(std::numeric_limits<Real>::quiet_NaN());
-  }
-  return llt.matrixL().solve(Matrix3<Real>::Identity());
-}
-
 class Verifier {
  public:
-  explicit Verifier(const UncertainSystem& system)
+  explicit Verifier(const ScaledSystem& system)
       : system_(system),
-        num_points_(system.point_bound.size()),
-        num_frames_(system.frame_bound.size()) {}
+        columns_(system.columns),
+        num_points_(system.num_points),
+        num_frames_(system.num_frames) {}
 
-  std::optional<double> Run();
+  std::optional<double> Run() const;
 
  private:
-  bool FindScaling();
-  bool Scale();
   template <typename Scalar>
   bool EliminatePoints(double shift, Matrix<Scalar>* frames) const;
   std::optional<double> EstimateSmallest() const;
   bool IsAbove(double shift) const;
   Real RoundingOfH() const;
-  Real LengthOfG() const;
 
-  // Calls visit(begin, end) for the columns of every point.
-  template <typename Visit>
-  bool ForPoints(const Visit& visit) const;
-
-  const UncertainSystem& system_;
+  const ScaledSystem& system_;
+  const std::vector<ScaledSystem::Columns>& columns_;
   const size_t num_points_;
   const size_t num_frames_;
-  std::vector<Matrix3<Real>> T_point_;
-  std::vector<Matrix3<Real>> T_frame_;
-  std::vector<ScaledColumns> columns_;
-  Real matrix_error_ = 0;  // Frobenius norm of what T M is not known by
 };
-
-template <typename Visit>
-bool Verifier::ForPoints(const Visit& visit) const {
-  const auto& columns = system_.columns;
-  std::vector<char> is_seen(num_points_, 0);
-  for (size_t begin = 0; begin < columns.size();) {
-    size_t end = begin;
-    while (end < columns.size() && columns[end].point == columns[begin].point) {
-      ++end;
-    }
-    is_seen[columns[begin].point] = 1;
-    if (!visit(begin, end)) return false;
-    begin = end;
-  }
-  return std::find(is_seen.begin(), is_seen.end(), 0) == is_seen.end();
-}
-
-// By a point's Gram matrix first, and by what is left of a frame's once the
-// points are eliminated.
-bool Verifier::FindScaling() {
-  T_point_.resize(num_points_);
-  T_frame_.resize(num_frames_);
-  std::vector<Matrix3<Real>> left(num_frames_, Matrix3<Real>::Zero());
-  const bool has_points = ForPoints([&](size_t begin, size_t end) {
-    const Columns* columns = system_.columns.data();
-    Matrix3<Real> gram = Matrix3<Real>::Zero();
-    for (size_t i = begin; i < end; ++i) {
-      gram += columns[i].point_rows * columns[i].point_rows.transpose();
-    }
-    // Twice: what one pass leaves of a badly scaled matrix is well scaled.
-    Matrix3<Real>& T = T_point_[columns[begin].point];
-    T = Whiten(gram);
-    gram.setZero();
-    for (size_t i = begin; i < end; ++i) {
-      const Block P = T * columns[i].point_rows;
-      gram += P * P.transpose();
-    }
-    T = Whiten(gram) * T;
-    if (!IsInvertible(T)) return false;
-    for (size_t i = begin; i < end; ++i) {
-      const Columns& c = columns[i];
-      if (c.frame < 0) continue;
-      const Matrix3<Real> G = (T * c.point_rows) * c.frame_rows.transpose();
-      left[c.frame] +=
-          c.frame_rows * c.frame_rows.transpose() - G.transpose() * G;
-    }
-    return true;
-  });
-  if (!has_points) return false;
-  for (size_t f = 0; f < num_frames_; ++f) {
-    T_frame_[f] = Whiten(left[f]);
-    if (!IsInvertible(T_frame_[f])) return false;
-  }
-  return true;
-}
-
-// And sums up what its rounding and the system's own uncertainty amount to.
-bool Verifier::Scale() {
-  Real sum = 0;
-  const auto scale = [&](const Matrix3<Real>& T, const Block& rows,
-                         const UncertainSystem::BlockError& error) -> Block {
-    const Block terms = T.cwiseAbs() * (rows.cwiseAbs() * (8 * kUnitRoundoff) +
-                                        error.cast<Real>());
-    sum += terms.squaredNorm();
-    return T * rows;
-  };
-  columns_.reserve(system_.columns.size());
-  for (const Columns& c : system_.columns) {
-    ScaledColumns scaled{c.point, c.frame, Block::Zero(), Block::Zero()};
-    scaled.point_rows = scale(T_point_[c.point], c.point_rows, c.point_error);
-    if (c.frame >= 0) {
-      scaled.frame_rows = scale(T_frame_[c.frame], c.frame_rows, c.frame_error);
-    }
-    columns_.push_back(scaled);
-  }
-  matrix_error_ = std::sqrt(sum) * kOutward;
-  return std::isfinite(matrix_error_);
-}
 
 // How far, at most, lambda_min of the exact H is below a shift whose
 // factorisation runs to its end: the rounding of H, and of the factorisation.
@@ -177,7 +66,7 @@ Real Verifier::RoundingOfH() const {
   std::vector<Real> point_count(num_points_, 0);
   std::vector<Real> frame_count(num_frames_, 0);
   Real column_sum = 0;
-  for (const ScaledColumns& c : columns_) {
+  for (const ScaledSystem::Columns& c : columns_) {
     point_sum[c.point] += c.point_rows.cwiseAbs().rowwise().sum();
     point_diagonal[c.point] += c.point_rows.rowwise().squaredNorm();
     point_count[c.point] += 2;
@@ -216,12 +105,12 @@ bool Verifier::EliminatePoints(double shift, Matrix<Scalar>* frames) const {
   const int64_t size = 3 * static_cast<int64_t>(num_frames_);
   frames->setZero(size, size);
   frames->diagonal().array() -= shift;
-  return ForPoints([&](size_t begin, size_t end) {
+  return ForPoints(columns_, num_points_, [&](size_t begin, size_t end) {
     Matrix3<Scalar> H = Matrix3<Scalar>::Zero();
     // One block per frame: a frame may see the point several times.
     std::vector<std::pair<int32_t, Matrix3<Scalar>>> blocks;  // L^-1 H_kf
     for (size_t i = begin; i < end; ++i) {
-      const ScaledColumns& c = columns_[i];
+      const ScaledSystem::Columns& c = columns_[i];
       const Eigen::Matrix<Scalar, 3, 2> P = c.point_rows.cast<Scalar>();
       H += P * P.transpose();
       if (c.frame < 0) continue;
@@ -282,24 +171,7 @@ bool Verifier::IsAbove(double shift) const {
   return llt.info() == Eigen::Success && frames.diagonal().allFinite();
 }
 
-Real Verifier::LengthOfG() const {
-  Real sum = 0;
-  for (size_t k = 0; k < num_points_; ++k) {
-    sum += (T_point_[k].cwiseAbs() * system_.point_bound[k].cast<Real>())
-               .squaredNorm();
-  }
-  for (size_t f = 0; f < num_frames_; ++f) {
-    sum += (T_frame_[f].cwiseAbs() * system_.frame_bound[f].cast<Real>())
-               .squaredNorm();
-  }
-  return std::sqrt(sum) * kOutward;
-}
-
-std::optional<double> Verifier::Run() {
-  if (num_frames_ > static_cast<size_t>(kMaxVerifiedFrames) || !FindScaling() ||
-      !Scale()) {
-    return std::nullopt;
-  }
+std::optional<double> Verifier::Run() const {
   const std::optional<double> smallest = EstimateSmallest();
   if (!smallest) return std::nullopt;
   const Real rounding = RoundingOfH();
@@ -307,10 +179,10 @@ std::optional<double> Verifier::Run() {
     const double shift = share * *smallest;
     const Real sigma = std::sqrt(std::max(Real{0}, shift - rounding)) *
                            (1 - 4 * kUnitRoundoff) -
-                       matrix_error_;
+                       system_.matrix_error;
     if (!(sigma > 0)) break;
     if (!IsAbove(shift)) continue;
-    const Real length = LengthOfG() / sigma * kOutward;
+    const Real length = system_.bound_length / sigma * kOutward;
     if (!std::isfinite(length)) break;
     return static_cast<double>(length) * (1 + 1e-15);
   }
@@ -320,7 +192,11 @@ std::optional<double> Verifier::Run() {
 }  // namespace
 
 std::optional<double> BoundSolutionByBlocks(const UncertainSystem& system) {
-  return Verifier(system).Run();
+  if (static_cast<int64_t>(system.frame_bound.size()) > kMaxVerifiedFrames) {
+    return std::nullopt;
+  }
+  const std::optional<ScaledSystem> scaled = ScaleBlocks(system);
+  return scaled ? Verifier(*scaled).Run() : std::nullopt;
 }
 
 }  // namespace krot
