@@ -26,6 +26,8 @@ constexpr double kRankTolerance = 1e-13;
 constexpr double kHighLeverage = 0.5;
 constexpr int kMaxHighLeverage = 6;
 constexpr int kRefinements = 1;
+// Starting a thread takes longer than its share of so few observations.
+constexpr int64_t kFewObservations = 4000;
 
 // column -= q q'column; returns q'column. Done twice, Gram-Schmidt is as
 // orthogonal as Householder's reflections [Giraud, Langou, Rozloznik 2005].
@@ -48,7 +50,8 @@ template <int kRows>
 PointElimination<kRows>::PointElimination(const BlockStructure& structure,
                                           int num_threads)
     : structure_(structure),
-      num_threads_(num_threads),
+      num_threads_(
+          structure.num_observations() < kFewObservations ? 1 : num_threads),
       frame_system_(structure),
       point_rows_(structure.num_observations() * kBlock),
       frame_rows_(structure.num_observations() * kBlock),
