@@ -3,30 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <utility>
-#include <vector>
+#include "tests/problem/graph_problem.h"
 
 namespace krot {
 namespace {
 
 using ::testing::Each;
 using ::testing::ElementsAre;
-
-// One view per frame; pairs are (frame, point), ordered by point.
-KnownRotationProblem MakeGraph(int32_t num_frames, int32_t num_points,
-                               std::vector<std::pair<int, int>> edges) {
-  KnownRotationProblem problem;
-  problem.num_frames = num_frames;
-  problem.num_points = num_points;
-  problem.views.resize(num_frames);
-  for (int32_t f = 0; f < num_frames; ++f) problem.views[f].frame = f;
-  for (const auto& [frame, point] : edges) {
-    problem.observations.push_back(
-        {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity(), frame, point});
-  }
-  IndexObservations(&problem);
-  return problem;
-}
 
 TEST(FindComponents, NumbersThemByTheirFirstFrame) {
   const Components components =

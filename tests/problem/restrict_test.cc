@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "krot/problem/cost.h"
+#include "tests/problem/graph_problem.h"
 #include "tests/problem/random_problem.h"
 
 namespace krot {
@@ -17,22 +17,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-
-// One view per frame; pairs are (frame, point), ordered by point.
-KnownRotationProblem MakeGraph(int32_t num_frames, int32_t num_points,
-                               std::vector<std::pair<int, int>> edges) {
-  KnownRotationProblem problem;
-  problem.num_frames = num_frames;
-  problem.num_points = num_points;
-  problem.views.resize(num_frames);
-  for (int32_t f = 0; f < num_frames; ++f) problem.views[f].frame = f;
-  for (const auto& [frame, point] : edges) {
-    problem.observations.push_back(
-        {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity(), frame, point});
-  }
-  IndexObservations(&problem);
-  return problem;
-}
 
 std::vector<int64_t> All(const KnownRotationProblem& problem) {
   std::vector<int64_t> all(problem.observations.size());
