@@ -53,8 +53,10 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
   DescentSummary summary;
   summary.cost_initial = residuals_.Evaluate(*x, norm_);
   summary.cost = summary.cost_initial;
-  CheckArgument(std::isfinite(summary.cost), "cost at the start", summary.cost,
-                "finite: all depths positive");
+  if (!std::isfinite(summary.cost)) {
+    summary.termination = DescentTermination::kBehind;
+    return summary;
+  }
   const StepSizeOptions step_options{options_.step_tolerance,
                                      options_.slope_probe, options_.max_step};
   summary.termination = DescentTermination::kMaxIterations;

@@ -38,8 +38,8 @@ class FastDescent {
 
   ResidualSet& residuals() { return residuals_; }
 
-  // Lowers the cost from *x, where all depths must be positive (throws
-  // std::invalid_argument otherwise). Never raises it.
+  // Lowers the cost from *x; never raises it. Where a depth at *x is not
+  // positive nothing is done, and the cost is infinite.
   DescentSummary Minimize(Eigen::Vector3d* x);
 
   // As far as `goal` says; `*active` is a warm start, and that of the next

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "krot/base/check.h"
-
 namespace krot {
 namespace {
 
@@ -95,8 +93,10 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
   double cost = residuals->Evaluate(*x, norm);
   summary.cost_initial = cost;
   summary.cost = cost;
-  CheckArgument(std::isfinite(cost), "cost at the start", cost,
-                "finite: all depths positive");
+  if (!std::isfinite(cost)) {
+    summary.termination = DescentTermination::kBehind;
+    return summary;
+  }
   if (cost <= goal.level) {
     summary.termination = DescentTermination::kLowEnough;
     return summary;

@@ -11,6 +11,7 @@ namespace krot {
 
 enum class DescentTermination {
   kNotRun,
+  kBehind,      // the start is not feasible: a depth there is not positive
   kStationary,  // no direction lowers the maximum, up to the tolerance
   kZeroCost,    // all residuals vanish
   kLowEnough,   // the start is at the level of the goal or below it

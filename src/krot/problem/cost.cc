@@ -1,6 +1,7 @@
 #include "krot/problem/cost.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -36,6 +37,51 @@ double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   return std::isfinite(residual) ? residual : kInfinity;
 }
 
+bool AllDepthsPositive(const KnownRotationProblem& problem,
+                       const Estimate& estimate, int num_threads) {
+  // Per view: depth = axis's + offset.
+  struct DepthRow {
+    Eigen::Vector3d axis;
+    double offset;
+  };
+  std::vector<DepthRow> rows;
+  rows.reserve(problem.views.size());
+  for (const View& view : problem.views) {
+    rows.push_back({view.cam_from_world_rotation.row(2),
+                    view.cam_from_rig_rotation.row(2).dot(
+                        estimate.translations[view.frame]) +
+                        view.cam_from_rig_translation.z()});
+  }
+  const int64_t count = static_cast<int64_t>(problem.observations.size());
+  std::atomic<bool> all_positive{true};
+  ParallelFor(count, kObservationsPerChunk, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                if (!all_positive) return;
+                bool positive = true;
+                for (int64_t i = begin; i < end; ++i) {
+                  const Observation& observation = problem.observations[i];
+                  const DepthRow& row = rows[observation.view];
+                  positive &= row.axis.dot(estimate.points[observation.point]) +
+                                  row.offset >
+                              0;
+                }
+                if (!positive) all_positive = false;
+              });
+  return all_positive;
+}
+
+double LargestResidual(const KnownRotationProblem& problem,
+                       const Estimate& estimate, Norm norm, int64_t begin,
+                       int64_t end) {
+  double largest = 0;
+  for (int64_t i = begin; i < end; ++i) {
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], estimate);
+    largest = std::max(largest, ResidualOf(viewed, norm));
+  }
+  return largest;
+}
+
 double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
             Norm norm, int num_threads) {
   CheckArgument(norm.p >= 1, "norm.p", norm.p, ">= 1");
@@ -49,18 +95,11 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
 
   const int64_t count = static_cast<int64_t>(problem.observations.size());
   std::vector<double> chunk_max(NumChunks(count, kObservationsPerChunk), 0);
-  ParallelFor(
-      count, kObservationsPerChunk, num_threads,
-      [&](int64_t begin, int64_t end, int) {
-        double largest = 0;
-        for (int64_t i = begin; i < end; ++i) {
-          const Observation& observation = problem.observations[i];
-          largest = std::max(
-              largest,
-              ResidualOf(ViewPoint(problem, observation, estimate), norm));
-        }
-        chunk_max[begin / kObservationsPerChunk] = largest;
-      });
+  ParallelFor(count, kObservationsPerChunk, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                chunk_max[begin / kObservationsPerChunk] =
+                    LargestResidual(problem, estimate, norm, begin, end);
+              });
   return chunk_max.empty()
              ? 0.0
              : *std::max_element(chunk_max.begin(), chunk_max.end());

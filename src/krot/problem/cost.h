@@ -20,6 +20,23 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
 // r = ||v||_p / w in pixels; infinity unless w > 0 and r is finite.
 double ResidualOf(const ViewedPoint& viewed, Norm norm);
 
+// Whether every observation has its point in front of the camera, w > 0: where
+// the cost is finite. A third of the work of Cost.
+bool AllDepthsPositive(const KnownRotationProblem& problem,
+                       const Estimate& estimate, int num_threads);
+
+// The largest residual of observations [begin, end), in pixels.
+double LargestResidual(const KnownRotationProblem& problem,
+                       const Estimate& estimate, Norm norm, int64_t begin,
+                       int64_t end);
+
+// The largest residual of a point, in pixels; 0 without observations.
+inline double PointCost(const KnownRotationProblem& problem,
+                        const Estimate& estimate, Norm norm, int64_t point) {
+  return LargestResidual(problem, estimate, norm, problem.point_begin[point],
+                         problem.point_begin[point + 1]);
+}
+
 // max_i r_i in pixels [Zhang18, (KRot)]; 0 if there are no observations.
 // Throws std::invalid_argument unless p >= 1 and the estimate has one
 // translation per frame and one point per point. O(observations); the result

@@ -1,6 +1,9 @@
 #include "krot/solver/block_sweep.h"
 
+#include <algorithm>
+
 #include "krot/base/parallel_for.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/observation_rows.h"
 
 namespace krot {
@@ -17,37 +20,56 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
                        const FastDescentOptions& options, Norm norm,
                        int num_threads, const CancelFlag* cancel)
     : problem_(problem),
+      norm_(norm),
       cancel_(cancel),
       num_threads_(ResolveNumThreads(num_threads)),
       descents_(num_threads_, FastDescent(options, norm)),
       point_active_(problem.num_points),
       frame_active_(problem.num_frames) {}
 
-void BlockSweep::IntersectPoints(Estimate* estimate) {
-  ParallelFor(problem_.num_points, kPointsPerChunk, num_threads_,
-              [&](int64_t begin, int64_t end, int worker) {
-                if (IsCancelled(cancel_)) return;
-                for (int64_t k = begin; k < end; ++k) {
-                  IntersectPoint(k, &descents_[worker], estimate);
-                }
-              });
+double BlockSweep::IntersectPoints(Estimate* estimate) {
+  return LargestOver(problem_.num_points, kPointsPerChunk,
+                     [&](int64_t k, FastDescent* descent) {
+                       return IntersectPoint(k, descent, estimate);
+                     });
 }
 
-void BlockSweep::ResectFrames(Estimate* estimate) {
-  ParallelFor(problem_.num_frames, kFramesPerChunk, num_threads_,
-              [&](int64_t begin, int64_t end, int worker) {
-                if (IsCancelled(cancel_)) return;
-                for (int64_t f = begin; f < end; ++f) {
-                  ResectFrame(f, &descents_[worker], estimate);
-                }
-              });
+double BlockSweep::ResectFrames(Estimate* estimate) {
+  return LargestOver(problem_.num_frames, kFramesPerChunk,
+                     [&](int64_t f, FastDescent* descent) {
+                       return ResectFrame(f, descent, estimate);
+                     });
 }
 
-void BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
-                                Estimate* estimate) {
+// The largest of what `minimize` returns for every block.
+template <typename Function>
+double BlockSweep::LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
+                               const Function& minimize) {
+  std::vector<double> chunk_max(NumChunks(num_blocks, blocks_per_chunk), 0);
+  ParallelFor(num_blocks, blocks_per_chunk, num_threads_,
+              [&](int64_t begin, int64_t end, int worker) {
+                if (IsCancelled(cancel_)) return;
+                double largest = 0;
+                for (int64_t block = begin; block < end; ++block) {
+                  largest =
+                      std::max(largest, minimize(block, &descents_[worker]));
+                }
+                chunk_max[begin / blocks_per_chunk] = largest;
+              });
+  return chunk_max.empty()
+             ? 0.0
+             : *std::max_element(chunk_max.begin(), chunk_max.end());
+}
+
+double BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
+                                  Estimate* estimate) {
   const int64_t begin = problem_.point_begin[k];
   const int64_t end = problem_.point_begin[k + 1];
-  if (begin == end) return;
+  if (begin == end) return 0;
+  if (goal_.level > 0) {  // whether it waits is known before rows are built
+    const double cost = PointCost(problem_, *estimate, norm_, k);
+    if (cost <= goal_.level) return cost;
+  }
   double row[kResidualRow];
   descent->residuals().Clear();
   for (int64_t i = begin; i < end; ++i) {
@@ -56,14 +78,14 @@ void BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
     IntersectionRow(view, observation, estimate->translations[view.frame], row);
     descent->residuals().Add(row);
   }
-  descent->Minimize(goal_, &point_active_[k], &estimate->points[k]);
+  return descent->Minimize(goal_, &point_active_[k], &estimate->points[k]).cost;
 }
 
-void BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
-                             Estimate* estimate) {
+double BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
+                               Estimate* estimate) {
   const int64_t begin = problem_.frame_begin[f];
   const int64_t end = problem_.frame_begin[f + 1];
-  if (begin == end) return;
+  if (begin == end) return 0;
   double row[kResidualRow];
   descent->residuals().Clear();
   for (int64_t n = begin; n < end; ++n) {
@@ -79,7 +101,8 @@ void BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
                  estimate->points[observation.point], row);
     descent->residuals().Add(row);
   }
-  descent->Minimize(goal_, &frame_active_[f], &estimate->translations[f]);
+  return descent->Minimize(goal_, &frame_active_[f], &estimate->translations[f])
+      .cost;
 }
 
 }  // namespace krot

@@ -12,6 +12,10 @@ namespace krot {
 // other and spread over threads; the result does not depend on how many. Each
 // thread keeps one FastDescent, so that sweeps do not allocate once warm.
 // Once `cancel` is set, the blocks that are left are skipped.
+//
+// Both return the cost that is reached, pixels, to rounding what Cost() gives:
+// infinity where a block starts at a depth that is not positive, and then the
+// estimate is of no use.
 class BlockSweep {
  public:
   // Keeps a reference to `problem`. `cancel` may be null.
@@ -23,16 +27,20 @@ class BlockSweep {
   void SetGoal(const DescentGoal& goal) { goal_ = goal; }
 
   // Line 3: every point's own optimum, the frames fixed: (Int_k) for all k.
-  void IntersectPoints(Estimate* estimate);
+  double IntersectPoints(Estimate* estimate);
 
   // Line 4: every frame's own optimum, the points fixed: (Res_j) for all j.
-  void ResectFrames(Estimate* estimate);
+  double ResectFrames(Estimate* estimate);
 
  private:
-  void IntersectPoint(int64_t k, FastDescent* descent, Estimate* estimate);
-  void ResectFrame(int64_t f, FastDescent* descent, Estimate* estimate);
+  template <typename Function>
+  double LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
+                     const Function& minimize);
+  double IntersectPoint(int64_t k, FastDescent* descent, Estimate* estimate);
+  double ResectFrame(int64_t f, FastDescent* descent, Estimate* estimate);
 
   const KnownRotationProblem& problem_;
+  Norm norm_;
   const CancelFlag* cancel_;
   int num_threads_;
   DescentGoal goal_;

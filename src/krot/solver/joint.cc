@@ -163,12 +163,12 @@ bool ComponentSolve::DoOthersFit(double level, Estimate* candidate) const {
   if (observations.empty()) return !is_behind;
   const RestrictedProblem part = RestrictProblem(problem_, observations);
   Estimate placed = RestrictEstimate(part, *candidate);
-  BlockSweep(part.problem, FastDescentOptions(), options_.norm,
-             options_.num_threads, options_.cancel)
-      .IntersectPoints(&placed);
+  const double cost =
+      BlockSweep(part.problem, FastDescentOptions(), options_.norm,
+                 options_.num_threads, options_.cancel)
+          .IntersectPoints(&placed);
   ReplaceEstimate(part, placed, candidate);
-  return !is_behind && Cost(part.problem, placed, options_.norm,
-                            options_.num_threads) <= level;
+  return !is_behind && cost <= level;
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {

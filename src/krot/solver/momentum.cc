@@ -1,7 +1,5 @@
 #include "krot/solver/momentum.h"
 
-#include <cmath>
-
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -21,10 +19,9 @@ void Extrapolate(const std::vector<Eigen::Vector3d>& from,
 
 }  // namespace
 
-Momentum::Momentum(const KnownRotationProblem& problem, Norm norm,
-                   int num_threads, const Estimate& start, double cost)
+Momentum::Momentum(const KnownRotationProblem& problem, int num_threads,
+                   const Estimate& start, double cost)
     : problem_(problem),
-      norm_(norm),
       num_threads_(num_threads),
       best_(start),
       previous_(start),
@@ -38,9 +35,7 @@ Estimate Momentum::NextStart() {
     Extrapolate(previous_.points, best_.points, beta, &start.points);
     Extrapolate(previous_.translations, best_.translations, beta,
                 &start.translations);
-    if (std::isfinite(Cost(problem_, start, norm_, num_threads_))) {
-      return start;
-    }
+    if (AllDepthsPositive(problem_, start, num_threads_)) return start;
   }
   improvements_ = 0;
   return best_;

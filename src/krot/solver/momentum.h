@@ -1,6 +1,5 @@
 #pragma once
 
-#include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -15,7 +14,7 @@ namespace krot {
 class Momentum {
  public:
   // Starts at `start`, of cost `cost`; keeps a reference to `problem`.
-  Momentum(const KnownRotationProblem& problem, Norm norm, int num_threads,
+  Momentum(const KnownRotationProblem& problem, int num_threads,
            const Estimate& start, double cost);
 
   // Where the next sweep starts: the best estimate, or beyond it as far as
@@ -31,7 +30,6 @@ class Momentum {
 
  private:
   const KnownRotationProblem& problem_;
-  const Norm norm_;
   const int num_threads_;
   Estimate best_;
   Estimate previous_;  // the best one before it

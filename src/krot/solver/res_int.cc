@@ -42,7 +42,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   summary.termination = ResIntTermination::kMaxSweeps;
   BlockSweep blocks(problem, options.fast_descent, options.norm,
                     options.num_threads, options.cancel);
-  Momentum momentum(problem, options.norm, options.num_threads, *estimate,
+  Momentum momentum(problem, options.num_threads, *estimate,
                     summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
   int idle_sweeps = 0;  // in a row
@@ -53,15 +53,14 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
     const DescentGoal coarse_goal{kCoarseTolerance,
                                   kCoarseLevel * momentum.best_cost()};
     blocks.SetGoal(is_coarse && !is_last ? coarse_goal : DescentGoal{});
-    blocks.IntersectPoints(&current);
-    if (options.update_frames) blocks.ResectFrames(&current);
+    double reached = blocks.IntersectPoints(&current);
+    if (options.update_frames) reached = blocks.ResectFrames(&current);
     if (IsCancelled(options.cancel)) {
       summary.termination = ResIntTermination::kInterrupted;
       break;
     }
     const double cost_before = momentum.best_cost();
-    momentum.Accept(current,
-                    Cost(problem, current, options.norm, options.num_threads));
+    momentum.Accept(current, reached);
     const double cost = momentum.best_cost();
     summary.sweeps.push_back({cost, timer.Seconds()});
     if (options.callback) options.callback(sweep, summary.sweeps.back());
@@ -77,8 +76,14 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
       break;
     }
   }
-  *estimate = momentum.best();
-  summary.cost_final = momentum.best_cost();
+  // The costs of sweeps differ from Cost() by rounding.
+  summary.cost_final =
+      Cost(problem, momentum.best(), options.norm, options.num_threads);
+  if (summary.cost_final <= summary.cost_initial) {
+    *estimate = momentum.best();
+  } else {
+    summary.cost_final = summary.cost_initial;
+  }
   return summary;
 }
 

@@ -13,18 +13,6 @@ constexpr int kTiesPerFrame = 20;
 
 }  // namespace
 
-double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
-                 Norm norm, int32_t point) {
-  double cost = 0;
-  for (int64_t i = problem.point_begin[point];
-       i < problem.point_begin[point + 1]; ++i) {
-    const ViewedPoint viewed =
-        ViewPoint(problem, problem.observations[i], estimate);
-    cost = std::max(cost, ResidualOf(viewed, norm));
-  }
-  return cost;
-}
-
 WorkingSet::WorkingSet(const KnownRotationProblem& problem)
     : problem_(problem), contains_(problem.num_points, 0) {}
 

@@ -47,8 +47,4 @@ class WorkingSet {
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost);
 
-// The largest residual of a point, pixels; infinity if it is behind a camera.
-double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
-                 Norm norm, int32_t point);
-
 }  // namespace krot
