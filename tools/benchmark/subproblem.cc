@@ -104,7 +104,8 @@ std::vector<Residual> IntersectionResiduals(const KnownRotationProblem& problem,
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
     double row[kResidualRow];
-    IntersectionRow(view, observation, estimate.translations[view.frame], row);
+    IntersectionRow(CamFromWorld(view, estimate.translations[view.frame]),
+                    observation, row);
     residuals.push_back(FromRow(row));
   }
   return residuals;

@@ -2,19 +2,15 @@
 
 namespace krot {
 
-void ResidualSet::Add(const double row[kResidualRow]) {
-  const int block = size_ / kResidualLanes;
-  const int lane = size_ % kResidualLanes;
-  if (block == static_cast<int>(blocks_.size())) {
+// A block whose lanes are idle: r = 0 / 1.
+void ResidualSet::AddBlock() {
+  const size_t block = size_ / kResidualLanes;
+  if (block == blocks_.size()) {
     blocks_.emplace_back();
     values_.resize(values_.size() + kResidualLanes);
   }
-  if (lane == 0) {  // idle lanes: r = 0 / 1
-    blocks_[block] = {};
-    for (double& d : blocks_[block].row[11]) d = 1;
-  }
-  for (int k = 0; k < kResidualRow; ++k) blocks_[block].row[k][lane] = row[k];
-  ++size_;
+  blocks_[block] = {};
+  for (double& d : blocks_[block].row[11]) d = 1;
 }
 
 void ResidualSet::Add(const Residual& residual) {

@@ -13,7 +13,13 @@ class ResidualSet {
  public:
   void Clear() { size_ = 0; }
   // A row is a_1, b_1, a_2, b_2, c, d.
-  void Add(const double row[kResidualRow]);
+  void Add(const double row[kResidualRow]) {
+    const int lane = size_ % kResidualLanes;
+    if (lane == 0) AddBlock();
+    ResidualBlock& block = blocks_[size_ / kResidualLanes];
+    for (int k = 0; k < kResidualRow; ++k) block.row[k][lane] = row[k];
+    ++size_;
+  }
   void Add(const Residual& residual);
   // Number i of `other`.
   void AddFrom(const ResidualSet& other, int i);
@@ -45,6 +51,8 @@ class ResidualSet {
   }
 
  private:
+  void AddBlock();
+
   int size_ = 0;
   std::vector<ResidualBlock> blocks_;
   std::vector<double> values_;

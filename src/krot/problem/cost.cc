@@ -22,12 +22,8 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
                       const Observation& observation,
                       const Estimate& estimate) {
   const View& view = problem.views[observation.view];
-  const Eigen::Vector3d x_cam =
-      view.cam_from_world_rotation * estimate.points[observation.point] +
-      view.cam_from_rig_rotation * estimate.translations[view.frame] +
-      view.cam_from_rig_translation;
-  return {x_cam.z(),
-          observation.J * (x_cam.head<2>() - observation.u * x_cam.z())};
+  return ViewPoint(CamFromWorld(view, estimate.translations[view.frame]),
+                   observation, estimate.points[observation.point]);
 }
 
 double ResidualOf(const ViewedPoint& viewed, Norm norm) {
@@ -37,49 +33,50 @@ double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   return std::isfinite(residual) ? residual : kInfinity;
 }
 
-bool AllDepthsPositive(const KnownRotationProblem& problem,
-                       const Estimate& estimate, int num_threads) {
-  // Per view: depth = axis's + offset.
-  struct DepthRow {
-    Eigen::Vector3d axis;
-    double offset;
-  };
-  std::vector<DepthRow> rows;
-  rows.reserve(problem.views.size());
-  for (const View& view : problem.views) {
-    rows.push_back({view.cam_from_world_rotation.row(2),
-                    view.cam_from_rig_rotation.row(2).dot(
-                        estimate.translations[view.frame]) +
-                        view.cam_from_rig_translation.z()});
-  }
-  const int64_t count = static_cast<int64_t>(problem.observations.size());
-  std::atomic<bool> all_positive{true};
-  ParallelFor(count, kObservationsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                if (!all_positive) return;
-                bool positive = true;
-                for (int64_t i = begin; i < end; ++i) {
-                  const Observation& observation = problem.observations[i];
-                  const DepthRow& row = rows[observation.view];
-                  positive &= row.axis.dot(estimate.points[observation.point]) +
-                                  row.offset >
-                              0;
-                }
-                if (!positive) all_positive = false;
-              });
-  return all_positive;
-}
-
 double LargestResidual(const KnownRotationProblem& problem,
-                       const Estimate& estimate, Norm norm, int64_t begin,
-                       int64_t end) {
+                       const std::vector<AffineMap>& cameras,
+                       const std::vector<Eigen::Vector3d>& points, Norm norm,
+                       int64_t begin, int64_t end) {
   double largest = 0;
   for (int64_t i = begin; i < end; ++i) {
-    const ViewedPoint viewed =
-        ViewPoint(problem, problem.observations[i], estimate);
+    const Observation& observation = problem.observations[i];
+    const ViewedPoint viewed = ViewPoint(cameras[observation.view], observation,
+                                         points[observation.point]);
     largest = std::max(largest, ResidualOf(viewed, norm));
   }
   return largest;
+}
+
+double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
+                 Norm norm, int64_t point) {
+  double cost = 0;
+  for (int64_t i = problem.point_begin[point];
+       i < problem.point_begin[point + 1]; ++i) {
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], estimate);
+    cost = std::max(cost, ResidualOf(viewed, norm));
+  }
+  return cost;
+}
+
+bool AllDepthsPositive(const KnownRotationProblem& problem,
+                       const Estimate& estimate, int num_threads) {
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem, estimate.translations);
+  std::atomic<bool> all_positive{true};
+  ParallelFor(
+      static_cast<int64_t>(problem.observations.size()), kObservationsPerChunk,
+      num_threads, [&](int64_t begin, int64_t end, int) {
+        bool positive = all_positive;
+        for (int64_t i = begin; i < end && positive; ++i) {
+          const Observation& observation = problem.observations[i];
+          const AffineMap& camera = cameras[observation.view];
+          const Eigen::Vector3d& point = estimate.points[observation.point];
+          positive = camera.row(2).head<3>().dot(point) + camera(2, 3) > 0;
+        }
+        if (!positive) all_positive = false;
+      });
+  return all_positive;
 }
 
 double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
@@ -93,12 +90,14 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
       estimate.points.size() == static_cast<size_t>(problem.num_points),
       "estimate.points.size()", estimate.points.size(), "the number of points");
 
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem, estimate.translations);
   const int64_t count = static_cast<int64_t>(problem.observations.size());
   std::vector<double> chunk_max(NumChunks(count, kObservationsPerChunk), 0);
   ParallelFor(count, kObservationsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {
-                chunk_max[begin / kObservationsPerChunk] =
-                    LargestResidual(problem, estimate, norm, begin, end);
+                chunk_max[begin / kObservationsPerChunk] = LargestResidual(
+                    problem, cameras, estimate.points, norm, begin, end);
               });
   return chunk_max.empty()
              ? 0.0

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "krot/minimax/norm.h"
+#include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -14,6 +18,13 @@ struct ViewedPoint {
   Eigen::Vector2d v;  // pixels times scene units
 };
 
+inline ViewedPoint ViewPoint(const AffineMap& camera,
+                             const Observation& observation,
+                             const Eigen::Vector3d& point) {
+  const Eigen::Vector3d x_cam = camera.leftCols<3>() * point + camera.col(3);
+  return {x_cam.z(),
+          observation.J * (x_cam.head<2>() - observation.u * x_cam.z())};
+}
 ViewedPoint ViewPoint(const KnownRotationProblem& problem,
                       const Observation& observation, const Estimate& estimate);
 
@@ -27,15 +38,13 @@ bool AllDepthsPositive(const KnownRotationProblem& problem,
 
 // The largest residual of observations [begin, end), in pixels.
 double LargestResidual(const KnownRotationProblem& problem,
-                       const Estimate& estimate, Norm norm, int64_t begin,
-                       int64_t end);
+                       const std::vector<AffineMap>& cameras,
+                       const std::vector<Eigen::Vector3d>& points, Norm norm,
+                       int64_t begin, int64_t end);
 
 // The largest residual of a point, in pixels; 0 without observations.
-inline double PointCost(const KnownRotationProblem& problem,
-                        const Estimate& estimate, Norm norm, int64_t point) {
-  return LargestResidual(problem, estimate, norm, problem.point_begin[point],
-                         problem.point_begin[point + 1]);
-}
+double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
+                 Norm norm, int64_t point);
 
 // max_i r_i in pixels [Zhang18, (KRot)]; 0 if there are no observations.
 // Throws std::invalid_argument unless p >= 1 and the estimate has one

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "krot/minimax/residual_kernel.h"
+#include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -21,31 +22,26 @@ namespace krot {
 
 namespace internal {
 
-inline void AffineRow(const Observation& observation, const Eigen::Matrix3d& R,
-                      const Eigen::Vector3d& o, double row[kResidualRow]) {
+inline void AffineRow(const Observation& observation, const AffineMap& map,
+                      double row[kResidualRow]) {
   const Eigen::Matrix2d& J = observation.J;
   const Eigen::Vector2d& u = observation.u;
   for (int k = 0; k < 4; ++k) {  // columns: of x and of 1
-    const double* x_cam = k < 3 ? &R(0, k) : o.data();
-    const double v1 = x_cam[0] - u[0] * x_cam[2];
-    const double v2 = x_cam[1] - u[1] * x_cam[2];
+    const double v1 = map(0, k) - u[0] * map(2, k);
+    const double v2 = map(1, k) - u[1] * map(2, k);
     row[k] = J(0, 0) * v1 + J(0, 1) * v2;
     row[4 + k] = J(1, 0) * v1 + J(1, 1) * v2;
-    row[8 + k] = x_cam[2];
+    row[8 + k] = map(2, k);
   }
 }
 
 }  // namespace internal
 
-// Int_k: the unknown is the point s, its frame at `translation`;
-// R = R_sr R_rw, o = R_sr t_f + t_sr.
-inline void IntersectionRow(const View& view, const Observation& observation,
-                            const Eigen::Vector3d& translation,
+// Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr.
+inline void IntersectionRow(const AffineMap& cam_from_world,
+                            const Observation& observation,
                             double row[kResidualRow]) {
-  internal::AffineRow(
-      observation, view.cam_from_world_rotation,
-      view.cam_from_rig_rotation * translation + view.cam_from_rig_translation,
-      row);
+  internal::AffineRow(observation, cam_from_world, row);
 }
 
 // Res_j: the unknown is the frame's translation t_f, its point at `point`;
@@ -53,10 +49,11 @@ inline void IntersectionRow(const View& view, const Observation& observation,
 inline void ResectionRow(const View& view, const Observation& observation,
                          const Eigen::Vector3d& point,
                          double row[kResidualRow]) {
-  internal::AffineRow(
-      observation, view.cam_from_rig_rotation,
-      view.cam_from_world_rotation * point + view.cam_from_rig_translation,
-      row);
+  AffineMap map;
+  map.leftCols<3>() = view.cam_from_rig_rotation;
+  map.col(3) =
+      view.cam_from_world_rotation * point + view.cam_from_rig_translation;
+  internal::AffineRow(observation, map, row);
 }
 
 }  // namespace krot

@@ -28,6 +28,7 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
       frame_active_(problem.num_frames) {}
 
 double BlockSweep::IntersectPoints(Estimate* estimate) {
+  cameras_ = CamerasFromWorld(problem_, estimate->translations);
   return LargestOver(problem_.num_points, kPointsPerChunk,
                      [&](int64_t k, FastDescent* descent) {
                        return IntersectPoint(k, descent, estimate);
@@ -67,15 +68,15 @@ double BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
   const int64_t end = problem_.point_begin[k + 1];
   if (begin == end) return 0;
   if (goal_.level > 0) {  // whether it waits is known before rows are built
-    const double cost = PointCost(problem_, *estimate, norm_, k);
+    const double cost = LargestResidual(problem_, cameras_, estimate->points,
+                                        norm_, begin, end);
     if (cost <= goal_.level) return cost;
   }
   double row[kResidualRow];
   descent->residuals().Clear();
   for (int64_t i = begin; i < end; ++i) {
     const Observation& observation = problem_.observations[i];
-    const View& view = problem_.views[observation.view];
-    IntersectionRow(view, observation, estimate->translations[view.frame], row);
+    IntersectionRow(cameras_[observation.view], observation, row);
     descent->residuals().Add(row);
   }
   return descent->Minimize(goal_, &point_active_[k], &estimate->points[k]).cost;

@@ -4,6 +4,7 @@
 
 #include "krot/base/progress.h"
 #include "krot/minimax/fast_descent.h"
+#include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -45,6 +46,7 @@ class BlockSweep {
   int num_threads_;
   DescentGoal goal_;
   std::vector<FastDescent> descents_;  // one per thread
+  std::vector<AffineMap> cameras_;     // per view, while points move
   // Every block's warm start.
   std::vector<ActiveResiduals> point_active_;
   std::vector<ActiveResiduals> frame_active_;
