@@ -9,6 +9,8 @@
 namespace krot {
 namespace {
 
+using Eigen::Vector3d;
+
 // Pieces whose gradients are closer than this to the affine hull of others,
 // relative to the largest gradient, count as affinely dependent on them.
 constexpr double kDependence = 1e-10;
@@ -18,192 +20,187 @@ constexpr double kRounding = 1e-15;
 // rounding alone could make the method cycle.
 constexpr int kMaxChanges = 200;
 
-// The affine hull of the active gradients as g_0 + range(D), D = Q R by
-// Gram-Schmidt, at most three columns.
-class ActiveHull {
+// The active pieces of a solution, with the affine hull of their gradients,
+// g_0 + range(D), as D = Q U by Gram-Schmidt: the columns of Q orthogonal, U
+// unit upper triangular. What the active set keeps in front, the hull keeps.
+class ActiveSet {
  public:
-  ActiveHull(const LinearPiece* pieces, const SimplexQpSolution& active,
-             double scale)
-      : pieces_(pieces), active_(active) {
-    const Eigen::Vector3d& g0 = pieces[active.index[0]].gradient;
-    for (int k = 1; k < active.size; ++k) {
-      Eigen::Vector3d q = pieces[active.index[k]].gradient - g0;
-      for (int m = 0; m < rank_; ++m) {
-        R_[m][rank_] = Q_[m].dot(q);
-        q -= R_[m][rank_] * Q_[m];
-      }
-      const double norm = q.norm();
-      if (!(norm > kDependence * scale)) {
-        independent_ = false;
-        return;
-      }
-      R_[rank_][rank_] = norm;
-      Q_[rank_] = q / norm;
-      ++rank_;
-    }
-  }
+  // `scale`: the largest gradient's length.
+  ActiveSet(const LinearPiece* pieces, double scale,
+            SimplexQpSolution* solution)
+      : pieces_(pieces),
+        smallest_squared_(kDependence * scale * kDependence * scale),
+        active_(*solution) {}
 
-  // Whether the active gradients are affinely independent.
-  bool independent() const { return independent_; }
+  // Brings the weights to the minimiser on the convex hull of a subset of the
+  // active pieces.
+  void Minimize();
 
-  // Barycentric coordinates in the hull of its point nearest to g; returns
-  // the distance to it.
-  double Project(const Eigen::Vector3d& g, double barycentric[4]) const {
-    Eigen::Vector3d rest = g - pieces_[active_.index[0]].gradient;
-    double y[3] = {};
-    for (int m = 0; m < rank_; ++m) {
-      y[m] = Q_[m].dot(rest);
-      rest -= y[m] * Q_[m];
-    }
-    BackSubstitute(y, barycentric);
-    return rest.norm();
-  }
+  // Adds piece j. If its gradient depends on the others, it takes the place of
+  // the one that blocks the move in its favour; `false` if the move is not
+  // blocked (by rounding only).
+  bool Add(int j);
 
-  // The weights (of any sign, sum 1) that solve the QP on the hull:
-  // D'D nu = delta - D'g_0, delta the differences of the values.
-  void Minimize(double weights[4]) const {
-    const LinearPiece& first = pieces_[active_.index[0]];
-    double y[3] = {};
-    for (int m = 0; m < rank_; ++m) {  // R'y = delta, then R nu = y - Q'g_0
-      y[m] = pieces_[active_.index[m + 1]].value - first.value;
-      for (int k = 0; k < m; ++k) y[m] -= R_[k][m] * y[k];
-      y[m] /= R_[m][m];
-    }
-    for (int m = 0; m < rank_; ++m) y[m] -= Q_[m].dot(first.gradient);
-    BackSubstitute(y, weights);
-  }
+  void SetStepAndLevel();
 
  private:
-  void BackSubstitute(const double y[3], double weights[4]) const {
-    double sum = 0;
-    for (int m = rank_ - 1; m >= 0; --m) {
-      double value = y[m];
-      for (int k = m + 1; k < rank_; ++k) value -= R_[m][k] * weights[k + 1];
-      weights[m + 1] = value / R_[m][m];
-      sum += weights[m + 1];
-    }
-    weights[0] = 1 - sum;
+  // g - g_0 = Q y + rest.
+  struct Coordinates {
+    double y[3] = {};
+    Vector3d rest;
+  };
+
+  const Vector3d& Gradient(int k) const {
+    return pieces_[active_.index[k]].gradient;
   }
+  Coordinates CoordinatesOf(const Vector3d& g) const;
+  bool AppendColumn(const Coordinates& column);
+  bool CompleteHull();
+  void Barycentric(const double y[3], double weights[4]) const;
+  double MoveWeights(const double direction[4], double limit);
+  void GiveUpLast();
 
   const LinearPiece* pieces_;
-  const SimplexQpSolution& active_;
-  bool independent_ = true;
-  int rank_ = 0;
-  Eigen::Vector3d Q_[3];
-  double R_[3][3] = {};
+  double smallest_squared_;
+  SimplexQpSolution& active_;
+  int rank_ = 0;  // columns of Q, those of pieces 1, ..., rank_
+  Vector3d Q_[3];
+  double inverse_squared_[3];  // 1 / |q|^2
+  double U_[3][3];             // above the diagonal
+  double z_[3];                // U'z = the differences of the values
+  double minimizer_[3];        // in coordinates y
 };
+
+ActiveSet::Coordinates ActiveSet::CoordinatesOf(const Vector3d& g) const {
+  Coordinates result;
+  result.rest = g - Gradient(0);
+  for (int m = 0; m < rank_; ++m) {
+    result.y[m] = Q_[m].dot(result.rest) * inverse_squared_[m];
+    result.rest -= result.y[m] * Q_[m];
+  }
+  return result;
+}
+
+// The next piece's column; `false` if it depends on the others. The QP on the
+// hull, D'D nu = delta - D'g_0 with delta the differences of the values, is
+// diagonal in y = U nu.
+bool ActiveSet::AppendColumn(const Coordinates& column) {
+  const double squared = column.rest.squaredNorm();
+  if (!(squared > smallest_squared_)) return false;
+  const int m = rank_++;
+  Q_[m] = column.rest;
+  inverse_squared_[m] = 1 / squared;
+  z_[m] = pieces_[active_.index[m + 1]].value - pieces_[active_.index[0]].value;
+  for (int k = 0; k < m; ++k) {
+    U_[k][m] = column.y[k];
+    z_[m] -= U_[k][m] * z_[k];
+  }
+  minimizer_[m] = (z_[m] - Q_[m].dot(Gradient(0))) * inverse_squared_[m];
+  return true;
+}
+
+bool ActiveSet::CompleteHull() {
+  while (rank_ + 1 < active_.size) {
+    if (!AppendColumn(CoordinatesOf(Gradient(rank_ + 1)))) return false;
+  }
+  return true;
+}
+
+// The weights, of any sign and sum 1, of the point with coordinates y.
+void ActiveSet::Barycentric(const double y[3], double weights[4]) const {
+  weights[0] = 1;
+  for (int m = rank_ - 1; m >= 0; --m) {
+    double weight = y[m];
+    for (int k = m + 1; k < rank_; ++k) weight -= U_[m][k] * weights[k + 1];
+    weights[m + 1] = weight;
+    weights[0] -= weight;
+  }
+}
 
 // Moves the weights along `direction`, at most by the step `limit`, until
 // the first of them vanishes, and drops every piece whose weight has. Returns
 // the step; infinite, with nothing moved, if nothing bounds it.
-double MoveWeights(const double direction[], double limit,
-                   SimplexQpSolution* active) {
+double ActiveSet::MoveWeights(const double direction[4], double limit) {
   double step = limit;
   int blocking = -1;
-  for (int k = 0; k < active->size; ++k) {
-    if (direction[k] < 0 && -active->weight[k] / direction[k] < step) {
-      step = -active->weight[k] / direction[k];
+  for (int k = 0; k < active_.size; ++k) {
+    if (direction[k] < 0 && active_.weight[k] + step * direction[k] < 0) {
+      step = -active_.weight[k] / direction[k];
       blocking = k;
     }
   }
   if (!std::isfinite(step)) return step;
   int kept = 0;
-  for (int k = 0; k < active->size; ++k) {
-    const double weight = active->weight[k] + step * direction[k];
-    if (k == blocking || !(weight > 0)) continue;
-    active->index[kept] = active->index[k];
-    active->weight[kept] = weight;
+  for (int k = 0; k < active_.size; ++k) {
+    const double weight = active_.weight[k] + step * direction[k];
+    if (k == blocking || !(weight > 0)) {
+      rank_ = std::min(rank_, std::max(kept - 1, 0));
+      continue;
+    }
+    active_.index[kept] = active_.index[k];
+    active_.weight[kept] = weight;
     ++kept;
   }
-  active->size = kept;
+  active_.size = kept;
   return step;
 }
 
-// As ActiveHull::Minimize for two pieces; `false` if they are dependent.
-bool MinimizeOverTwo(const LinearPiece& first, const LinearPiece& second,
-                     double scale, double weights[4]) {
-  const Eigen::Vector3d difference = second.gradient - first.gradient;
-  const double squared = difference.squaredNorm();
-  const double smallest = kDependence * scale;
-  if (!(squared > smallest * smallest)) return false;
-  weights[1] =
-      (second.value - first.value - difference.dot(first.gradient)) / squared;
-  weights[0] = 1 - weights[1];
-  return true;
+void ActiveSet::GiveUpLast() {
+  --active_.size;
+  double sum = 0;
+  for (int k = 0; k < active_.size; ++k) sum += active_.weight[k];
+  if (!(sum > 0)) active_.weight[0] = sum = 1;
+  for (int k = 0; k < active_.size; ++k) active_.weight[k] /= sum;
 }
 
-// The weights that solve the QP on the affine hull of the active gradients,
-// two or more; `false` if those are dependent.
-bool MinimizeOverHull(const LinearPiece* pieces,
-                      const SimplexQpSolution& active, double scale,
-                      double weights[4]) {
-  if (active.size == 2) {
-    return MinimizeOverTwo(pieces[active.index[0]], pieces[active.index[1]],
-                           scale, weights);
-  }
-  const ActiveHull hull(pieces, active, scale);
-  if (hull.independent()) hull.Minimize(weights);
-  return hull.independent();
-}
-
-// Brings the weights to the minimiser on the convex hull of a subset of the
-// active pieces.
-void MinimizeOverActive(const LinearPiece* pieces, double scale,
-                        SimplexQpSolution* active) {
-  while (active->size > 1) {
-    double direction[4] = {};
-    if (!MinimizeOverHull(pieces, *active, scale, direction)) {
-      // By rounding only: give up the last piece.
-      --active->size;
-      double sum = 0;
-      for (int k = 0; k < active->size; ++k) sum += active->weight[k];
-      if (!(sum > 0)) active->weight[0] = sum = 1;
-      for (int k = 0; k < active->size; ++k) active->weight[k] /= sum;
+void ActiveSet::Minimize() {
+  while (active_.size > 1) {
+    if (!CompleteHull()) {
+      GiveUpLast();  // dependent, by rounding only
       continue;
     }
-    for (int k = 0; k < active->size; ++k) direction[k] -= active->weight[k];
-    const int size = active->size;
-    MoveWeights(direction, /*limit=*/1, active);
-    if (active->size == size) return;
+    double direction[4];
+    Barycentric(minimizer_, direction);
+    for (int k = 0; k < active_.size; ++k) direction[k] -= active_.weight[k];
+    const int size = active_.size;
+    MoveWeights(direction, /*limit=*/1);
+    if (active_.size == size) return;
   }
-  active->weight[0] = 1;
+  active_.weight[0] = 1;
 }
 
-// Adds piece j to the active ones. If its gradient depends on theirs, it
-// takes the place of the one that blocks the move in its favour; `false` if
-// the move is not blocked (by rounding only).
-bool AddToActive(const LinearPiece* pieces, int j, double scale,
-                 SimplexQpSolution* active) {
-  const ActiveHull hull(pieces, *active, scale);
-  double barycentric[4] = {};
-  const double distance = hull.Project(pieces[j].gradient, barycentric);
-  if (active->size < 4 && distance > kDependence * scale) {
-    active->index[active->size] = j;
-    active->weight[active->size] = 0;
-    ++active->size;
-    return true;
+bool ActiveSet::Add(int j) {
+  const Coordinates column = CoordinatesOf(pieces_[j].gradient);
+  const int k = active_.size;
+  if (k < 4) {
+    active_.index[k] = j;
+    active_.weight[k] = 0;
+    if (AppendColumn(column)) {
+      ++active_.size;
+      return true;
+    }
   }
-  double direction[4] = {};
-  for (int k = 0; k < active->size; ++k) direction[k] = -barycentric[k];
+  double direction[4];
+  Barycentric(column.y, direction);
+  for (int m = 0; m < active_.size; ++m) direction[m] = -direction[m];
   const double step =
-      MoveWeights(direction, std::numeric_limits<double>::infinity(), active);
-  if (!std::isfinite(step) || active->size == 4) return false;
-  active->index[active->size] = j;
-  active->weight[active->size] = step;
-  ++active->size;
+      MoveWeights(direction, std::numeric_limits<double>::infinity());
+  if (!std::isfinite(step) || active_.size == 4) return false;
+  active_.index[active_.size] = j;
+  active_.weight[active_.size] = step;
+  ++active_.size;
   return true;
 }
 
-void SetStepAndLevel(const LinearPiece* pieces, SimplexQpSolution* solution) {
-  solution->step.setZero();
-  for (int k = 0; k < solution->size; ++k) {
-    solution->step -= solution->weight[k] * pieces[solution->index[k]].gradient;
+void ActiveSet::SetStepAndLevel() {
+  active_.step.setZero();
+  for (int k = 0; k < active_.size; ++k) {
+    active_.step -= active_.weight[k] * Gradient(k);
   }
-  solution->level = 0;  // the mean: all agree at the minimiser
-  for (int k = 0; k < solution->size; ++k) {
-    const LinearPiece& piece = pieces[solution->index[k]];
-    solution->level += solution->weight[k] *
-                       (piece.value + piece.gradient.dot(solution->step));
+  active_.level = 0;  // the mean: all agree at the minimiser
+  for (int k = 0; k < active_.size; ++k) {
+    active_.level += active_.weight[k] * (pieces_[active_.index[k]].value +
+                                          Gradient(k).dot(active_.step));
   }
 }
 
@@ -226,16 +223,15 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
     }
   }
   const double tolerance = kRounding * (values + scale);
-  scale = std::sqrt(scale);
-
+  ActiveSet active(pieces, std::sqrt(scale), solution);
   if (solution->size == 0) {
     solution->size = 1;
     solution->index[0] = best;
     solution->weight[0] = 1;
   } else {
-    MinimizeOverActive(pieces, scale, solution);
+    active.Minimize();
   }
-  SetStepAndLevel(pieces, solution);
+  active.SetStepAndLevel();
   for (int change = 0; change < kMaxChanges; ++change) {
     int highest = -1;
     double level = solution->level + tolerance;
@@ -251,9 +247,9 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
     for (int k = 0; k < solution->size; ++k) {
       if (solution->index[k] == highest) return;  // rounding
     }
-    if (!AddToActive(pieces, highest, scale, solution)) return;
-    MinimizeOverActive(pieces, scale, solution);
-    SetStepAndLevel(pieces, solution);
+    if (!active.Add(highest)) return;
+    active.Minimize();
+    active.SetStepAndLevel();
   }
 }
 

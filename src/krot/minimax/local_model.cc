@@ -18,21 +18,21 @@ constexpr double kSmallestDepthShare = 0.1;
 // Keeps H invertible where rounding would not: relative to its trace.
 constexpr double kRounding = 1e-14;
 
-// The inverse of the Cholesky factor L of H = L L'.
+// The inverse of the Cholesky factor L of H = L L'; reads the lower triangle.
 Matrix3d InverseCholesky(const Matrix3d& H) {
-  const double l00 = std::sqrt(H(0, 0));
-  const double l10 = H(1, 0) / l00;
-  const double l20 = H(2, 0) / l00;
   const double floor = kRounding * H.trace();
-  const double l11 = std::sqrt(std::max(H(1, 1) - l10 * l10, floor));
-  const double l21 = (H(2, 1) - l20 * l10) / l11;
-  const double l22 =
-      std::sqrt(std::max(H(2, 2) - l20 * l20 - l21 * l21, floor));
+  const double i00 = 1 / std::sqrt(H(0, 0));
+  const double l10 = H(1, 0) * i00;
+  const double l20 = H(2, 0) * i00;
+  const double i11 = 1 / std::sqrt(std::max(H(1, 1) - l10 * l10, floor));
+  const double l21 = (H(2, 1) - l20 * l10) * i11;
+  const double i22 =
+      1 / std::sqrt(std::max(H(2, 2) - l20 * l20 - l21 * l21, floor));
+  const double i10 = -l10 * i00 * i11;
   Matrix3d inverse;
-  const double i10 = -l10 / (l00 * l11);
-  inverse << 1 / l00, 0, 0,  //
-      i10, 1 / l11, 0,       //
-      -(l20 / l00 + l21 * i10) / l22, -l21 / (l11 * l22), 1 / l22;
+  inverse << i00, 0, 0,  //
+      i10, i11, 0,       //
+      -(l20 * i00 + l21 * i10) * i22, -l21 * i11 * i22, i22;
   return inverse;
 }
 
@@ -46,8 +46,9 @@ void LocalModel::Start(const Vector3d& x_start) {
 }
 
 void LocalModel::AddMember(const ResidualSet& residuals, int index) {
-  members_.push_back({index, 0, 0, 0});
   rows_.AddFrom(residuals, index);
+  const double depth_start = rows_.Depth(rows_.size() - 1, x_start_);
+  members_.push_back({index, depth_start, 0, 0, 0});
 }
 
 void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
@@ -122,23 +123,26 @@ LocalModel::Bend LocalModel::BendOf(size_t m) const {
   return {piece.curvature, piece.bend};
 }
 
-// sum_i mu_i c_i b_i b_i'.
-Matrix3d LocalModel::Curvature() const {
-  Matrix3d sum = Matrix3d::Zero();
+// The lower triangle of H = sum_i mu_i c_i b_i b_i' + kappa G.
+Matrix3d LocalModel::Hessian(double kappa) const {
+  Matrix3d sum = kappa * metric_;
   if (norm_.IsPolyhedral()) return sum;  // flat pieces
   for (size_t m = 0; m < members_.size(); ++m) {
     const double multiplier = members_[m].multiplier;
     if (!(multiplier > 0)) continue;
     const Bend bend = BendOf(m);
-    const Vector3d weighted = multiplier * bend.curvature * bend.direction;
-    sum.noalias() += weighted * bend.direction.transpose();
+    const Vector3d& b = bend.direction;
+    const Vector3d weighted = multiplier * bend.curvature * b;
+    for (int j = 0; j < 3; ++j) {
+      for (int i = j; i < 3; ++i) sum(i, j) += weighted[i] * b[j];
+    }
   }
   return sum;
 }
 
 LocalModel::Step LocalModel::Minimize(double kappa) {
   // With H = L L', the step in L'd has unit curvature.
-  const Matrix3d L_inverse = InverseCholesky(kappa * metric_ + Curvature());
+  const Matrix3d L_inverse = InverseCholesky(Hessian(kappa));
   scaled_pieces_.resize(pieces_.size());
   for (size_t k = 0; k < pieces_.size(); ++k) {
     scaled_pieces_[k].value = pieces_[k].value;
@@ -239,7 +243,7 @@ double LocalModel::DepthGrowth() const {
   for (int k = 0; k < solution_.size; ++k) {
     if (solution_.index[k] == kZeroPiece) continue;
     const int m = member_of_piece_[solution_.index[k]];
-    growth = std::max(growth, members_[m].depth / rows_[m].Depth(x_start_));
+    growth = std::max(growth, members_[m].depth / members_[m].depth_start);
   }
   return growth;
 }

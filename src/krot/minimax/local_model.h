@@ -89,6 +89,7 @@ class LocalModel {
  private:
   struct Member {
     int index;
+    double depth_start;      // at x_start
     double depth;            // at x
     double multiplier;       // mu_i
     double last_multiplier;  // of the last step
@@ -103,7 +104,7 @@ class LocalModel {
   void AddSmoothPieces();
   void SetMetric(double cost);
   Bend BendOf(size_t m) const;
-  Eigen::Matrix3d Curvature() const;
+  Eigen::Matrix3d Hessian(double kappa) const;
   bool UpdateLastMultipliers();
   int FindMember(int index) const;
 

@@ -111,20 +111,23 @@ void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
 
 double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
                   const double x[3], const double d[3], double lowest) {
-  double shares[kResidualLanes];
-  for (double& share : shares) share = 1;
+  double result = 1;
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;
+    double fall[kResidualLanes];
+    double room[kResidualLanes];
+    int num_too_far = 0;
     for (int k = 0; k < kResidualLanes; ++k) {
-      const double fall =
-          -(row[8][k] * d[0] + row[9][k] * d[1] + row[10][k] * d[2]);
-      const double room = (1 - lowest) * EvaluateLane(row, k, x).w;
-      const double share = room < fall ? room / fall : 1;
-      shares[k] = share < shares[k] ? share : shares[k];
+      fall[k] = -(row[8][k] * d[0] + row[9][k] * d[1] + row[10][k] * d[2]);
+      room[k] = (1 - lowest) * EvaluateLane(row, k, x).w;
+      num_too_far += room[k] < fall[k];
+    }
+    if (num_too_far == 0) continue;
+    for (int k = 0; k < kResidualLanes; ++k) {
+      const double share = room[k] < fall[k] ? room[k] / fall[k] : 1;
+      result = share < result ? share : result;
     }
   }
-  double result = 1;
-  for (const double share : shares) result = share < result ? share : result;
   return result;
 }
 

@@ -39,6 +39,13 @@ class ResidualSet {
     return residual;
   }
 
+  double Depth(int i, const Eigen::Vector3d& x) const {
+    const auto& row = blocks_[i / kResidualLanes].row;
+    const int lane = i % kResidualLanes;
+    return row[8][lane] * x[0] + row[9][lane] * x[1] + row[10][lane] * x[2] +
+           row[11][lane];
+  }
+
   // max_i r_i(x), the cost; infinity unless all depths are positive, 0 if
   // empty. values()[i] is r_i(x) afterwards.
   double Evaluate(const Eigen::Vector3d& x, Norm norm);
