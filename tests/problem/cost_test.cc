@@ -103,6 +103,36 @@ TEST(Cost, IsInfiniteIfOnePointIsBehindOneCamera) {
   EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm::L2(), 1), kInfinity);
 }
 
+TEST(PointCost, IsTheLargestResidualOfThePoint) {
+  const RandomScene scene = MakeRandomScene({});
+  double largest = 0;
+  for (int32_t k = 0; k < scene.problem.num_points; ++k) {
+    double expected = 0;
+    for (const Observation& observation : scene.problem.observations) {
+      if (observation.point != k) continue;
+      expected = std::max(
+          expected,
+          ResidualOf(ViewPoint(scene.problem, observation, scene.estimate),
+                     Norm::L2()));
+    }
+    EXPECT_EQ(PointCost(scene.problem, scene.estimate, Norm::L2(), k),
+              expected);
+    largest = std::max(largest, expected);
+  }
+  EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm::L2(), 1), largest);
+}
+
+TEST(AllDepthsPositive, IsWhereTheCostIsFinite) {
+  const RandomScene scene = MakeRandomScene({});
+  EXPECT_TRUE(AllDepthsPositive(scene.problem, scene.estimate, 2));
+  for (int32_t k = 0; k < scene.problem.num_points; ++k) {
+    Estimate behind = scene.estimate;
+    behind.points[k].z() = -10;
+    ASSERT_EQ(Cost(scene.problem, behind, Norm::L2(), 1), kInfinity);
+    EXPECT_FALSE(AllDepthsPositive(scene.problem, behind, 2));
+  }
+}
+
 TEST(Cost, OfNoObservationsIsZero) {
   KnownRotationProblem problem;
   IndexObservations(&problem);

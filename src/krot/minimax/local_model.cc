@@ -17,6 +17,8 @@ constexpr double kSmallestWeight = 1e-9;
 constexpr double kSmallestDepthShare = 0.1;
 // Keeps H invertible where rounding would not: relative to its trace.
 constexpr double kRounding = 1e-14;
+// G serves as long as (what has changed since, relative)^2 is below this.
+constexpr double kMetricReach = 1e-2;
 
 // The inverse of the Cholesky factor L of H = L L'; reads the lower triangle.
 Matrix3d InverseCholesky(const Matrix3d& H) {
@@ -42,6 +44,7 @@ void LocalModel::Start(const Vector3d& x_start) {
   x_start_ = x_start;
   members_.clear();
   rows_.Clear();
+  num_members_of_metric_ = 0;
   solution_.size = 0;
 }
 
@@ -61,7 +64,7 @@ void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
   } else {
     AddPieces();
   }
-  SetMetric(cost);
+  if (!IsMetricGood(cost)) SetMetric(cost);
   // A warm start of the next step must not name tangents that are gone.
   const int num_pieces = static_cast<int>(pieces_.size());
   for (int k = 0; k < solution_.size; ++k) {
@@ -101,6 +104,14 @@ void LocalModel::AddPieces() {
   }
 }
 
+// Whether G was set with the same members near x: so near that, by G itself,
+// neither residuals nor depths change by much.
+bool LocalModel::IsMetricGood(double cost) const {
+  if (num_members_of_metric_ != members_.size()) return false;
+  const Vector3d d = x_ - x_metric_;
+  return d.dot(metric_ * d) <= kMetricReach * cost;
+}
+
 void LocalModel::SetMetric(double cost) {
   double sums[6];
   SumMetric(rows_.blocks(), rows_.num_blocks(), x_.data(), cost, sums);
@@ -108,6 +119,8 @@ void LocalModel::SetMetric(double cost) {
       sums[1], sums[3], sums[4],         //
       sums[2], sums[4], sums[5];
   metric_ /= cost * static_cast<double>(members_.size());
+  x_metric_ = x_;
+  num_members_of_metric_ = members_.size();
 }
 
 // c_i and b_i of the member m.

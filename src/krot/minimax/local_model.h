@@ -102,6 +102,7 @@ class LocalModel {
 
   void AddPieces();
   void AddSmoothPieces();
+  bool IsMetricGood(double cost) const;
   void SetMetric(double cost);
   Bend BendOf(size_t m) const;
   Eigen::Matrix3d Hessian(double kappa) const;
@@ -115,7 +116,9 @@ class LocalModel {
   Eigen::Vector3d x_;
   std::vector<LinearPiece> pieces_;  // 0: no residual falls below zero
   std::vector<int> member_of_piece_;
-  Eigen::Matrix3d metric_;  // G
+  Eigen::Matrix3d metric_;            // G, as it was
+  Eigen::Vector3d x_metric_;          // there,
+  size_t num_members_of_metric_ = 0;  // with so many members
   std::vector<GradientBlock> gradients_;
   std::vector<LinearPiece> scaled_pieces_;
   SimplexQpSolution solution_;

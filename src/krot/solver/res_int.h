@@ -23,7 +23,7 @@ namespace krot {
 // optimum, whatever the paper says (docs/method.md).
 
 struct Sweep {
-  double cost = 0;     // pixels, the best after the sweep
+  double cost = 0;     // pixels, the best after the sweep, to rounding
   double seconds = 0;  // wall clock since the start
 };
 
