@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -46,8 +47,23 @@ class DegenerateTest : public testing::TestWithParam<double> {
     return summary;
   }
 
+  // Off the centre of the first camera, where v and w vanish.
+  Vector3d StartBesideCamera(const ResidualProblem& problem, double distance) {
+    const Residual& ray = problem.residuals.front();
+    Eigen::Matrix3d rows;
+    rows << ray.A, ray.c.transpose();
+    const Vector3d center =
+        -rows.inverse() * Vector3d(ray.b[0], ray.b[1], ray.d);
+    Vector3d aside = distance * generator_.Normal3();
+    if (ray.c.dot(aside) < 0) aside = -aside;
+    return center + aside;
+  }
+
   void ExpectOptimum(const ResidualProblem& problem, double distance) {
-    Vector3d x = generator_.Start(problem, distance);
+    ExpectOptimumFrom(problem, generator_.Start(problem, distance));
+  }
+
+  void ExpectOptimumFrom(const ResidualProblem& problem, Vector3d x) {
     const DescentSummary summary = Minimize(problem, &x);
     const OracleOptimum oracle =
         MinimizeByEllipsoids(problem.residuals, norm(), x, /*radius=*/20);
@@ -190,6 +206,33 @@ TEST_P(DegenerateTest, AnInfimumAtInfinityMayBePositive) {
   EXPECT_LT(summary.cost, 2.5 * (1 + 1e-3));
   EXPECT_TRUE(summary.termination == DescentTermination::kFarAway ||
               summary.termination == DescentTermination::kStationary);
+}
+
+// Beside one camera its residual is large and bends strongly, the others' are
+// far away: where depths end is no matter of where they start.
+TEST_P(DegenerateTest, AStartBesideACameraLeadsToTheOptimumToo) {
+  for (int instance = 0; instance < kInstances; ++instance) {
+    const ResidualProblem problem = generator_.Triangulation(5, 5);
+    const double distance = std::pow(10, -1 - 5 * generator_.Uniform());
+    Vector3d x = StartBesideCamera(problem, distance);
+    if (!std::isfinite(problem.Cost(x, norm()))) continue;  // behind another
+    ExpectOptimumFrom(problem, x);
+  }
+}
+
+// All points lie beside their observations on the same side, by anything up to
+// 20 pixels: a step that takes the largest residuals to zero takes the small
+// ones through zero and far beyond, which no linearisation tells.
+TEST_P(DegenerateTest, ResidualsOnOneSideOnlyAreHalved) {
+  for (int instance = 0; instance < 3; ++instance) {
+    ResidualProblem problem = generator_.Resection(1000, 0);
+    for (Residual& residual : problem.residuals) {
+      const Eigen::Vector2d offset(20 * generator_.Uniform(), 0);
+      residual.A += offset * residual.c.transpose();
+      residual.b += offset * residual.d;
+    }
+    ExpectOptimumFrom(problem, problem.x_true);
+  }
 }
 
 // Rays from the corners of a square and from above and below, all turned by

@@ -20,6 +20,14 @@ constexpr double kRounding = 1e-14;
 // G serves as long as (what has changed since, relative)^2 is below this.
 constexpr double kMetricReach = 1e-2;
 
+// How far x is from where v and w vanish: from the camera or, if that is what
+// moves, from its point. Up to a factor near 1.
+double DistanceFromCamera(const Residual& residual, const Vector3d& x) {
+  const double focal_length = residual.A.norm() / std::sqrt(2.0);
+  return std::hypot(residual.Depth(x),
+                    residual.Numerator(x).norm() / focal_length);
+}
+
 // The inverse of the Cholesky factor L of H = L L'; reads the lower triangle.
 Matrix3d InverseCholesky(const Matrix3d& H) {
   const double floor = kRounding * H.trace();
@@ -42,6 +50,7 @@ Matrix3d InverseCholesky(const Matrix3d& H) {
 
 void LocalModel::Start(const Vector3d& x_start) {
   x_start_ = x_start;
+  scale_ = 0;
   members_.clear();
   rows_.Clear();
   num_members_of_metric_ = 0;
@@ -50,8 +59,8 @@ void LocalModel::Start(const Vector3d& x_start) {
 
 void LocalModel::AddMember(const ResidualSet& residuals, int index) {
   rows_.AddFrom(residuals, index);
-  const double depth_start = rows_.Depth(rows_.size() - 1, x_start_);
-  members_.push_back({index, depth_start, 0, 0, 0});
+  members_.push_back({index, 0, 0, 0});
+  scale_ = std::max(scale_, DistanceFromCamera(residuals[index], x_start_));
 }
 
 void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
@@ -252,13 +261,13 @@ double LocalModel::DepthShare(const Vector3d& d) const {
 }
 
 double LocalModel::DepthGrowth() const {
-  double growth = 0;
+  double depth = 0;
   for (int k = 0; k < solution_.size; ++k) {
     if (solution_.index[k] == kZeroPiece) continue;
-    const int m = member_of_piece_[solution_.index[k]];
-    growth = std::max(growth, members_[m].depth / members_[m].depth_start);
+    depth =
+        std::max(depth, members_[member_of_piece_[solution_.index[k]]].depth);
   }
-  return growth;
+  return depth / scale_;
 }
 
 }  // namespace krot

@@ -82,14 +82,14 @@ class LocalModel {
   // below a tenth of what it is at x.
   double DepthShare(const Eigen::Vector3d& d) const;
 
-  // The largest depth at x, relative to its start, of the members that bear
-  // the last step.
+  // The largest depth at x of the members that bear the last step, by the
+  // distance of the start from the camera of any member at most: as far as a
+  // start beside one camera is from the others, depths may grow.
   double DepthGrowth() const;
 
  private:
   struct Member {
     int index;
-    double depth_start;      // at x_start
     double depth;            // at x
     double multiplier;       // mu_i
     double last_multiplier;  // of the last step
@@ -113,6 +113,7 @@ class LocalModel {
   ResidualSet rows_;  // the members' residuals
   Norm norm_;
   Eigen::Vector3d x_start_;
+  double scale_ = 0;  // the start's largest distance from a member's camera
   Eigen::Vector3d x_;
   std::vector<LinearPiece> pieces_;  // 0: no residual falls below zero
   std::vector<int> member_of_piece_;

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 namespace krot {
 namespace {
 
 using Eigen::Vector3d;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // So many residuals become members at a time, the largest first.
 constexpr int kMaxAdded = 8;
@@ -24,8 +28,14 @@ constexpr double kSufficientShare = 0.1;
 constexpr double kGoodShare = 0.5;
 // Promises below this, relative, are rounding if the trial does not keep them.
 constexpr double kRounding = 1e-10;
+constexpr double kFinestTolerance = DescentGoal{}.tolerance;
 // So often a failed trial may teach the model before kappa rises.
 constexpr int kMaxLessons = 5;
+// A lesson after which the next trial costs no less than this share of the one
+// before was none.
+constexpr double kLessonWorth = 0.99;
+// Depths that fall by less than this, relative, count as constant.
+constexpr double kSmallFall = 0.1;
 
 // Whether the minimiser lies so far away that going on has no point: where
 // depths have grown a millionfold nothing changes by more than 1e-6 of it any
@@ -40,11 +50,22 @@ double LeftAfter(const LocalModel::Step& step, double cost_trial) {
   return std::max(cost_trial - step.level, step.held_back);
 }
 
+// How much of a step is taken. Where all depths fall by the same share f of
+// themselves, a residual changes with d / (1 + f) as much as its linearisation
+// does with d. Small falls do not matter, and no depth falls below a tenth.
+double ShareOf(const LocalModel& model, const Vector3d& d) {
+  const double share = model.DepthShare((0.9 / kSmallFall) * d);
+  if (share == 1) return 1;
+  const double fall = kSmallFall / share;
+  return std::min(1 / (1 + fall), 0.9 / fall);
+}
+
 }  // namespace
 
 // Makes the largest residuals above `level` members, if they are not yet.
-// Returns whether there were any.
-bool NewtonDescent::AddMembers(const ResidualSet& residuals, double level) {
+// Returns the largest of them, if there were any.
+std::optional<double> NewtonDescent::AddMembers(const ResidualSet& residuals,
+                                                double level) {
   const double* values = residuals.values();
   int largest[kMaxAdded];  // indices, by falling value
   int count = 0;
@@ -58,7 +79,8 @@ bool NewtonDescent::AddMembers(const ResidualSet& residuals, double level) {
     if (count == kMaxAdded) level = values[largest[kMaxAdded - 1]];
   }
   for (int k = 0; k < count; ++k) AddMember(residuals, largest[k]);
-  return count > 0;
+  if (count == 0) return std::nullopt;
+  return values[largest[0]];
 }
 
 void NewtonDescent::AddMember(const ResidualSet& residuals, int index) {
@@ -103,7 +125,8 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
   }
   double kappa = kInitialKappa;
   if (cost > kZeroPixels) StartModel(*residuals, cost, norm, *active, *x);
-  int lessons = 0;  // since the last step taken
+  int lessons = 0;                 // since the last step taken
+  double cost_failed = kInfinity;  // of the last trial since then
   summary.termination = DescentTermination::kMaxIterations;
   while (summary.iterations < max_iterations) {
     if (!(cost > kZeroPixels)) {
@@ -112,8 +135,13 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
     }
     LocalModel::Step step = model_.Minimize(kappa);
     const double promise = cost - step.level;
-    const bool is_last = !(promise > goal.tolerance * cost);
-    if (is_last && kappa > kSmallestKappa) {  // small for kappa's sake?
+    const double share = ShareOf(model_, step.d);
+    // A promise that takes depths near zero says little: residuals go with
+    // 1 / depth.
+    const double tolerance = share < 1 ? kFinestTolerance : goal.tolerance;
+    const bool is_last = !(promise > tolerance * cost);
+    // Is it small for the sake of a kappa that nothing has raised here?
+    if (is_last && kappa > kSmallestKappa && lessons == 0) {
       model_.RaiseMultipliers();
       kappa = kSmallestKappa;
       ++summary.iterations;
@@ -123,7 +151,6 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       summary.termination = DescentTermination::kFarAway;
       break;
     }
-    const double share = model_.DepthShare(step.d);
     ++summary.iterations;
     const Vector3d x_trial = *x + share * step.d;
     const double cost_trial = residuals->Evaluate(x_trial, norm);
@@ -143,8 +170,10 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       summary.termination = DescentTermination::kStationary;
       break;
     }
-    const bool overlooked =
-        cost_trial > step.level && AddMembers(*residuals, step.level);
+    std::optional<double> overlooked;
+    if (cost_trial > step.level) {
+      overlooked = AddMembers(*residuals, step.level);
+    }
     if (kept > kSufficientShare) {
       *x = x_trial;
       cost = cost_trial;
@@ -152,15 +181,21 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
       model_.Linearize(*x, cost, norm);
       if (kept > kGoodShare) kappa = std::max(kappa * kShrink, kSmallestKappa);
       lessons = 0;
+      cost_failed = kInfinity;
       continue;
     }
     if (overlooked) {
       model_.Linearize(*x, cost, norm);
-      continue;
+      // Whether the model knew the largest residual, and misjudged it.
+      const bool misjudged = *overlooked < cost_trial;
+      if (!misjudged || ++lessons <= kMaxLessons) continue;
+    } else {
+      bool learned = model_.RaiseMultipliers();
+      learned |= model_.AddTangents(x_trial, residuals->values(), step.level);
+      learned &= cost_trial < kLessonWorth * cost_failed;
+      cost_failed = cost_trial;
+      if (learned && ++lessons <= kMaxLessons) continue;
     }
-    bool learned = model_.RaiseMultipliers();
-    learned |= model_.AddTangents(x_trial, residuals->values(), step.level);
-    if (learned && ++lessons <= kMaxLessons) continue;
     kappa *= kGrow;
     if (kappa > kLargestKappa) {
       summary.termination = DescentTermination::kNoDecrease;

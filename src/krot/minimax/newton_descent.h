@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -52,7 +53,7 @@ class NewtonDescent {
  private:
   void StartModel(const ResidualSet& residuals, double cost, Norm norm,
                   const ActiveResiduals& active, const Eigen::Vector3d& x);
-  bool AddMembers(const ResidualSet& residuals, double level);
+  std::optional<double> AddMembers(const ResidualSet& residuals, double level);
   void AddMember(const ResidualSet& residuals, int index);
 
   LocalModel model_;
