@@ -13,7 +13,6 @@ namespace krot {
 namespace {
 
 constexpr ModelSize kSmall = {"small", 6, 60, 240};
-constexpr double kTimeLimit = 120;  // seconds
 
 double SumOfSquares(const KnownRotationProblem& problem,
                     const Estimate& estimate) {
@@ -30,7 +29,7 @@ class FullRivals : public testing::Test {
   // Solves by `rival` from the model's start.
   Estimate Solve(KnownRotationSolver* rival) const {
     Estimate estimate = model_.built.start;
-    EXPECT_TRUE(rival->Minimize(problem(), kTimeLimit, &estimate));
+    EXPECT_TRUE(rival->Minimize(problem(), /*cancel=*/nullptr, &estimate));
     return estimate;
   }
 

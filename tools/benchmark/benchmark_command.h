@@ -8,6 +8,7 @@ namespace krot {
 // The commands of `krot_benchmark`, one .cc file each. They return an exit
 // code or throw what krot_benchmark.cc turns into one.
 int RunTriangulationBenchmark(const std::vector<std::string>& arguments);
+int RunBlocksBenchmark(const std::vector<std::string>& arguments);
 int RunKnownRotationBenchmark(const std::vector<std::string>& arguments);
 int RunSweepBenchmark(const std::vector<std::string>& arguments);
 int RunScalingBenchmark(const std::vector<std::string>& arguments);

@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "krot/base/parallel_for.h"
+#include "krot/base/timer.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_model.h"
 #include "tools/benchmark/benchmark_report.h"
+#include "tools/benchmark/model_list.h"
 #include "tools/benchmark/process.h"
 #include "tools/benchmark/timing.h"
 #include "tools/command_error.h"
@@ -44,6 +46,9 @@ Proof ReadProof(const std::string& report_path, double relative_gap) {
   return proof;
 }
 
+// No further round of a model begins later than this.
+constexpr double kEnoughSeconds = 10;
+
 struct Race {
   std::vector<double> krot_seconds;
   std::vector<double> colmap_seconds;  // empty: it failed
@@ -69,7 +74,9 @@ Race RunRace(const JointBenchmarkOptions& options, const std::string& path) {
       options.colmap_path, "bundle_adjuster", "--input_path", path,
       "--output_path",     folder / "colmap"};
   Race race;
+  const Timer timer;
   for (int repeat = 0; repeat < options.common.repeats; ++repeat) {
+    if (timer.Seconds() > kEnoughSeconds) break;
     const ProcessResult ours = RunProcess(krot);
     if (ours.exit_code != kExitDone) {
       throw CommandError(kExitInternal,
@@ -120,8 +127,7 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
   table.columns = {"model", "observations", "krot",        "colmap",
                    "ratio", "maximum (px)", "gap reached", "iterations"};
   std::vector<double> ratios;
-  for (const std::string& path : options.common.input_paths) {
-    LogLine(options.common.log, 1, path);
+  table.notes = MeasureModels(options.common, [&](const std::string& path) {
     const BenchmarkModel model = ReadBenchmarkModel(path);
     const Race race = RunRace(options, path);
     const double ours = Median(race.krot_seconds);
@@ -139,9 +145,10 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
          SizedCell(ours), theirs, ratio, RealCell(race.proof.cost, 4),
          TextCell(race.proof.is_reached ? "yes" : "no"),
          CountCell(static_cast<int64_t>(race.proof.iterations))});
-  }
+  });
   if (!ratios.empty()) {
-    table.notes = {"Median ratio " + SizedCell(Median(ratios)).text + "."};
+    table.notes.push_back("Median ratio " + SizedCell(Median(ratios)).text +
+                          ".");
   }
   BenchmarkReport report;
   report.command = "joint";

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,10 +12,13 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/problem/cost.h"
+#include "krot/report/text_table.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/known_rotation_solver.h"
+#include "tools/benchmark/model_list.h"
 #include "tools/benchmark/synthetic_model.h"
+#include "tools/benchmark/time_limit.h"
 #include "tools/benchmark/timing.h"
 #include "tools/command_error.h"
 
@@ -25,8 +29,7 @@ struct KnownRotationOptions {
   BenchmarkOptions common;
   int num_threads = -1;
   int synthetic_sizes = kNumPaperSizes;
-  int max_rival_observations = 50000;
-  double time_limit = 60;  // seconds
+  double time_limit = 20;  // seconds
 };
 
 struct Outcome {
@@ -35,35 +38,41 @@ struct Outcome {
   bool has_finished = true;
 };
 
+using Solvers = std::vector<std::unique_ptr<KnownRotationSolver>>;
+
 // The runs of one solver end early once they have taken this long together.
 constexpr double kEnoughSeconds = 20;
 
-void Run(const BenchmarkModel& model, double time_limit,
+void Run(const BenchmarkModel& model, const CancelFlag* cancel,
          KnownRotationSolver* solver, Outcome* outcome) {
-  double sum = 0;
-  for (const double seconds : outcome->seconds) sum += seconds;
+  const std::vector<double>& past = outcome->seconds;
+  const double sum = std::accumulate(past.begin(), past.end(), 0.0);
   if (sum > kEnoughSeconds || !outcome->has_finished) return;
   Estimate estimate = model.built.start;
   const Timer timer;
   outcome->has_finished =
-      solver->Minimize(model.built.problem, time_limit, &estimate);
+      solver->Minimize(model.built.problem, cancel, &estimate);
   outcome->seconds.push_back(timer.Seconds());
   outcome->cost = Cost(model.built.problem, estimate, Norm::L2(), -1);
 }
-
-using Solvers = std::vector<std::unique_ptr<KnownRotationSolver>>;
 
 std::string Title(const KnownRotationSolver& solver) {
   return solver.Name() + " x" + std::to_string(solver.NumThreads());
 }
 
+Solvers Joined(Solvers a, Solvers b) {
+  std::move(b.begin(), b.end(), std::back_inserter(a));
+  return a;
+}
+
 class Contest {
  public:
   explicit Contest(const KnownRotationOptions& options) : options_(options) {
-    solvers_ = OwnFullSolvers(ResolveNumThreads(options.num_threads));
-    num_own_ = solvers_.size();
-    Solvers rivals = RivalFullSolvers(ResolveNumThreads(options.num_threads));
-    std::move(rivals.begin(), rivals.end(), std::back_inserter(solvers_));
+    const int num_threads = ResolveNumThreads(options.num_threads);
+    solvers_ = OwnFullSolvers(num_threads);
+    num_unlimited_ = solvers_.size();
+    solvers_ = Joined(std::move(solvers_), PaperFullSolvers(num_threads));
+    solvers_ = Joined(std::move(solvers_), RivalFullSolvers(num_threads));
     seconds_.name = "table2";
     seconds_.caption = "Seconds on the whole problem, p = 2, on x threads";
     costs_.name = "table2_cost";
@@ -71,68 +80,110 @@ class Contest {
         "Pixels: the largest residual that they start from and end at";
     seconds_.columns = {"model", "images", "points", "observations"};
     costs_.columns = {"model", "start"};
+    plot_.title = "Synthetic models of the sizes of the paper's Table 2";
+    plot_.x_label = "observations";
+    plot_.y_label = "seconds, where finished";
     for (const auto& solver : solvers_) {
       seconds_.columns.push_back(Title(*solver));
       costs_.columns.push_back(Title(*solver));
+      plot_.series.push_back({Title(*solver), {}});
     }
     seconds_.notes = {
         "* ends more than 1e-3 above the lowest cost, relative (next table): "
-        "its time is not that of the optimum. n/a: not finished within the "
-        "time limit, or not run on so many observations."};
+        "its time is not that of the optimum. " +
+        LimitText() +
+        ": given up at this limit; the next table says how far it came. KROT's "
+        "own have no limit."};
   }
 
   void Add(const BenchmarkModel& model) {
-    const KnownRotationProblem& problem = model.built.problem;
-    const int64_t count = static_cast<int64_t>(problem.observations.size());
-    std::vector<Outcome> outcomes(solvers_.size());
-    for (int repeat = 0; repeat < options_.common.repeats; ++repeat) {
-      for (size_t s = 0; s < solvers_.size(); ++s) {
-        const bool is_rival = s >= num_own_ && s + 1 < solvers_.size();
-        if (is_rival && count > options_.max_rival_observations) continue;
-        LogLine(options_.common.log, 1,
-                model.name + ": " + Title(*solvers_[s]));
-        Run(model, options_.time_limit, solvers_[s].get(), &outcomes[s]);
-      }
-    }
+    const std::vector<Outcome> outcomes = Compete(model);
     double lowest = std::numeric_limits<double>::infinity();
     for (const Outcome& outcome : outcomes) {
-      if (!outcome.seconds.empty()) lowest = std::min(lowest, outcome.cost);
+      lowest = std::min(lowest, outcome.cost);
     }
+    const KnownRotationProblem& problem = model.built.problem;
     std::vector<Cell> seconds = {
-        TextCell(model.name), CountCell(problem.num_frames),
-        CountCell(problem.num_points), CountCell(count)};
+        TextCell(model.name), CountCell(model.num_images),
+        CountCell(problem.num_points), CountCell(NumObservations(model))};
     std::vector<Cell> costs = {
         TextCell(model.name),
         RealCell(Cost(problem, model.built.start, Norm::L2(), -1), 4)};
     for (const Outcome& outcome : outcomes) {
-      if (outcome.seconds.empty()) {
-        seconds.push_back(MissingCell());
-        costs.push_back(MissingCell());
-        continue;
-      }
-      Cell cell = outcome.has_finished ? SizedCell(Median(outcome.seconds))
-                                       : MissingCell();
-      const bool misses = outcome.cost > (1 + kSameCost) * lowest;
-      if (outcome.has_finished && misses) cell.text += " *";
-      seconds.push_back(std::move(cell));
+      seconds.push_back(TimeCell(outcome, lowest));
       costs.push_back(RealCell(outcome.cost, 4));
     }
     seconds_.rows.push_back(std::move(seconds));
     costs_.rows.push_back(std::move(costs));
   }
 
-  std::vector<ResultTable> TakeTables() {
-    return {std::move(seconds_), std::move(costs_)};
+  void AddSynthetic(const ModelSize& size) {
+    const BenchmarkModel model =
+        SyntheticModel(size, options_.common.random_seed);
+    Add(model);
+    // Of this row: a number where the solver has finished.
+    for (size_t s = 0; s < solvers_.size(); ++s) {
+      const Cell& cell =
+          seconds_.rows.back()[seconds_.columns.size() - solvers_.size() + s];
+      if (!cell.value.is_number()) continue;
+      plot_.series[s].points.emplace_back(NumObservations(model),
+                                          cell.value.get<double>());
+    }
+  }
+
+  // May be called once; `notes` go below the times.
+  BenchmarkReport TakeReport(const std::vector<std::string>& notes) {
+    BenchmarkReport report;
+    report.command = "known_rotation";
+    seconds_.notes.insert(seconds_.notes.end(), notes.begin(), notes.end());
+    report.tables = {std::move(seconds_), std::move(costs_)};
+    if (options_.synthetic_sizes > 0) {
+      for (PlotSeries& series : plot_.series) {
+        std::sort(series.points.begin(), series.points.end());
+      }
+      report.plot = std::move(plot_);
+    }
+    return report;
   }
 
  private:
   static constexpr double kSameCost = 1e-3;
 
+  static int64_t NumObservations(const BenchmarkModel& model) {
+    return static_cast<int64_t>(model.built.problem.observations.size());
+  }
+
+  std::string LimitText() const {
+    return "> " + FormatNumber(options_.time_limit, 0);
+  }
+
+  std::vector<Outcome> Compete(const BenchmarkModel& model) const {
+    std::vector<Outcome> outcomes(solvers_.size());
+    for (int repeat = 0; repeat < options_.common.repeats; ++repeat) {
+      for (size_t s = 0; s < solvers_.size(); ++s) {
+        LogLine(options_.common.log, 1,
+                model.name + ": " + Title(*solvers_[s]));
+        const TimeLimit limit(options_.time_limit);
+        Run(model, s < num_unlimited_ ? nullptr : limit.flag(),
+            solvers_[s].get(), &outcomes[s]);
+      }
+    }
+    return outcomes;
+  }
+
+  Cell TimeCell(const Outcome& outcome, double lowest) const {
+    if (!outcome.has_finished) return MissingCell(LimitText());
+    Cell cell = SizedCell(Median(outcome.seconds));
+    if (outcome.cost > (1 + kSameCost) * lowest) cell.text += " *";
+    return cell;
+  }
+
   const KnownRotationOptions& options_;
-  Solvers solvers_;  // the last is least squares
-  size_t num_own_ = 0;
+  Solvers solvers_;
+  size_t num_unlimited_ = 0;  // the first so many have all the time
   ResultTable seconds_;
   ResultTable costs_;
+  LogPlot plot_;  // of the synthetic models
 };
 
 }  // namespace
@@ -149,27 +200,21 @@ int RunKnownRotationBenchmark(const std::vector<std::string>& arguments) {
                     Between(0, kNumPaperSizes),
                     "Synthetic models of the first so many sizes of the "
                     "paper's Table 2");
-  parser.AddInteger("max_rival_observations", &options.max_rival_observations,
-                    AtLeast(0),
-                    "Gugat and proximal splitting do not run on more");
   parser.AddReal("time_limit", &options.time_limit, Above(0.0, "seconds"),
-                 "After which a rival is given up");
+                 "After which a rival or the paper's method is given up");
   if (!parser.Parse(arguments)) {
     PrintTable(options.common.log, parser.Help());
     return kExitDone;
   }
   CheckReportPaths(options.common);
   Contest contest(options);
-  for (const std::string& path : options.common.input_paths) {
-    contest.Add(ReadBenchmarkModel(path));
-  }
+  const std::vector<std::string> left_out = MeasureModels(
+      options.common,
+      [&](const std::string& path) { contest.Add(ReadBenchmarkModel(path)); });
   for (int size = 0; size < options.synthetic_sizes; ++size) {
-    contest.Add(SyntheticModel(kPaperSizes[size], options.common.random_seed));
+    contest.AddSynthetic(kPaperSizes[size]);
   }
-  BenchmarkReport report;
-  report.command = "known_rotation";
-  report.tables = contest.TakeTables();
-  PublishReport(report, options.common);
+  PublishReport(contest.TakeReport(left_out), options.common);
   return kExitDone;
 }
 

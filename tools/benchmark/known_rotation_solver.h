@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/base/progress.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -17,16 +18,20 @@ class KnownRotationSolver {
   virtual std::string Name() const = 0;
   virtual int NumThreads() const = 0;
 
-  // Improves an estimate of positive depths. False if it gave up after
-  // `time_limit` seconds.
-  virtual bool Minimize(const KnownRotationProblem& problem, double time_limit,
-                        Estimate* estimate) = 0;
+  // Improves an estimate of positive depths. False if `cancel`, which may be
+  // null, ended it before it was done.
+  virtual bool Minimize(const KnownRotationProblem& problem,
+                        const CancelFlag* cancel, Estimate* estimate) = 0;
 };
 
 // The schedule of method `auto`, the joint solver alone, and sweeps with `fast`
-// and with `paper` settings to the paper's stop rule, each on one thread and,
-// if that is more, on `num_threads`. The time limit does not apply.
+// settings to the paper's stop rule, on one thread and, if that is more, on
+// `num_threads`.
 std::vector<std::unique_ptr<KnownRotationSolver>> OwnFullSolvers(
+    int num_threads);
+
+// Sweeps with `paper` settings: [Zhang18, Alg. 1], on as many threads.
+std::vector<std::unique_ptr<KnownRotationSolver>> PaperFullSolvers(
     int num_threads);
 
 // Gugat and proximal splitting on the full problem, as in [Zhang18, Tab. 2],

@@ -24,6 +24,8 @@ struct Command {
 constexpr Command kCommands[] = {
     {"triangulation", "one point at a time against its rivals [Fig. 4, Tab. 1]",
      &RunTriangulationBenchmark},
+    {"blocks", "single sub-problems of models, fast against paper settings",
+     &RunBlocksBenchmark},
     {"known_rotation", "the whole problem against its rivals [Tab. 2]",
      &RunKnownRotationBenchmark},
     {"sweep", "the cost of a sweep per observation, and its floor",

@@ -17,13 +17,14 @@ class Schedule : public KnownRotationSolver {
   std::string Name() const override { return name_; }
   int NumThreads() const override { return num_threads_; }
 
-  bool Minimize(const KnownRotationProblem& problem, double /*time_limit*/,
+  bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
     SolveModelOptions options;
     options.num_threads = num_threads_;
+    options.cancel = cancel;
     SolveSummary summary;
     RunSchedule(problem, options, method_, Timer(), estimate, &summary);
-    return true;
+    return !IsCancelled(cancel);
   }
 
  private:
@@ -42,14 +43,15 @@ class Sweeps : public KnownRotationSolver {
   std::string Name() const override { return name_; }
   int NumThreads() const override { return num_threads_; }
 
-  bool Minimize(const KnownRotationProblem& problem, double /*time_limit*/,
+  bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
     ResIntOptions options;
     options.fast_descent.settings = settings_;
     options.sweep_tolerance = 1e-3;  // the paper's
     options.num_threads = num_threads_;
-    SolveResInt(problem, options, estimate);
-    return true;
+    options.cancel = cancel;
+    const ResIntSummary summary = SolveResInt(problem, options, estimate);
+    return summary.termination != ResIntTermination::kInterrupted;
   }
 
  private:
@@ -58,24 +60,31 @@ class Sweeps : public KnownRotationSolver {
   int num_threads_;
 };
 
+using Solvers = std::vector<std::unique_ptr<KnownRotationSolver>>;
+
+void AddSweeps(const std::string& name, FastDescentSettings settings,
+               int num_threads, Solvers* solvers) {
+  solvers->push_back(std::make_unique<Sweeps>(name, settings, 1));
+  if (num_threads == 1) return;
+  solvers->push_back(std::make_unique<Sweeps>(name, settings, num_threads));
+}
+
 }  // namespace
 
-std::vector<std::unique_ptr<KnownRotationSolver>> OwnFullSolvers(
-    int num_threads) {
-  std::vector<std::unique_ptr<KnownRotationSolver>> solvers;
+Solvers OwnFullSolvers(int num_threads) {
+  Solvers solvers;
   solvers.push_back(
       std::make_unique<Schedule>("KROT auto", SolveMethod::kAuto, num_threads));
   solvers.push_back(std::make_unique<Schedule>(
       "KROT joint", SolveMethod::kJoint, num_threads));
-  const std::pair<const char*, FastDescentSettings> kinds[] = {
-      {"sweeps fast", FastDescentSettings::kFast},
-      {"Res-Int (paper)", FastDescentSettings::kPaper}};
-  for (const auto& [name, settings] : kinds) {
-    solvers.push_back(std::make_unique<Sweeps>(name, settings, 1));
-    if (num_threads > 1) {
-      solvers.push_back(std::make_unique<Sweeps>(name, settings, num_threads));
-    }
-  }
+  AddSweeps("sweeps fast", FastDescentSettings::kFast, num_threads, &solvers);
+  return solvers;
+}
+
+Solvers PaperFullSolvers(int num_threads) {
+  Solvers solvers;
+  AddSweeps("Res-Int (paper)", FastDescentSettings::kPaper, num_threads,
+            &solvers);
   return solvers;
 }
 

@@ -29,19 +29,36 @@ class OwnSolver : public SubproblemSolver {
   FastDescent descent_;
 };
 
+using Solvers = std::vector<std::unique_ptr<SubproblemSolver>>;
+
+std::unique_ptr<SubproblemSolver> Fast(Norm norm) {
+  return std::make_unique<OwnSolver>("KROT fast", FastDescentOptions{},
+                                     DescentGoal{}, norm);
+}
+
+std::unique_ptr<SubproblemSolver> Paper(Norm norm) {
+  FastDescentOptions options;
+  options.settings = FastDescentSettings::kPaper;
+  return std::make_unique<OwnSolver>("FDM (paper)", options, DescentGoal{},
+                                     norm);
+}
+
 }  // namespace
 
-std::vector<std::unique_ptr<SubproblemSolver>> OwnSolvers(Norm norm) {
-  FastDescentOptions paper;
-  paper.settings = FastDescentSettings::kPaper;
-  std::vector<std::unique_ptr<SubproblemSolver>> solvers;
-  const auto add = [&](const char* name, const FastDescentOptions& options,
-                       const DescentGoal& goal) {
-    solvers.push_back(std::make_unique<OwnSolver>(name, options, goal, norm));
-  };
-  add("KROT fast", {}, {});
-  add("fast, 1e-6", {}, {kRivalTolerance, /*level=*/0});
-  add("FDM (paper)", paper, {});
+Solvers OwnSolvers(Norm norm) {
+  Solvers solvers;
+  solvers.push_back(Fast(norm));
+  solvers.push_back(std::make_unique<OwnSolver>(
+      "fast, 1e-6", FastDescentOptions{},
+      DescentGoal{kRivalTolerance, /*level=*/0}, norm));
+  solvers.push_back(Paper(norm));
+  return solvers;
+}
+
+Solvers FastAndPaper(Norm norm) {
+  Solvers solvers;
+  solvers.push_back(Fast(norm));
+  solvers.push_back(Paper(norm));
   return solvers;
 }
 

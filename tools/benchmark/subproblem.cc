@@ -111,6 +111,37 @@ std::vector<Residual> IntersectionResiduals(const KnownRotationProblem& problem,
   return residuals;
 }
 
+std::vector<Residual> ResectionResiduals(const KnownRotationProblem& problem,
+                                         const Estimate& estimate,
+                                         int32_t frame) {
+  std::vector<Residual> residuals;
+  for (int64_t n = problem.frame_begin[frame];
+       n < problem.frame_begin[frame + 1]; ++n) {
+    const Observation& observation =
+        problem.observations[problem.frame_observations[n]];
+    double row[kResidualRow];
+    ResectionRow(problem.views[observation.view], observation,
+                 estimate.points[observation.point], row);
+    residuals.push_back(FromRow(row));
+  }
+  return residuals;
+}
+
+std::optional<Subproblem> MakeBlock(std::vector<Residual> residuals,
+                                    const Vector3d& start) {
+  Subproblem problem{std::move(residuals), start};
+  const bool is_determined = std::any_of(
+      problem.residuals.begin(), problem.residuals.end(),
+      [&](const Residual& residual) {
+        return MidPoint(problem.residuals.front(), residual).has_value();
+      });
+  if (!is_determined || !std::isfinite(problem.Cost(start, Norm::L2()))) {
+    return std::nullopt;
+  }
+  Rescale(MeanDepth(problem), &problem);
+  return problem;
+}
+
 std::vector<Residual> RandomTriangulation(int num_cameras, double sigma,
                                           Random* random) {
   constexpr double kFocalLength = 1000;  // pixels

@@ -38,6 +38,17 @@ std::vector<Residual> IntersectionResiduals(const KnownRotationProblem& problem,
                                             const Estimate& estimate,
                                             int32_t point);
 
+// Frame f of a problem as its points stand: (Res_f).
+std::vector<Residual> ResectionResiduals(const KnownRotationProblem& problem,
+                                         const Estimate& estimate,
+                                         int32_t frame);
+
+// A block of a sweep, point or frame, which starts where it stands. None where
+// a depth is not positive there, or where no ray makes half a degree with the
+// first: the optimum would be anywhere.
+std::optional<Subproblem> MakeBlock(std::vector<Residual> residuals,
+                                    const Eigen::Vector3d& start);
+
 // `num_cameras` at random, looking roughly at a random point among them, which
 // they observe with Gaussian noise of `sigma` pixels per axis, focal length
 // 1000 pixels: an instance of [Zhang18, Fig. 4].

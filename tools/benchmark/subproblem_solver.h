@@ -25,8 +25,12 @@ class SubproblemSolver {
 // of a step, is narrower than this, relative.
 inline constexpr double kRivalTolerance = 1e-6;
 
-// KROT's own: `fast` first, then `paper`. p >= 1.
+// KROT's own: `fast` to the optimum, `fast` to the rivals' tolerance, `paper`.
+// p >= 1.
 std::vector<std::unique_ptr<SubproblemSolver>> OwnSolvers(Norm norm);
+
+// `fast` to the optimum and `paper` alone.
+std::vector<std::unique_ptr<SubproblemSolver>> FastAndPaper(Norm norm);
 
 // Those of the literature that can solve this norm: p = 2 or infinity.
 std::vector<std::unique_ptr<SubproblemSolver>> RivalSolvers(Norm norm);

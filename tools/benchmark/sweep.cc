@@ -13,6 +13,7 @@
 #include "krot/solver/res_int.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"
+#include "tools/benchmark/model_list.h"
 #include "tools/benchmark/synthetic_model.h"
 #include "tools/benchmark/timing.h"
 #include "tools/command_error.h"
@@ -31,7 +32,7 @@ struct SweepOptions {
 
 // Microseconds per observation and sweep, by round.
 struct SweepTimes {
-  std::vector<double> paper;    // one thread
+  std::vector<double> paper;    // one thread; one round, or none
   std::vector<double> fast;     // one thread
   std::vector<double> threads;  // fast, all threads
   std::vector<double> floor;    // one pass over the residuals, one thread
@@ -80,7 +81,7 @@ SweepTimes Measure(const SweepOptions& options, const BenchmarkModel& model) {
     times.threads.push_back(MicrosecondsPerSweep(
         model, FastDescentSettings::kFast, threads, &times.fast_cost));
     times.floor.push_back(MicrosecondsPerPass(model));
-    if (count > options.max_paper_observations) continue;
+    if (repeat > 0 || count > options.max_paper_observations) continue;
     times.paper.push_back(MicrosecondsPerSweep(
         model, FastDescentSettings::kPaper, 1, &times.paper_cost));
   }
@@ -142,12 +143,11 @@ int RunSweepBenchmark(const std::vector<std::string>& arguments) {
                    "fast / floor",   "gain of " + threads + " threads",
                    "fast ends (px)", "paper ends (px)"};
   const auto add = [&](const BenchmarkModel& model) {
-    LogLine(options.common.log, 1, model.name);
     table.rows.push_back(Row(model, Measure(options, model)));
   };
-  for (const std::string& path : options.common.input_paths) {
+  table.notes = MeasureModels(options.common, [&](const std::string& path) {
     add(ReadBenchmarkModel(path));
-  }
+  });
   if (options.synthetic_size > 0) {
     add(SyntheticModel(kPaperSizes[options.synthetic_size - 1],
                        options.common.random_seed));

@@ -9,6 +9,7 @@
 #include "tools/benchmark/benchmark_model.h"
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/competition.h"
+#include "tools/benchmark/model_list.h"
 #include "tools/command_error.h"
 
 namespace krot {
@@ -150,8 +151,7 @@ void RunFigure4(const TriangulationOptions& options, Norm norm,
   table.name = "figure4";
   table.caption =
       "Microseconds of processor time per triangulation, random cameras, sigma "
-      "= 5 "
-      "px, p = " +
+      "= 5 px, p = " +
       options.norm;
   table.columns = {"cameras"};
   table.columns.insert(table.columns.end(), names.begin(), names.end());
@@ -199,8 +199,7 @@ void RunTable1(const TriangulationOptions& options, Norm norm,
   table.notes = {kMissNote};
   ResultTable ratios = RatioTable(table.name, names, "model");
   ResultTable excess = ExcessTable(table.name, names, "model");
-  for (const std::string& path : options.common.input_paths) {
-    LogLine(options.common.log, 1, path);
+  const auto measure = [&](const std::string& path) {
     Random random(options.common.random_seed);
     const Case one = ModelCase(path, options.max_points, &random);
     const std::vector<Standing> standings =
@@ -214,7 +213,10 @@ void RunTable1(const TriangulationOptions& options, Norm norm,
     table.rows.push_back(std::move(row));
     AddRatioRow(standings, one.name, &ratios);
     AddExcessRow(standings, one.name, &excess);
-  }
+  };
+  const std::vector<std::string> left_out =
+      MeasureModels(options.common, measure);
+  table.notes.insert(table.notes.end(), left_out.begin(), left_out.end());
   report->tables.push_back(std::move(table));
   report->tables.push_back(std::move(ratios));
   report->tables.push_back(std::move(excess));

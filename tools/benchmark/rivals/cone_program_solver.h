@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/progress.h"
 #include "krot/conic/nt_scaling.h"
 
 namespace krot {
@@ -37,6 +38,7 @@ struct ConeProgramOptions {
   double stop_above = std::numeric_limits<double>::infinity();
   double gap = 1e-9;  // tau minus its dual bound, absolute; > 0
   int max_iterations = 60;
+  const CancelFlag* cancel = nullptr;  // may be null; looked at every iteration
 };
 
 struct ConeProgramSummary {
@@ -70,7 +72,8 @@ class ConeProgramSolver {
       if (summary.tau < options.stop_below ||
           summary.tau_bound > options.stop_above ||
           summary.tau - summary.tau_bound < options.gap ||
-          summary.iterations == options.max_iterations) {
+          summary.iterations == options.max_iterations ||
+          IsCancelled(options.cancel)) {
         break;
       }
       ++summary.iterations;

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "krot/base/timer.h"
 #include "krot/problem/cost.h"
 #include "tools/benchmark/rivals/cone_program_solver.h"
 #include "tools/benchmark/rivals/full_rivals.h"
@@ -19,19 +18,18 @@ class FullGugat : public KnownRotationSolver {
   std::string Name() const override { return "Gugat"; }
   int NumThreads() const override { return 1; }
 
-  bool Minimize(const KnownRotationProblem& problem, double time_limit,
+  bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
-    const Timer timer;
     JointProgram program(problem);
     double upper = CostOf(problem, *estimate);
     double lower = 0;
     double gamma = upper;
     while (upper - lower > kTolerance * upper) {
-      if (timer.Seconds() > time_limit) return false;
       program.Set(*estimate, gamma);
       Eigen::VectorXd y = program.StartAt(/*margin=*/0.1 * gamma);
       ConeProgramOptions options;
       options.gap = 0.1 * kTolerance * gamma;
+      options.cancel = cancel;
       const ConeProgramSummary summary =
           solver_.Minimize(&program, options, &y);
       const Estimate next_estimate = program.ToEstimate(y);
@@ -40,6 +38,7 @@ class FullGugat : public KnownRotationSolver {
         *estimate = next_estimate;
         upper = cost;
       }
+      if (IsCancelled(cancel)) return false;
       if (summary.tau_bound > 0) lower = std::max(lower, gamma);
       double next = gamma + summary.tau / Slope(program, y);
       if (!(lower < next && next < upper)) next = upper;

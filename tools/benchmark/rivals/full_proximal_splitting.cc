@@ -1,6 +1,5 @@
 #include <algorithm>
 
-#include "krot/base/timer.h"
 #include "krot/problem/cost.h"
 #include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/rivals/projection_error.h"
@@ -23,9 +22,8 @@ class FullProximalSplitting : public KnownRotationSolver {
   std::string Name() const override { return "proximal"; }
   int NumThreads() const override { return num_threads_; }
 
-  bool Minimize(const KnownRotationProblem& problem, double time_limit,
+  bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
-    const Timer timer;
     const size_t count = problem.observations.size();
     Estimate x = *estimate;
     std::vector<Vector2d> z = ImageErrors(problem, x);
@@ -40,7 +38,7 @@ class FullProximalSplitting : public KnownRotationSolver {
     options.max_num_iterations = 1;
     ceres::Solver::Summary summary;
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-      if (timer.Seconds() > time_limit) return false;
+      if (IsCancelled(cancel)) return false;
       for (size_t i = 0; i < count; ++i) targets[i] = z[i] - u[i];
       ceres::Solve(options, &least_squares, &summary);
       const std::vector<Vector2d> r = ImageErrors(problem, x);

@@ -4,6 +4,20 @@
 namespace krot {
 namespace {
 
+class CancelCallback : public ceres::IterationCallback {
+ public:
+  explicit CancelCallback(const CancelFlag* cancel) : cancel_(cancel) {}
+
+  ceres::CallbackReturnType operator()(
+      const ceres::IterationSummary& /*iteration*/) override {
+    return IsCancelled(cancel_) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                : ceres::SOLVER_CONTINUE;
+  }
+
+ private:
+  const CancelFlag* cancel_;
+};
+
 class LeastSquares : public KnownRotationSolver {
  public:
   explicit LeastSquares(int num_threads) : num_threads_(num_threads) {}
@@ -11,17 +25,18 @@ class LeastSquares : public KnownRotationSolver {
   std::string Name() const override { return "least squares"; }
   int NumThreads() const override { return num_threads_; }
 
-  bool Minimize(const KnownRotationProblem& problem, double time_limit,
+  bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
     ceres::Problem least_squares;
     BuildLeastSquares(problem, nullptr, estimate, &least_squares);
     ceres::Solver::Options options =
         LeastSquaresOptions(problem, num_threads_, estimate);
     options.max_num_iterations = 100;
-    options.max_solver_time_in_seconds = time_limit;
+    CancelCallback callback(cancel);
+    options.callbacks.push_back(&callback);
     ceres::Solver::Summary summary;
     ceres::Solve(options, &least_squares, &summary);
-    return summary.total_time_in_seconds < time_limit;
+    return summary.termination_type != ceres::USER_SUCCESS;
   }
 
  private:

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "krot/base/progress.h"
+
+namespace krot {
+
+// Raises a flag once `seconds` have passed, for a solver that looks at one
+// between its steps.
+class TimeLimit {
+ public:
+  explicit TimeLimit(double seconds);
+  TimeLimit(const TimeLimit&) = delete;
+  TimeLimit& operator=(const TimeLimit&) = delete;
+  ~TimeLimit();
+
+  const CancelFlag* flag() const { return &has_passed_; }
+
+ private:
+  CancelFlag has_passed_{false};
+  std::mutex mutex_;
+  std::condition_variable condition_;
+  bool is_over_ = false;  // guarded by mutex_
+  std::thread thread_;
+};
+
+}  // namespace krot
