@@ -18,8 +18,8 @@ int ExitCodeOf(std::vector<std::string> arguments) {
 
 TEST(BenchmarkCommand, HelpsWithEveryCommand) {
   EXPECT_EQ(ExitCodeOf({}), 0);
-  for (const char* command :
-       {"triangulation", "known_rotation", "sweep", "scaling", "joint"}) {
+  for (const char* command : {"triangulation", "blocks", "known_rotation",
+                              "sweep", "scaling", "joint", "summary"}) {
     EXPECT_EQ(ExitCodeOf({command, "--help"}), 0) << command;
   }
 }
@@ -28,6 +28,8 @@ TEST(BenchmarkCommand, RefusesWhatItDoesNotKnow) {
   EXPECT_EQ(ExitCodeOf({"triangle"}), 1);
   EXPECT_EQ(ExitCodeOf({"triangulation", "--repeats", "0"}), 1);
   EXPECT_EQ(ExitCodeOf({"joint"}), 1);
+  EXPECT_EQ(ExitCodeOf({"blocks"}), 1);
+  EXPECT_EQ(ExitCodeOf({"summary", "--report_path", "no_such_folder"}), 1);
   EXPECT_EQ(ExitCodeOf({"triangulation", "--figure4", "0", "--input_path",
                         "no_such_folder"}),
             2);
@@ -55,7 +57,7 @@ TEST(BenchmarkCommand, ReportsTheSameAsJsonAndAsPlot) {
 TEST(BenchmarkCommand, MeasuresModelsOfItsOwn) {
   const ScratchFolder folder;
   const std::string report = folder / "report.json";
-  ASSERT_EQ(ExitCodeOf({"scaling", "--max_observations", "10000",
+  ASSERT_EQ(ExitCodeOf({"scaling", "--max_observations", "10000", "--vary", "0",
                         "--report_path", report}),
             0);
   std::ifstream stream(report);

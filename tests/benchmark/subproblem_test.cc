@@ -1,7 +1,12 @@
 #include "tools/benchmark/subproblem.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
+
+#include "krot/problem/cost.h"
+#include "tools/benchmark/synthetic_model.h"
 
 namespace krot {
 namespace {
@@ -57,6 +62,58 @@ TEST(MakeTriangulation, StartsInFrontOfAllCamerasAtAMeanDepthOfOne) {
 TEST(MakeTriangulation, NeedsTwoRays) {
   Random random(/*seed=*/5);
   EXPECT_FALSE(MakeTriangulation(RandomTriangulation(1, 5, &random), &random));
+}
+
+TEST(MakeBlock, StartsWhereItStands) {
+  Random random(/*seed=*/6);
+  const std::vector<Residual> rays = RandomTriangulation(5, 5, &random);
+  const auto middle = MidPoint(rays[0], rays[1]);
+  ASSERT_TRUE(middle);
+  const auto block = MakeBlock(rays, *middle);
+  ASSERT_TRUE(block);
+  for (int i = 0; i < 5; ++i) {
+    const double r = ResidualValue(rays[i], *middle, Norm::L2());
+    EXPECT_NEAR(ResidualValue(block->residuals[i], block->start, Norm::L2()), r,
+                1e-9 * r);
+  }
+}
+
+TEST(MakeBlock, NeedsRaysThatMeet) {
+  Random random(/*seed=*/7);
+  const std::vector<Residual> rays = RandomTriangulation(2, 5, &random);
+  const auto middle = MidPoint(rays[0], rays[1]);
+  ASSERT_TRUE(middle);
+  EXPECT_FALSE(MakeBlock({rays[0], rays[0]}, *middle));
+}
+
+// Moving a frame or a point changes the same residuals of the problem.
+TEST(Residuals, OfPointsAndFramesAreThoseOfTheProblem) {
+  const BenchmarkModel model =
+      SyntheticModel({"small", 6, 60, 240}, /*seed=*/1);
+  const KnownRotationProblem& problem = model.built.problem;
+  Estimate moved = model.built.start;
+  moved.translations[2][0] += 0.01;
+  moved.points[7][1] += 0.01;
+  const double pixels = Cost(problem, moved, Norm::L2(), 1);
+  double largest = 0;
+  int count = 0;
+  const auto add = [&](const std::vector<Residual>& residuals,
+                       const Eigen::Vector3d& x) {
+    for (const Residual& residual : residuals) {
+      largest = std::max(largest, ResidualValue(residual, x, Norm::L2()));
+      ++count;
+    }
+  };
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    add(ResectionResiduals(problem, moved, f), moved.translations[f]);
+  }
+  EXPECT_NEAR(largest, pixels, 1e-9 * pixels);
+  largest = 0;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    add(IntersectionResiduals(problem, moved, k), moved.points[k]);
+  }
+  EXPECT_NEAR(largest, pixels, 1e-9 * pixels);
+  EXPECT_EQ(count, 2 * static_cast<int>(problem.observations.size()));
 }
 
 }  // namespace

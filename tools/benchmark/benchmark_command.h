@@ -13,5 +13,6 @@ int RunKnownRotationBenchmark(const std::vector<std::string>& arguments);
 int RunSweepBenchmark(const std::vector<std::string>& arguments);
 int RunScalingBenchmark(const std::vector<std::string>& arguments);
 int RunJointBenchmark(const std::vector<std::string>& arguments);
+int RunSummaryBenchmark(const std::vector<std::string>& arguments);
 
 }  // namespace krot

@@ -1,14 +1,17 @@
 #!/usr/bin/env bash
 # Prints every benchmark: those of the paper, with every rival, and those of
-# speed and size. Meant to take less than 30 minutes on two idle cores.
-# Builds krot and krot_benchmark into build/ first (or takes those in BUILD).
+# speed and size; at the end what was asked and what was measured. Made to take
+# less than 30 minutes on two idle cores, once krot and krot_benchmark are built
+# (into build/, first; or those in BUILD are taken).
 #
 # Usage: tools/benchmark/run_all.sh [MODELS] [OUTPUT]
 #
 # MODELS is a folder of COLMAP models, by default KROT_REAL_MODELS; without it
-# synthetic models alone are measured. SYNTHETIC_SIZES (of 6, the paper's Table
-# 2) and MAX_OBSERVATIONS (of `scaling`) ask for more. OUTPUT is a folder for the tables
-# (*.md), reports (*.json) and plots (*.svg); by default they are thrown away.
+# synthetic models alone are measured. OUTPUT is a folder for the tables (*.md),
+# reports (*.json) and plots (*.svg); by default they are thrown away. Needs
+# 3 GB of memory and 1 GB in TMPDIR. QUICK=1 measures little of everything, in a
+# minute or two, to see that it goes through. What fails is named on stderr and
+# left out.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 models=${1:-${KROT_REAL_MODELS:-}}
@@ -23,42 +26,99 @@ if [[ -z ${BUILD:-} ]]; then
   BUILD=$root/build
 fi
 
-# --input_path M for every folder in $models that `krot` can solve.
-inputs=()
+# What each part measures: see krot_benchmark COMMAND -h.
+triangulation=(--repeats 9 --max_points 300)
+blocks=()
+known_rotation=(--repeats 1 --time_limit 8)
+sweep=(--repeats 5)
+scaling=(--max_observations 10000000 --max_joint_observations 2000000)
+joint=()
+if [[ ${QUICK:-0} == 1 ]]; then
+  triangulation=(--repeats 1 --max_points 10)
+  blocks=(--repeats 1 --max_points 10 --max_frames 2)
+  known_rotation=(--repeats 1 --time_limit 0.2 --synthetic_sizes 1)
+  sweep=(--repeats 1 --synthetic_size 1)
+  scaling=(--max_observations 10000 --vary 0)
+  joint=(--repeats 1)
+fi
+
+complain() { printf 'run_all.sh: %s\n' "$*" >&2; }
+
+# How many observations of a model krot can optimise; fails where none.
+count_observations() {
+  local probe=$output/probe code=0
+  "$BUILD/krot" point_triangulator --input_path "$1" --output_path "$probe" \
+    --overwrite 1 --log_level 0 --report_path "$probe.txt" \
+    >/dev/null 2>&1 || code=$?
+  ((code)) || sed -n 's/.*"num_observations": \([0-9]*\).*/\1/p' "$probe.txt"
+  rm -rf "$probe" "$probe.txt"
+  return "$code"
+}
+
+# --input_path M for every folder in $models that tells something.
+all=()
 if [[ -n $models ]]; then
   for model in "$models"/*/; do
-    if "$BUILD/krot" point_triangulator --input_path "$model" --output_path \
-      "$output/probe" --overwrite 1 --log_level 0 >/dev/null 2>&1; then
-      inputs+=(--input_path "$model")
+    if count=$(count_observations "$model") && ((count >= 1000)); then
+      all+=(--input_path "$model")
+    else
+      complain "$model is left out: not a model, or of less than 1000" \
+        "observations that krot can solve"
     fi
   done
-  rm -rf "$output/probe"
 fi
-# The largest few, which are worth a sweep's timing.
-large=()
-for name in tower south128_full; do
-  if [[ -n $models && -d $models/$name ]]; then
-    large+=(--input_path "$models/$name")
-  fi
+# Of these: the largest few, which are worth a sweep's timing, and those that a
+# user could have: tower_init is tower from a start that no COLMAP run leaves.
+large=() usual=()
+for ((i = 1; i < ${#all[@]}; i += 2)); do
+  case $(basename "${all[i]}") in
+    tower_init) large+=(--input_path "${all[i]}") ;;
+    tower | south128_full) large+=(--input_path "${all[i]}") ;;&
+    *) usual+=(--input_path "${all[i]}") ;;
+  esac
 done
+
+rm -f "$output/elapsed.md"
+printf '| part | seconds |\n|---|---:|\n' >"$output/elapsed.new"
 
 # run NAME COMMAND OPTION... : prints, and keeps $output/NAME.*
 run() {
-  local name=$1
+  local name=$1 start=$SECONDS code=0
   shift
-  printf '\n'
+  rm -f "$output/$name".{md,json,svg}
   "$BUILD/krot_benchmark" "$@" --format markdown \
-    --report_path "$output/$name.json" --plot_path "$output/$name.svg" |
-    tee "$output/$name.md"
+    --report_path "$output/$name.json" --plot_path "$output/$name.svg" \
+    >"$output/$name.new" || code=$?
+  if ((code == 0)); then
+    mv "$output/$name.new" "$output/$name.md"
+    printf '\n' && cat "$output/$name.md"
+    printf '\n%s: %d s\n' "$name" $((SECONDS - start))
+  else
+    rm -f "$output/$name.new"
+    complain "$name is left out: krot_benchmark ended with exit code $code" \
+      "after $((SECONDS - start)) s"
+  fi
+  printf '| %s | %d |\n' "$name" $((SECONDS - start)) >>"$output/elapsed.new"
 }
 
-run triangulation triangulation "${inputs[@]}"
-run triangulation_inf triangulation --norm inf "${inputs[@]}"
-# All six sizes of the paper's Table 2 take much longer than that with paper settings.
-run known_rotation known_rotation --time_limit 20 --repeats 1 \
-  --synthetic_sizes "${SYNTHETIC_SIZES:-2}" "${inputs[@]}"
-run sweep sweep "${large[@]}"
-run scaling scaling --max_observations "${MAX_OBSERVATIONS:-1000000}"
-if [[ ${#inputs[@]} -gt 0 ]] && command -v colmap >/dev/null; then
-  run joint joint "${inputs[@]}"
+begin=$SECONDS
+run triangulation triangulation "${triangulation[@]}" "${all[@]}"
+run triangulation_inf triangulation --norm inf "${triangulation[@]}" "${all[@]}"
+if ((${#all[@]})); then
+  run blocks blocks "${blocks[@]}" "${all[@]}"
 fi
+run known_rotation known_rotation "${known_rotation[@]}" "${all[@]}"
+run sweep sweep "${sweep[@]}" "${large[@]}"
+run scaling scaling "${scaling[@]}"
+if ((${#usual[@]})); then
+  command -v colmap >/dev/null || complain "colmap is not there: joint is of" \
+    "krot alone"
+  run joint joint "${joint[@]}" "${usual[@]}"
+fi
+printf '| all | %d |\n' $((SECONDS - begin)) >>"$output/elapsed.new"
+mv "$output/elapsed.new" "$output/elapsed.md"
+
+printf '\n'
+"$BUILD/krot_benchmark" summary --format markdown --report_path "$output" |
+  tee "$output/summary.md"
+printf '\n' && cat "$output/elapsed.md"

@@ -2,27 +2,19 @@
 // to file, as models grow: in observations, in frames, in length of tracks.
 
 #include <algorithm>
-#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "krot/base/parallel_for.h"
-#include "krot/model/model_io.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"
+#include "tools/benchmark/growth.h"
 #include "tools/benchmark/process.h"
 #include "tools/command_error.h"
 
 namespace krot {
 namespace {
-
-// A street: frames one after the other, random tracks.
-struct Street {
-  int64_t observations = 0;  // about so many
-  int64_t frames = 0;
-  int64_t track_length = 10;  // mean
-};
 
 constexpr int64_t kMillion = 1000000;
 constexpr int64_t kObservationsPerFrame = 1000;
@@ -40,99 +32,9 @@ struct ScalingOptions {
   std::string krot_path;
   int max_observations = 1000000;
   int max_joint_observations = 2000000;
+  bool vary = true;  // frames and tracks as well
   int num_threads = -1;
 };
-
-// Seconds are wall clock.
-struct Growth {
-  std::string method;
-  Street street;
-  int64_t num_observations = 0;
-  double read = 0;
-  double solve = 0;
-  double write = 0;
-  double total = 0;
-  int64_t steps = 0;  // sweeps, or iterations of the joint solver
-  double seconds_of_steps = 0;
-  int64_t peak_bytes = 0;
-  int64_t model_bytes = 0;
-
-  double MicrosecondsPerStep() const {
-    return 1e6 * seconds_of_steps / static_cast<double>(steps) / Count();
-  }
-  double Count() const { return static_cast<double>(num_observations); }
-};
-
-void RunKrot(const ScalingOptions& options,
-             std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), options.krot_path);
-  arguments.insert(arguments.end(), {"--log_level", "0"});
-  const ProcessResult result = RunProcess(arguments);
-  if (result.exit_code == kExitDone) return;
-  throw CommandError(kExitInternal, options.krot_path + " " + arguments[1] +
-                                        " ended with exit code " +
-                                        std::to_string(result.exit_code));
-}
-
-void Synthesize(const ScalingOptions& options, const Street& street,
-                const std::string& path) {
-  RunKrot(options, {"model_synthesizer",
-                    "--output_path",
-                    path,
-                    "--overwrite",
-                    "1",
-                    "--Scene.layout",
-                    "street",
-                    "--Scene.num_frames",
-                    std::to_string(street.frames),
-                    "--Scene.num_points",
-                    std::to_string(street.observations / street.track_length),
-                    "--Scene.track_length",
-                    std::to_string(street.track_length),
-                    "--Scene.pixel_noise",
-                    "1",
-                    "--Scene.start_translation_noise",
-                    "0.01",
-                    "--Scene.start_point_noise",
-                    "0.01",
-                    "--random_seed",
-                    std::to_string(options.common.random_seed)});
-}
-
-// What a loaded model occupies, its lists' contents alone.
-int64_t ModelBytes(const std::string& path) {
-  const Model model = ReadModel(path, DetectModelFormat(path));
-  size_t bytes = model.points3D.size() * sizeof(Point3D) +
-                 model.track_elements.size() * sizeof(TrackElement);
-  for (const Image& image : model.images) {
-    bytes += sizeof(Image) + image.points2D.size() * sizeof(Point2D);
-  }
-  return static_cast<int64_t>(bytes);
-}
-
-Growth Solve(const ScalingOptions& options, const std::string& method,
-             const std::string& model, const ScratchFolder& folder) {
-  RunKrot(options,
-          {"solver", "--input_path", model, "--output_path", folder / "solved",
-           "--overwrite", "1", "--report_path", folder / "report.json",
-           "--Solver.method", method, "--Solver.num_threads",
-           std::to_string(ResolveNumThreads(options.num_threads))});
-  std::ifstream stream(folder / "report.json");
-  const auto json = nlohmann::json::parse(stream);
-  const auto& seconds = json.at("seconds");
-  const auto& steps = json.at(method == "res_int" ? "sweeps" : "iterations");
-  Growth growth;
-  growth.method = method;
-  growth.num_observations = json.at("num_observations");
-  growth.read = seconds.at("read");
-  growth.solve = seconds.at("solve");
-  growth.write = seconds.at("write");
-  growth.total = seconds.at("total");
-  growth.steps = static_cast<int64_t>(steps.size());
-  if (!steps.empty()) growth.seconds_of_steps = steps.back().at("seconds");
-  growth.peak_bytes = json.at("peak_memory_bytes");
-  return growth;
-}
 
 // By sweeps and, up to max_joint_observations, by the joint solver.
 void Measure(const ScalingOptions& options, const Street& street,
@@ -141,19 +43,15 @@ void Measure(const ScalingOptions& options, const Street& street,
           std::to_string(street.observations) + " observations, " +
               std::to_string(street.frames) + " frames, tracks of " +
               std::to_string(street.track_length));
+  const KrotRun run = {options.krot_path,
+                       ResolveNumThreads(options.num_threads),
+                       options.common.random_seed};
   const ScratchFolder folder;
   const std::string model = folder / "model";
-  Synthesize(options, street, model);
-  const int64_t model_bytes = ModelBytes(model);
-  for (const char* method : {"res_int", "joint"}) {
-    const bool is_joint = method == std::string("joint");
-    if (is_joint && street.observations > options.max_joint_observations) {
-      continue;
-    }
-    growths->push_back(Solve(options, method, model, folder));
-    growths->back().street = street;
-    growths->back().model_bytes = model_bytes;
-  }
+  SynthesizeStreet(run, street, model);
+  growths->push_back(MeasureStreet(run, "res_int", street, model, folder));
+  if (street.observations > options.max_joint_observations) return;
+  growths->push_back(MeasureStreet(run, "joint", street, model, folder));
 }
 
 // The time per step by that of the same method on `reference`; missing where
@@ -260,6 +158,7 @@ BenchmarkReport MeasureAll(const ScalingOptions& options) {
   LogPlot plot;
   report.tables.push_back(MeasureSizes(options, &plot));
   report.plot = std::move(plot);
+  if (!options.vary) return report;
   const int64_t size =
       std::min<int64_t>(kFixedObservations, options.max_observations);
   report.tables.push_back(MeasureFrames(options, size));
@@ -283,6 +182,9 @@ int RunScalingBenchmark(const std::vector<std::string>& arguments) {
                     "The largest model, of up to ten million");
   parser.AddInteger("max_joint_observations", &options.max_joint_observations,
                     AtLeast(0), "Method joint does not run on more");
+  parser.AddBool("vary", &options.vary,
+                 "Also models of one size with ever more frames, and with "
+                 "ever longer tracks");
   parser.AddInteger("num_threads", &options.num_threads, AtLeast(-1),
                     "krot's threads; -1 or 0: all");
   if (!parser.Parse(arguments)) {
