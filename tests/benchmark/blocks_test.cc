@@ -14,7 +14,8 @@
 namespace krot {
 namespace {
 
-constexpr double kAgreement = 1e-9;  // pixels
+constexpr double kRadius = 4;        // mean depths, about the start
+constexpr double kAgreement = 1e-9;  // relative
 
 class BlocksOfRealModels : public testing::TestWithParam<const char*> {
  protected:
@@ -24,18 +25,19 @@ class BlocksOfRealModels : public testing::TestWithParam<const char*> {
     model_ = ReadBenchmarkModel(std::filesystem::path(root) / GetParam());
   }
 
-  // `fast` at the oracle's optimum, and not above `paper`. False where the
-  // oracle's ball does not hold the optimum for certain.
+  // `fast` at the oracle's optimum, and not above `paper`.
   void ExpectOptimum(const Subproblem& block) {
     const Norm norm = Norm::L2();
-    const double fast = block.Cost(solvers_[0]->Minimize(block), norm);
+    const Eigen::Vector3d x = solvers_[0]->Minimize(block);
+    const double fast = block.Cost(x, norm);
     const double paper = block.Cost(solvers_[1]->Minimize(block), norm);
-    EXPECT_LE(fast, paper + kAgreement);
+    EXPECT_LE(fast, (1 + kAgreement) * paper);
     const OracleOptimum oracle =
-        MinimizeByEllipsoids(block.residuals, norm, block.start, /*radius=*/4);
-    // Where the oracle's ball is too small it is not below `fast` either.
-    EXPECT_LE(fast, oracle.cost + kAgreement);
-    num_proved_ += fast - oracle.lower_bound <= kAgreement;
+        MinimizeByEllipsoids(block.residuals, norm, block.start, kRadius);
+    EXPECT_NEAR(fast, oracle.cost, kAgreement * oracle.cost);
+    // No point of the ball is better, and `fast` ended well inside.
+    EXPECT_LE(fast - oracle.lower_bound, kAgreement * fast);
+    EXPECT_LT((x - block.start).norm(), 0.9 * kRadius);
     ++num_blocks_;
   }
 
@@ -43,24 +45,22 @@ class BlocksOfRealModels : public testing::TestWithParam<const char*> {
   std::vector<std::unique_ptr<SubproblemSolver>> solvers_ =
       FastAndPaper(Norm::L2());
   int num_blocks_ = 0;
-  int num_proved_ = 0;
 };
 
 TEST_P(BlocksOfRealModels, HaveTheOptimumOfTheOracle) {
   const KnownRotationProblem& problem = model_.built.problem;
   const Estimate& start = model_.built.start;
-  for (int32_t k = 0; k < problem.num_points; k += problem.num_points / 50) {
+  for (int32_t k = 0; k < problem.num_points; k += problem.num_points / 40) {
     const auto block =
         MakeBlock(IntersectionResiduals(problem, start, k), start.points[k]);
     if (block) ExpectOptimum(*block);
   }
-  for (int32_t f = 0; f < problem.num_frames; f += 4) {
+  for (int32_t f = 0; f < problem.num_frames; f += 8) {
     const auto block =
         MakeBlock(ResectionResiduals(problem, start, f), start.translations[f]);
     if (block) ExpectOptimum(*block);
   }
-  EXPECT_GT(num_blocks_, 40);
-  EXPECT_EQ(num_proved_, num_blocks_);
+  EXPECT_GT(num_blocks_, 30);
 }
 
 INSTANTIATE_TEST_SUITE_P(, BlocksOfRealModels,

@@ -59,5 +59,16 @@ TEST(ResultTable, KeepsItsNumbersInJson) {
   EXPECT_TRUE(json["rows"][1]["us"].is_null());
 }
 
+TEST(ResultTable, FoldsUpDetailsInMarkdown) {
+  ResultTable table;
+  table.caption = "Costs";
+  table.columns = {"model"};
+  table.rows = {{TextCell("tower")}};
+  table.is_detail = true;
+  EXPECT_EQ(ToMarkdown(table),
+            "<details><summary>Costs</summary>\n\n| model |\n|---|\n"
+            "| tower |\n\n</details>\n");
+}
+
 }  // namespace
 }  // namespace krot

@@ -121,11 +121,14 @@ class Contest {
     const BenchmarkModel model =
         SyntheticModel(size, options_.common.random_seed);
     Add(model);
-    // Of this row: a number where the solver has finished.
+    // Of this row: a number where the solver has finished. One line per method.
     for (size_t s = 0; s < solvers_.size(); ++s) {
       const Cell& cell =
           seconds_.rows.back()[seconds_.columns.size() - solvers_.size() + s];
-      if (!cell.value.is_number()) continue;
+      const bool is_most_threads =
+          s + 1 == solvers_.size() ||
+          solvers_[s]->Name() != solvers_[s + 1]->Name();
+      if (!is_most_threads || !cell.value.is_number()) continue;
       plot_.series[s].points.emplace_back(NumObservations(model),
                                           cell.value.get<double>());
     }

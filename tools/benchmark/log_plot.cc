@@ -115,6 +115,11 @@ class Canvas {
          << "\" stroke=\"#dddddd\"/>\n";
   }
 
+  void Dot(double x, double y, const char* color) {
+    svg_ << "<circle cx=\"" << Number(x) << "\" cy=\"" << Number(y)
+         << "\" r=\"2.5\" fill=\"" << color << "\"/>\n";
+  }
+
   void DrawGrid() {
     for (double decade = y_.low; decade <= y_.high; ++decade) {
       const double y = Y(std::pow(10, decade));
@@ -136,33 +141,37 @@ class Canvas {
     }
   }
 
-  // Names go to the right ends, moved apart from the top downwards.
+  // Names go to where the lines end, moved apart from the top downwards.
   void DrawSeries() {
     struct Name {
+      double x;
       double y;
       size_t series;
     };
     std::vector<Name> names;
     for (size_t s = 0; s < plot_.series.size(); ++s) {
       std::ostringstream line;
+      double last_x = 0;
       double last_y = 0;
       for (const auto& point : plot_.series[s].points) {
         if (!IsShown(point)) continue;
+        last_x = X(point.first);
         last_y = Y(point.second);
-        line << Number(X(point.first)) << "," << Number(last_y) << " ";
+        line << Number(last_x) << "," << Number(last_y) << " ";
+        Dot(last_x, last_y, kColors[s % kColors.size()]);
       }
       if (line.str().empty()) continue;
       svg_ << "<polyline fill=\"none\" stroke-width=\"2\" stroke=\""
            << kColors[s % kColors.size()] << "\" points=\"" << line.str()
            << "\"/>\n";
-      names.push_back({last_y, s});
+      names.push_back({last_x, last_y, s});
     }
     std::sort(names.begin(), names.end(),
               [](const Name& a, const Name& b) { return a.y < b.y; });
     double next = 0;
     for (const Name& name : names) {
       const double y = std::max(name.y, next);
-      Text(kWidth - kRight + 6, y + 4, "start", plot_.series[name.series].name,
+      Text(name.x + 6, y + 4, "start", plot_.series[name.series].name,
            kColors[name.series % kColors.size()]);
       next = y + kNameHeight;
     }

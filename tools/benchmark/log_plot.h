@@ -20,7 +20,7 @@ struct LogPlot {
 };
 
 // A self-contained SVG image; decades are ruled, each line bears its name at
-// its right end. Points that are not positive and finite are left out.
+// its end. Points that are not positive and finite are left out.
 std::string ToSvg(const LogPlot& plot);
 
 }  // namespace krot

@@ -31,7 +31,7 @@ awk -v output="$output" '
   !is_replaced { print }
 ' "$document" >"$refreshed"
 cat "$refreshed" >"$document"
-for name in triangulation triangulation_inf; do
+for name in triangulation triangulation_inf known_rotation scaling; do
   if [[ -s $output/$name.svg ]]; then
     cp "$output/$name.svg" "$root/docs/images/benchmark_$name.svg"
   fi

@@ -60,7 +60,10 @@ std::string ToText(const ResultTable& table) {
 }
 
 std::string ToMarkdown(const ResultTable& table) {
-  std::string text = table.caption + ":\n\n" + MarkdownRow(table.columns) + "|";
+  std::string text =
+      table.is_detail ? "<details><summary>" + table.caption + "</summary>\n\n"
+                      : table.caption + ":\n\n";
+  text += MarkdownRow(table.columns) + "|";
   for (size_t column = 0; column < table.columns.size(); ++column) {
     text += column == 0 ? "---|" : "---:|";
   }
@@ -72,6 +75,7 @@ std::string ToMarkdown(const ResultTable& table) {
     const bool looks_like_a_list = note.rfind("* ", 0) == 0;
     text += (looks_like_a_list ? "\n\\" : "\n") + note + "\n";
   }
+  if (table.is_detail) text += "\n</details>\n";
   return text;
 }
 

@@ -29,6 +29,7 @@ struct ResultTable {
   std::vector<std::string> columns;
   std::vector<std::vector<Cell>> rows;  // as many cells as columns
   std::vector<std::string> notes;       // sentences below the table
+  bool is_detail = false;               // Markdown folds it up
 };
 
 std::string ToText(const ResultTable& table);

@@ -62,7 +62,7 @@ Case ModelCase(const std::string& path, int max_points, Random* random) {
   result.name = model.name;
   result.num_points = built.problem.num_points;
   result.num_images = model.num_images;
-  const int step = std::max(1, built.problem.num_points / max_points);
+  const int step = (built.problem.num_points + max_points - 1) / max_points;
   for (int32_t k = 0; k < built.problem.num_points; k += step) {
     std::optional<Subproblem> problem = MakeTriangulation(
         IntersectionResiduals(built.problem, built.start, k), random);
@@ -103,6 +103,7 @@ ResultTable ExcessTable(const std::string& name,
   table.caption =
       "How far the solvers end above the lowest cost of any of them, relative, "
       "at most";
+  table.is_detail = true;
   table.columns = {first_column};
   table.columns.insert(table.columns.end(), solvers.begin(), solvers.end());
   return table;
@@ -198,6 +199,7 @@ void RunTable1(const TriangulationOptions& options, Norm norm,
   table.columns.insert(table.columns.end(), names.begin(), names.end());
   table.notes = {kMissNote};
   ResultTable ratios = RatioTable(table.name, names, "model");
+  ratios.is_detail = true;
   ResultTable excess = ExcessTable(table.name, names, "model");
   const auto measure = [&](const std::string& path) {
     Random random(options.common.random_seed);
