@@ -1,8 +1,6 @@
 // tools/benchmark/run_all.sh, on little: that every part goes through, that
 // what fails is named, and that docs/benchmarks.md takes up all that it leaves.
 
-#include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <regex>
@@ -28,15 +26,15 @@ std::string TextOf(const fs::path& path) {
   return text.str();
 }
 
+// One run serves all questions: it takes a while.
 class RunAll : public testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    folder_ = std::make_unique<ScratchFolder>();
+  void SetUp() override {
     const std::string krot =
         (fs::path(KROT_BENCHMARK_EXECUTABLE).parent_path() / "krot").string();
-    fs::create_directories(*folder_ / "models/nothing");
+    fs::create_directories(folder_ / "models/nothing");
     ASSERT_EQ(RunProcess({krot, "model_synthesizer", "--output_path",
-                          *folder_ / "models/small", "--Scene.num_frames", "8",
+                          folder_ / "models/small", "--Scene.num_frames", "8",
                           "--Scene.num_points", "400"})
                   .exit_code,
               0);
@@ -46,65 +44,68 @@ class RunAll : public testing::Test {
                           "basename cat dirname mkdir mktemp mv rm sed tee) "
                           "bin && PATH=$1/bin QUICK=1 BUILD=$2 bash $3 models "
                           "output >out.txt 2>err.txt",
-                          "bash", *folder_ / "", fs::path(krot).parent_path(),
+                          "bash", folder_ / "", fs::path(krot).parent_path(),
                           KROT_RUN_ALL})
                   .exit_code,
               0)
-        << TextOf(*folder_ / "err.txt");
+        << TextOf(folder_ / "err.txt");
   }
 
-  static void TearDownTestSuite() { folder_.reset(); }
-
-  static std::string Output(const std::string& name) {
-    return TextOf(*folder_ / ("output/" + name));
+  std::string Output(const std::string& name) const {
+    return TextOf(folder_ / ("output/" + name));
   }
 
-  static std::unique_ptr<ScratchFolder> folder_;
+  void ExpectTheTablesOfTheDocument() const {
+    std::set<std::string> left;
+    for (const auto& entry : fs::directory_iterator(folder_ / "output")) {
+      if (entry.path().extension() != ".md") continue;
+      left.insert(entry.path().stem());
+      EXPECT_THAT(TextOf(entry.path()), HasSubstr("|---")) << entry.path();
+    }
+    std::set<std::string> wanted;
+    const std::string document = TextOf(KROT_BENCHMARK_DOCUMENT);
+    const std::regex begin("<!-- begin ([a-z_]+) -->");
+    for (std::sregex_iterator it(document.begin(), document.end(), begin), end;
+         it != end; ++it) {
+      wanted.insert((*it)[1]);
+      EXPECT_THAT(document,
+                  HasSubstr("<!-- end " + std::string((*it)[1]) + " -->"));
+    }
+    EXPECT_EQ(left, wanted);
+  }
+
+  void ExpectALineForWhatIsLeftOut() const {
+    const std::string err = TextOf(folder_ / "err.txt");
+    EXPECT_THAT(err, HasSubstr("run_all.sh: models/nothing/ is left out: "));
+    EXPECT_THAT(err, HasSubstr("run_all.sh: colmap is not there: "));
+    EXPECT_THAT(Output("joint.md"), HasSubstr("| small |"));
+  }
+
+  void ExpectTheTimeOfEveryPart() const {
+    const std::string out = TextOf(folder_ / "out.txt");
+    for (const char* part : {"triangulation", "triangulation_inf", "blocks",
+                             "known_rotation", "sweep", "scaling", "joint"}) {
+      EXPECT_TRUE(std::regex_search(
+          out, std::regex("\n" + std::string(part) + ": [0-9]+ s\n")))
+          << part;
+      EXPECT_THAT(Output("elapsed.md"), HasSubstr(std::string(part) + " | "));
+    }
+  }
+
+  void ExpectTheAnswersAtTheEnd() const {
+    const std::string out = TextOf(folder_ / "out.txt");
+    EXPECT_THAT(out, HasSubstr(Output("summary.md")));
+    EXPECT_THAT(Output("summary.md"), HasSubstr("fastest rival"));
+  }
+
+  const ScratchFolder folder_;
 };
 
-std::unique_ptr<ScratchFolder> RunAll::folder_;
-
-TEST_F(RunAll, LeavesEveryTableOfTheDocumentAndNoOther) {
-  std::set<std::string> left;
-  for (const auto& entry : fs::directory_iterator(*folder_ / "output")) {
-    if (entry.path().extension() != ".md") continue;
-    left.insert(entry.path().stem());
-    EXPECT_THAT(TextOf(entry.path()), HasSubstr("|---")) << entry.path();
-  }
-  std::set<std::string> wanted;
-  const std::string document = TextOf(KROT_BENCHMARK_DOCUMENT);
-  const std::regex begin("<!-- begin ([a-z_]+) -->");
-  for (std::sregex_iterator it(document.begin(), document.end(), begin), end;
-       it != end; ++it) {
-    wanted.insert((*it)[1]);
-    EXPECT_THAT(document,
-                HasSubstr("<!-- end " + std::string((*it)[1]) + " -->"));
-  }
-  EXPECT_EQ(left, wanted);
-}
-
-TEST_F(RunAll, NamesWhatItLeavesOutInOneLineEach) {
-  const std::string err = TextOf(*folder_ / "err.txt");
-  EXPECT_THAT(err, HasSubstr("run_all.sh: models/nothing/ is left out: "));
-  EXPECT_THAT(err, HasSubstr("run_all.sh: colmap is not there: "));
-  EXPECT_THAT(Output("joint.md"), HasSubstr("| small |"));
-}
-
-TEST_F(RunAll, SaysHowLongEveryPartTook) {
-  const std::string out = TextOf(*folder_ / "out.txt");
-  for (const char* part : {"triangulation", "triangulation_inf", "blocks",
-                           "known_rotation", "sweep", "scaling", "joint"}) {
-    EXPECT_TRUE(std::regex_search(
-        out, std::regex("\n" + std::string(part) + ": [0-9]+ s\n")))
-        << part;
-    EXPECT_THAT(Output("elapsed.md"), HasSubstr(std::string(part) + " | "));
-  }
-}
-
-TEST_F(RunAll, EndsWithTheAnswers) {
-  const std::string out = TextOf(*folder_ / "out.txt");
-  EXPECT_THAT(out, HasSubstr(Output("summary.md")));
-  EXPECT_THAT(Output("summary.md"), HasSubstr("fastest rival"));
+TEST_F(RunAll, GoesThroughAndLeavesWhatTheDocumentTakesUp) {
+  ExpectTheTablesOfTheDocument();
+  ExpectALineForWhatIsLeftOut();
+  ExpectTheTimeOfEveryPart();
+  ExpectTheAnswersAtTheEnd();
 }
 
 }  // namespace

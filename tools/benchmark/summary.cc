@@ -129,7 +129,7 @@ ResultTable Summarize(const Reports& reports) {
   const std::vector<Json> races = Rows(reports, "joint", "joint");
   ResultTable table;
   table.name = "summary";
-  table.caption = "Asked and measured; medians, with the range in brackets";
+  table.caption = "Medians have their range in brackets";
   table.columns = {"what", "asked", "measured", "command"};
   const auto add = [&](const std::string& what, const std::string& asked,
                        const std::string& measured,
