@@ -146,6 +146,8 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
          TextCell(race.proof.is_reached ? "yes" : "no"),
          CountCell(static_cast<int64_t>(race.proof.iterations))});
   });
+  table.notes.push_back("No round of a model begins more than " +
+                        SizedCell(kEnoughSeconds).text + " s after its first.");
   if (!ratios.empty()) {
     table.notes.push_back("Median ratio " + SizedCell(Median(ratios)).text +
                           ".");

@@ -136,7 +136,8 @@ int RunSweepBenchmark(const std::vector<std::string>& arguments) {
   table.name = "sweep";
   table.caption =
       "Microseconds per observation and sweep over the first ten sweeps, one "
-      "thread; the floor is one pass over all residuals";
+      "thread, paper settings in one round; the floor is one pass over all "
+      "residuals";
   table.columns = {"model",          "observations",
                    "fast",           "paper",
                    "paper / fast",   "floor",
