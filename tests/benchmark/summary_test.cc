@@ -8,6 +8,7 @@
 namespace krot {
 namespace {
 
+using testing::ElementsAre;
 using testing::HasSubstr;
 using Json = nlohmann::ordered_json;
 
@@ -66,6 +67,13 @@ TEST(Summary, SpeaksOfTheLargestModelOfEachMethod) {
       {{"method", "res_int"}, {"observations", 99}, {"ratio", 1.25}}};
   EXPECT_EQ(Answer({{"scaling", Report("scaling", rows)}}, "by that at 10^6"),
             "1.25 at 99");
+}
+
+TEST(Summary, NamesTheLoadUnderWhichItWasMeasured) {
+  Json report = Report("blocks", Json::array());
+  report["machine"]["load"] = 2.04;
+  EXPECT_THAT(Summarize({{"blocks", report}, {"sweep", report}}).notes,
+              ElementsAre(HasSubstr("blocks 2.0, sweep 2.0.")));
 }
 
 TEST(Summary, ListsModelsOneByOne) {

@@ -12,7 +12,6 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/problem/cost.h"
-#include "krot/report/text_table.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/known_rotation_solver.h"
@@ -121,17 +120,7 @@ class Contest {
     const BenchmarkModel model =
         SyntheticModel(size, options_.common.random_seed);
     Add(model);
-    // Of this row: a number where the solver has finished. One line per method.
-    for (size_t s = 0; s < solvers_.size(); ++s) {
-      const Cell& cell =
-          seconds_.rows.back()[seconds_.columns.size() - solvers_.size() + s];
-      const bool is_most_threads =
-          s + 1 == solvers_.size() ||
-          solvers_[s]->Name() != solvers_[s + 1]->Name();
-      if (!is_most_threads || !cell.value.is_number()) continue;
-      plot_.series[s].points.emplace_back(NumObservations(model),
-                                          cell.value.get<double>());
-    }
+    PlotLastRow();
   }
 
   // May be called once; `notes` go below the times.
@@ -157,7 +146,7 @@ class Contest {
   }
 
   std::string LimitText() const {
-    return "> " + FormatNumber(options_.time_limit, 0);
+    return "> " + NumberText(options_.time_limit);
   }
 
   std::vector<Outcome> Compete(const BenchmarkModel& model) const {
@@ -172,6 +161,21 @@ class Contest {
       }
     }
     return outcomes;
+  }
+
+  // Where the solvers have finished; of each method that on most threads.
+  void PlotLastRow() {
+    const std::vector<Cell>& row = seconds_.rows.back();
+    const size_t first = row.size() - solvers_.size();
+    const double count = row[first - 1].value;  // of observations
+    for (size_t s = 0; s < solvers_.size(); ++s) {
+      const bool has_more_threads =
+          s + 1 < solvers_.size() &&
+          solvers_[s]->Name() == solvers_[s + 1]->Name();
+      const Cell& cell = row[first + s];
+      if (has_more_threads || !cell.value.is_number()) continue;
+      plot_.series[s].points.emplace_back(count, cell.value.get<double>());
+    }
   }
 
   Cell TimeCell(const Outcome& outcome, double lowest) const {

@@ -29,7 +29,7 @@ fi
 # What each part measures: see krot_benchmark COMMAND -h.
 triangulation=(--repeats 9 --max_points 300)
 blocks=()
-known_rotation=(--repeats 1 --time_limit 8)
+known_rotation=(--repeats 1 --time_limit 6)
 sweep=(--repeats 5)
 scaling=(--max_observations 10000000 --max_joint_observations 2000000)
 joint=()

@@ -121,6 +121,19 @@ std::string Certified(const std::vector<Json>& rows) {
   return std::to_string(reached) + " of " + std::to_string(rows.size());
 }
 
+// "Load at the end of each part: blocks 2.1, joint 1.9."
+std::vector<std::string> LoadNotes(const Reports& reports) {
+  std::string loads;
+  for (const auto& [name, report] : reports) {
+    const auto machine = report.find("machine");
+    if (machine == report.end()) continue;
+    loads += (loads.empty() ? "" : ", ") + name + " " +
+             RealCell(machine->at("load"), 1).text;
+  }
+  if (loads.empty()) return {};
+  return {"Load at the end of each part: " + loads + "."};
+}
+
 }  // namespace
 
 ResultTable Summarize(const Reports& reports) {
@@ -166,6 +179,7 @@ ResultTable Summarize(const Reports& reports) {
   add("`krot solver`'s time by `colmap bundle_adjuster`'s, real models",
       "median <= 0.1", MedianRatio(races), "joint");
   add("of those, proved to a gap of 1e-4", "all", Certified(races), "joint");
+  table.notes = LoadNotes(reports);
   return table;
 }
 
