@@ -58,10 +58,24 @@ void SynthesizeStreet(const KrotRun& run, const Street& street,
 Growth MeasureStreet(const KrotRun& run, const std::string& method,
                      const Street& street, const std::string& model,
                      const ScratchFolder& folder) {
-  RunKrot(run, {"solver", "--input_path", model, "--output_path",
-                folder / "solved", "--overwrite", "1", "--report_path",
-                folder / "report.json", "--Solver.method", method,
-                "--Solver.num_threads", std::to_string(run.num_threads)});
+  std::vector<std::string> arguments = {"solver",
+                                        "--input_path",
+                                        model,
+                                        "--output_path",
+                                        folder / "solved",
+                                        "--overwrite",
+                                        "1",
+                                        "--report_path",
+                                        folder / "report.json",
+                                        "--Solver.method",
+                                        method,
+                                        "--Solver.num_threads",
+                                        std::to_string(run.num_threads)};
+  if (method == "res_int") {
+    arguments.insert(arguments.end(),
+                     {"--ResInt.max_sweeps", std::to_string(run.max_sweeps)});
+  }
+  RunKrot(run, std::move(arguments));
   std::ifstream stream(folder / "report.json");
   const auto json = nlohmann::json::parse(stream);
   const auto& seconds = json.at("seconds");
@@ -74,6 +88,7 @@ Growth MeasureStreet(const KrotRun& run, const std::string& method,
   growth.solve = seconds.at("solve");
   growth.write = seconds.at("write");
   growth.total = seconds.at("total");
+  growth.is_cut = json.at("termination") == "max_sweeps";
   growth.steps = static_cast<int64_t>(steps.size());
   if (!steps.empty()) growth.seconds_of_steps = steps.back().at("seconds");
   growth.peak_bytes = json.at("peak_memory_bytes");

@@ -23,7 +23,8 @@ struct Growth {
   double solve = 0;
   double write = 0;
   double total = 0;
-  int64_t steps = 0;  // sweeps, or iterations of the joint solver
+  int64_t steps = 0;    // sweeps, or iterations of the joint solver
+  bool is_cut = false;  // by the limit of sweeps
   double seconds_of_steps = 0;
   int64_t peak_bytes = 0;
   int64_t model_bytes = 0;
@@ -37,7 +38,8 @@ struct Growth {
 // How `krot` is run.
 struct KrotRun {
   std::string krot_path;
-  int num_threads = 1;  // >= 1
+  int num_threads = 1;    // >= 1
+  int max_sweeps = 1000;  // >= 0
   uint64_t random_seed = 0;
 };
 

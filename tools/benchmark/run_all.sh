@@ -31,7 +31,7 @@ triangulation=(--repeats 9 --max_points 300)
 blocks=()
 known_rotation=(--repeats 1 --time_limit 6)
 sweep=(--repeats 5)
-scaling=(--max_observations 10000000 --max_joint_observations 2000000)
+scaling=(--max_observations 10000000 --max_sweeps 150)
 joint=()
 if [[ ${QUICK:-0} == 1 ]]; then
   triangulation=(--repeats 1 --max_points 10)

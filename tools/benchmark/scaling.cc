@@ -33,6 +33,7 @@ struct ScalingOptions {
   int max_observations = 1000000;
   int max_joint_observations = 2000000;
   bool vary = true;  // frames and tracks as well
+  int max_sweeps = 1000;
   int num_threads = -1;
 };
 
@@ -45,7 +46,7 @@ void Measure(const ScalingOptions& options, const Street& street,
               std::to_string(street.track_length));
   const KrotRun run = {options.krot_path,
                        ResolveNumThreads(options.num_threads),
-                       options.common.random_seed};
+                       options.max_sweeps, options.common.random_seed};
   const ScratchFolder folder;
   const std::string model = folder / "model";
   SynthesizeStreet(run, street, model);
@@ -80,7 +81,10 @@ ResultTable ToTable(const std::string& name, const std::string& caption,
       "method",      "frames", "track",     "observations",      "read",
       "solve",       "write",  "in all",    "us in all",         "steps",
       "us per step", "ratio",  "peak (MB)", "B beyond the model"};
+  table.notes = {"* the limit of sweeps: the stop rule was not reached."};
   for (const Growth& growth : growths) {
+    Cell steps = CountCell(growth.steps);
+    if (growth.is_cut) steps.text += " *";
     const double beyond =
         static_cast<double>(growth.peak_bytes - growth.model_bytes);
     table.rows.push_back(
@@ -89,8 +93,8 @@ ResultTable ToTable(const std::string& name, const std::string& caption,
          CountCell(growth.num_observations), SizedCell(growth.read),
          SizedCell(growth.solve), SizedCell(growth.write),
          SizedCell(growth.total),
-         SizedCell(1e6 * growth.total / growth.Count()),
-         CountCell(growth.steps), SizedCell(growth.MicrosecondsPerStep()),
+         SizedCell(1e6 * growth.total / growth.Count()), std::move(steps),
+         SizedCell(growth.MicrosecondsPerStep()),
          RatioTo(reference, growth, growths),
          SizedCell(1e-6 * static_cast<double>(growth.peak_bytes)),
          SizedCell(beyond / growth.Count())});
@@ -182,6 +186,8 @@ int RunScalingBenchmark(const std::vector<std::string>& arguments) {
                     "The largest model, of up to ten million");
   parser.AddInteger("max_joint_observations", &options.max_joint_observations,
                     AtLeast(0), "Method joint does not run on more");
+  parser.AddInteger("max_sweeps", &options.max_sweeps, AtLeast(1),
+                    "Where sweeps end that do not stop before");
   parser.AddBool("vary", &options.vary,
                  "Also models of one size with ever more frames, and with "
                  "ever longer tracks");
