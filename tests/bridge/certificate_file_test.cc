@@ -1,5 +1,6 @@
 #include "krot/bridge/certificate_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -187,9 +188,14 @@ TEST_P(CertificateOfModel, IsRefusedIfAnyNumberOfItsFileChanges) {
   expect_refused([](CertificateFile* f) { f->defect = 1e-3; });
   expect_refused([](CertificateFile* f) { f->model_sha256[5] ^= 1; });
   expect_refused([](CertificateFile* f) { f->norm = Norm::LInf(); });
+  using Observation = CertificateFile::SupportObservation;
+  double largest = 0;
+  for (const Observation& o : solved_.file.observations) {
+    largest = std::max(largest, o.lambda);
+  }
+  const double millionth = 1e-6 * largest;
   for (size_t n = 0; n < solved_.file.observations.size(); ++n) {
     SCOPED_TRACE(n);
-    using Observation = CertificateFile::SupportObservation;
     const auto expect_one =
         [&](const std::function<void(Observation*)>& change) {
           expect_refused(
@@ -200,8 +206,8 @@ TEST_P(CertificateOfModel, IsRefusedIfAnyNumberOfItsFileChanges) {
     expect_one([](Observation* o) { ++o->point3D_id; });
     expect_one([](Observation* o) { o->u[1] += 1e-6; });
     expect_one([](Observation* o) { o->J(0, 1) += 1e-3; });
-    expect_one([](Observation* o) { o->lambda *= 1 + 1e-6; });
-    expect_one([](Observation* o) { o->y *= 1 - 1e-6; });
+    expect_one([&](Observation* o) { o->lambda += millionth; });
+    expect_one([&](Observation* o) { o->y -= millionth * o->y.normalized(); });
     expect_one([](Observation* o) { o->u[0] = std::nan(""); });
     expect_refused([&](CertificateFile* f) {
       f->observations.erase(f->observations.begin() + static_cast<int64_t>(n));

@@ -13,7 +13,8 @@ namespace krot {
 
 // What a stranger's pocket script finds, for a connected support without
 // baselines: everything dense, in long double, rows and unknowns in a map, the
-// smallest singular value by an SVD. No code is shared with the library.
+// smallest singular value by an SVD. y and lambda both may change, in units of
+// lambda. No code is shared with the library.
 struct NaiveCheck {
   double longest = 0;  // max |y_i|_dual / lambda_i
   double term = 0;     // |defect|_2 / sigma_min(M)
@@ -33,7 +34,7 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
     if (frame != omitted && frame_row.emplace(frame, rows).second) rows += 3;
   }
   const int count = static_cast<int>(certificate.observations.size());
-  Matrix M = Matrix::Zero(rows, 2 * count);
+  Matrix M = Matrix::Zero(rows, 3 * count);
   Matrix defect = Matrix::Zero(rows, 1);
   NaiveCheck check;
   for (int i = 0; i < count; ++i) {
@@ -50,10 +51,11 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
                  (static_cast<long double>(R(n, k)) -
                   static_cast<long double>(o.u[n]) * R(2, k));
           }
-          M(row + k, 2 * i + r) = lambda * a;
+          M(row + k, 3 * i + r) = lambda * a;
           defect(row + k, 0) += a * certified.y[r];
         }
-        defect(row + k, 0) += certificate.lower_bound * lambda * R(2, k);
+        M(row + k, 3 * i + 2) = certificate.lower_bound * lambda * R(2, k);
+        defect(row + k, 0) += M(row + k, 3 * i + 2);
       }
     };
     add(point_row.at(o.point), view.cam_from_world_rotation);
@@ -69,7 +71,7 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
   }
   const Eigen::JacobiSVD<Matrix> svd(M);
   check.term =
-      rows > 2 * count
+      rows > 3 * count
           ? INFINITY
           : static_cast<double>(defect.norm() / svd.singularValues()(rows - 1));
   return check;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/restrict.h"
 #include "krot/solver/dual_repair.h"
 #include "krot/solver/support.h"
@@ -11,6 +12,12 @@
 namespace krot {
 namespace {
 
+// Of SelectBalanced.
+constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
+// How often misfits are dropped and the rest is tried again.
+constexpr int kMaxDrops = 20;
+// Smaller multipliers, by the largest, are left out at first.
+constexpr double kSharesOfLargest[] = {1e-3, 1e-5, 0};
 constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
 // Of the sub-problems.
 constexpr double kSmallestGap = 1e-9;
@@ -24,6 +31,29 @@ constexpr int kMaxReductions = 4;
 constexpr double kDefectFactor = 2;
 constexpr double kSmallestDefect = 1e-12;
 
+// The bound that multipliers would prove, pixels, if (1) held: the estimate
+// times (1).
+double SuggestedBound(const KnownRotationProblem& problem,
+                      const Estimate& estimate,
+                      const std::vector<Multiplier>& multipliers) {
+  double weighted_residual = 0;
+  double weighted_depth = 0;
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], estimate);
+    weighted_residual -= multipliers[i].y.dot(viewed.v);
+    weighted_depth += multipliers[i].lambda * viewed.depth;
+  }
+  return weighted_residual / weighted_depth;
+}
+
+std::vector<Multiplier> Pick(const std::vector<Multiplier>& multipliers,
+                             const std::vector<int64_t>& observations) {
+  std::vector<Multiplier> picked;
+  for (const int64_t i : observations) picked.push_back(multipliers[i]);
+  return picked;
+}
+
 // Equal bounds are told by the smaller support.
 bool IsBetter(const Certificate& a, const Certificate& b) {
   const double margin = kEqualBounds * b.lower_bound;
@@ -34,6 +64,16 @@ bool IsBetter(const Certificate& a, const Certificate& b) {
     return a.lower_bound > b.lower_bound + margin;
   }
   return a.lower_bound > b.lower_bound;
+}
+
+void CheckInput(const KnownRotationProblem& problem,
+                const std::vector<Multiplier>& multipliers,
+                const CertificateOptions& options) {
+  CheckArgument(multipliers.size() == problem.observations.size(),
+                "multipliers.size()", multipliers.size(),
+                "the number of observations");
+  CheckArgument(options.max_unknowns >= 1, "options.max_unknowns",
+                options.max_unknowns, ">= 1");
 }
 
 class Maker {
@@ -47,6 +87,10 @@ class Maker {
   // of what sets its maximum, and so on.
   void Try(const std::vector<int64_t>& observations, const Estimate& estimate,
            const std::vector<Multiplier>& multipliers, double threshold);
+
+  // Tries what balances of these multipliers at `delta`, pixels.
+  void TryBalanced(double delta, const std::vector<Multiplier>& multipliers,
+                   const std::vector<int64_t>& candidates);
 
   bool IsEnough() const {
     return IsCancelled(options_.cancel) ||
@@ -64,8 +108,13 @@ class Maker {
   }
   void SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
                       double threshold, int num_reductions);
-  void Offer(const RestrictedProblem& part, const Estimate& estimate,
-             const std::vector<Multiplier>& multipliers);
+  std::vector<int64_t> OfferBalanced(double delta,
+                                     const std::vector<Multiplier>& multipliers,
+                                     const std::vector<int64_t>& candidates,
+                                     double tolerance);
+  // Returns the misfits of the part.
+  std::vector<int64_t> Offer(const RestrictedProblem& part, double delta,
+                             const std::vector<Multiplier>& multipliers);
 
   const KnownRotationProblem& problem_;
   const Norm norm_;
@@ -77,10 +126,52 @@ void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
                 const std::vector<Multiplier>& multipliers, double threshold) {
   const RestrictedProblem part = RestrictProblem(problem_, observations);
   if (NumUnknowns(part.problem) > options_.max_unknowns) return;
-  std::vector<Multiplier> known;
-  for (const int64_t i : observations) known.push_back(multipliers[i]);
-  Offer(part, RestrictEstimate(part, whole), known);
+  const std::vector<Multiplier> known = Pick(multipliers, observations);
+  const double delta =
+      SuggestedBound(part.problem, RestrictEstimate(part, whole), known);
+  Offer(part, delta, known);
+  if (!IsEnough()) TryBalanced(delta, multipliers, observations);
   if (!IsEnough()) SolveAndReduce(part, whole, threshold, kMaxReductions);
+}
+
+void Maker::TryBalanced(double delta,
+                        const std::vector<Multiplier>& multipliers,
+                        const std::vector<int64_t>& candidates) {
+  for (const double tolerance : kBalanceTolerances) {
+    std::vector<int64_t> left = candidates;
+    for (int drop = 0; drop < kMaxDrops && !left.empty() && !IsEnough();
+         ++drop) {
+      left = OfferBalanced(delta, multipliers, left, tolerance);
+    }
+    if (IsEnough()) return;
+  }
+}
+
+// The balanced ones of the candidates; returns those of them that are worth
+// another try, without their misfits.
+std::vector<int64_t> Maker::OfferBalanced(
+    double delta, const std::vector<Multiplier>& multipliers,
+    const std::vector<int64_t>& candidates, double tolerance) {
+  std::vector<int64_t> left;
+  const std::vector<int64_t> balanced =
+      SelectBalanced(problem_, delta, multipliers, candidates, tolerance);
+  for (const std::vector<int64_t>& component :
+       SplitIntoComponents(problem_, balanced)) {
+    const std::vector<int64_t> misfits =
+        Offer(RestrictProblem(problem_, component), delta,
+              Pick(multipliers, component));
+    if (misfits.empty()) continue;
+    auto misfit = misfits.begin();
+    for (size_t n = 0; n < component.size(); ++n) {
+      if (misfit != misfits.end() && *misfit == static_cast<int64_t>(n)) {
+        ++misfit;
+      } else {
+        left.push_back(component[n]);
+      }
+    }
+  }
+  std::sort(left.begin(), left.end());
+  return left;
 }
 
 void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
@@ -102,7 +193,7 @@ void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
   const InteriorPointSummary summary =
       MinimizeJointly(part.problem, options, &estimate, &multipliers);
   if (summary.termination == InteriorPointTermination::kStopped) return;
-  Offer(part, estimate, multipliers);
+  Offer(part, SuggestedBound(part.problem, estimate, multipliers), multipliers);
 
   const std::vector<int64_t> support = SelectSupport(
       part.problem,
@@ -122,21 +213,26 @@ void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
   }
 }
 
-void Maker::Offer(const RestrictedProblem& part, const Estimate& estimate,
-                  const std::vector<Multiplier>& multipliers) {
-  std::optional<Certificate> certificate =
-      RepairMultipliers(part.problem, norm_, estimate, multipliers);
-  if (!certificate || !IsBetter(*certificate, best_)) return;
+std::vector<int64_t> Maker::Offer(const RestrictedProblem& part, double delta,
+                                  const std::vector<Multiplier>& multipliers) {
+  if (!(delta > 0) || NumUnknowns(part.problem) > options_.max_unknowns) {
+    return {};
+  }
+  RepairedMultipliers repaired =
+      RepairMultipliers(part.problem, norm_, delta, multipliers);
+  std::optional<Certificate>& certificate = repaired.certificate;
+  if (!certificate || !IsBetter(*certificate, best_)) return repaired.misfits;
   for (CertifiedObservation& o : certificate->observations) {
     o.observation = part.observation_of[o.observation];
   }
   certificate->defect = kMaxDefect;
   const CertificateCheck check =
       CheckCertificate(problem_, norm_, *certificate);
-  if (!check.is_accepted) return;
+  if (!check.is_accepted) return {};
   certificate->defect =
       std::clamp(kDefectFactor * check.defect, kSmallestDefect, kMaxDefect);
   best_ = std::move(*certificate);
+  return {};
 }
 
 }  // namespace
@@ -145,11 +241,7 @@ std::optional<Certificate> MakeCertificate(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
     double gamma, const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options) {
-  CheckArgument(multipliers.size() == problem.observations.size(),
-                "multipliers.size()", multipliers.size(),
-                "the number of observations");
-  CheckArgument(options.max_unknowns >= 1, "options.max_unknowns",
-                options.max_unknowns, ">= 1");
+  CheckInput(problem, multipliers, options);
   const std::vector<double> scores =
       SupportScores(problem, norm, estimate, gamma, multipliers);
   Maker maker(problem, norm, options);
@@ -164,6 +256,27 @@ std::optional<Certificate> MakeCertificate(
       maker.Try(component, estimate, multipliers, threshold);
       if (maker.IsEnough()) return maker.best();
     }
+  }
+  return maker.best();
+}
+
+std::optional<Certificate> MakeInfeasibilityCertificate(
+    const KnownRotationProblem& problem, Norm norm, double bound,
+    const std::vector<Multiplier>& multipliers,
+    const CertificateOptions& options) {
+  CheckInput(problem, multipliers, options);
+  double largest = 0;
+  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
+  Maker maker(problem, norm, options);
+  for (const double share : kSharesOfLargest) {
+    std::vector<int64_t> candidates;
+    for (size_t i = 0; i < multipliers.size(); ++i) {
+      if (multipliers[i].lambda > share * largest) {
+        candidates.push_back(static_cast<int64_t>(i));
+      }
+    }
+    maker.TryBalanced(bound, multipliers, candidates);
+    if (maker.IsEnough()) break;
   }
   return maker.best();
 }

@@ -26,14 +26,23 @@ struct CertificateOptions {
 // observation. Their sum need not prove anything; they only tell which
 // observations may set the maximum.
 //
-// For several thresholds of SupportScores it solves the sub-problem of the
-// observations above (each of its connected components, as each is a bound),
-// drops what does not set that one's maximum, repairs the multipliers, and
+// For several thresholds of SupportScores it repairs the multipliers of the
+// observations above (of each of their connected components, as each is a
+// bound), then those that balance of them (SelectBalanced), then those of
+// their own sub-problem, solved, without what does not set its maximum. It
 // keeps the highest bound that CheckCertificate accepts. None if there is no
 // such. p = 1, 2 or infinity. Allocates as much as a few sub-problems.
 std::optional<Certificate> MakeCertificate(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
     double gamma, const std::vector<Multiplier>& multipliers,
+    const CertificateOptions& options);
+
+// The same from the multipliers with which FindFeasible ends where no estimate
+// has all its residuals below `bound`, pixels: a certificate near that bound
+// from what balances of them (SelectBalanced), for several tolerances.
+std::optional<Certificate> MakeInfeasibilityCertificate(
+    const KnownRotationProblem& problem, Norm norm, double bound,
+    const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options);
 
 }  // namespace krot

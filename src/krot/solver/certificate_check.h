@@ -56,8 +56,7 @@ struct CertificateCheck {
 //
 // The rotations count as known to kRotationError per entry. Works for p = 1, 2
 // and infinity; anything else, and whatever else is wrong with the
-// certificate, is a refusal and never an exception. Cubic in the frames of the
-// support (at most kMaxVerifiedFrames), linear in its points.
+// certificate, is a refusal and never an exception. O(support log support).
 CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
                                   Norm norm, const Certificate& certificate);
 

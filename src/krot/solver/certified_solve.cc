@@ -1,7 +1,9 @@
 #include "krot/solver/certified_solve.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
+#include <vector>
 
 #include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
@@ -13,36 +15,64 @@ namespace {
 // A certificate is tried once the interior point's own gap is as small as the
 // one asked for, and again whenever it has fallen by this factor.
 constexpr double kGapBetweenCertificates = 0.3;
-// Where rounding ends the interior point anyway.
-constexpr double kSmallestGap = 1e-10;
+// Of the gap asked for, where the interior point has gone far enough: what is
+// not proved there is none of its optimum's.
+constexpr double kFarBelow = 1e-2;
 // Iterations after which a start is given up if the gap is still large. Most
 // models take 10 to 50 in all; a start whose points hug the boundary of the
 // cones can hold the interior point back for hundreds.
 constexpr int kIterationsPerStart = 60;
 constexpr double kLargeGap = 0.1;
-// A fresh start is looked for at these shares of the cost.
-constexpr double kRestartShares[] = {0.25, 0.5, 0.75, 0.9, 0.97};
-constexpr int kMaxRestarts = 4;
-constexpr double kHopelessGap = 1e-2;
+// So many iterations must halve the gap, or the start is given up.
+constexpr int kPatience = 30;
+// A fresh start is found by bisection, to this width, relative to the cost; if
+// that was in vain, to a share of it.
+constexpr double kFirstWidth = 1e-2;
+constexpr double kShareOfWidth = 0.25;
+constexpr double kStartMargin = 0.1;
+constexpr double kFreshStartMargin = 1e-2;
+// In the unit of depth, of the median.
+constexpr double kShareOfDepth = 0.1;
+constexpr double kHopelessGap = 1e-5;
+// Whether there is anything below the cost is asked at this share of the gap
+// that is to be shown.
+constexpr double kShareOfGap = 0.5;
+// What is lost of a bound when it is proved, at most, relative.
+constexpr double kProofLoss = 1e-3;
+
+double MedianDepth(const KnownRotationProblem& problem,
+                   const Estimate& estimate) {
+  std::vector<double> depths;
+  depths.reserve(problem.observations.size());
+  for (const Observation& observation : problem.observations) {
+    depths.push_back(ViewPoint(problem, observation, estimate).depth);
+  }
+  const auto median =
+      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), median, depths.end());
+  return *median;
+}
 
 }  // namespace
 
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
-                               const Estimate& start)
+                               const Estimate& start, double known_bound)
     : problem_(problem),
       options_(options),
       estimate_(start),
-      cost_(Cost(problem, start, options.norm, options.num_threads)) {}
+      cost_(Cost(problem, start, options.norm, options.num_threads)),
+      lower_bound_(known_bound) {}
 
-void CertifiedSolve::TryCertificate(const ConicIterate& iterate) {
+CertificateOptions CertifiedSolve::OptionsFor(double sufficient_bound) const {
   CertificateOptions options;
-  options.sufficient_bound = (1 - options_.relative_gap) * cost_;
+  options.sufficient_bound = sufficient_bound;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
-  std::optional<Certificate> certificate =
-      MakeCertificate(problem_, options_.norm, *iterate.estimate, iterate.gamma,
-                      *iterate.multipliers, options);
+  return options;
+}
+
+void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
   if (!certificate) return;
   const CertificateCheck check =
       CheckCertificate(problem_, options_.norm, *certificate);
@@ -53,14 +83,18 @@ void CertifiedSolve::TryCertificate(const ConicIterate& iterate) {
 }
 
 InteriorPointTermination CertifiedSolve::RunFromEstimate(
-    const IsWorthProving& is_worth_proving, const IterationReport& report) {
+    double start_margin, const IsWorthProving& is_worth_proving,
+    const IterationReport& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
+  options.start_margin = start_margin;
   options.max_iterations = max_iterations_ - iterations_;
-  options.smallest_gap = std::min(kSmallestGap, options_.relative_gap);
+  options.smallest_gap = kFarBelow * options_.relative_gap;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
   double next_gap = options_.relative_gap;
+  double milestone = std::numeric_limits<double>::infinity();
+  int milestone_iteration = 0;
   options.stop = [&](const ConicIterate& iterate) {
     ++iterations_;
     if (iterate.cost < cost_) {
@@ -69,13 +103,23 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
     }
     if (iterate.gap <= next_gap) {
       is_given_up_ = !is_worth_proving(estimate_, cost_);
-      if (!is_given_up_) TryCertificate(iterate);
+      if (!is_given_up_) {
+        Adopt(MakeCertificate(problem_, options_.norm, *iterate.estimate,
+                              iterate.gamma, *iterate.multipliers,
+                              OptionsFor((1 - options_.relative_gap) * cost_)));
+      }
       next_gap = kGapBetweenCertificates * iterate.gap;
     }
+    gap_ = iterate.gap;
+    if (gap_ < milestone / 2) {
+      milestone = gap_;
+      milestone_iteration = iterate.iteration;
+    }
     JointIteration iteration;
-    iteration.gap = iterate.gap;
+    iteration.gap = gap_;
     report(iteration);
     return is_given_up_ || IsGapReached() ||
+           iterate.iteration >= milestone_iteration + kPatience ||
            (iterate.iteration >= kIterationsPerStart &&
             iterate.gap > kLargeGap);
   };
@@ -84,10 +128,13 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
   return MinimizeJointly(problem_, options, &last, &multipliers).termination;
 }
 
-// An estimate of lower cost, far from the boundary of the cones.
-bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
+// Either an estimate below `bound`, pixels, far from the boundary of the cones,
+// which becomes the best; or a proof, if all goes well, that there is none.
+bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
   FeasibleStartOptions options;
   options.norm = options_.norm;
+  options.unit_depth = kShareOfDepth * MedianDepth(problem_, estimate_);
+  options.known_bound = lower_bound_;
   options.hopeless_gap = kHopelessGap;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
@@ -97,26 +144,62 @@ bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
     iteration.target = target;
     report(iteration);
   };
-  for (const double share : kRestartShares) {
-    if (share * cost_ <= lower_bound_) continue;
-    if (FindEstimateBelow(problem_, share * cost_, options, &estimate_) ==
-        InteriorPointTermination::kFeasible) {
-      LowerByFeasibility(problem_, options, &estimate_);
-      cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
-      return true;
+  std::vector<Multiplier> multipliers;
+  if (FindEstimateBelow(problem_, bound, options, &estimate_, &multipliers) ==
+      InteriorPointTermination::kFeasible) {
+    LowerByFeasibility(problem_, options, &estimate_);
+    cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
+    return true;
+  }
+  const double sufficient =
+      std::min((1 - kProofLoss) * bound, (1 - options_.relative_gap) * cost_);
+  Adopt(MakeInfeasibilityCertificate(problem_, options_.norm, bound,
+                                     multipliers, OptionsFor(sufficient)));
+  return false;
+}
+
+// Brings cost and what is known to be infeasible together. Whether there is a
+// new estimate.
+bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
+  bool is_fresh = false;
+  double infeasible = lower_bound_;
+  while (cost_ - infeasible > width * cost_ && !IsGapReached() &&
+         iterations_ < max_iterations_ && !IsCancelled(options_.cancel)) {
+    const double bound = (infeasible + cost_) / 2;
+    if (TryBelow(bound, report)) {
+      is_fresh = true;
+    } else {
+      infeasible = std::max(bound, lower_bound_);
     }
   }
-  return false;
+  return is_fresh;
+}
+
+// Whether there is a new estimate. Where the interior point believes that there
+// is none, a proof of that is sought first.
+bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
+  bool is_fresh = false;
+  if (gap_ <= kLargeGap) {
+    is_fresh =
+        TryBelow((1 - kShareOfGap * options_.relative_gap) * cost_, report);
+    if (IsGapReached()) return false;
+  }
+  is_fresh |= Bisect(width_, report);
+  width_ *= kShareOfWidth;
+  return is_fresh;
 }
 
 JointTermination CertifiedSolve::Run(int max_iterations,
                                      const IsWorthProving& is_worth_proving,
                                      const IterationReport& report) {
   max_iterations_ = max_iterations;
+  width_ = kFirstWidth;
   if (!(cost_ > 0)) return JointTermination::kGapReached;
-  for (int restart = 0; restart <= kMaxRestarts; ++restart) {
+  double start_margin = kStartMargin;
+  for (;;) {
     const InteriorPointTermination termination =
-        RunFromEstimate(is_worth_proving, report);
+        RunFromEstimate(start_margin, is_worth_proving, report);
+    start_margin = kFreshStartMargin;
     if (IsGapReached()) return JointTermination::kGapReached;
     if (is_given_up_) return JointTermination::kStalled;
     if (termination == InteriorPointTermination::kInterrupted) {
@@ -126,13 +209,13 @@ JointTermination CertifiedSolve::Run(int max_iterations,
       return JointTermination::kMaxIterations;
     }
     const bool is_fresh = FindFreshStart(report);
+    if (IsGapReached()) return JointTermination::kGapReached;
     if (IsCancelled(options_.cancel)) return JointTermination::kInterrupted;
-    if (!is_fresh) break;
     if (iterations_ >= max_iterations_) {
       return JointTermination::kMaxIterations;
     }
+    if (!is_fresh) return JointTermination::kStalled;
   }
-  return JointTermination::kStalled;
 }
 
 }  // namespace krot

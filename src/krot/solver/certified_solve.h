@@ -21,9 +21,11 @@ class CertifiedSolve {
   // is optimal.
   using IsWorthProving = std::function<bool(const Estimate&, double cost)>;
 
-  // Keeps references. All depths of `start` are positive.
+  // Keeps references. All depths of `start` are positive. A cost that is as low
+  // as `known_bound`, pixels, allows is low enough.
   CertifiedSolve(const KnownRotationProblem& problem,
-                 const JointOptions& options, const Estimate& start);
+                 const JointOptions& options, const Estimate& start,
+                 double known_bound);
 
   // Takes at most `max_iterations`, except for those towards a fresh start,
   // which it ends once begun. Asks before every certificate that it tries, and
@@ -35,7 +37,7 @@ class CertifiedSolve {
   // The best so far, never worse than the start, and its cost in pixels.
   const Estimate& estimate() const { return estimate_; }
   double cost() const { return cost_; }
-  // What the certificate proves, pixels; 0 if there is none.
+  // What the certificate proves, pixels; without one, the known bound.
   double lower_bound() const { return lower_bound_; }
   const std::optional<Certificate>& certificate() const { return certificate_; }
   // Those towards a fresh start included.
@@ -46,9 +48,13 @@ class CertifiedSolve {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
   InteriorPointTermination RunFromEstimate(
-      const IsWorthProving& is_worth_proving, const IterationReport& report);
+      double start_margin, const IsWorthProving& is_worth_proving,
+      const IterationReport& report);
   bool FindFreshStart(const IterationReport& report);
-  void TryCertificate(const ConicIterate& iterate);
+  bool Bisect(double width, const IterationReport& report);
+  bool TryBelow(double bound, const IterationReport& report);
+  CertificateOptions OptionsFor(double sufficient_bound) const;
+  void Adopt(std::optional<Certificate> certificate);
 
   const KnownRotationProblem& problem_;
   const JointOptions& options_;
@@ -58,6 +64,8 @@ class CertifiedSolve {
   std::optional<Certificate> certificate_;
   int iterations_ = 0;
   int max_iterations_ = 0;
+  double width_ = 0;  // of the next bisection, relative
+  double gap_ = 0;    // of the interior point, where its last run ended
   bool is_given_up_ = false;
 };
 

@@ -11,19 +11,26 @@
 namespace krot {
 
 // Makes multipliers that satisfy the identities (1) and (2) of
-// certificate_check.h approximately satisfy them to rounding. The lambda_i
-// keep their proportions; y_i moves by lambda_i a_i, with sum |a_i|^2 the
-// least, for the delta whose bound delta / max (|y_i|_dual / lambda_i) is the
-// largest.
+// certificate_check.h approximately for `delta` > 0, pixels, satisfy them to
+// rounding. It goes to and fro between the least change, relative and in a
+// metric in which lengthening y_i / lambda_i costs more than turning it, that
+// restores (1) and (2), and the nearest multipliers with |y_i|_dual <=
+// lambda_i. Where the two do not meet, y is divided by the largest
+// |y_i|_dual / lambda_i, and what is proved is delta by as much smaller.
 //
-// Requires one connected problem, an estimate whose depths are positive (it
-// only says what size (2) has) and one multiplier per observation, all
-// lambda > 0. None if the unknowns are more than twice the observations, or if
-// parts of the problem are flexible. The certificate's observations are those
-// of `problem`; its defect is 0, nothing is verified. See least_norm.h for the
-// cost.
-std::optional<Certificate> RepairMultipliers(
-    const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
+// Requires one connected problem and one multiplier per observation, all
+// lambda > 0. See least_norm.h for the cost.
+struct RepairedMultipliers {
+  // Its observations are those of the problem; its defect is 0, nothing is
+  // verified. None if the equations cannot be solved, or if there are misfits.
+  std::optional<Certificate> certificate;
+  // The observations whose lambda would have to change by more than half: the
+  // others may balance without them. Ascending.
+  std::vector<int64_t> misfits;
+};
+
+RepairedMultipliers RepairMultipliers(
+    const KnownRotationProblem& problem, Norm norm, double delta,
     const std::vector<Multiplier>& multipliers);
 
 }  // namespace krot

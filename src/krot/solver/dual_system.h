@@ -5,14 +5,15 @@
 
 #include <Eigen/Core>
 
+#include "krot/conic/interior_point.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/solver/least_norm.h"
 
 namespace krot {
 
-// The identities (1) and (2) of certificate_check.h as linear equations.
-// Unknown are eta_i = y_i / lambda_i and, optionally, relative changes of the
-// lambda_i. Internal to the making of certificates.
+// The identities (1) and (2) of certificate_check.h as linear equations in the
+// multipliers y_i, lambda_i, for one delta. Internal to the making of
+// certificates.
 //
 // The rows are those of the points and of all frames but the first (the
 // problem must be connected). Where a frame sees points through several
@@ -20,53 +21,36 @@ namespace krot {
 // centre of the frame's first view.
 class DualSystem {
  public:
-  using Real = long double;
-  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+  // (2) is asked to stay as far below zero as it is for these multipliers, at
+  // least by `margin`, relative to what it sums up.
+  DualSystem(const KnownRotationProblem& problem, double delta,
+             const std::vector<Multiplier>& multipliers, double margin);
 
-  DualSystem(const KnownRotationProblem& problem,
-             const std::vector<double>& lambda);
+  // What the equations miss for these, evaluated in extended precision.
+  Eigen::VectorXd Miss(const std::vector<Multiplier>& multipliers) const;
 
-  // Asks for a left-hand side of (2) that is -delta * margin instead of 0.
-  void SetConstantMargin(double margin);
-
-  // The equations' left-hand sides, without c's: M eta, M = [A_i' lambda_i].
-  VectorXr Multiply(const Eigen::VectorXd& eta) const;
-  // sum_i lambda_i c_i.
-  const VectorXr& c() const { return c_; }
-
-  // The equations M x = rhs, and those that also let the lambda_i change by
-  // x_i lambda_i, which adds lambda_i (A_i'eta_i + delta c_i) x_i.
-  LeastNormProblem Equations() const;
-  LeastNormProblem EquationsWithScalings(const Eigen::VectorXd& eta,
-                                         double delta) const;
-
-  int64_t num_rows() const { return num_rows_; }
-  static int64_t NumRows(const KnownRotationProblem& problem) {
-    return 3 * (int64_t{problem.num_points} + problem.num_frames - 1);
-  }
+  // The equations for changes of the multipliers of the constructor, in units
+  // of lambda_i: of y_i by axes[i]' x_1,2, and of both y_i and lambda_i by x_3.
+  LeastNormProblem Changes(const std::vector<Eigen::Matrix2d>& axes) const;
 
  private:
+  using Real = long double;
   using Matrix3r = Eigen::Matrix<Real, 3, 3>;
   using Vector3r = Eigen::Matrix<Real, 3, 1>;
-  // lambda (A; c) by the two unknowns of an observation, and lambda (b; d).
+  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+  // (A; delta c) by the two unknowns of an observation, and (b; delta d).
   struct Block {
     Matrix3r point;
     Matrix3r frame;
-    Vector3r constants;
-    int64_t point_row;
-    int64_t frame_row;  // -1: omitted
+    Vector3r constants = Vector3r::Zero();
+    int32_t point_index = 0;
+    int32_t frame_index = 0;  // 0: omitted
   };
 
-  // Calls visit(row, lambda (A; c) of that row) for every row of a block.
-  template <typename Visit>
-  void ForRows(const Block& block, const Visit& visit) const;
-
-  int32_t num_points_;
-  int32_t num_frames_;
+  const std::vector<Multiplier> multipliers_;
+  LeastNormProblem empty_;  // without columns
   std::vector<Block> blocks_;
-  bool has_constants_ = false;
-  int64_t num_rows_ = 0;
-  VectorXr c_;
+  Real constants_ = 0;  // the left-hand side of (2) that is asked for
 };
 
 }  // namespace krot

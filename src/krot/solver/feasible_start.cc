@@ -23,10 +23,10 @@ double UnitDepth(const KnownRotationProblem& problem) {
 
 }  // namespace
 
-InteriorPointTermination FindEstimateBelow(const KnownRotationProblem& problem,
-                                           double bound,
-                                           const FeasibleStartOptions& options,
-                                           Estimate* estimate) {
+InteriorPointTermination FindEstimateBelow(
+    const KnownRotationProblem& problem, double bound,
+    const FeasibleStartOptions& options, Estimate* estimate,
+    std::vector<Multiplier>* multipliers) {
   InteriorPointOptions conic;
   conic.norm = options.norm;
   conic.max_iterations = options.max_iterations;
@@ -36,9 +36,9 @@ InteriorPointTermination FindEstimateBelow(const KnownRotationProblem& problem,
     if (options.callback) options.callback(bound);
     return iterate.gamma > 1 && iterate.gap < options.hopeless_gap;
   };
-  std::vector<Multiplier> multipliers;
-  return FindFeasible(problem, conic, bound, UnitDepth(problem), estimate,
-                      &multipliers)
+  return FindFeasible(problem, conic, bound,
+                      options.unit_depth.value_or(UnitDepth(problem)), estimate,
+                      multipliers)
       .termination;
 }
 
@@ -46,11 +46,13 @@ bool LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
                         Estimate* estimate) {
   bool is_lower = false;
+  std::vector<Multiplier> multipliers;
   for (;;) {
     const double cost =
         Cost(problem, *estimate, options.norm, options.num_threads);
-    if (!(cost > 0) ||
-        FindEstimateBelow(problem, kShare * cost, options, estimate) !=
+    if (!(kShare * cost > options.known_bound) ||
+        FindEstimateBelow(problem, kShare * cost, options, estimate,
+                          &multipliers) !=
             InteriorPointTermination::kFeasible) {
       return is_lower;
     }

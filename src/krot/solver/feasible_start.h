@@ -1,6 +1,8 @@
 #pragma once
 
 #include <functional>
+#include <optional>
+#include <vector>
 
 #include "krot/conic/interior_point.h"
 #include "krot/minimax/norm.h"
@@ -11,7 +13,12 @@ namespace krot {
 struct FeasibleStartOptions {
   Norm norm;
   int max_iterations = 200;  // >= 1
-  // Gives up, without proof, once the programme's gap is this small and the
+  // A depth that is small against the scene, scene units; it only shapes the
+  // way. None: a share of the longest baseline, or 1 where the scale is free.
+  std::optional<double> unit_depth;
+  // Nothing below this is sought, pixels.
+  double known_bound = 0;
+  // Gives up once the programme's gap is this small and the
   // bound not met; 0: never.
   double hopeless_gap = 0;
   int num_threads = -1;
@@ -25,11 +32,12 @@ struct FeasibleStartOptions {
 // pixels, from nothing: FindFeasible with a unit of depth that suits the
 // problem's baselines. As that starts from the centre of the cones, the
 // estimate is a good start for MinimizeJointly. `*estimate` is only written if
-// one is found (kFeasible).
-InteriorPointTermination FindEstimateBelow(const KnownRotationProblem& problem,
-                                           double bound,
-                                           const FeasibleStartOptions& options,
-                                           Estimate* estimate);
+// one is found (kFeasible); otherwise `*multipliers` may prove that there is
+// none (MakeInfeasibilityCertificate).
+InteriorPointTermination FindEstimateBelow(
+    const KnownRotationProblem& problem, double bound,
+    const FeasibleStartOptions& options, Estimate* estimate,
+    std::vector<Multiplier>* multipliers);
 
 // Lowers an estimate by FindEstimateBelow at a quarter of its cost, again and
 // again as long as there is one; returns whether there was. Takes some five

@@ -49,6 +49,7 @@ class StartSearch {
  private:
   FeasibleStartOptions StartOptions(double hopeless_gap);
   InitializerTermination DecideByOptimum(Estimate* estimate);
+  bool Proves(Certificate certificate);
   void Record(JointIteration iteration);
 
   const RestrictedProblem& part_;
@@ -83,10 +84,11 @@ FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
 // estimate that misses the bound, it proves that there is none, or meets the
 // bound itself.
 InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
+  std::vector<Multiplier> multipliers;
   for (double bound = kBoundGrowth * options_.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
-    const InteriorPointTermination found =
-        FindEstimateBelow(part_.problem, bound, StartOptions(0), estimate);
+    const InteriorPointTermination found = FindEstimateBelow(
+        part_.problem, bound, StartOptions(0), estimate, &multipliers);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
@@ -100,12 +102,7 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
       Record(iteration);
     };
     const JointSummary optimum = SolveJoint(part_.problem, joint, estimate);
-    if (optimum.certificate && optimum.lower_bound > options_.max_error) {
-      summary_.certificate = optimum.certificate;
-      for (CertifiedObservation& o : summary_.certificate->observations) {
-        o.observation = part_.observation_of[o.observation];
-      }
-      summary_.lower_bound = optimum.lower_bound;
+    if (optimum.certificate && Proves(*optimum.certificate)) {
       return InitializerTermination::kInfeasible;
     }
     if (optimum.termination == JointTermination::kInterrupted) {
@@ -118,13 +115,34 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
   return InitializerTermination::kFailed;
 }
 
+// Whether a certificate of the part shows that there is no start. Keeps it
+// then.
+bool StartSearch::Proves(Certificate certificate) {
+  const CertificateCheck check =
+      CheckCertificate(part_.problem, options_.norm, certificate);
+  if (!(check.proved_bound > options_.max_error)) return false;
+  for (CertifiedObservation& o : certificate.observations) {
+    o.observation = part_.observation_of[o.observation];
+  }
+  summary_.lower_bound = check.proved_bound;
+  summary_.certificate = std::move(certificate);
+  return true;
+}
+
 InitializerTermination StartSearch::Run(Estimate* start) {
+  std::vector<Multiplier> multipliers;
   const InteriorPointTermination found = FindEstimateBelow(
-      part_.problem, options_.max_error, StartOptions(0), start);
+      part_.problem, options_.max_error, StartOptions(0), start, &multipliers);
   if (found == InteriorPointTermination::kInterrupted) {
     return InitializerTermination::kInterrupted;
   }
   if (found != InteriorPointTermination::kFeasible) {
+    const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
+        part_.problem, options_.norm, options_.max_error, multipliers,
+        CertificateOptions());
+    if (certificate && Proves(*certificate)) {
+      return InitializerTermination::kInfeasible;
+    }
     const InitializerTermination decision = DecideByOptimum(start);
     if (decision != InitializerTermination::kFeasible) return decision;
   }

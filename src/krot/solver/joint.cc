@@ -97,7 +97,7 @@ JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
                                            const IterationReport& report,
                                            Estimate* candidate) {
   const Estimate start = RestrictEstimate(part, estimate_);
-  CertifiedSolve solve(part.problem, options_, start);
+  CertifiedSolve solve(part.problem, options_, start, lower_bound_);
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {

@@ -35,7 +35,7 @@ using JointCallback =
 struct JointOptions {
   Norm norm;                   // p = 1, 2 or infinity
   double relative_gap = 1e-4;  // (cost - lower_bound) / cost; > 0
-  int max_iterations = 300;    // per component; >= 1
+  int max_iterations = 2000;   // per component; >= 1
   int num_threads = -1;
   const CancelFlag* cancel = nullptr;  // may be null
   JointCallback callback;  // counts over all components; may be empty

@@ -37,7 +37,7 @@ struct LeastNormProblem {
 };
 
 // Their solutions of least norm: dense, by Householder's reflections, where
-// that is affordable, as supports may be nearly flexible; beyond
+// that is affordable, as their multipliers span many decades; beyond
 // `max_dense_rows` by eliminating points.
 class LeastNormSolver {
  public:

@@ -27,4 +27,14 @@ std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
                                    const std::vector<double>& scores,
                                    double threshold);
 
+// The largest part of the `candidates`, ascending, in which the forces of the
+// multipliers at `delta` pixels (force_balance.h) balance at every point and
+// frame, up to `tolerance` > 0 of the largest delta lambda there: what does not
+// is dropped, until everything does, and without those that bound nothing.
+std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
+                                    double delta,
+                                    const std::vector<Multiplier>& multipliers,
+                                    std::vector<int64_t> candidates,
+                                    double tolerance);
+
 }  // namespace krot
