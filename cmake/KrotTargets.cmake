@@ -31,6 +31,24 @@ function(krot_warnings target)
   endif()
 endfunction()
 
+# krot_native_kernel(<file>)
+#
+# Compiles one source file of this folder's library for the machine at hand.
+# It must have no Eigen type in its interface: vector flags would change their
+# alignment and so the ABI.
+function(krot_native_kernel file)
+  set(kernel_flags -O3 -fno-math-errno -fno-trapping-math)
+  if(KROT_NATIVE)
+    include(CheckCXXCompilerFlag)
+    check_cxx_compiler_flag(-march=native KROT_HAS_MARCH_NATIVE)
+    if(KROT_HAS_MARCH_NATIVE)
+      list(APPEND kernel_flags -march=native)
+    endif()
+  endif()
+  set_source_files_properties(${file} PROPERTIES
+    COMPILE_OPTIONS "${kernel_flags}")
+endfunction()
+
 # krot_test(<name> SOURCES file... DEPENDS target...)
 #
 # A GoogleTest executable whose every TEST is one CTest test.

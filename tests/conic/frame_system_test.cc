@@ -1,6 +1,7 @@
 #include "krot/conic/frame_system.h"
 
 #include <random>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
@@ -118,6 +119,44 @@ TEST(FrameSystem, SolvesALongChainSparselyAsItDoesDensely) {
     FillChain(kSparseFrames, system);
     ASSERT_TRUE(system->Factorize(2));
     EXPECT_LT((system->Solve(rhs) - x_true).norm(), 1e-11 * x_true.norm());
+  }
+}
+
+// Tracks with gaps across the fixed frame, on top of a chain that is large
+// enough to stay positive definite; two of their frames stand apart.
+TEST(FrameSystem, LosesSquaresAsTheDenseMatrixDoes) {
+  const int fixed = 3;
+  for (const int num_frames : {12, kSparseFrames}) {
+    const std::vector<int32_t> frames = {0, 1, 2, 4, 5, 7, 8, 9, 11};
+    const std::vector<char> is_apart = {0, 1, 0, 0, 1, 0, 1, 0, 0};
+    BlockStructure structure = MakeChain(num_frames, fixed);
+    structure.frame_of.insert(structure.frame_of.end(), frames.begin(),
+                              frames.end());
+    structure.point_begin.push_back(
+        static_cast<int64_t>(structure.frame_of.size()));
+    FrameSystem system(structure);
+    FillChain(num_frames, &system);
+    MatrixXd expected = DenseChain(num_frames, fixed);
+
+    std::mt19937 generator(3);
+    std::normal_distribution<double> normal;
+    using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
+    Rows G(3, 3 * frames.size());
+    for (double& entry : G.reshaped()) entry = 0.05 * normal(generator);
+    const double* const rows[3] = {&G(0, 0), &G(1, 0), &G(2, 0)};
+    system.SubtractSquare(system.num_parts() - 1, frames, is_apart, rows);
+    for (size_t a = 0; a < frames.size(); ++a) {
+      for (size_t b = 0; b < frames.size(); ++b) {
+        if (is_apart[a] && is_apart[b]) continue;
+        expected.block<3, 3>(system.column(frames[a]),
+                             system.column(frames[b])) -=
+            G.middleCols<3>(3 * a).transpose() * G.middleCols<3>(3 * b);
+      }
+    }
+    ASSERT_TRUE(system.Factorize(1));
+    const VectorXd x_true = RandomVector(system.num_columns());
+    const VectorXd x = system.Solve(expected * x_true);
+    EXPECT_LT((x - x_true).norm(), 1e-11 * x_true.norm());
   }
 }
 

@@ -64,6 +64,17 @@ TYPED_TEST(NtScalingTest, IsSymmetricAndPositiveDefinite) {
   });
 }
 
+TYPED_TEST(NtScalingTest, TakesAPairWhereSmallestProductSays) {
+  for (const double margin : {1.0, 1e-2, 1e-4, 1e-6}) {
+    this->ForPairs(margin, [&](const auto& s, const auto& z) {
+      const double root =
+          TypeParam::SmallestEigenvalue(NtScaling<TypeParam>(s, z).Apply(z));
+      EXPECT_NEAR(TypeParam::SmallestProduct(s, z), root * root,
+                  1e-14 / margin * s.dot(z));
+    });
+  }
+}
+
 TYPED_TEST(NtScalingTest, OfACentredPairHasOneEigenvalue) {
   // s = mu z^-1: lambda is sqrt(mu) times the identity.
   ConeGenerator<TypeParam> random(4);

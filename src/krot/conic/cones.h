@@ -13,8 +13,8 @@ namespace krot {
 // in R^3; for p = 1 and infinity four half-planes.
 //
 // Each offers, for vectors of kDim numbers: the identity, the product, the
-// solution y of x o y = r (Divide), the smallest eigenvalue, the longest step
-// that stays in the cone, and the map T from (gamma w; v) into the cone.
+// solution y of x o y = r (Divide), the smallest eigenvalue, the square of that
+// of a pair (SmallestProduct), the longest step that stays in the cone.
 
 struct SecondOrderCone {
   static constexpr int kDim = 3;
@@ -46,6 +46,16 @@ struct SecondOrderCone {
 
   static double SmallestEigenvalue(const Vector& x) {
     return x[0] - x.tail<2>().norm();
+  }
+
+  // Of lambda = W z = W^-1 s, W being the scaling of a pair in the cone
+  // (nt_scaling.h), the smallest eigenvalue squared: the lesser root of
+  // t^2 - 2 s'z t + det(s) det(z).
+  static double SmallestProduct(const Vector& s, const Vector& z) {
+    const double half_sum = s.dot(z);
+    const double product = Determinant(s) * Determinant(z);
+    const double root = std::sqrt(std::max(0.0, half_sum * half_sum - product));
+    return product / (half_sum + root);
   }
 
   // The largest alpha <= limit with x + alpha d in the cone; x inside it.
@@ -81,6 +91,10 @@ struct FourHalfLines {
   }
 
   static double SmallestEigenvalue(const Vector& x) { return x.minCoeff(); }
+
+  static double SmallestProduct(const Vector& s, const Vector& z) {
+    return s.cwiseProduct(z).minCoeff();
+  }
 
   static double MaxStep(const Vector& x, const Vector& d, double limit) {
     for (int k = 0; k < kDim; ++k) {

@@ -134,9 +134,7 @@ bool ConicSolver<Cone>::IsInside(const State& trial) const {
         !(Cone::SmallestEigenvalue(trial.z[i]) > 0)) {
       return -1.0;
     }
-    const double root = Cone::SmallestEigenvalue(
-        NtScaling<Cone>(s, trial.z[i]).Apply(trial.z[i]));
-    return root * root - kNeighbourhood * mu;
+    return Cone::SmallestProduct(s, trial.z[i]) - kNeighbourhood * mu;
   }) >= 0;
 }
 

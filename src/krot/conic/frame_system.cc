@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "krot/base/parallel_for.h"
+#include "krot/conic/block_update.h"
 
 namespace krot {
 namespace {
@@ -41,7 +42,7 @@ FrameSystem::FrameSystem(const BlockStructure& structure)
   if (is_dense_) {
     dense_.resize(num_parts_);
   } else {
-    blocks_.resize(num_parts_);
+    values_.resize(num_parts_);
   }
 }
 
@@ -79,32 +80,60 @@ void FrameSystem::FindPattern(const BlockStructure& structure) {
   }
 }
 
-int64_t FrameSystem::BlockIndex(int32_t a, int32_t b) const {
-  const auto begin = block_row_.begin() + block_begin_[b / 3];
-  const auto end = block_row_.begin() + block_begin_[b / 3 + 1];
-  return std::lower_bound(begin, end, a / 3) - block_row_.begin();
+FrameSystem::Block FrameSystem::BlockOf(int part, int32_t a, int32_t b) {
+  const int32_t row = column(a);
+  const int32_t col = column(b);
+  if (is_dense_) return {&dense_[part](row, col), num_columns_};
+  const int64_t begin = block_begin_[col / 3];
+  const int64_t end = block_begin_[col / 3 + 1];
+  const auto found = std::lower_bound(block_row_.begin() + begin,
+                                      block_row_.begin() + end, row / 3);
+  const int64_t n = found - block_row_.begin() - begin;
+  return {values_[part].data() + 9 * begin + 3 * n, 3 * (end - begin)};
 }
 
 void FrameSystem::SetZero() {
   for (Eigen::MatrixXd& part : dense_) part.setZero(num_columns_, num_columns_);
-  for (std::vector<double>& part : blocks_) {
+  for (std::vector<double>& part : values_) {
     part.assign(9 * block_row_.size(), 0.0);
   }
 }
 
 void FrameSystem::AddBlock(int part, int32_t a, int32_t b,
                            const double block[9]) {
-  const int32_t row = column(a);
-  const int32_t col = column(b);
-  if (is_dense_) {
-    double* target = &dense_[part](row, col);
-    for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) target[r] += block[3 * c + r];
-      target += num_columns_;
+  const Block target = BlockOf(part, a, b);
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) {
+      target.first[c * target.stride + r] += block[3 * c + r];
     }
-  } else {
-    double* target = blocks_[part].data() + 9 * BlockIndex(row, col);
-    for (int k = 0; k < 9; ++k) target[k] += block[k];
+  }
+}
+
+// By runs of frames that follow each other: there the rows do, too.
+void FrameSystem::SubtractSquare(int part, const std::vector<int32_t>& frames,
+                                 const std::vector<char>& is_apart,
+                                 const double* const G[3]) {
+  const size_t n = frames.size();
+  for (size_t b = 0; b < n; ++b) {
+    double S[9];
+    for (int r = 0; r < 3; ++r) std::copy_n(G[r] + 3 * b, 3, S + 3 * r);
+    for (size_t begin = b; begin < n;) {
+      if (is_apart[b] && is_apart[begin]) {
+        ++begin;
+        continue;
+      }
+      size_t end = begin + 1;
+      while (end < n && column(frames[end]) == column(frames[end - 1]) + 3 &&
+             !(is_apart[b] && is_apart[end])) {
+        ++end;
+      }
+      const Block target = BlockOf(part, frames[begin], frames[b]);
+      const double* const rows[3] = {G[0] + 3 * begin, G[1] + 3 * begin,
+                                     G[2] + 3 * begin};
+      SubtractFromColumns(rows, S, 3 * static_cast<int64_t>(end - begin),
+                          target.first, target.stride);
+      begin = end;
+    }
   }
 }
 
@@ -129,7 +158,7 @@ bool FrameSystem::Factorize(int num_threads) {
         for (int r = 0; r < 3; ++r, ++entry) {
           double sum = 0;
           for (int part = 0; part < num_parts_; ++part) {
-            sum += blocks_[part][9 * n + 3 * (column % 3) + r];
+            sum += values_[part][entry];
           }
           sparse_.innerIndexPtr()[entry] =
               static_cast<Index>(3 * block_row_[n] + r);

@@ -32,6 +32,12 @@ class FrameSystem {
   // Adds a 3x3 block (column-major) at frames a, b with column(a) >=
   // column(b) >= 0. Different parts may be filled at the same time.
   void AddBlock(int part, int32_t a, int32_t b, const double block[9]);
+  // Subtracts G'G, G = [G_0 G_1 ...] standing for the free frames
+  // `frames`, ascending, but for the blocks of two frames that `is_apart`
+  // marks. G is given by its three rows of 3 x frames.size() numbers.
+  void SubtractSquare(int part, const std::vector<int32_t>& frames,
+                      const std::vector<char>& is_apart,
+                      const double* const G[3]);
 
   // Cholesky factor of the sum of the parts, with growing regularisation
   // until it exists; false if it never does.
@@ -42,8 +48,15 @@ class FrameSystem {
   int64_t MemoryBytes() const;
 
  private:
+  // A block: three columns of three numbers, `stride` apart. Of frames that
+  // follow each other the blocks of one column do too, without a gap.
+  struct Block {
+    double* first;
+    int64_t stride;
+  };
+
   void FindPattern(const BlockStructure& structure);
-  int64_t BlockIndex(int32_t a, int32_t b) const;
+  Block BlockOf(int part, int32_t a, int32_t b);
 
   bool is_dense_ = true;
   int num_parts_ = 1;
@@ -55,7 +68,7 @@ class FrameSystem {
   // Sparse: the block columns of the lower triangle.
   std::vector<int64_t> block_begin_;
   std::vector<int32_t> block_row_;
-  std::vector<std::vector<double>> blocks_;  // per part, 9 per block
+  std::vector<std::vector<double>> values_;  // per part, as of sparse_
   Eigen::SparseMatrix<double> sparse_;
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower,
                        Eigen::AMDOrdering<int>>

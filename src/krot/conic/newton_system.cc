@@ -76,6 +76,7 @@ template <typename Cone>
 bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
                                    double scalar,
                                    const std::vector<Vector>& z) {
+  using Rows = Eigen::Matrix<double, kDim, 3, Eigen::RowMajor>;
   const double top_per_depth = program_.TopPerDepth(scalar);
   loop_.ForEach([&](int64_t i) {
     scaling_[i] = NtScaling<Cone>(Slack(viewed[i], scalar), z[i]);
@@ -87,8 +88,14 @@ bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
     Matrix3d E;
     E.row(0) << 0, 0, top_per_depth;
     E.template bottomRows<2>() << o.J, -o.J * o.u;
-    FillRows(i, E * view.cam_from_world_rotation, elimination_.point_rows(i));
-    FillRows(i, E * view.cam_from_rig_rotation, elimination_.frame_rows(i));
+    Rows rows;  // of x_cam
+    for (int c = 0; c < 3; ++c) {
+      rows.col(c) = scaling_[i].ApplyInverse(T_ * E.col(c));
+    }
+    Eigen::Map<Rows>(elimination_.point_rows(i)).noalias() =
+        rows * view.cam_from_world_rotation;
+    Eigen::Map<Rows>(elimination_.frame_rows(i)).noalias() =
+        rows * view.cam_from_rig_rotation;
   });
   gap_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); });
   mu_ = gap_ / static_cast<double>(loop_.count() * Cone::kDegree);
@@ -103,15 +110,6 @@ bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
   elimination_.Multiply(x_border_, rest_[0].data());
   loop_.ForEach([&](int64_t i) { rest_[i] = border_[i] - rest_[i]; });
   return true;
-}
-
-template <typename Cone>
-void NewtonSystem<Cone>::FillRows(int64_t i, const Matrix3d& K,
-                                  double* rows) const {
-  for (int c = 0; c < 3; ++c) {
-    const Vector column = scaling_[i].ApplyInverse(T_ * K.col(c));
-    for (int r = 0; r < kDim; ++r) rows[3 * r + c] = column[r];
-  }
 }
 
 // e = mean of c_i / w_i: e'dx is the mean relative change of the depths.

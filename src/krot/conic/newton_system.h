@@ -68,7 +68,6 @@ class NewtonSystem {
   static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
  private:
-  void FillRows(int64_t i, const Eigen::Matrix3d& K, double* rows) const;
   void FindGauge(const std::vector<ViewedPoint>& viewed);
   void SolveForTarget(double sigma);
 

@@ -1,8 +1,6 @@
 #include "krot/conic/point_elimination.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 #include "krot/base/parallel_for.h"
 
@@ -19,30 +17,12 @@ using ConstBlock = Eigen::Map<const Block<kRows>>;
 template <int kRows>
 using Rows = Eigen::Matrix<double, kRows, 1>;
 
-// A column that keeps less than this of its norm is a combination of the
-// ones before it: the point is free to move along it.
-constexpr double kRankTolerance = 1e-13;
 // An observation all but determines its point beyond this |Q_a|^2.
 constexpr double kHighLeverage = 0.5;
 constexpr int kMaxHighLeverage = 6;
 constexpr int kRefinements = 1;
 // Starting a thread takes longer than its share of so few observations.
 constexpr int64_t kFewObservations = 4000;
-
-// column -= q q'column; returns q'column. Done twice, Gram-Schmidt is as
-// orthogonal as Householder's reflections [Giraud, Langou, Rozloznik 2005].
-double Orthogonalize(const double* q, int64_t n, double* column) {
-  double dot = 0;
-  for (int64_t i = 0; i < n; ++i) dot += q[3 * i] * column[3 * i];
-  for (int64_t i = 0; i < n; ++i) column[3 * i] -= dot * q[3 * i];
-  return dot;
-}
-
-double ColumnNorm(const double* column, int64_t n) {
-  double sum = 0;
-  for (int64_t i = 0; i < n; ++i) sum += column[3 * i] * column[3 * i];
-  return std::sqrt(sum);
-}
 
 }  // namespace
 
@@ -102,30 +82,49 @@ void PointElimination<kRows>::ForPoints(
               });
 }
 
-// A_s = Q R by Gram-Schmidt with reorthogonalisation.
 template <int kRows>
 void PointElimination<kRows>::OrthogonalizePoint(int64_t k) {
   const int64_t begin = structure_.point_begin[k];
-  const int64_t n = (structure_.point_begin[k + 1] - begin) * kRows;
-  const double* A = point_rows_.data() + begin * kBlock;
+  const int64_t end = structure_.point_begin[k + 1];
   double* Q = Q_.data() + begin * kBlock;
-  std::copy(A, A + 3 * n, Q);
-  double R[3][3] = {};
-  for (int c = 0; c < 3; ++c) {
-    const double norm_before = ColumnNorm(Q + c, n);
-    for (int pass = 0; pass < 2; ++pass) {
-      for (int b = 0; b < c; ++b) {
-        R[b][c] += Orthogonalize(Q + b, n, Q + c);
-      }
+  std::copy(point_rows_.data() + begin * kBlock,
+            point_rows_.data() + end * kBlock, Q);
+  R_[k] = Orthogonalize((end - begin) * kRows, Q);
+}
+
+// Collects the free frames that see a point, with G = Q'A_t.
+template <int kRows>
+void PointElimination<kRows>::FindSightings(int64_t k,
+                                            Sightings* sightings) const {
+  Sightings& s = *sightings;
+  s.Clear();
+  const int64_t begin = structure_.point_begin[k];
+  const int64_t end = structure_.point_begin[k + 1];
+  for (std::vector<double>& row : s.G) row.resize(3 * (end - begin));
+  for (int64_t n = begin; n < end;) {
+    const int32_t frame = structure_.frame_of[begin + order_[n]];
+    const int64_t first = n;
+    Matrix3d G = Matrix3d::Zero();
+    double leverage = 0;
+    for (; n < end && structure_.frame_of[begin + order_[n]] == frame; ++n) {
+      const int64_t i = begin + order_[n];
+      const ConstBlock<kRows> Q(&Q_[i * kBlock]);
+      G.noalias() +=
+          Q.transpose() * ConstBlock<kRows>(&frame_rows_[i * kBlock]);
+      leverage += Q.squaredNorm();
     }
-    const double norm = ColumnNorm(Q + c, n);
-    // Along a free direction the point does not answer.
-    const bool is_free = !(norm > kRankTolerance * norm_before);
-    R[c][c] = is_free ? std::numeric_limits<double>::infinity() : norm;
-    const double scale = is_free ? 0 : 1 / norm;
-    for (int64_t i = 0; i < n; ++i) Q[3 * i + c] *= scale;
+    if (frame_system_.column(frame) < 0) continue;
+    const size_t column = 3 * s.frames.size();
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) s.G[r][column + c] = G(r, c);
+    }
+    s.frames.push_back(frame);
+    s.begin.push_back(first);
+    s.end.push_back(n);
+    s.is_high.push_back(leverage > kHighLeverage &&
+                        static_cast<int>(s.high.size()) < kMaxHighLeverage);
+    if (s.is_high.back()) s.high.push_back(s.frames.size() - 1);
   }
-  R_[k] = {R[0][0], R[0][1], R[0][2], R[1][1], R[1][2], R[2][2]};
 }
 
 // Adds A_t' (I - Q Q') A_t, a 3x3 block for each pair of frames that see the
@@ -133,69 +132,53 @@ void PointElimination<kRows>::OrthogonalizePoint(int64_t k) {
 // they are squared: moving frame and point together, they may all but cancel.
 template <int kRows>
 void PointElimination<kRows>::AddPointToFrameSystem(int64_t k, int part) {
+  thread_local Sightings s;
+  FindSightings(k, &s);
   const int64_t begin = structure_.point_begin[k];
-  const int64_t end = structure_.point_begin[k + 1];
-  const auto Q = [&](int64_t i) { return ConstBlock<kRows>(&Q_[i * kBlock]); };
-  const auto F = [&](int64_t i) {
-    return ConstBlock<kRows>(&frame_rows_[i * kBlock]);
-  };
-  thread_local std::vector<Sighting> sightings;
-  sightings.clear();
-  Sighting* high[kMaxHighLeverage];
-  for (int64_t n = begin; n < end; ++n) {
-    const int64_t i = begin + order_[n];
-    const int32_t frame = structure_.frame_of[i];
-    if (frame_system_.column(frame) < 0) continue;
-    if (sightings.empty() || sightings.back().frame != frame) {
-      sightings.push_back({frame, n, n, 0, Matrix3d::Zero(), false});
+  for (size_t a = 0; a < s.frames.size(); ++a) {
+    if (s.is_high[a]) continue;
+    Matrix3d block = Matrix3d::Zero();
+    for (int64_t n = s.begin[a]; n < s.end[a]; ++n) {
+      const ConstBlock<kRows> F(&frame_rows_[(begin + order_[n]) * kBlock]);
+      block.noalias() += F.transpose() * F;
     }
-    Sighting& sighting = sightings.back();
-    sighting.end = n + 1;
-    sighting.G += Q(i).transpose() * F(i);
-    sighting.leverage += Q(i).squaredNorm();
+    frame_system_.AddBlock(part, s.frames[a], s.frames[a], block.data());
   }
-  int num_high = 0;
-  for (Sighting& sighting : sightings) {
-    sighting.is_high =
-        sighting.leverage > kHighLeverage && num_high < kMaxHighLeverage;
-    if (sighting.is_high) high[num_high++] = &sighting;
-  }
-  Matrix3d block;
-  for (const Sighting& a : sightings) {
-    if (!a.is_high) {
-      block.noalias() = -a.G.transpose() * a.G;
-      for (int64_t n = a.begin; n < a.end; ++n) {
-        const int64_t i = begin + order_[n];
-        block.noalias() += F(i).transpose() * F(i);
-      }
-      frame_system_.AddBlock(part, a.frame, a.frame, block.data());
-    }
-    for (const Sighting* b = sightings.data(); b != &a; ++b) {
-      if (a.is_high && b->is_high) continue;
-      block.noalias() = -a.G.transpose() * b->G;
-      frame_system_.AddBlock(part, a.frame, b->frame, block.data());
-    }
-  }
-  if (num_high == 0) return;
-  // P = (I - Q Q') A_t for the frames of high leverage, over all rows.
-  const int64_t m = end - begin;
+  const double* const G[3] = {s.G[0].data(), s.G[1].data(), s.G[2].data()};
+  frame_system_.SubtractSquare(part, s.frames, s.is_high, G);
+  if (!s.high.empty()) AddHighLeverage(k, part, s);
+}
+
+// P'P, P = (I - Q Q') A_t, for the frames of high leverage.
+template <int kRows>
+void PointElimination<kRows>::AddHighLeverage(int64_t k, int part,
+                                              const Sightings& s) {
+  const int64_t begin = structure_.point_begin[k];
+  const int64_t m = structure_.point_begin[k + 1] - begin;
+  const int num_high = static_cast<int>(s.high.size());
   thread_local std::vector<Block<kRows>> P;
   P.resize(m * num_high);
   for (int h = 0; h < num_high; ++h) {
-    for (int64_t a = 0; a < m; ++a) {
-      P[h * m + a].noalias() = -Q(begin + a) * high[h]->G;
+    Matrix3d G;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) G(r, c) = s.G[r][3 * s.high[h] + c];
     }
-    for (int64_t n = high[h]->begin; n < high[h]->end; ++n) {
-      P[h * m + order_[n]] += F(begin + order_[n]);
+    for (int64_t a = 0; a < m; ++a) {
+      P[h * m + a].noalias() =
+          -ConstBlock<kRows>(&Q_[(begin + a) * kBlock]) * G;
+    }
+    for (int64_t n = s.begin[s.high[h]]; n < s.end[s.high[h]]; ++n) {
+      P[h * m + order_[n]] +=
+          ConstBlock<kRows>(&frame_rows_[(begin + order_[n]) * kBlock]);
     }
   }
   for (int g = 0; g < num_high; ++g) {
     for (int h = 0; h <= g; ++h) {
-      block.setZero();
+      Matrix3d block = Matrix3d::Zero();
       for (int64_t a = 0; a < m; ++a) {
         block.noalias() += P[g * m + a].transpose() * P[h * m + a];
       }
-      frame_system_.AddBlock(part, high[g]->frame, high[h]->frame,
+      frame_system_.AddBlock(part, s.frames[s.high[g]], s.frames[s.high[h]],
                              block.data());
     }
   }
@@ -236,12 +219,7 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
   ForPoints([&](int64_t k, int part) {
     const int64_t begin = structure_.point_begin[k];
     const int64_t end = structure_.point_begin[k + 1];
-    const UpperTriangle& R = R_[k];
-    const Vector3d& gk = g.points[k];
-    Vector3d top;
-    top[0] = gk[0] / R.r00;
-    top[1] = (gk[1] - R.r01 * top[0]) / R.r11;
-    top[2] = (gk[2] - R.r02 * top[0] - R.r12 * top[1]) / R.r22;
+    Vector3d top = R_[k].SolveTransposed(g.points[k]);
     if (r != nullptr) {
       for (int64_t i = begin; i < end; ++i) {
         top += ConstBlock<kRows>(&Q_[i * kBlock]).transpose() *
@@ -269,18 +247,14 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
     if (column >= 0) x->frames[f] = t.segment<3>(column);
   }
   ForPoints([&](int64_t k, int) {
-    Vector3d& s = x->points[k];
-    Vector3d top = s;
+    Vector3d top = x->points[k];
     for (int64_t i = structure_.point_begin[k];
          i < structure_.point_begin[k + 1]; ++i) {
       top -= ConstBlock<kRows>(&Q_[i * kBlock]).transpose() *
              (ConstBlock<kRows>(&frame_rows_[i * kBlock]) *
               x->frames[structure_.frame_of[i]]);
     }
-    const UpperTriangle& R = R_[k];
-    s[2] = top[2] / R.r22;
-    s[1] = (top[1] - R.r12 * s[2]) / R.r11;
-    s[0] = (top[0] - R.r01 * s[1] - R.r02 * s[2]) / R.r00;
+    x->points[k] = R_[k].Solve(top);
   });
 }
 

@@ -6,6 +6,7 @@
 
 #include "krot/conic/block_structure.h"
 #include "krot/conic/frame_system.h"
+#include "krot/conic/thin_qr.h"
 
 namespace krot {
 
@@ -51,22 +52,28 @@ class PointElimination {
  private:
   static constexpr int kBlock = 3 * kRows;
 
-  struct UpperTriangle {
-    double r00 = 0, r01 = 0, r02 = 0, r11 = 0, r12 = 0, r22 = 0;
-  };
+  // The free frames that see a point, in one observation or more.
+  struct Sightings {
+    std::vector<int32_t> frames;      // ascending
+    std::vector<int64_t> begin, end;  // of order_, per frame
+    std::vector<char> is_high;        // per frame: its leverage is
+    std::vector<size_t> high;         // the frames of which it is
+    std::vector<double> G[3];         // the rows of Q'A_t
 
-  // A frame that sees a point, in one observation or more.
-  struct Sighting {
-    int32_t frame;
-    int64_t begin, end;  // of order_
-    double leverage;     // |Q_a|^2
-    Eigen::Matrix3d G;   // Q_a'A_t
-    bool is_high;
+    void Clear() {
+      frames.clear();
+      begin.clear();
+      end.clear();
+      is_high.clear();
+      high.clear();
+    }
   };
 
   void ForPoints(const std::function<void(int64_t k, int part)>& body) const;
   void OrthogonalizePoint(int64_t k);
+  void FindSightings(int64_t k, Sightings* sightings) const;
   void AddPointToFrameSystem(int64_t k, int part);
+  void AddHighLeverage(int64_t k, int part, const Sightings& sightings);
   void SolveOnce(const BlockVector& g, const double* r, BlockVector* x) const;
 
   const BlockStructure& structure_;
