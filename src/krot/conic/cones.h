@@ -14,7 +14,8 @@ namespace krot {
 //
 // Each offers, for vectors of kDim numbers: the identity, the product, the
 // solution y of x o y = r (Divide), the smallest eigenvalue, the square of that
-// of a pair (SmallestProduct), the longest step that stays in the cone.
+// of a pair (SmallestProduct), the vector with its eigenvalues limited to a
+// range (Clamp), and the longest step that stays in the cone.
 
 struct SecondOrderCone {
   static constexpr int kDim = 3;
@@ -58,6 +59,21 @@ struct SecondOrderCone {
     return product / (half_sum + root);
   }
 
+  // With the eigenvectors of x; x itself if its eigenvalues are in the range.
+  static Vector Clamp(const Vector& x, double low, double high) {
+    const double norm = x.tail<2>().norm();
+    if (x[0] - norm >= low && x[0] + norm <= high) return x;
+    const double least = std::min(std::max(x[0] - norm, low), high);
+    const double largest = std::min(std::max(x[0] + norm, low), high);
+    Vector result;
+    result[0] = (largest + least) / 2;
+    result.tail<2>().setZero();
+    if (norm > 0) {
+      result.tail<2>() = (largest - least) / (2 * norm) * x.tail<2>();
+    }
+    return result;
+  }
+
   // The largest alpha <= limit with x + alpha d in the cone; x inside it.
   static double MaxStep(const Vector& x, const Vector& d, double limit) {
     // (x0 + alpha d0)^2 - |x1 + alpha d1|^2 = c + 2 b alpha + a alpha^2 >= 0
@@ -94,6 +110,10 @@ struct FourHalfLines {
 
   static double SmallestProduct(const Vector& s, const Vector& z) {
     return s.cwiseProduct(z).minCoeff();
+  }
+
+  static Vector Clamp(const Vector& x, double low, double high) {
+    return x.cwiseMax(low).cwiseMin(high);
   }
 
   static double MaxStep(const Vector& x, const Vector& d, double limit) {

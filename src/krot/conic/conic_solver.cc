@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace krot {
 namespace {
@@ -18,6 +19,16 @@ constexpr double kSmallestSigma = 1e-6;
 constexpr double kDamping = 0.98;
 constexpr double kBacktracking = 0.7;
 constexpr double kSmallestStep = 1e-8;
+// Centrality correctors aim at a step that is longer by kLonger, where they
+// bring the pairs' products within these shares of the target mu. One that
+// does not gain kWorthwhile of kLonger is the last [Colombo, Gondzio 2008].
+constexpr int kCentralityCorrectors = 2;
+constexpr double kLonger = 0.3;
+constexpr double kLeastProduct = 0.1;
+constexpr double kLargestProduct = 10;
+constexpr double kWorthwhile = 0.1;
+// Steps beyond this one need no corrector.
+constexpr double kLongStep = 0.9;
 
 void Move(const BlockVector& direction, double step, Estimate* x) {
   for (size_t k = 0; k < x->points.size(); ++k) {
@@ -88,33 +99,68 @@ void ConicSolver<Cone>::FindDirection(bool only_centre) {
       [&](int64_t i) -> Vector {
         Vector target = sigma * system_.mu() * Cone::Identity();
         if (!only_centre) {
-          target -= Cone::Product(system_.ds()[i], system_.dz()[i]);
+          target -= Cone::Product(system_.direction().ds[i],
+                                  system_.direction().dz[i]);
         }
         return Cone::Divide(system_.lambda()[i], target);
       },
       sigma);
+  for (int n = 0; n < kCentralityCorrectors; ++n) {
+    if (!ImproveCentrality(sigma)) break;
+  }
+}
+
+// Adds to lambda o f what the products of the pairs lack, a longer step
+// ahead, of being near sigma mu. Takes it back if the step becomes shorter for
+// it. Whether another one may be worth while.
+template <typename Cone>
+bool ConicSolver<Cone>::ImproveCentrality(double sigma) {
+  const StepLengths before = MaxSteps(kDamping);
+  if (before.Least() > kLongStep) return false;
+  const double ahead = std::min(1.0, before.Least() + kLonger);
+  const double mu = sigma * system_.mu();
+  typename NewtonSystem<Cone>::Direction direction = system_.direction();
+  system_.Solve(
+      [&](int64_t i) -> Vector {
+        const Vector& lambda = system_.lambda()[i];
+        const Vector product = Cone::Product(lambda + ahead * direction.ds[i],
+                                             lambda + ahead * direction.dz[i]);
+        const Vector lacking =
+            Cone::Clamp(product, kLeastProduct * mu, kLargestProduct * mu) -
+            product;
+        return system_.target()[i] +
+               Cone::Divide(lambda, Cone::Clamp(lacking, -kLargestProduct * mu,
+                                                kLargestProduct * mu));
+      },
+      sigma);
+  const double gain = MaxSteps(kDamping).Least() - before.Least();
+  if (gain < 0) system_.Restore(std::move(direction));
+  return gain >= kWorthwhile * kLonger;
 }
 
 // Mehrotra's choice: the cube of what the predictor leaves of the gap.
 template <typename Cone>
 double ConicSolver<Cone>::AffineSigma() const {
-  const double step = std::min(1.0, MaxStep());
+  const StepLengths step = MaxSteps(1);
   const double gap = system_.loop().Sum([&](int64_t i) {
     const Vector& lambda = system_.lambda()[i];
-    return (lambda + step * system_.ds()[i])
-        .dot(lambda + step * system_.dz()[i]);
+    return (lambda + step.primal * system_.direction().ds[i])
+        .dot(lambda + step.dual * system_.direction().dz[i]);
   });
   const double left = std::max(0.0, gap / system_.gap());
   return std::min(1.0, std::max(kSmallestSigma, left * left * left));
 }
 
+// `damping` times the steps to the boundary, at most 1.
 template <typename Cone>
-double ConicSolver<Cone>::MaxStep() const {
-  return system_.loop().Min([&](int64_t i) {
-    const Vector& lambda = system_.lambda()[i];
-    const double step = Cone::MaxStep(lambda, system_.ds()[i], 1 / kDamping);
-    return Cone::MaxStep(lambda, system_.dz()[i], step);
-  });
+typename ConicSolver<Cone>::StepLengths ConicSolver<Cone>::MaxSteps(
+    double damping) const {
+  const auto max_step = [&](const std::vector<Vector>& direction) {
+    return damping * system_.loop().Min([&](int64_t i) {
+      return Cone::MaxStep(system_.lambda()[i], direction[i], 1 / damping);
+    });
+  };
+  return {max_step(system_.direction().ds), max_step(system_.direction().dz)};
 }
 
 template <typename Cone>
@@ -138,25 +184,25 @@ bool ConicSolver<Cone>::IsInside(const State& trial) const {
   }) >= 0;
 }
 
-// The longest tried step that stays in the neighbourhood of the path; 0 if
-// none does.
+// The longest tried steps that stay in the neighbourhood of the path, the
+// shorter of the two; 0 if none do.
 template <typename Cone>
 double ConicSolver<Cone>::TakeStep() {
   system_.loop().ForEach([&](int64_t i) { dz_[i] = system_.UnscaledDz(i); });
-  for (double step = std::min(1.0, kDamping * MaxStep()); step >= kSmallestStep;
-       step *= kBacktracking) {
+  for (StepLengths step = MaxSteps(kDamping); step.Least() >= kSmallestStep;
+       step.primal *= kBacktracking, step.dual *= kBacktracking) {
     trial_.x = now_.x;
-    Move(system_.dx(), step, &trial_.x);
-    trial_.scalar = now_.scalar + step * system_.dscalar();
+    Move(system_.direction().dx, step.primal, &trial_.x);
+    trial_.scalar = now_.scalar + step.primal * system_.direction().dscalar;
     ViewAll(&trial_);
     system_.loop().ForEach(
-        [&](int64_t i) { trial_.z[i] = now_.z[i] + step * dz_[i]; });
+        [&](int64_t i) { trial_.z[i] = now_.z[i] + step.dual * dz_[i]; });
     trial_.gap = system_.loop().Sum([&](int64_t i) {
       return system_.Slack(trial_.viewed[i], trial_.scalar).dot(trial_.z[i]);
     });
     if (IsInside(trial_)) {
       std::swap(now_, trial_);
-      return step;
+      return step.Least();
     }
   }
   return 0;
@@ -221,8 +267,8 @@ InteriorPointSummary ConicSolver<Cone>::Run() {
 template <typename Cone>
 int64_t ConicSolver<Cone>::MemoryBytes(const KnownRotationProblem& problem) {
   constexpr int64_t kPerObservation =
-      sizeof(Multiplier) + 3 * sizeof(Vector) + 2 * sizeof(ViewedPoint);
-  constexpr int64_t kPerUnknown = 3 * sizeof(Eigen::Vector3d);
+      sizeof(Multiplier) + 5 * sizeof(Vector) + 2 * sizeof(ViewedPoint);
+  constexpr int64_t kPerUnknown = 4 * sizeof(Eigen::Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
          (problem.num_points + problem.num_frames) * kPerUnknown +
          NewtonSystem<Cone>::MemoryBytes(problem);

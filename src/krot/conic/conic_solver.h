@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -8,9 +9,11 @@
 
 namespace krot {
 
-// One run of the interior point: a predictor and a corrector step [Mehrotra
-// 1992] per factorisation of the Newton system, in a wide neighbourhood of the
-// central path. Slacks are recomputed at every trial: top = g w is bilinear.
+// One run of the interior point: per factorisation of the Newton system a
+// predictor, a corrector [Mehrotra 1992] and up to two centrality correctors
+// [Gondzio 1996], in a wide neighbourhood of the central path. Slacks are
+// recomputed at every trial: top = g w is bilinear. Since they are exact
+// whatever the multipliers, the two have step lengths of their own.
 template <typename Cone>
 class ConicSolver {
  public:
@@ -37,11 +40,19 @@ class ConicSolver {
     double cost = 0;  // pixels
   };
 
+  // Along ds, and so x and g, and along dz.
+  struct StepLengths {
+    double primal = 0;
+    double dual = 0;
+    double Least() const { return std::min(primal, dual); }
+  };
+
   void ViewAll(State* state) const;
   void CentreMultipliers();
   void FindDirection(bool only_centre);
+  bool ImproveCentrality(double sigma);
   double AffineSigma() const;
-  double MaxStep() const;
+  StepLengths MaxSteps(double damping) const;
   bool IsInside(const State& trial) const;
   double TakeStep();
   void ExportMultipliers();

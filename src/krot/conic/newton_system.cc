@@ -61,9 +61,10 @@ NewtonSystem<Cone>::NewtonSystem(const KnownRotationProblem& problem,
       lambda_(problem.observations.size()),
       border_(problem.observations.size()),
       rest_(problem.observations.size()),
-      target_(problem.observations.size()),
-      ds_(problem.observations.size()),
-      dz_(problem.observations.size()) {}
+      target_(problem.observations.size()) {
+  direction_.ds.resize(problem.observations.size());
+  direction_.dz.resize(problem.observations.size());
+}
 
 template <typename Cone>
 typename Cone::Vector NewtonSystem<Cone>::Slack(const ViewedPoint& viewed,
@@ -158,14 +159,15 @@ void NewtonSystem<Cone>::SolveForTarget(double sigma) {
     rhs[1] -= sigma;
   }
   const Eigen::Vector2d solution = M.fullPivLu().solve(rhs);
-  dscalar_ = solution[0];
-  dx_ = x_target_;
-  dx_.Add(-dscalar_, x_border_);
-  dx_.Add(-solution[1], x_gauge_);
-  elimination_.Multiply(dx_, ds_[0].data());
+  Direction& d = direction_;
+  d.dscalar = solution[0];
+  d.dx = x_target_;
+  d.dx.Add(-d.dscalar, x_border_);
+  d.dx.Add(-solution[1], x_gauge_);
+  elimination_.Multiply(d.dx, d.ds[0].data());
   loop_.ForEach([&](int64_t i) {
-    ds_[i] += dscalar_ * border_[i];
-    dz_[i] = target_[i] - lambda_[i] - ds_[i];
+    d.ds[i] += d.dscalar * border_[i];
+    d.dz[i] = target_[i] - lambda_[i] - d.ds[i];
   });
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "krot/conic/cone_program.h"
@@ -44,8 +45,9 @@ class NewtonSystem {
   bool Factorize(const std::vector<ViewedPoint>& viewed, double scalar,
                  const std::vector<Vector>& z);
 
-  // The direction for the targets f = target(i), and for the centring sigma
-  // of the depths' growth where baselines set the scale.
+  // The direction for the targets f = target(i), which may depend on the last
+  // f and direction, and for the centring sigma of the depths' growth where
+  // baselines set the scale.
   template <typename Target>
   void Solve(const Target& target, double sigma) {
     loop_.ForEach([&](int64_t i) { target_[i] = target(i); });
@@ -56,13 +58,19 @@ class NewtonSystem {
   double gap() const { return gap_; }  // sum s'z = sum |lambda|^2
   double mu() const { return mu_; }    // of each pair, on the central path
   const std::vector<Vector>& lambda() const { return lambda_; }
-  const std::vector<Vector>& ds() const { return ds_; }
-  const std::vector<Vector>& dz() const { return dz_; }
-  const BlockVector& dx() const { return dx_; }
-  double dscalar() const { return dscalar_; }
+  const std::vector<Vector>& target() const { return target_; }  // the last f
+
+  // Where the last Solve leads; ds and dz are scaled.
+  struct Direction {
+    BlockVector dx;
+    double dscalar = 0;
+    std::vector<Vector> ds, dz;
+  };
+  const Direction& direction() const { return direction_; }
+  void Restore(Direction direction) { direction_ = std::move(direction); }
   // The multipliers' direction without its scaling.
   Vector UnscaledDz(int64_t i) const {
-    return scaling_[i].ApplyInverse(dz_[i]);
+    return scaling_[i].ApplyInverse(direction_.dz[i]);
   }
 
   static int64_t MemoryBytes(const KnownRotationProblem& problem);
@@ -85,13 +93,11 @@ class NewtonSystem {
   std::vector<Vector> border_;  // b: the column of g
   std::vector<Vector> rest_;    // b - A Xb
   std::vector<Vector> target_;  // f
-  std::vector<Vector> ds_, dz_;
-  BlockVector gauge_;     // e
-  BlockVector x_border_;  // Xb = H^-1 A'b
-  BlockVector x_gauge_;   // Xe = H^-1 e
-  BlockVector x_target_;  // Xf = H^-1 A'f
-  BlockVector dx_;
-  double dscalar_ = 0;
+  BlockVector gauge_;           // e
+  BlockVector x_border_;        // Xb = H^-1 A'b
+  BlockVector x_gauge_;         // Xe = H^-1 e
+  BlockVector x_target_;        // Xf = H^-1 A'f
+  Direction direction_;
 };
 
 }  // namespace krot

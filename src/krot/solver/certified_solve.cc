@@ -12,6 +12,10 @@
 namespace krot {
 namespace {
 
+// Whether a proof is worth while is asked when the interior point's own gap is
+// this small, and again whenever it has fallen by the factor below.
+constexpr double kFirstGapToAsk = 0.3;
+constexpr double kGapBetweenQuestions = 0.1;
 // A certificate is tried once the interior point's own gap is as small as the
 // one asked for, and again whenever it has fallen by this factor.
 constexpr double kGapBetweenCertificates = 0.3;
@@ -93,6 +97,7 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
   double next_gap = options_.relative_gap;
+  double gap_to_ask = kFirstGapToAsk;
   double milestone = std::numeric_limits<double>::infinity();
   int milestone_iteration = 0;
   options.stop = [&](const ConicIterate& iterate) {
@@ -101,13 +106,14 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
       cost_ = iterate.cost;
       estimate_ = *iterate.estimate;
     }
-    if (iterate.gap <= next_gap) {
-      is_given_up_ = !is_worth_proving(estimate_, cost_);
-      if (!is_given_up_) {
-        Adopt(MakeCertificate(problem_, options_.norm, *iterate.estimate,
-                              iterate.gamma, *iterate.multipliers,
-                              OptionsFor((1 - options_.relative_gap) * cost_)));
-      }
+    if (iterate.gap <= std::max(next_gap, gap_to_ask)) {
+      is_given_up_ = !is_worth_proving(estimate_);
+      while (gap_to_ask >= iterate.gap) gap_to_ask *= kGapBetweenQuestions;
+    }
+    if (iterate.gap <= next_gap && !is_given_up_) {
+      Adopt(MakeCertificate(problem_, options_.norm, *iterate.estimate,
+                            iterate.gamma, *iterate.multipliers,
+                            OptionsFor((1 - options_.relative_gap) * cost_)));
       next_gap = kGapBetweenCertificates * iterate.gap;
     }
     gap_ = iterate.gap;

@@ -17,9 +17,8 @@ using IterationReport = std::function<void(const JointIteration&)>;
 // Internal to SolveJoint.
 class CertifiedSolve {
  public:
-  // Whether it is worth while to prove that an estimate of this cost, pixels,
-  // is optimal.
-  using IsWorthProving = std::function<bool(const Estimate&, double cost)>;
+  // Whether it is worth while to go on from this estimate towards a proof.
+  using IsWorthProving = std::function<bool(const Estimate&)>;
 
   // Keeps references. All depths of `start` are positive. A cost that is as low
   // as `known_bound`, pixels, allows is low enough.
@@ -28,8 +27,8 @@ class CertifiedSolve {
                  double known_bound);
 
   // Takes at most `max_iterations`, except for those towards a fresh start,
-  // which it ends once begun. Asks before every certificate that it tries, and
-  // ends as kStalled if it is not worth while.
+  // which it ends once begun. Asks now and then on the way, and before every
+  // certificate that it tries, and ends as kStalled if it is not worth while.
   JointTermination Run(int max_iterations,
                        const IsWorthProving& is_worth_proving,
                        const IterationReport& report);

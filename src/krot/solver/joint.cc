@@ -11,8 +11,8 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/restrict.h"
-#include "krot/solver/block_sweep.h"
 #include "krot/solver/certified_solve.h"
+#include "krot/solver/extend_solution.h"
 #include "krot/solver/working_set.h"
 
 namespace krot {
@@ -21,7 +21,10 @@ namespace {
 // A working set takes in the points that do not fit in below this share of its
 // optimum, the worst first, and grows by this factor at most.
 constexpr double kShareOfLevel = 0.9;
-constexpr double kMaxGrowth = 1.5;
+constexpr double kMaxGrowth = 3;
+// Of the gap asked for, the share that a working set's own proof may leave; the
+// rest is what other points may exceed its cost by.
+constexpr double kShareOfGap = 0.5;
 // After so many rounds it takes in everything.
 constexpr int kMaxRounds = 12;
 
@@ -75,7 +78,8 @@ class ComponentSolve {
   JointTermination SolvePart(const RestrictedProblem& part,
                              const IterationReport& report,
                              Estimate* candidate);
-  bool DoOthersFit(double level, Estimate* candidate) const;
+  bool FitOthers(Estimate* candidate);
+  void Keep(const Estimate& candidate);
 
   const KnownRotationProblem& problem_;
   const JointOptions& options_;
@@ -85,19 +89,22 @@ class ComponentSolve {
   // By a solve of all points that is under way.
   double reached_ = std::numeric_limits<double>::infinity();
   double level_ = 0;  // the cost of the working set's solution, pixels
+  bool do_others_fit_ = false;  // when that was last tried
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
   int iterations_ = 0;
   int64_t num_working_observations_ = 0;
 };
 
-// A working set whose optimum leaves other points above it is not worth a
+// A working set whose solution leaves other points above it is not worth a
 // proof, but more points.
 JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
                                            const IterationReport& report,
                                            Estimate* candidate) {
+  JointOptions options = options_;
+  if (!set_.IsAll()) options.relative_gap *= kShareOfGap;
   const Estimate start = RestrictEstimate(part, estimate_);
-  CertifiedSolve solve(part.problem, options_, start, lower_bound_);
+  CertifiedSolve solve(part.problem, options, start, lower_bound_);
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
@@ -109,10 +116,10 @@ JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
   };
   const JointTermination termination = solve.Run(
       options_.max_iterations - iterations_,
-      [&](const Estimate& estimate, double cost) {
+      [&](const Estimate& estimate) {
         replace(estimate);
-        level_ = std::max(level_, cost);
-        return DoOthersFit(level_, candidate);
+        do_others_fit_ = FitOthers(candidate);
+        return do_others_fit_;
       },
       [&](const JointIteration& iteration) {
         if (set_.IsAll()) reached_ = std::min(reached_, solve.cost());
@@ -123,8 +130,7 @@ JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
     lower_bound_ = solve.lower_bound();
     certificate_ = InWhole(part, *solve.certificate());
   }
-  replace(solve.estimate());
-  level_ = std::max(level_, solve.cost());
+  if (do_others_fit_) replace(solve.estimate());
   return termination;
 }
 
@@ -132,6 +138,7 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
                                                  Estimate* candidate) {
   const std::vector<int64_t> observations = set_.Observations();
   num_working_observations_ = static_cast<int64_t>(observations.size());
+  do_others_fit_ = true;
   JointTermination worst = JointTermination::kGapReached;
   for (const std::vector<int64_t>& part :
        SplitIntoComponents(problem_, observations)) {
@@ -139,50 +146,36 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
         SolvePart(RestrictProblem(problem_, part), report, candidate);
     if (termination == JointTermination::kGapReached) continue;
     worst = termination;
-    if (termination != JointTermination::kStalled) break;
+    if (termination != JointTermination::kStalled || !do_others_fit_) break;
   }
   return worst;
 }
 
-// Points outside the working set stay where they are if that is good enough,
-// and otherwise take their own optimum. Those behind a camera are left to the
-// next working set. Whether all are below `level` then.
-bool ComponentSolve::DoOthersFit(double level, Estimate* candidate) const {
-  std::vector<int64_t> observations;
-  bool is_behind = false;
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (set_.Contains(k)) continue;
-    const double cost = PointCost(problem_, *candidate, options_.norm, k);
-    is_behind |= !std::isfinite(cost);
-    if (cost <= level || !std::isfinite(cost)) continue;
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      observations.push_back(i);
-    }
-  }
-  if (observations.empty()) return !is_behind;
-  const RestrictedProblem part = RestrictProblem(problem_, observations);
-  Estimate placed = RestrictEstimate(part, *candidate);
-  const double cost =
-      BlockSweep(part.problem, FastDescentOptions(), options_.norm,
-                 options_.num_threads, options_.cancel)
-          .IntersectPoints(&placed);
-  ReplaceEstimate(part, placed, candidate);
-  return !is_behind && cost <= level;
+// Whether the working set's solution extends to all points, none exceeding its
+// cost by more than the gap leaves room for.
+bool ComponentSolve::FitOthers(Estimate* candidate) {
+  level_ = set_.Cost(*candidate, options_.norm);
+  const double highest =
+      level_ / (1 - (1 - kShareOfGap) * options_.relative_gap);
+  const bool do_fit =
+      ExtendSolution(problem_, set_, options_, level_, highest, candidate);
+  Keep(*candidate);
+  return do_fit;
+}
+
+void ComponentSolve::Keep(const Estimate& candidate) {
+  const double cost = CostOf(candidate);
+  if (cost > cost_) return;
+  cost_ = cost;
+  estimate_ = candidate;
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (!(cost_ > 0)) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
-    level_ = 0;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
-    const bool do_others_fit = DoOthersFit(level_, &candidate);
-    const double cost = CostOf(candidate);
-    if (cost <= cost_) {
-      cost_ = cost;
-      estimate_ = candidate;
-    }
+    if (do_others_fit_) do_others_fit_ = FitOthers(&candidate);
     if (IsGapReached()) return JointTermination::kGapReached;
     if (set_.IsAll() || termination == JointTermination::kInterrupted ||
         termination == JointTermination::kMaxIterations) {
@@ -191,7 +184,7 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
     const int64_t num_added = set_.AddAbove(
         candidate, options_.norm, kShareOfLevel * level_,
         static_cast<int64_t>((kMaxGrowth - 1) * set_.num_points()) + 1);
-    if (do_others_fit || num_added == 0 || round == kMaxRounds) set_.AddAll();
+    if (do_others_fit_ || num_added == 0 || round == kMaxRounds) set_.AddAll();
   }
 }
 

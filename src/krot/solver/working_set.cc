@@ -84,6 +84,15 @@ std::vector<int64_t> WorkingSet::Observations() const {
   return observations;
 }
 
+double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {
+  double cost = 0;
+  for (int32_t k = 0; k < problem_.num_points; ++k) {
+    if (!Contains(k)) continue;
+    cost = std::max(cost, PointCost(problem_, estimate, norm, k));
+  }
+  return cost;
+}
+
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost) {
   WorkingSet set(problem);

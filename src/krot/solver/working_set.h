@@ -32,6 +32,8 @@ class WorkingSet {
   bool IsAll() const { return num_points_ == problem_.num_points; }
   int32_t num_points() const { return num_points_; }
   std::vector<int64_t> Observations() const;  // ascending
+  // The largest residual of its points, pixels. O(observations).
+  double Cost(const Estimate& estimate, Norm norm) const;
 
  private:
   void Add(int32_t point);
