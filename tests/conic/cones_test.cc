@@ -68,6 +68,35 @@ TYPED_TEST(ConeTest, SmallestEigenvalueIsWhatTheIdentityMayTakeAway) {
   }
 }
 
+// Vectors with the same eigenvectors are those that commute as operators.
+TYPED_TEST(ConeTest, ClampLimitsTheEigenvaluesAndNothingElse) {
+  ConeGenerator<TypeParam> random(7);
+  const auto e = TypeParam::Identity();
+  const auto largest = [](const auto& x) {
+    return -TypeParam::SmallestEigenvalue(-x);
+  };
+  const auto limit = [](double x, double low, double high) {
+    return std::min(std::max(x, low), high);
+  };
+  for (int n = 0; n < kTrials; ++n) {
+    const auto x = random.Direction();
+    const double low = -0.1 * (n % 5);
+    const double high = 0.2 + 0.1 * (n % 7);
+    const auto clamped = TypeParam::Clamp(x, low, high);
+    EXPECT_NEAR(TypeParam::SmallestEigenvalue(clamped),
+                limit(TypeParam::SmallestEigenvalue(x), low, high), 1e-15);
+    EXPECT_NEAR(largest(clamped), limit(largest(x), low, high), 1e-15);
+    // x o (y o z) = y o (x o z)
+    const auto z = random.Direction();
+    EXPECT_LT((TypeParam::Product(x, TypeParam::Product(clamped, z)) -
+               TypeParam::Product(clamped, TypeParam::Product(x, z)))
+                  .norm(),
+              1e-14);
+    EXPECT_EQ(TypeParam::Clamp(x, -10, 10), x);
+    EXPECT_LT((TypeParam::Clamp(0.5 * e, 1, 2) - e).norm(), 1e-15);
+  }
+}
+
 TYPED_TEST(ConeTest, MaxStepEndsWhereBisectionFindsTheBoundary) {
   ConeGenerator<TypeParam> random(4);
   int num_limited = 0;

@@ -86,6 +86,23 @@ TEST(WorkingSet, ListsAllObservationsOfItsPointsInOrder) {
   }
 }
 
+TEST(WorkingSet, CostsWhatItsPointsCost) {
+  const RandomScene scene = MakeScene();
+  WorkingSet set(scene.problem);
+  EXPECT_EQ(set.Cost(scene.estimate, Norm::L2()), 0);
+  set.AddTies(9);
+  double expected = 0;
+  for (int32_t k = 0; k < scene.problem.num_points; ++k) {
+    if (!set.Contains(k)) continue;
+    expected = std::max(
+        expected, PointCost(scene.problem, scene.estimate, Norm::L2(), k));
+  }
+  EXPECT_EQ(set.Cost(scene.estimate, Norm::L2()), expected);
+  set.AddAll();
+  EXPECT_EQ(set.Cost(scene.estimate, Norm::L2()),
+            Cost(scene.problem, scene.estimate, Norm::L2(), 1));
+}
+
 // The bound is proved for all observations, whatever the solver looked at.
 TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
   for (unsigned seed = 1; seed <= 5; ++seed) {

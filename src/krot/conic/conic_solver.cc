@@ -141,17 +141,18 @@ bool ConicSolver<Cone>::ImproveCentrality(double sigma) {
 // Mehrotra's choice: the cube of what the predictor leaves of the gap.
 template <typename Cone>
 double ConicSolver<Cone>::AffineSigma() const {
-  const StepLengths step = MaxSteps(1);
+  const double step = MaxSteps(1).Least();
   const double gap = system_.loop().Sum([&](int64_t i) {
     const Vector& lambda = system_.lambda()[i];
-    return (lambda + step.primal * system_.direction().ds[i])
-        .dot(lambda + step.dual * system_.direction().dz[i]);
+    return (lambda + step * system_.direction().ds[i])
+        .dot(lambda + step * system_.direction().dz[i]);
   });
   const double left = std::max(0.0, gap / system_.gap());
   return std::min(1.0, std::max(kSmallestSigma, left * left * left));
 }
 
-// `damping` times the steps to the boundary, at most 1.
+// `damping` times the steps to the boundary, at most 1. Stationarity of the
+// cost programme holds for one g, and so the two go together there.
 template <typename Cone>
 typename ConicSolver<Cone>::StepLengths ConicSolver<Cone>::MaxSteps(
     double damping) const {
@@ -160,7 +161,10 @@ typename ConicSolver<Cone>::StepLengths ConicSolver<Cone>::MaxSteps(
       return Cone::MaxStep(system_.lambda()[i], direction[i], 1 / damping);
     });
   };
-  return {max_step(system_.direction().ds), max_step(system_.direction().dz)};
+  StepLengths steps{max_step(system_.direction().ds),
+                    max_step(system_.direction().dz)};
+  if (program_.IsCost()) steps.primal = steps.dual = steps.Least();
+  return steps;
 }
 
 template <typename Cone>

@@ -12,8 +12,8 @@ namespace krot {
 // One run of the interior point: per factorisation of the Newton system a
 // predictor, a corrector [Mehrotra 1992] and up to two centrality correctors
 // [Gondzio 1996], in a wide neighbourhood of the central path. Slacks are
-// recomputed at every trial: top = g w is bilinear. Since they are exact
-// whatever the multipliers, the two have step lengths of their own.
+// recomputed at every trial: top = g w is bilinear. Where it is linear, in the
+// feasibility programme, slacks and multipliers have step lengths of their own.
 template <typename Cone>
 class ConicSolver {
  public:
