@@ -14,7 +14,7 @@ namespace {
 
 // Whether a proof is worth while is asked when the interior point's own gap is
 // this small, and again whenever it has fallen by the factor below.
-constexpr double kFirstGapToAsk = 0.3;
+constexpr double kFirstGapToAsk = 0.1;
 constexpr double kGapBetweenQuestions = 0.1;
 // A certificate is tried once the interior point's own gap is as small as the
 // one asked for, and again whenever it has fallen by this factor.
