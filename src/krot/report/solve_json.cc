@@ -1,0 +1,146 @@
+#include <optional>
+
+#include <nlohmann/json.hpp>
+
+#include "krot/report/adjustment_report.h"
+#include "krot/report/solve_report.h"
+
+namespace krot {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const char* TerminationName(SolveTermination termination) {
+  switch (termination) {
+    case SolveTermination::kGapReached:
+      return "gap_reached";
+    case SolveTermination::kStalled:
+      return "stalled";
+    case SolveTermination::kMaxSweeps:
+      return "max_sweeps";
+    case SolveTermination::kMaxIterations:
+      return "max_iterations";
+    case SolveTermination::kInfeasible:
+      return "infeasible";
+    case SolveTermination::kNoStart:
+      return "no_start";
+    case SolveTermination::kInterrupted:
+      return "interrupted";
+    case SolveTermination::kNothingToSolve:
+      return "nothing_to_solve";
+    case SolveTermination::kNotRun:
+      break;
+  }
+  return "not_run";
+}
+
+Json NumberOrNull(const std::optional<double>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json IterationsJson(const std::vector<JointIteration>& iterations) {
+  Json json = Json::array();
+  for (const JointIteration& iteration : iterations) {
+    json.push_back({{"method", iteration.target ? "feasible_start" : "joint"},
+                    {"cost", NumberOrNull(iteration.cost)},
+                    {"lower_bound", NumberOrNull(iteration.lower_bound)},
+                    {"gap", NumberOrNull(iteration.gap)},
+                    {"target", NumberOrNull(iteration.target)},
+                    {"seconds", iteration.seconds}});
+  }
+  return json;
+}
+
+Json SupportJson(const std::vector<SupportObservation>& support) {
+  Json json = Json::array();
+  for (const SupportObservation& observation : support) {
+    json.push_back({{"image_id", observation.image_id},
+                    {"image_name", observation.image_name},
+                    {"point2D_idx", observation.point2D_idx},
+                    {"point3D_id", observation.point3D_id},
+                    {"multiplier", observation.multiplier},
+                    {"error_px", observation.error_px}});
+  }
+  return json;
+}
+
+Json ErrorJson(const PixelErrorStatistics& statistics) {
+  if (statistics.count == 0) {
+    return {{"max", nullptr},
+            {"p99", nullptr},
+            {"mean", nullptr},
+            {"rms", nullptr}};
+  }
+  return {{"max", statistics.max},
+          {"p99", statistics.p99},
+          {"mean", statistics.mean},
+          {"rms", statistics.rms}};
+}
+
+Json PolishJson(const std::optional<PolishSummary>& polish) {
+  if (!polish) return {};
+  const BundleAdjustmentSummary& adjustment = polish->adjustment;
+  return {{"polish", PolishName(polish->polish)},
+          {"termination", AdjustmentTerminationName(adjustment.termination)},
+          {"cost_initial", adjustment.cost_initial},
+          {"cost_final", adjustment.cost_final},
+          {"num_iterations", adjustment.num_iterations},
+          {"pixel_error", ErrorJson(polish->pixel_error)},
+          {"seconds", adjustment.seconds}};
+}
+
+}  // namespace
+
+std::string SolveJson(const SolveReport& report) {
+  const SolveSummary& summary = report.summary;
+  Json left_out = Json::object();
+  for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
+    left_out[LeftOutName(static_cast<LeftOut>(reason))] =
+        summary.left_out[reason];
+  }
+  Json sweeps = Json::array();
+  for (const Sweep& sweep : summary.sweeps) {
+    sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
+  }
+  const Json json = {
+      {"version", report.version},
+      {"command", report.command},
+      {"method", report.method},
+      {"norm", NormName(summary.norm)},
+      {"termination", TerminationName(summary.termination)},
+      {"num_frames", summary.num_frames},
+      {"num_images", summary.num_images},
+      {"num_points", summary.num_points},
+      {"num_observations", summary.num_observations},
+      {"working_observations", summary.num_working_observations
+                                   ? Json(*summary.num_working_observations)
+                                   : Json()},
+      {"left_out", left_out},
+      {"cost_initial", summary.cost_initial},
+      {"cost_final", summary.cost_final},
+      {"lower_bound", NumberOrNull(summary.lower_bound)},
+      {"relative_gap", NumberOrNull(summary.relative_gap)},
+      {"certified", summary.is_certified},
+      {"pixel_error",
+       {{"before", ErrorJson(summary.pixel_error_before)},
+        {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"polish", PolishJson(summary.polish)},
+      {"sweeps", sweeps},
+      {"iterations", IterationsJson(summary.iterations)},
+      {"support", SupportJson(summary.support)},
+      {"seconds",
+       {{"read", report.seconds_read},
+        {"build", summary.seconds_build},
+        {"solve", summary.seconds_solve},
+        {"certify", NumberOrNull(summary.seconds_certify)},
+        {"write", report.seconds_write},
+        {"total", report.seconds_total}}},
+      {"peak_memory_bytes", report.peak_memory_bytes},
+      {"threads", report.threads},
+      {"seed", report.seed},
+  };
+  // Image names are bytes, not always UTF-8.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace krot
