@@ -20,6 +20,9 @@ constexpr double kRounding = 1e-14;
 // G serves as long as (what has changed since, relative)^2 is below this.
 constexpr double kMetricReach = 1e-2;
 
+// See DepthGrowth.
+constexpr double kNearby = 1e3;
+
 // How far x is from where v and w vanish: from the camera or, if that is what
 // moves, from its point. Up to a factor near 1.
 double DistanceFromCamera(const Residual& residual, const Vector3d& x) {
@@ -50,7 +53,7 @@ Matrix3d InverseCholesky(const Matrix3d& H) {
 
 void LocalModel::Start(const Vector3d& x_start) {
   x_start_ = x_start;
-  scale_ = 0;
+  depth_start_ = 0;
   members_.clear();
   rows_.Clear();
   num_members_of_metric_ = 0;
@@ -60,7 +63,8 @@ void LocalModel::Start(const Vector3d& x_start) {
 void LocalModel::AddMember(const ResidualSet& residuals, int index) {
   rows_.AddFrom(residuals, index);
   members_.push_back({index, 0, 0, 0});
-  scale_ = std::max(scale_, DistanceFromCamera(residuals[index], x_start_));
+  depth_start_ =
+      std::max(depth_start_, rows_.Depth(rows_.size() - 1, x_start_));
 }
 
 void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
@@ -267,7 +271,13 @@ double LocalModel::DepthGrowth() const {
     depth =
         std::max(depth, members_[member_of_piece_[solution_.index[k]]].depth);
   }
-  return depth / scale_;
+  // A distance is no less than the depth, which is at hand.
+  if (depth <= kNearby * depth_start_) return depth / depth_start_;
+  double distance = 0;
+  for (int m = 0; m < rows_.size(); ++m) {
+    distance = std::max(distance, DistanceFromCamera(rows_[m], x_start_));
+  }
+  return depth / distance;
 }
 
 }  // namespace krot

@@ -84,7 +84,8 @@ class LocalModel {
 
   // The largest depth at x of the members that bear the last step, by the
   // distance of the start from the camera of any member at most: as far as a
-  // start beside one camera is from the others, depths may grow.
+  // start beside one camera is from the others, depths may grow. A bound from
+  // above where it is below a thousand.
   double DepthGrowth() const;
 
  private:
@@ -113,7 +114,7 @@ class LocalModel {
   ResidualSet rows_;  // the members' residuals
   Norm norm_;
   Eigen::Vector3d x_start_;
-  double scale_ = 0;  // the start's largest distance from a member's camera
+  double depth_start_ = 0;  // the members' largest at x_start
   Eigen::Vector3d x_;
   std::vector<LinearPiece> pieces_;  // 0: no residual falls below zero
   std::vector<int> member_of_piece_;

@@ -49,8 +49,7 @@ void DifferentiateNorm(const Vector2d& v, Norm norm, double n,
 
 }  // namespace
 
-double NormOf(const Vector2d& v, Norm norm) {
-  if (norm.p == 2) return v.norm();
+double internal::NormOtherThanL2(const Vector2d& v, Norm norm) {
   if (norm.p == 1) return std::abs(v[0]) + std::abs(v[1]);
   const double largest = std::max(std::abs(v[0]), std::abs(v[1]));
   if (norm.IsPolyhedral() || !(largest > 0)) return largest;

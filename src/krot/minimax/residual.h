@@ -20,8 +20,14 @@ struct Residual {
   double Depth(const Eigen::Vector3d& x) const { return c.dot(x) + d; }
 };
 
+namespace internal {
+double NormOtherThanL2(const Eigen::Vector2d& v, Norm norm);
+}  // namespace internal
+
 // ||v||_p.
-double NormOf(const Eigen::Vector2d& v, Norm norm);
+inline double NormOf(const Eigen::Vector2d& v, Norm norm) {
+  return norm.p == 2 ? v.norm() : internal::NormOtherThanL2(v, norm);
+}
 
 // r(x); infinity unless the depth is positive.
 double ResidualValue(const Residual& residual, const Eigen::Vector3d& x,

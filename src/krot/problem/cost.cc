@@ -14,6 +14,7 @@
 namespace krot {
 namespace {
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int64_t kObservationsPerChunk = 16384;
 
 }  // namespace
@@ -27,18 +28,17 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
 }
 
 double ResidualOf(const ViewedPoint& viewed, Norm norm) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (!(viewed.depth > 0)) return kInfinity;
   const double residual = NormOf(viewed.v, norm) / viewed.depth;
   return std::isfinite(residual) ? residual : kInfinity;
 }
 
-double LargestResidual(const KnownRotationProblem& problem,
-                       const std::vector<AffineMap>& cameras,
-                       const std::vector<Eigen::Vector3d>& points, Norm norm,
-                       int64_t begin, int64_t end) {
+double ResidualAbove(double level, const KnownRotationProblem& problem,
+                     const std::vector<AffineMap>& cameras,
+                     const std::vector<Eigen::Vector3d>& points, Norm norm,
+                     int64_t begin, int64_t end) {
   double largest = 0;
-  for (int64_t i = begin; i < end; ++i) {
+  for (int64_t i = begin; i < end && largest <= level; ++i) {
     const Observation& observation = problem.observations[i];
     const ViewedPoint viewed = ViewPoint(cameras[observation.view], observation,
                                          points[observation.point]);
@@ -96,8 +96,9 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
   std::vector<double> chunk_max(NumChunks(count, kObservationsPerChunk), 0);
   ParallelFor(count, kObservationsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {
-                chunk_max[begin / kObservationsPerChunk] = LargestResidual(
-                    problem, cameras, estimate.points, norm, begin, end);
+                chunk_max[begin / kObservationsPerChunk] =
+                    ResidualAbove(kInfinity, problem, cameras, estimate.points,
+                                  norm, begin, end);
               });
   return chunk_max.empty()
              ? 0.0

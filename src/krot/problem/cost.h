@@ -36,11 +36,12 @@ double ResidualOf(const ViewedPoint& viewed, Norm norm);
 bool AllDepthsPositive(const KnownRotationProblem& problem,
                        const Estimate& estimate, int num_threads);
 
-// The largest residual of observations [begin, end), in pixels.
-double LargestResidual(const KnownRotationProblem& problem,
-                       const std::vector<AffineMap>& cameras,
-                       const std::vector<Eigen::Vector3d>& points, Norm norm,
-                       int64_t begin, int64_t end);
+// The first residual of observations [begin, end) above `level`, or the
+// largest if none is; in pixels.
+double ResidualAbove(double level, const KnownRotationProblem& problem,
+                     const std::vector<AffineMap>& cameras,
+                     const std::vector<Eigen::Vector3d>& points, Norm norm,
+                     int64_t begin, int64_t end);
 
 // The largest residual of a point, in pixels; 0 without observations.
 double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,

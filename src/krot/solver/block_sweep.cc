@@ -68,8 +68,8 @@ double BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
   const int64_t end = problem_.point_begin[k + 1];
   if (begin == end) return 0;
   if (goal_.level > 0) {  // whether it waits is known before rows are built
-    const double cost = LargestResidual(problem_, cameras_, estimate->points,
-                                        norm_, begin, end);
+    const double cost = ResidualAbove(goal_.level, problem_, cameras_,
+                                      estimate->points, norm_, begin, end);
     if (cost <= goal_.level) return cost;
   }
   double row[kResidualRow];
