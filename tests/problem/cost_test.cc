@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <stdexcept>
 #include <vector>
@@ -120,6 +122,21 @@ TEST(PointCost, IsTheLargestResidualOfThePoint) {
     largest = std::max(largest, expected);
   }
   EXPECT_EQ(Cost(scene.problem, scene.estimate, Norm::L2(), 1), largest);
+}
+
+TEST(MedianDepth, HasAsManyDepthsBelowAsAbove) {
+  const RandomScene scene = MakeRandomScene({});
+  const double median = MedianDepth(scene.problem, scene.estimate);
+  int64_t below = 0;
+  int64_t above = 0;
+  for (const Observation& observation : scene.problem.observations) {
+    const double depth =
+        ViewPoint(scene.problem, observation, scene.estimate).depth;
+    below += depth < median;
+    above += depth > median;
+  }
+  EXPECT_GT(below, 0);
+  EXPECT_LE(std::abs(below - above), 1);
 }
 
 TEST(AllDepthsPositive, IsWhereTheCostIsFinite) {

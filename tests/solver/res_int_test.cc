@@ -256,6 +256,26 @@ TEST(BlockSweep, LeavesBlocksAtTheLevelOfTheGoalWhereTheyAre) {
   }
 }
 
+TEST(BlockSweep, LeavesPointsAtTheLevelOfTheGoalWhereTheyAre) {
+  const RandomScene scene = MakeScene(7);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
+                    nullptr);
+  const double level =
+      (1 + 1e-9) * PointCost(scene.problem, scene.estimate, Norm::L2(), 0);
+  blocks.SetGoal({1e-11, level});
+  Estimate estimate = scene.estimate;
+  blocks.IntersectPoints(&estimate);
+  int num_moved = 0;
+  for (int32_t k = 0; k < scene.problem.num_points; ++k) {
+    const bool is_above =
+        PointCost(scene.problem, scene.estimate, Norm::L2(), k) > level;
+    EXPECT_EQ(estimate.points[k] != scene.estimate.points[k], is_above);
+    num_moved += is_above;
+  }
+  EXPECT_GT(num_moved, 0);
+  EXPECT_LT(num_moved, scene.problem.num_points);
+}
+
 TEST(BlockSweep, ReturnsTheCostThatItReaches) {
   RandomScene scene = MakeScene(8);
   BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 2,

@@ -118,9 +118,9 @@ class LocalModel {
   Eigen::Vector3d x_;
   std::vector<LinearPiece> pieces_;  // 0: no residual falls below zero
   std::vector<int> member_of_piece_;
-  Eigen::Matrix3d metric_;            // G, as it was
-  Eigen::Vector3d x_metric_;          // there,
-  size_t num_members_of_metric_ = 0;  // with so many members
+  Eigen::Matrix3d metric_;            // G
+  Eigen::Vector3d x_metric_;          // where G was set
+  size_t num_members_of_metric_ = 0;  // then; 0: not yet
   std::vector<GradientBlock> gradients_;
   std::vector<LinearPiece> scaled_pieces_;
   SimplexQpSolution solution_;

@@ -33,6 +33,19 @@ double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   return std::isfinite(residual) ? residual : kInfinity;
 }
 
+double MedianDepth(const KnownRotationProblem& problem,
+                   const Estimate& estimate) {
+  std::vector<double> depths;
+  depths.reserve(problem.observations.size());
+  for (const Observation& observation : problem.observations) {
+    depths.push_back(ViewPoint(problem, observation, estimate).depth);
+  }
+  const auto median =
+      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), median, depths.end());
+  return *median;
+}
+
 double ResidualAbove(double level, const KnownRotationProblem& problem,
                      const std::vector<AffineMap>& cameras,
                      const std::vector<Eigen::Vector3d>& points, Norm norm,

@@ -36,6 +36,11 @@ double ResidualOf(const ViewedPoint& viewed, Norm norm);
 bool AllDepthsPositive(const KnownRotationProblem& problem,
                        const Estimate& estimate, int num_threads);
 
+// The median of the depths of all observations, of which there must be one;
+// scene units. O(observations).
+double MedianDepth(const KnownRotationProblem& problem,
+                   const Estimate& estimate);
+
 // The first residual of observations [begin, end) above `level`, or the
 // largest if none is; in pixels.
 double ResidualAbove(double level, const KnownRotationProblem& problem,

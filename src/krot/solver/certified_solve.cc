@@ -44,19 +44,6 @@ constexpr double kShareOfGap = 0.5;
 // What is lost of a bound when it is proved, at most, relative.
 constexpr double kProofLoss = 1e-3;
 
-double MedianDepth(const KnownRotationProblem& problem,
-                   const Estimate& estimate) {
-  std::vector<double> depths;
-  depths.reserve(problem.observations.size());
-  for (const Observation& observation : problem.observations) {
-    depths.push_back(ViewPoint(problem, observation, estimate).depth);
-  }
-  const auto median =
-      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), median, depths.end());
-  return *median;
-}
-
 }  // namespace
 
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,

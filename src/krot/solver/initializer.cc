@@ -23,16 +23,9 @@ constexpr double kHopelessGap = 1e-2;
 
 // Scales the estimate to a median depth of one.
 void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
-  std::vector<double> depths;
-  depths.reserve(problem.observations.size());
-  for (const Observation& observation : problem.observations) {
-    depths.push_back(ViewPoint(problem, observation, *estimate).depth);
-  }
-  const auto median =
-      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), median, depths.end());
-  for (Eigen::Vector3d& t : estimate->translations) t /= *median;
-  for (Eigen::Vector3d& s : estimate->points) s /= *median;
+  const double median = MedianDepth(problem, *estimate);
+  for (Eigen::Vector3d& t : estimate->translations) t /= median;
+  for (Eigen::Vector3d& s : estimate->points) s /= median;
 }
 
 // A component's way to a start.
