@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/problem/cost.h"
-#include "krot/solver/joint.h"
+#include "krot/joint/joint.h"
 #include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/synthetic_model.h"
 

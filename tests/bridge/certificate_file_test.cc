@@ -16,7 +16,7 @@
 #include "krot/model/model_error.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
-#include "tests/solver/joint_iterate.h"
+#include "tests/proof/joint_iterate.h"
 
 namespace krot {
 namespace {

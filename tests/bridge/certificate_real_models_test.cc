@@ -7,8 +7,8 @@
 
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/model/model_io.h"
-#include "tests/solver/joint_iterate.h"
-#include "tests/solver/naive_certificate_check.h"
+#include "tests/proof/joint_iterate.h"
+#include "tests/proof/naive_certificate_check.h"
 
 namespace krot {
 namespace {

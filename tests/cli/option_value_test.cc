@@ -1,4 +1,4 @@
-#include "tools/option_value.h"
+#include "tools/krot/option_value.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "tools/solve_progress.h"
+#include "tools/krot/solve_progress.h"
 
 #include <algorithm>
 #include <optional>

@@ -13,7 +13,7 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/model/validate.h"
 #include "krot/problem/cost.h"
-#include "krot/solver/block_sweep.h"
+#include "krot/sweeps/block_sweep.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

@@ -4,7 +4,7 @@
 
 #include "krot/model/model_io.h"
 #include "krot/model/validate.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

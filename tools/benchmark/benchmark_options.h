@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "tools/log.h"
-#include "tools/option_parser.h"
+#include "tools/krot/log.h"
+#include "tools/krot/option_parser.h"
 
 namespace krot {
 

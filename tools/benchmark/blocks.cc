@@ -12,7 +12,7 @@
 #include "tools/benchmark/competition.h"
 #include "tools/benchmark/model_list.h"
 #include "tools/benchmark/timing.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model/model_io.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

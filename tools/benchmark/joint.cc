@@ -14,7 +14,7 @@
 #include "tools/benchmark/model_list.h"
 #include "tools/benchmark/process.h"
 #include "tools/benchmark/timing.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

@@ -19,7 +19,7 @@
 #include "tools/benchmark/synthetic_model.h"
 #include "tools/benchmark/time_limit.h"
 #include "tools/benchmark/timing.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

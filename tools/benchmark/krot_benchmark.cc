@@ -10,7 +10,7 @@
 #include "krot/model/model_error.h"
 #include "krot/report/write_file.h"
 #include "tools/benchmark/benchmark_command.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

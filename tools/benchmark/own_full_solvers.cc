@@ -2,8 +2,8 @@
 
 #include "krot/base/timer.h"
 #include "krot/pipeline/schedule.h"
-#include "krot/solver/joint.h"
-#include "krot/solver/res_int.h"
+#include "krot/joint/joint.h"
+#include "krot/sweeps/res_int.h"
 #include "tools/benchmark/known_rotation_solver.h"
 
 namespace krot {

@@ -11,7 +11,7 @@
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/growth.h"
 #include "tools/benchmark/process.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

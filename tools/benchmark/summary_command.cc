@@ -6,7 +6,7 @@
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_options.h"
 #include "tools/benchmark/summary.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

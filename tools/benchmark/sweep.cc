@@ -10,13 +10,13 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/problem/cost.h"
-#include "krot/solver/res_int.h"
+#include "krot/sweeps/res_int.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/model_list.h"
 #include "tools/benchmark/synthetic_model.h"
 #include "tools/benchmark/timing.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

@@ -10,7 +10,7 @@
 #include "tools/benchmark/benchmark_report.h"
 #include "tools/benchmark/competition.h"
 #include "tools/benchmark/model_list.h"
-#include "tools/command_error.h"
+#include "tools/krot/command_error.h"
 
 namespace krot {
 namespace {

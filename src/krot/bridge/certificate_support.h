@@ -7,7 +7,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
-#include "krot/solver/certificate_check.h"
+#include "krot/proof/certificate_check.h"
 
 namespace krot {
 

@@ -5,7 +5,7 @@
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/cost.h"
-#include "krot/solver/block_sweep.h"
+#include "krot/sweeps/block_sweep.h"
 
 namespace krot {
 namespace {

@@ -5,7 +5,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/restrict.h"
-#include "krot/solver/working_set.h"
+#include "krot/joint/working_set.h"
 
 namespace krot {
 namespace {

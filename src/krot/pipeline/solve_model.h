@@ -13,8 +13,8 @@
 #include "krot/bridge/certificate_support.h"
 #include "krot/model/model.h"
 #include "krot/pipeline/polish.h"
-#include "krot/solver/joint.h"
-#include "krot/solver/res_int.h"
+#include "krot/joint/joint.h"
+#include "krot/sweeps/res_int.h"
 
 namespace krot {
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "krot/solver/initializer.h"
+#include "krot/joint/initializer.h"
 
 namespace krot {
 namespace {

@@ -1,0 +1,214 @@
+#include "krot/joint/certified_solve.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "krot/conic/interior_point.h"
+#include "krot/problem/cost.h"
+#include "krot/joint/feasible_start.h"
+
+namespace krot {
+namespace {
+
+// Whether a proof is worth while is asked when the interior point's own gap is
+// this small, and again whenever it has fallen by the factor below.
+constexpr double kFirstGapToAsk = 0.1;
+constexpr double kGapBetweenQuestions = 0.1;
+// A certificate is tried once the interior point's own gap is as small as the
+// one asked for, and again whenever it has fallen by this factor.
+constexpr double kGapBetweenCertificates = 0.3;
+// Of the gap asked for, where the interior point has gone far enough: what is
+// not proved there is none of its optimum's.
+constexpr double kFarBelow = 1e-2;
+// Iterations after which a start is given up if the gap is still large. Most
+// models take 10 to 50 in all; a start whose points hug the boundary of the
+// cones can hold the interior point back for hundreds.
+constexpr int kIterationsPerStart = 60;
+constexpr double kLargeGap = 0.1;
+// So many iterations must halve the gap, or the start is given up.
+constexpr int kPatience = 30;
+// A fresh start is found by bisection, to this width, relative to the cost; if
+// that was in vain, to a share of it.
+constexpr double kFirstWidth = 1e-2;
+constexpr double kShareOfWidth = 0.25;
+constexpr double kStartMargin = 0.1;
+constexpr double kFreshStartMargin = 1e-2;
+// In the unit of depth, of the median.
+constexpr double kShareOfDepth = 0.1;
+constexpr double kHopelessGap = 1e-5;
+// Whether there is anything below the cost is asked at this share of the gap
+// that is to be shown.
+constexpr double kShareOfGap = 0.5;
+// What is lost of a bound when it is proved, at most, relative.
+constexpr double kProofLoss = 1e-3;
+
+}  // namespace
+
+CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
+                               const JointOptions& options,
+                               const Estimate& start, double known_bound)
+    : problem_(problem),
+      options_(options),
+      estimate_(start),
+      cost_(Cost(problem, start, options.norm, options.num_threads)),
+      lower_bound_(known_bound) {}
+
+CertificateOptions CertifiedSolve::OptionsFor(double sufficient_bound) const {
+  CertificateOptions options;
+  options.sufficient_bound = sufficient_bound;
+  options.num_threads = options_.num_threads;
+  options.cancel = options_.cancel;
+  return options;
+}
+
+void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
+  if (!certificate) return;
+  const CertificateCheck check =
+      CheckCertificate(problem_, options_.norm, *certificate);
+  if (check.is_accepted && check.proved_bound > lower_bound_) {
+    lower_bound_ = check.proved_bound;
+    certificate_ = std::move(certificate);
+  }
+}
+
+InteriorPointTermination CertifiedSolve::RunFromEstimate(
+    double start_margin, const IsWorthProving& is_worth_proving,
+    const IterationReport& report) {
+  InteriorPointOptions options;
+  options.norm = options_.norm;
+  options.start_margin = start_margin;
+  options.max_iterations = max_iterations_ - iterations_;
+  options.smallest_gap = kFarBelow * options_.relative_gap;
+  options.num_threads = options_.num_threads;
+  options.cancel = options_.cancel;
+  double next_gap = options_.relative_gap;
+  double gap_to_ask = kFirstGapToAsk;
+  double milestone = std::numeric_limits<double>::infinity();
+  int milestone_iteration = 0;
+  options.stop = [&](const ConicIterate& iterate) {
+    ++iterations_;
+    if (iterate.cost < cost_) {
+      cost_ = iterate.cost;
+      estimate_ = *iterate.estimate;
+    }
+    if (iterate.gap <= std::max(next_gap, gap_to_ask)) {
+      is_given_up_ = !is_worth_proving(estimate_);
+      while (gap_to_ask >= iterate.gap) gap_to_ask *= kGapBetweenQuestions;
+    }
+    if (iterate.gap <= next_gap && !is_given_up_) {
+      Adopt(MakeCertificate(problem_, options_.norm, *iterate.estimate,
+                            iterate.gamma, *iterate.multipliers,
+                            OptionsFor((1 - options_.relative_gap) * cost_)));
+      next_gap = kGapBetweenCertificates * iterate.gap;
+    }
+    gap_ = iterate.gap;
+    if (gap_ < milestone / 2) {
+      milestone = gap_;
+      milestone_iteration = iterate.iteration;
+    }
+    JointIteration iteration;
+    iteration.gap = gap_;
+    report(iteration);
+    return is_given_up_ || IsGapReached() ||
+           iterate.iteration >= milestone_iteration + kPatience ||
+           (iterate.iteration >= kIterationsPerStart &&
+            iterate.gap > kLargeGap);
+  };
+  std::vector<Multiplier> multipliers;
+  Estimate last = estimate_;
+  return MinimizeJointly(problem_, options, &last, &multipliers).termination;
+}
+
+// Either an estimate below `bound`, pixels, far from the boundary of the cones,
+// which becomes the best; or a proof, if all goes well, that there is none.
+bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
+  FeasibleStartOptions options;
+  options.norm = options_.norm;
+  options.unit_depth = kShareOfDepth * MedianDepth(problem_, estimate_);
+  options.known_bound = lower_bound_;
+  options.hopeless_gap = kHopelessGap;
+  options.num_threads = options_.num_threads;
+  options.cancel = options_.cancel;
+  options.callback = [&](double target) {
+    ++iterations_;
+    JointIteration iteration;
+    iteration.target = target;
+    report(iteration);
+  };
+  std::vector<Multiplier> multipliers;
+  if (FindEstimateBelow(problem_, bound, options, &estimate_, &multipliers) ==
+      InteriorPointTermination::kFeasible) {
+    LowerByFeasibility(problem_, options, &estimate_);
+    cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
+    return true;
+  }
+  const double sufficient =
+      std::min((1 - kProofLoss) * bound, (1 - options_.relative_gap) * cost_);
+  Adopt(MakeInfeasibilityCertificate(problem_, options_.norm, bound,
+                                     multipliers, OptionsFor(sufficient)));
+  return false;
+}
+
+// Brings cost and what is known to be infeasible together. Whether there is a
+// new estimate.
+bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
+  bool is_fresh = false;
+  double infeasible = lower_bound_;
+  while (cost_ - infeasible > width * cost_ && !IsGapReached() &&
+         iterations_ < max_iterations_ && !IsCancelled(options_.cancel)) {
+    const double bound = (infeasible + cost_) / 2;
+    if (TryBelow(bound, report)) {
+      is_fresh = true;
+    } else {
+      infeasible = std::max(bound, lower_bound_);
+    }
+  }
+  return is_fresh;
+}
+
+// Whether there is a new estimate. Where the interior point believes that there
+// is none, a proof of that is sought first.
+bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
+  bool is_fresh = false;
+  if (gap_ <= kLargeGap) {
+    is_fresh =
+        TryBelow((1 - kShareOfGap * options_.relative_gap) * cost_, report);
+    if (IsGapReached()) return false;
+  }
+  is_fresh |= Bisect(width_, report);
+  width_ *= kShareOfWidth;
+  return is_fresh;
+}
+
+JointTermination CertifiedSolve::Run(int max_iterations,
+                                     const IsWorthProving& is_worth_proving,
+                                     const IterationReport& report) {
+  max_iterations_ = max_iterations;
+  width_ = kFirstWidth;
+  if (!(cost_ > 0)) return JointTermination::kGapReached;
+  double start_margin = kStartMargin;
+  for (;;) {
+    const InteriorPointTermination termination =
+        RunFromEstimate(start_margin, is_worth_proving, report);
+    start_margin = kFreshStartMargin;
+    if (IsGapReached()) return JointTermination::kGapReached;
+    if (is_given_up_) return JointTermination::kStalled;
+    if (termination == InteriorPointTermination::kInterrupted) {
+      return JointTermination::kInterrupted;
+    }
+    if (iterations_ >= max_iterations_) {
+      return JointTermination::kMaxIterations;
+    }
+    const bool is_fresh = FindFreshStart(report);
+    if (IsGapReached()) return JointTermination::kGapReached;
+    if (IsCancelled(options_.cancel)) return JointTermination::kInterrupted;
+    if (iterations_ >= max_iterations_) {
+      return JointTermination::kMaxIterations;
+    }
+    if (!is_fresh) return JointTermination::kStalled;
+  }
+}
+
+}  // namespace krot

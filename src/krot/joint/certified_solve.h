@@ -1,0 +1,71 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/proof/certificate.h"
+#include "krot/joint/joint.h"
+
+namespace krot {
+
+// Told of every iteration, of which only gap and target are filled in.
+using IterationReport = std::function<void(const JointIteration&)>;
+
+// The interior point on a connected problem, from an estimate to the certified
+// gap: it tries certificates on the way and leaves starts that hold it back.
+// Internal to SolveJoint.
+class CertifiedSolve {
+ public:
+  // Whether it is worth while to go on from this estimate towards a proof.
+  using IsWorthProving = std::function<bool(const Estimate&)>;
+
+  // Keeps references. All depths of `start` are positive. A cost that is as low
+  // as `known_bound`, pixels, allows is low enough.
+  CertifiedSolve(const KnownRotationProblem& problem,
+                 const JointOptions& options, const Estimate& start,
+                 double known_bound);
+
+  // Takes at most `max_iterations`, except for those towards a fresh start,
+  // which it ends once begun. Asks now and then on the way, and before every
+  // certificate that it tries, and ends as kStalled if it is not worth while.
+  JointTermination Run(int max_iterations,
+                       const IsWorthProving& is_worth_proving,
+                       const IterationReport& report);
+
+  // The best so far, never worse than the start, and its cost in pixels.
+  const Estimate& estimate() const { return estimate_; }
+  double cost() const { return cost_; }
+  // What the certificate proves, pixels; without one, the known bound.
+  double lower_bound() const { return lower_bound_; }
+  const std::optional<Certificate>& certificate() const { return certificate_; }
+  // Those towards a fresh start included.
+  int iterations() const { return iterations_; }
+
+ private:
+  bool IsGapReached() const {
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+  }
+  InteriorPointTermination RunFromEstimate(
+      double start_margin, const IsWorthProving& is_worth_proving,
+      const IterationReport& report);
+  bool FindFreshStart(const IterationReport& report);
+  bool Bisect(double width, const IterationReport& report);
+  bool TryBelow(double bound, const IterationReport& report);
+  CertificateOptions OptionsFor(double sufficient_bound) const;
+  void Adopt(std::optional<Certificate> certificate);
+
+  const KnownRotationProblem& problem_;
+  const JointOptions& options_;
+  Estimate estimate_;
+  double cost_ = 0;
+  double lower_bound_ = 0;
+  std::optional<Certificate> certificate_;
+  int iterations_ = 0;
+  int max_iterations_ = 0;
+  double width_ = 0;  // of the next bisection, relative
+  double gap_ = 0;    // of the interior point, where its last run ended
+  bool is_given_up_ = false;
+};
+
+}  // namespace krot

@@ -1,0 +1,73 @@
+#include "krot/joint/extend_solution.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "krot/problem/cost.h"
+#include "krot/problem/restrict.h"
+#include "krot/sweeps/block_sweep.h"
+
+namespace krot {
+namespace {
+
+// Sweeps move the blocks above this share of the highest cost allowed, as far
+// as this tolerance. They end with the one that leaves more than that share of
+// the excess.
+constexpr double kShareOfHighest = 0.9;
+constexpr double kSweepTolerance = 1e-3;
+constexpr double kExcessLeft = 0.8;
+constexpr int kMaxSweeps = 10;
+
+// Places the points outside the set; whether none is behind a camera.
+bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
+                 const JointOptions& options, double level,
+                 Estimate* estimate) {
+  std::vector<int64_t> observations;
+  bool is_behind = false;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    if (set.Contains(k)) continue;
+    const double cost = PointCost(problem, *estimate, options.norm, k);
+    is_behind |= !std::isfinite(cost);
+    if (cost <= level || !std::isfinite(cost)) continue;
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      observations.push_back(i);
+    }
+  }
+  if (observations.empty()) return !is_behind;
+  const RestrictedProblem part = RestrictProblem(problem, observations);
+  Estimate placed = RestrictEstimate(part, *estimate);
+  BlockSweep(part.problem, FastDescentOptions(), options.norm,
+             options.num_threads, options.cancel)
+      .IntersectPoints(&placed);
+  ReplaceEstimate(part, placed, estimate);
+  return !is_behind;
+}
+
+}  // namespace
+
+bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
+                    const JointOptions& options, double level, double highest,
+                    Estimate* estimate) {
+  if (!PlaceOthers(problem, set, options, level, estimate)) return false;
+  const auto excess = [&] {
+    return Cost(problem, *estimate, options.norm, options.num_threads) -
+           highest;
+  };
+  double left = excess();
+  if (left <= 0) return true;
+  BlockSweep blocks(problem, FastDescentOptions(), options.norm,
+                    options.num_threads, options.cancel);
+  blocks.SetGoal({kSweepTolerance, kShareOfHighest * highest});
+  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
+    blocks.ResectFrames(estimate);
+    blocks.IntersectPoints(estimate);
+    const double before = std::exchange(left, excess());
+    if (left <= 0) return true;
+    if (left > kExcessLeft * before) return false;
+  }
+  return false;
+}
+
+}  // namespace krot

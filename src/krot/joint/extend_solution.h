@@ -1,0 +1,22 @@
+#pragma once
+
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/joint/joint.h"
+#include "krot/joint/working_set.h"
+
+namespace krot {
+
+// Extends the solution of a working set, whose cost is `level`, to the points
+// outside, so that no residual exceeds `highest` >= level, pixels. Points stay
+// where they are if that is good enough, and otherwise take their own optimum
+// as the frames stand. If that does not suffice, sweeps move the frames as
+// well, and the set's points with them: its solution is seldom the only one,
+// and what leaves a point above it is often a frame that the set hardly holds.
+//
+// Whether it succeeded; `estimate` is as far as it came either way. Points
+// behind a camera stay there, and it fails. O(observations) per sweep.
+bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
+                    const JointOptions& options, double level, double highest,
+                    Estimate* estimate);
+
+}  // namespace krot

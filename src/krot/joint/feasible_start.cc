@@ -1,0 +1,63 @@
+#include "krot/joint/feasible_start.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "krot/problem/cost.h"
+
+namespace krot {
+namespace {
+
+// Of the longest baseline: a depth that is small against the scene. Without
+// baselines there is no scale, and any depth will do.
+constexpr double kUnitDepthPerBaseline = 1e-2;
+constexpr double kShare = 0.25;
+
+double UnitDepth(const KnownRotationProblem& problem) {
+  double longest = 0;
+  for (const View& view : problem.views) {
+    longest = std::max(longest, view.cam_from_rig_translation.norm());
+  }
+  return longest > 0 ? kUnitDepthPerBaseline * longest : 1;
+}
+
+}  // namespace
+
+InteriorPointTermination FindEstimateBelow(
+    const KnownRotationProblem& problem, double bound,
+    const FeasibleStartOptions& options, Estimate* estimate,
+    std::vector<Multiplier>* multipliers) {
+  InteriorPointOptions conic;
+  conic.norm = options.norm;
+  conic.max_iterations = options.max_iterations;
+  conic.num_threads = options.num_threads;
+  conic.cancel = options.cancel;
+  conic.stop = [&](const ConicIterate& iterate) {
+    if (options.callback) options.callback(bound);
+    return iterate.gamma > 1 && iterate.gap < options.hopeless_gap;
+  };
+  return FindFeasible(problem, conic, bound,
+                      options.unit_depth.value_or(UnitDepth(problem)), estimate,
+                      multipliers)
+      .termination;
+}
+
+bool LowerByFeasibility(const KnownRotationProblem& problem,
+                        const FeasibleStartOptions& options,
+                        Estimate* estimate) {
+  bool is_lower = false;
+  std::vector<Multiplier> multipliers;
+  for (;;) {
+    const double cost =
+        Cost(problem, *estimate, options.norm, options.num_threads);
+    if (!(kShare * cost > options.known_bound) ||
+        FindEstimateBelow(problem, kShare * cost, options, estimate,
+                          &multipliers) !=
+            InteriorPointTermination::kFeasible) {
+      return is_lower;
+    }
+    is_lower = true;
+  }
+}
+
+}  // namespace krot

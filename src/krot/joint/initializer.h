@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "krot/base/progress.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/proof/certificate.h"
+#include "krot/joint/joint.h"
+
+namespace krot {
+
+// A start from nothing but rotations and observations: the paper's "one
+// bisection iteration at a loose upper bound" [Zhang18, Sec. 4.2].
+
+struct InitializerOptions {
+  Norm norm;                 // p = 1, 2 or infinity
+  double max_error = 100;    // the bound that the start must meet, pixels; > 0
+  int max_iterations = 200;  // per component; >= 1
+  int num_threads = -1;
+  const CancelFlag* cancel = nullptr;  // may be null
+  JointCallback callback;  // counts over all components; may be empty
+};
+
+enum class InitializerTermination {
+  kNotRun,
+  kFeasible,    // every depth is positive, every residual below max_error
+  kInfeasible,  // proved: no estimate does that
+  kFailed,      // neither was shown: no estimate was found at any bound
+  kInterrupted,
+};
+
+struct InitializerSummary {
+  InitializerTermination termination = InitializerTermination::kNotRun;
+  double cost = 0;  // pixels, of the estimate if feasible
+  std::vector<JointIteration> iterations;
+  // kInfeasible: proves lower_bound > max_error.
+  std::optional<Certificate> certificate;
+  double lower_bound = 0;  // pixels, what it proves
+};
+
+// Finds an estimate whose residuals are all below max_error, and as far below
+// as comes easily, each connected component for itself; `*estimate` is only
+// written if there is one, its points and frames without observations not even
+// then. Where baselines do not set the scale, components come out with a median
+// depth of one. Throws std::invalid_argument for options out of range.
+InitializerSummary FindStart(const KnownRotationProblem& problem,
+                             const InitializerOptions& options,
+                             Estimate* estimate);
+
+}  // namespace krot

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/proof/certificate_check.h"
+
+namespace krot {
+
+// What CheckCertificate asks of its input before it proves anything. Each
+// returns why the input is refused, one sentence without its full stop, or
+// nothing.
+
+// Finite numbers, a known norm, observations of the problem in ascending
+// order, and |y|_dual <= lambda for each.
+std::optional<std::string> RefuseNumbers(const KnownRotationProblem& problem,
+                                         Norm norm,
+                                         const Certificate& certificate);
+
+// Every R_cw must be R_sr R_rw, to kRotationError per entry, for one R_rw per
+// frame; and all must be rotations as far as the proof relies on it.
+std::optional<std::string> RefuseRotations(const KnownRotationProblem& problem);
+
+// The norm dual to ||.||_p; p = 1, 2 or infinity.
+long double DualNorm(const Eigen::Matrix<long double, 2, 1>& y, Norm norm);
+
+// "start" value "end", with all digits of the value.
+std::string Sentence(const std::string& start, double value,
+                     const std::string& end);
+
+}  // namespace krot

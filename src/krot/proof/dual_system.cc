@@ -1,0 +1,92 @@
+#include "krot/proof/dual_system.h"
+
+#include <algorithm>
+
+#include <Eigen/LU>
+
+namespace krot {
+namespace {
+
+template <typename Scalar>
+Eigen::Matrix<Scalar, 3, 1> Stack(const Multiplier& multiplier) {
+  return {multiplier.y[0], multiplier.y[1], multiplier.lambda};
+}
+
+}  // namespace
+
+DualSystem::DualSystem(const KnownRotationProblem& problem, double delta,
+                       const std::vector<Multiplier>& multipliers,
+                       double margin)
+    : multipliers_(multipliers),
+      empty_{problem.num_points, problem.num_frames, false, {}} {
+  Real sum = 0;
+  Real size = 0;
+  std::vector<const View*> first_view(problem.num_frames, nullptr);
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    const Observation& observation = problem.observations[i];
+    const View& view = problem.views[observation.view];
+    Matrix3r E;
+    E << observation.J.cast<Real>(),
+        -observation.J.cast<Real>() * observation.u.cast<Real>(), 0, 0, delta;
+    Block block;
+    block.point = E * view.cam_from_world_rotation.cast<Real>();
+    block.frame = E * view.cam_from_rig_rotation.cast<Real>();
+    block.point_index = observation.point;
+    block.frame_index = view.frame;
+    const View*& first = first_view[view.frame];
+    if (first == nullptr) first = &view;
+    if (first != &view) {
+      const Matrix3r rig_from_first =
+          Matrix3r(first->cam_from_rig_rotation.cast<Real>()).inverse();
+      block.constants =
+          E * view.cam_from_rig_translation.cast<Real>() -
+          block.frame *
+              (rig_from_first * first->cam_from_rig_translation.cast<Real>());
+      empty_.has_last_row |= !block.constants.isZero(0);
+    }
+    sum += block.constants.dot(Stack<Real>(multipliers[i]));
+    size += multipliers[i].lambda * block.constants.norm();
+    blocks_.push_back(block);
+  }
+  constants_ = std::min(sum, -margin * size);
+}
+
+Eigen::VectorXd DualSystem::Miss(
+    const std::vector<Multiplier>& multipliers) const {
+  VectorXr miss = VectorXr::Zero(empty_.num_rows());
+  if (empty_.has_last_row) miss[miss.size() - 1] = -constants_;
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& block = blocks_[i];
+    const Vector3r z = Stack<Real>(multipliers[i]);
+    miss.segment<3>(3 * int64_t{block.point_index}) +=
+        block.point.transpose() * z;
+    if (block.frame_index > 0) {
+      miss.segment<3>(3 * (int64_t{empty_.num_points} + block.frame_index -
+                           1)) += block.frame.transpose() * z;
+    }
+    if (empty_.has_last_row) miss[miss.size() - 1] += block.constants.dot(z);
+  }
+  return miss.cast<double>();
+}
+
+LeastNormProblem DualSystem::Changes(
+    const std::vector<Eigen::Matrix2d>& axes) const {
+  LeastNormProblem equations = empty_;
+  for (size_t i = 0; i < blocks_.size(); ++i) {
+    const Block& block = blocks_[i];
+    Matrix3r units = Matrix3r::Zero();
+    units.topLeftCorner<2, 2>() =
+        Real{multipliers_[i].lambda} * axes[i].cast<Real>();
+    units.row(2) = Stack<Real>(multipliers_[i]).transpose();
+    LeastNormProblem::Columns columns;
+    columns.point = block.point_index;
+    columns.frame = block.frame_index;
+    columns.point_rows = (units * block.point).cast<double>();
+    columns.frame_rows = (units * block.frame).cast<double>();
+    columns.last_row = (units * block.constants).cast<double>();
+    equations.columns.push_back(columns);
+  }
+  return equations;
+}
+
+}  // namespace krot

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/conic/interior_point.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/proof/least_norm.h"
+
+namespace krot {
+
+// The identities (1) and (2) of certificate_check.h as linear equations in the
+// multipliers y_i, lambda_i, for one delta. Internal to the making of
+// certificates.
+//
+// The rows are those of the points and of all frames but the first (the
+// problem must be connected). Where a frame sees points through several
+// projection centres, one more row holds the constants (b; d), counted from the
+// centre of the frame's first view.
+class DualSystem {
+ public:
+  // (2) is asked to stay as far below zero as it is for these multipliers, at
+  // least by `margin`, relative to what it sums up.
+  DualSystem(const KnownRotationProblem& problem, double delta,
+             const std::vector<Multiplier>& multipliers, double margin);
+
+  // What the equations miss for these, evaluated in extended precision.
+  Eigen::VectorXd Miss(const std::vector<Multiplier>& multipliers) const;
+
+  // The equations for changes of the multipliers of the constructor, in units
+  // of lambda_i: of y_i by axes[i]' x_1,2, and of both y_i and lambda_i by x_3.
+  LeastNormProblem Changes(const std::vector<Eigen::Matrix2d>& axes) const;
+
+ private:
+  using Real = long double;
+  using Matrix3r = Eigen::Matrix<Real, 3, 3>;
+  using Vector3r = Eigen::Matrix<Real, 3, 1>;
+  using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
+  // (A; delta c) by the two unknowns of an observation, and (b; delta d).
+  struct Block {
+    Matrix3r point;
+    Matrix3r frame;
+    Vector3r constants = Vector3r::Zero();
+    int32_t point_index = 0;
+    int32_t frame_index = 0;  // 0: omitted
+  };
+
+  const std::vector<Multiplier> multipliers_;
+  LeastNormProblem empty_;  // without columns
+  std::vector<Block> blocks_;
+  Real constants_ = 0;  // the left-hand side of (2) that is asked for
+};
+
+}  // namespace krot

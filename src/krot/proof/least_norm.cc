@@ -1,0 +1,134 @@
+#include "krot/proof/least_norm.h"
+
+#include <limits>
+#include <utility>
+
+namespace krot {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// A last row that keeps less than this of its length (squared) follows from
+// the others.
+constexpr double kSmallestLastRow = 1e-20;
+// A factorisation takes seconds at most.
+constexpr int kNumThreads = 1;
+
+}  // namespace
+
+bool LeastNormSolver::Factorize(LeastNormProblem problem) {
+  problem_ = std::move(problem);
+  elimination_.reset();
+  if (problem_.num_rows() > 3 * static_cast<int64_t>(problem_.columns.size())) {
+    return false;
+  }
+  return problem_.num_rows() <= max_dense_rows_ ? FactorizeDense()
+                                                : FactorizeByPoints();
+}
+
+VectorXd LeastNormSolver::Solve(const VectorXd& rhs) const {
+  if (elimination_) return SolveByPoints(rhs);
+  const int64_t rows = scale_.size();
+  VectorXd padded = VectorXd::Zero(qr_.rows());
+  padded.head(rows) = qr_.matrixQR()
+                          .topRows(rows)
+                          .triangularView<Eigen::Upper>()
+                          .transpose()
+                          .solve(rhs.cwiseProduct(scale_));
+  return qr_.householderQ() * padded;
+}
+
+bool LeastNormSolver::FactorizeDense() {
+  const int64_t num_rows = problem_.num_rows();
+  MatrixXd transposed = MatrixXd::Zero(
+      3 * static_cast<int64_t>(problem_.columns.size()), num_rows);
+  int64_t i = 0;
+  for (const LeastNormProblem::Columns& c : problem_.columns) {
+    transposed.block<3, 3>(i, 3 * int64_t{c.point}) = c.point_rows;
+    if (c.frame > 0) {
+      transposed.block<3, 3>(
+          i, 3 * (int64_t{problem_.num_points} + c.frame - 1)) = c.frame_rows;
+    }
+    if (problem_.has_last_row) {
+      transposed.block<3, 1>(i, num_rows - 1) = c.last_row;
+    }
+    i += 3;
+  }
+  scale_ = transposed.colwise().norm().cwiseInverse();
+  if (!scale_.allFinite()) return false;
+  transposed *= scale_.asDiagonal();
+  qr_.compute(transposed);
+  const VectorXd diagonal = qr_.matrixQR().diagonal().cwiseAbs();
+  return diagonal.minCoeff() >
+         std::numeric_limits<double>::epsilon() * diagonal.maxCoeff();
+}
+
+// With A = M': the solution of least norm is A (A'A)^-1 rhs.
+bool LeastNormSolver::FactorizeByPoints() {
+  structure_ = {};
+  structure_.point_begin.assign(1, 0);
+  for (const LeastNormProblem::Columns& c : problem_.columns) {
+    while (static_cast<int32_t>(structure_.point_begin.size()) <= c.point) {
+      structure_.point_begin.push_back(
+          static_cast<int64_t>(structure_.frame_of.size()));
+    }
+    structure_.frame_of.push_back(c.frame);
+  }
+  structure_.point_begin.resize(
+      problem_.num_points + 1,
+      static_cast<int64_t>(structure_.frame_of.size()));
+  structure_.frame_is_fixed.assign(problem_.num_frames, 0);
+  structure_.frame_is_fixed[0] = 1;
+  elimination_ = std::make_unique<PointElimination<3>>(structure_, kNumThreads);
+  using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  for (size_t i = 0; i < problem_.columns.size(); ++i) {
+    const LeastNormProblem::Columns& c = problem_.columns[i];
+    const int64_t n = static_cast<int64_t>(i);
+    Eigen::Map<RowMajor>(elimination_->point_rows(n)) = c.point_rows;
+    Eigen::Map<RowMajor>(elimination_->frame_rows(n)) = c.frame_rows;
+  }
+  if (!elimination_->Factorize()) return false;
+  if (!problem_.has_last_row) return true;
+  last_row_.resize(3 * static_cast<int64_t>(problem_.columns.size()));
+  for (size_t i = 0; i < problem_.columns.size(); ++i) {
+    last_row_.segment<3>(3 * static_cast<int64_t>(i)) =
+        problem_.columns[i].last_row;
+  }
+  const double norm2 = last_row_.squaredNorm();
+  BlockVector zero;
+  zero.SetZero(problem_.num_points, problem_.num_frames);
+  BlockVector x;
+  elimination_->Solve(zero, last_row_.data(), &x);
+  VectorXd in_span(last_row_.size());
+  elimination_->Multiply(x, in_span.data());
+  last_row_ -= in_span;
+  last_row_norm2_ = last_row_.squaredNorm();
+  return last_row_norm2_ > kSmallestLastRow * norm2;
+}
+
+VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {
+  BlockVector g;
+  g.SetZero(problem_.num_points, problem_.num_frames);
+  for (int32_t k = 0; k < problem_.num_points; ++k) {
+    g.points[k] = rhs.segment<3>(3 * int64_t{k});
+  }
+  for (int32_t f = 1; f < problem_.num_frames; ++f) {
+    g.frames[f] = rhs.segment<3>(3 * (int64_t{problem_.num_points} + f - 1));
+  }
+  BlockVector x;
+  elimination_->Solve(g, nullptr, &x);
+  VectorXd solution(3 * static_cast<int64_t>(problem_.columns.size()));
+  elimination_->Multiply(x, solution.data());
+  if (problem_.has_last_row) {
+    double rest = rhs[rhs.size() - 1];
+    for (size_t i = 0; i < problem_.columns.size(); ++i) {
+      rest -= problem_.columns[i].last_row.dot(
+          solution.segment<3>(3 * static_cast<int64_t>(i)));
+    }
+    solution += rest / last_row_norm2_ * last_row_;
+  }
+  return solution;
+}
+
+}  // namespace krot

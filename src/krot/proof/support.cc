@@ -1,0 +1,105 @@
+#include "krot/proof/support.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "krot/problem/cost.h"
+#include "krot/problem/restrict.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Vector3d;
+
+// Of some observations at a point or frame.
+struct Balance {
+  Vector3d sum = Vector3d::Zero();  // of the forces
+  double largest = 0;               // delta lambda
+
+  bool IsWithin(double tolerance) const {
+    return sum.norm() < tolerance * largest;
+  }
+};
+
+struct Balances {
+  std::vector<Balance> of_point;
+  std::vector<Balance> of_frame;
+};
+
+Balances BalanceForces(const KnownRotationProblem& problem, double delta,
+                       const std::vector<Multiplier>& multipliers,
+                       const std::vector<int64_t>& observations) {
+  Balances balances{std::vector<Balance>(problem.num_points),
+                    std::vector<Balance>(problem.num_frames)};
+  for (const int64_t i : observations) {
+    const Observation& observation = problem.observations[i];
+    const View& view = problem.views[observation.view];
+    const double delta_lambda = delta * multipliers[i].lambda;
+    const Eigen::Vector2d q = observation.J.transpose() * multipliers[i].y;
+    const Vector3d force =
+        view.cam_from_world_rotation.transpose() *
+        Vector3d(q[0], q[1], delta_lambda - observation.u.dot(q));
+    for (Balance* balance : {&balances.of_point[observation.point],
+                             &balances.of_frame[view.frame]}) {
+      balance->sum += force;
+      balance->largest = std::max(balance->largest, delta_lambda);
+    }
+  }
+  return balances;
+}
+
+}  // namespace
+
+std::vector<double> SupportScores(const KnownRotationProblem& problem,
+                                  Norm norm, const Estimate& estimate,
+                                  double gamma,
+                                  const std::vector<Multiplier>& multipliers) {
+  std::vector<double> scores(problem.observations.size());
+  double sum = 0;
+  for (size_t i = 0; i < scores.size(); ++i) {
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], estimate);
+    const double share = multipliers[i].lambda * viewed.depth;
+    const double slack = 1 - ResidualOf(viewed, norm) / gamma;
+    scores[i] = share / std::max(slack, std::numeric_limits<double>::epsilon());
+    sum += share;
+  }
+  for (double& score : scores) score /= sum;
+  return scores;
+}
+
+std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
+                                   const std::vector<double>& scores,
+                                   double threshold) {
+  std::vector<int64_t> support;
+  for (size_t i = 0; i < scores.size(); ++i) {
+    if (scores[i] > threshold) support.push_back(static_cast<int64_t>(i));
+  }
+  return PruneUnconstrained(problem, support);
+}
+
+std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
+                                    double delta,
+                                    const std::vector<Multiplier>& multipliers,
+                                    std::vector<int64_t> candidates,
+                                    double tolerance) {
+  for (;;) {
+    const Balances balances =
+        BalanceForces(problem, delta, multipliers, candidates);
+    std::vector<int64_t> balanced;
+    for (const int64_t i : candidates) {
+      const Observation& observation = problem.observations[i];
+      const int32_t frame = problem.views[observation.view].frame;
+      if (balances.of_point[observation.point].IsWithin(tolerance) &&
+          balances.of_frame[frame].IsWithin(tolerance)) {
+        balanced.push_back(i);
+      }
+    }
+    balanced = PruneUnconstrained(problem, balanced);
+    if (balanced.size() == candidates.size()) return balanced;
+    candidates = std::move(balanced);
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,90 @@
+#include "krot/sweeps/res_int.h"
+
+#include <cmath>
+
+#include "krot/base/check.h"
+#include "krot/base/timer.h"
+#include "krot/problem/cost.h"
+#include "krot/sweeps/block_sweep.h"
+#include "krot/sweeps/momentum.h"
+
+namespace krot {
+namespace {
+
+// How far coarse sweeps take a block: see res_int.h.
+constexpr double kCoarseTolerance = 1e-3;
+constexpr double kCoarseLevel = 0.5;
+
+void CheckOptions(const ResIntOptions& options) {
+  CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
+  CheckArgument(options.max_sweeps >= 0, "max_sweeps", options.max_sweeps,
+                ">= 0");
+  CheckArgument(options.sweep_tolerance >= 0, "sweep_tolerance",
+                options.sweep_tolerance, ">= 0");
+  CheckArgument(options.patience >= 1, "patience", options.patience, ">= 1");
+}
+
+}  // namespace
+
+ResIntSummary SolveResInt(const KnownRotationProblem& problem,
+                          const ResIntOptions& options, Estimate* estimate) {
+  CheckOptions(options);
+  const Timer timer;
+  const bool literal =
+      options.fast_descent.settings == FastDescentSettings::kPaper;
+  const int patience = literal ? 1 : options.patience;
+  ResIntSummary summary;
+  summary.cost_initial =
+      Cost(problem, *estimate, options.norm, options.num_threads);
+  CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
+                summary.cost_initial, "finite: all depths positive");
+
+  summary.termination = ResIntTermination::kMaxSweeps;
+  BlockSweep blocks(problem, options.fast_descent, options.norm,
+                    options.num_threads, options.cancel);
+  Momentum momentum(problem, options.num_threads, *estimate,
+                    summary.cost_initial);
+  bool is_coarse = !literal && options.update_frames;
+  int idle_sweeps = 0;  // in a row
+  for (int sweep = 1; sweep <= options.max_sweeps; ++sweep) {
+    const bool is_last = sweep == options.max_sweeps;
+    Estimate current =
+        literal || is_last ? momentum.best() : momentum.NextStart();
+    const DescentGoal coarse_goal{kCoarseTolerance,
+                                  kCoarseLevel * momentum.best_cost()};
+    blocks.SetGoal(is_coarse && !is_last ? coarse_goal : DescentGoal{});
+    double reached = blocks.IntersectPoints(&current);
+    if (options.update_frames) reached = blocks.ResectFrames(&current);
+    if (IsCancelled(options.cancel)) {
+      summary.termination = ResIntTermination::kInterrupted;
+      break;
+    }
+    const double cost_before = momentum.best_cost();
+    momentum.Accept(current, reached);
+    const double cost = momentum.best_cost();
+    summary.sweeps.push_back({cost, timer.Seconds()});
+    if (options.callback) options.callback(sweep, summary.sweeps.back());
+    const bool idle =
+        cost_before - cost <= options.sweep_tolerance * cost_before;
+    idle_sweeps = idle ? idle_sweeps + 1 : 0;
+    if (is_coarse && idle_sweeps == patience) {
+      is_coarse = false;
+      idle_sweeps = 0;
+    }
+    if (idle_sweeps == patience || cost == 0) {
+      summary.termination = ResIntTermination::kStalled;
+      break;
+    }
+  }
+  // The costs of sweeps differ from Cost() by rounding.
+  summary.cost_final =
+      Cost(problem, momentum.best(), options.norm, options.num_threads);
+  if (summary.cost_final <= summary.cost_initial) {
+    *estimate = momentum.best();
+  } else {
+    summary.cost_final = summary.cost_initial;
+  }
+  return summary;
+}
+
+}  // namespace krot

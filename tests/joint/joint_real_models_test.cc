@@ -1,0 +1,105 @@
+// SolveJoint on real models against the optima of a reference solver.
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "krot/bridge/bridge.h"
+#include "krot/model/model_io.h"
+#include "krot/problem/cost.h"
+#include "krot/joint/initializer.h"
+#include "krot/joint/joint.h"
+
+namespace krot {
+namespace {
+
+constexpr double kGap = 1e-4;  // the reference's own, too
+
+struct RealModel {
+  const char* folder;
+  double optimum;  // linearised pixels, p = 2
+};
+
+void PrintTo(const RealModel& model, std::ostream* stream) {
+  *stream << model.folder;
+}
+
+std::string Name(const testing::TestParamInfo<RealModel>& test) {
+  return test.param.folder;
+}
+
+class RealModelTest : public testing::TestWithParam<RealModel> {
+ protected:
+  void SetUp() override {
+    const char* root = std::getenv("KROT_REAL_MODELS");
+    if (root == nullptr) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+    const std::filesystem::path folder =
+        std::filesystem::path(root) / GetParam().folder;
+    built_ = BuildProblem(ReadModel(folder, DetectModelFormat(folder)), {});
+  }
+
+  void ExpectOptimumFrom(Estimate estimate) const {
+    JointOptions options;
+    options.relative_gap = kGap;
+    const JointSummary summary = SolveJoint(built_.problem, options, &estimate);
+    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    const double optimum = GetParam().optimum;
+    // Five digits are known.
+    EXPECT_NEAR(summary.cost_final, optimum, 1e-4 * optimum + 5e-5);
+    EXPECT_EQ(summary.cost_final,
+              Cost(built_.problem, estimate, options.norm, 1));
+    ASSERT_TRUE(summary.certificate);
+    const CertificateCheck check =
+        CheckCertificate(built_.problem, options.norm, *summary.certificate);
+    EXPECT_TRUE(check.is_accepted) << check.refusal;
+    EXPECT_GE(check.proved_bound, (1 - kGap) * summary.cost_final);
+    EXPECT_LE(check.proved_bound, summary.cost_final);
+    RecordProperty("iterations", static_cast<int>(summary.iterations.size()));
+  }
+
+  BuiltProblem built_;
+};
+
+using SolveJointOfRealModel = RealModelTest;
+
+TEST_P(SolveJointOfRealModel, ProvesTheReferenceOptimumFromItsOwnStart) {
+  ExpectOptimumFrom(built_.start);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Local, SolveJointOfRealModel,
+    testing::Values(
+        RealModel{"crane8_txt", 3.1011}, RealModel{"door", 4.3929},
+        RealModel{"door_colmap", 3.4205}, RealModel{"fountain11", 3.2858},
+        RealModel{"longtracks92", 3.4528}, RealModel{"maupertuis4_txt", 2.5369},
+        RealModel{"outliers12", 18.9275}, RealModel{"room50_opencv", 3.6473},
+        RealModel{"south128", 3.1778}, RealModel{"south128_full", 3.5773},
+        RealModel{"task41_rigs_frames", 3.5041}, RealModel{"tower", 4.6315},
+        RealModel{"tower_init", 4.6315}, RealModel{"two_cameras44", 2.9279}),
+    Name);
+
+using FindStartOfRealModel = RealModelTest;
+
+TEST_P(FindStartOfRealModel, LeadsToTheReferenceOptimum) {
+  Estimate estimate;
+  const InitializerSummary start = FindStart(built_.problem, {}, &estimate);
+  ASSERT_EQ(start.termination, InitializerTermination::kFeasible);
+  EXPECT_LT(start.cost, InitializerOptions().max_error);
+  ExpectOptimumFrom(estimate);
+}
+
+INSTANTIATE_TEST_SUITE_P(Local, FindStartOfRealModel,
+                         testing::Values(RealModel{"crane8_txt", 3.1011},
+                                         RealModel{"fountain11", 3.2858},
+                                         RealModel{"longtracks92", 3.4528},
+                                         RealModel{"maupertuis4_txt", 2.5369},
+                                         RealModel{"south128", 3.1778},
+                                         RealModel{"task41_rigs_frames",
+                                                   3.5041},
+                                         RealModel{"two_cameras44", 2.9279}),
+                         Name);
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,328 @@
+#include "krot/joint/joint.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "krot/problem/cost.h"
+#include "krot/joint/initializer.h"
+#include "krot/sweeps/res_int.h"
+#include "tests/oracle/lp_oracle.h"
+#include "tests/joint/small_scenes.h"
+
+namespace krot {
+namespace {
+
+constexpr double kGap = 1e-6;
+
+JointOptions Options(Norm norm) {
+  JointOptions options;
+  options.norm = norm;
+  options.relative_gap = kGap;
+  options.num_threads = 1;
+  return options;
+}
+
+// Recomputes everything that the summary claims.
+void ExpectCertified(const KnownRotationProblem& problem, Norm norm,
+                     const Estimate& estimate, const JointSummary& summary) {
+  EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+  EXPECT_EQ(summary.cost_final, Cost(problem, estimate, norm, 1));
+  EXPECT_LE(summary.cost_final, summary.cost_initial);
+  ASSERT_TRUE(summary.certificate);
+  const CertificateCheck check =
+      CheckCertificate(problem, norm, *summary.certificate);
+  EXPECT_TRUE(check.is_accepted) << check.refusal;
+  EXPECT_EQ(check.proved_bound, summary.lower_bound);
+  EXPECT_LE(check.proved_bound, summary.cost_final);
+  EXPECT_GE(check.proved_bound, (1 - kGap) * summary.cost_final);
+}
+
+double OptimalCost(const RandomScene& scene, Norm norm) {
+  Estimate estimate = scene.estimate;
+  return SolveJoint(scene.problem, Options(norm), &estimate).cost_final;
+}
+
+// Every unknown moved by up to `size` along each axis; depths stay positive.
+Estimate Shake(const RandomScene& scene, double size) {
+  std::mt19937 generator(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (;; size *= 0.9) {
+    Estimate estimate = scene.estimate;
+    for (auto* vectors : {&estimate.translations, &estimate.points}) {
+      for (Eigen::Vector3d& vector : *vectors) {
+        for (double& entry : vector) entry += size * uniform(generator);
+      }
+    }
+    if (std::isfinite(Cost(scene.problem, estimate, Norm::L2(), 1))) {
+      return estimate;
+    }
+  }
+}
+
+// Sweeps after a rough start push points against their cones.
+Estimate HugTheBoundary(const RandomScene& scene, Norm norm) {
+  Estimate estimate = Shake(scene, 3);
+  ResIntOptions sweeps;
+  sweeps.norm = norm;
+  sweeps.max_sweeps = 5;
+  sweeps.sweep_tolerance = 1e-9;
+  SolveResInt(scene.problem, sweeps, &estimate);
+  return estimate;
+}
+
+class SolveJointTest : public testing::TestWithParam<double> {
+ protected:
+  Norm norm() const { return {GetParam()}; }
+};
+
+TEST_P(SolveJointTest, ProvesItsOptimumToAMillionth) {
+  for (const double baseline : {0.0, 0.3, 0.05}) {
+    for (unsigned seed = 1; seed <= 8; ++seed) {
+      SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
+      RandomScene scene = MakeSmallScene(seed, baseline);
+      const JointSummary summary =
+          SolveJoint(scene.problem, Options(norm()), &scene.estimate);
+      ExpectCertified(scene.problem, norm(), scene.estimate, summary);
+      EXPECT_EQ(summary.num_components, 1);
+    }
+  }
+}
+
+TEST_P(SolveJointTest, AgreesWithLinearProgrammes) {
+  if (norm().p == 2) GTEST_SKIP() << "no linear programme for p = 2";
+  for (const double baseline : {0.0, 0.3}) {
+    for (unsigned seed = 11; seed <= 13; ++seed) {
+      SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
+      RandomScene scene = MakeSmallScene(seed, baseline);
+      // The larger the depths, the less CLP's absolute tolerance matters.
+      const std::optional<double> expected = OptimalCostByBisection(
+          scene.problem, norm(), Cost(scene.problem, scene.estimate, norm(), 1),
+          baseline > 0 ? 0.1 : 1000);
+      if (!expected) GTEST_SKIP() << "built without CLP";
+      const double cost = OptimalCost(scene, norm());
+      EXPECT_NEAR(cost, *expected, 1e-6 * cost);
+    }
+  }
+}
+
+TEST_P(SolveJointTest, EndsAtTheSameOptimumFromAnyStart) {
+  for (const double baseline : {0.0, 0.3}) {
+    for (unsigned seed = 21; seed <= 24; ++seed) {
+      SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
+      const RandomScene scene = MakeSmallScene(seed, baseline);
+      const double optimum = OptimalCost(scene, norm());
+
+      Estimate far = Shake(scene, 2);
+      JointSummary summary = SolveJoint(scene.problem, Options(norm()), &far);
+      EXPECT_GT(summary.cost_initial, 20 * optimum);
+      ExpectCertified(scene.problem, norm(), far, summary);
+      EXPECT_NEAR(summary.cost_final, optimum, 1e-6 * optimum);
+
+      Estimate from_nothing;
+      InitializerOptions initializer;
+      initializer.norm = norm();
+      FindStart(scene.problem, initializer, &from_nothing);
+      summary = SolveJoint(scene.problem, Options(norm()), &from_nothing);
+      ExpectCertified(scene.problem, norm(), from_nothing, summary);
+      EXPECT_NEAR(summary.cost_final, optimum, 1e-6 * optimum);
+    }
+  }
+}
+
+TEST_P(SolveJointTest, LeavesStartsThatHugTheBoundary) {
+  for (unsigned seed = 31; seed <= 36; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeSmallScene(seed);
+    Estimate estimate = HugTheBoundary(scene, norm());
+    const JointSummary summary =
+        SolveJoint(scene.problem, Options(norm()), &estimate);
+    ExpectCertified(scene.problem, norm(), estimate, summary);
+    const double optimum = OptimalCost(scene, norm());
+    EXPECT_NEAR(summary.cost_final, optimum, 1e-6 * optimum);
+  }
+}
+
+TEST_P(SolveJointTest, SolvesEveryComponentToItsOwnOptimum) {
+  const RandomScene first = MakeSmallScene(41);
+  const RandomScene second = MakeSmallScene(42, 0.3);
+  for (const bool is_first_first : {true, false}) {
+    RandomScene glued =
+        is_first_first ? Glue(first, second) : Glue(second, first);
+    const JointSummary summary =
+        SolveJoint(glued.problem, Options(norm()), &glued.estimate);
+    ExpectCertified(glued.problem, norm(), glued.estimate, summary);
+    EXPECT_EQ(summary.num_components, 2);
+
+    const RandomScene& front = is_first_first ? first : second;
+    double cost_of_front = 0;
+    double cost_of_back = 0;
+    for (const Observation& o : glued.problem.observations) {
+      double& cost =
+          o.point < front.problem.num_points ? cost_of_front : cost_of_back;
+      cost = std::max(
+          cost,
+          ResidualOf(ViewPoint(glued.problem, o, glued.estimate), norm()));
+    }
+    if (!is_first_first) std::swap(cost_of_front, cost_of_back);
+    const double optimum_of_first = OptimalCost(first, norm());
+    const double optimum_of_second = OptimalCost(second, norm());
+    EXPECT_NEAR(cost_of_front, optimum_of_first, 1e-6 * optimum_of_first);
+    EXPECT_NEAR(cost_of_back, optimum_of_second, 1e-6 * optimum_of_second);
+  }
+}
+
+TEST_P(SolveJointTest, LeavesWhatNothingSeesWhereItIs) {
+  RandomScene scene = MakeSmallScene(43);
+  const double optimum = OptimalCost(scene, norm());
+  AddUnseen(&scene);
+  const JointSummary summary =
+      SolveJoint(scene.problem, Options(norm()), &scene.estimate);
+  ExpectCertified(scene.problem, norm(), scene.estimate, summary);
+  EXPECT_EQ(summary.cost_final, optimum);
+  EXPECT_EQ(scene.estimate.translations.back(), Eigen::Vector3d(7, 8, 9));
+  EXPECT_EQ(scene.estimate.points.back(), Eigen::Vector3d(-1, -2, -3));
+}
+
+TEST_P(SolveJointTest, HasTheSameBitsAtAnyNumberOfThreads) {
+  RandomSceneOptions scene_options;
+  scene_options.num_points = 1200;  // several chunks
+  const RandomScene scene = MakeRandomScene(scene_options);
+  std::optional<Estimate> expected;
+  double expected_bound = 0;
+  for (const int num_threads : {1, 2, 3}) {
+    JointOptions options = Options(norm());
+    options.relative_gap = 1e-4;
+    options.num_threads = num_threads;
+    Estimate estimate = scene.estimate;
+    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    if (!expected) {
+      expected = estimate;
+      expected_bound = summary.lower_bound;
+    }
+    EXPECT_EQ(estimate.translations, expected->translations);
+    EXPECT_EQ(estimate.points, expected->points);
+    EXPECT_EQ(summary.lower_bound, expected_bound);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Norms, SolveJointTest,
+    testing::Values(1, 2, std::numeric_limits<double>::infinity()),
+    [](const auto& test) {
+      return test.param == 1 ? "L1" : test.param == 2 ? "L2" : "LInf";
+    });
+
+TEST(SolveJoint, ReportsEveryIterationAndNeverALossOfWhatItHad) {
+  RandomScene scene = Glue(MakeSmallScene(51), MakeSmallScene(52));
+  JointOptions options = Options(Norm::L2());
+  int calls = 0;
+  options.callback = [&](int iteration, const JointIteration&) {
+    EXPECT_EQ(iteration, ++calls);
+  };
+  const JointSummary summary =
+      SolveJoint(scene.problem, options, &scene.estimate);
+  ASSERT_EQ(static_cast<int>(summary.iterations.size()), calls);
+  double seconds = 0;
+  double bound = 0;
+  for (const JointIteration& iteration : summary.iterations) {
+    EXPECT_LE(iteration.cost, summary.cost_initial);
+    EXPECT_GE(iteration.seconds, seconds);
+    EXPECT_GE(iteration.lower_bound.value_or(0), bound);
+    seconds = iteration.seconds;
+    bound = iteration.lower_bound.value_or(0);
+  }
+  EXPECT_EQ(bound, summary.lower_bound);
+  EXPECT_EQ(summary.iterations.back().cost, summary.cost_final);
+}
+
+TEST(SolveJoint, StopsAtMaxIterations) {
+  RandomScene scene = MakeSmallScene(53);
+  JointOptions options = Options(Norm::L2());
+  options.max_iterations = 1;
+  const JointSummary summary =
+      SolveJoint(scene.problem, options, &scene.estimate);
+  EXPECT_EQ(summary.termination, JointTermination::kMaxIterations);
+  EXPECT_EQ(summary.iterations.size(), 1u);
+  EXPECT_LE(summary.cost_final, summary.cost_initial);
+  EXPECT_EQ(summary.cost_final,
+            Cost(scene.problem, scene.estimate, Norm::L2(), 1));
+}
+
+TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
+  const RandomScene scene = MakeSmallScene(54);
+  for (const int last : {0, 1, 4}) {
+    CancelFlag is_cancelled = last == 0;
+    JointOptions options = Options(Norm::L2());
+    options.cancel = &is_cancelled;
+    options.callback = [&](int iteration, const JointIteration&) {
+      if (iteration == last) is_cancelled = true;
+    };
+    Estimate estimate = scene.estimate;
+    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    EXPECT_EQ(summary.termination, JointTermination::kInterrupted);
+    EXPECT_EQ(static_cast<int>(summary.iterations.size()), last);
+    EXPECT_LE(summary.cost_final, summary.cost_initial);
+    EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
+  }
+}
+
+// With starts from most of which the interior point gets nowhere.
+TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
+  int num_interrupted = 0;
+  for (const unsigned seed : {35, 47, 61, 80}) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeSmallScene(seed);
+    Estimate estimate = HugTheBoundary(scene, Norm::L2());
+    CancelFlag is_cancelled = false;
+    JointOptions options = Options(Norm::L2());
+    options.cancel = &is_cancelled;
+    options.callback = [&](int, const JointIteration& state) {
+      if (!state.target) return;
+      EXPECT_LT(*state.target, *state.cost);
+      EXPECT_FALSE(state.gap);
+      is_cancelled = true;
+      ++num_interrupted;
+    };
+    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    EXPECT_EQ(summary.termination == JointTermination::kInterrupted,
+              is_cancelled);
+    EXPECT_EQ(summary.iterations.back().target.has_value(), is_cancelled);
+    EXPECT_LE(summary.cost_final, summary.cost_initial);
+    EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, Norm::L2(), 1));
+  }
+  EXPECT_GT(num_interrupted, 0);
+}
+
+TEST(SolveJoint, OfNothingIsDone) {
+  KnownRotationProblem problem;
+  IndexObservations(&problem);
+  Estimate estimate;
+  const JointSummary summary =
+      SolveJoint(problem, Options(Norm::L2()), &estimate);
+  EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+  EXPECT_EQ(summary.num_components, 0);
+  EXPECT_EQ(summary.cost_final, 0);
+}
+
+TEST(SolveJoint, RefusesStartsBehindACameraAndBadOptions) {
+  RandomScene scene = MakeSmallScene(55);
+  const auto run = [&](const JointOptions& options) {
+    SolveJoint(scene.problem, options, &scene.estimate);
+  };
+  EXPECT_THROW(run(Options({1.5})), std::invalid_argument);
+  JointOptions options = Options(Norm::L2());
+  options.relative_gap = 0;
+  EXPECT_THROW(run(options), std::invalid_argument);
+  options = Options(Norm::L2());
+  options.max_iterations = 0;
+  EXPECT_THROW(run(options), std::invalid_argument);
+  scene.estimate.points[0] *= -1;
+  EXPECT_THROW(run(Options(Norm::L2())), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace krot

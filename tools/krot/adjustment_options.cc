@@ -1,0 +1,185 @@
+#include "tools/krot/adjustment_options.h"
+
+#include <string>
+#include <vector>
+
+namespace krot {
+namespace {
+
+constexpr char kCeres[] = "BundleAdjustmentCeres.";
+constexpr char kPlain[] = "BundleAdjustment.";
+
+bool ParseLoss(const std::string& text, RobustLoss* loss) {
+  if (text == "TRIVIAL") *loss = RobustLoss::kTrivial;
+  if (text == "SOFT_L1") *loss = RobustLoss::kSoftL1;
+  if (text == "CAUCHY") *loss = RobustLoss::kCauchy;
+  if (text == "HUBER") *loss = RobustLoss::kHuber;
+  return text == "TRIVIAL" || text == "SOFT_L1" || text == "CAUCHY" ||
+         text == "HUBER";
+}
+
+// Of what COLMAP 4 and COLMAP 3.8 both know, in two groups.
+const std::vector<std::string> kMoved = {
+    "max_num_iterations", "max_linear_solver_iterations", "function_tolerance",
+    "gradient_tolerance", "parameter_tolerance"};
+
+void RefuseBoth(const OptionParser& parser, const std::string& a,
+                const std::string& b) {
+  if (!parser.IsGiven(a) || !parser.IsGiven(b)) return;
+  throw OptionError("--" + a + " and --" + b + " are the same; give one");
+}
+
+void RefuseWith(const OptionParser& parser, const std::string& name,
+                const std::string& why) {
+  if (!parser.IsGiven(name)) return;
+  throw OptionError("--" + name + " has no effect " + why);
+}
+
+}  // namespace
+
+void AdjustmentOptions::AddTo(OptionParser* parser) {
+  AddRefined(parser);
+  AddCap(parser);
+  AddCeres(parser);
+}
+
+void AdjustmentOptions::AddRefined(OptionParser* parser) {
+  BundleAdjustmentOptions* options = &adjustment_;
+  parser->AddBool("BundleAdjustment.refine_focal_length",
+                  &options->refine_focal_length, "Focal lengths may move");
+  parser->AddBool("BundleAdjustment.refine_principal_point",
+                  &options->refine_principal_point,
+                  "Principal points may move");
+  parser->AddBool("BundleAdjustment.refine_extra_params",
+                  &options->refine_extra_params,
+                  "Distortion parameters may move");
+  parser->AddBool("BundleAdjustment.refine_rig_from_world",
+                  &options->refine_rig_from_world,
+                  "Frames may move; in a model without rigs, images");
+  parser->AddBool("BundleAdjustment.refine_sensor_from_rig",
+                  &options->refine_sensor_from_rig,
+                  "The sensors of a rig may move in it");
+  parser->AddBool("BundleAdjustment.refine_extrinsics", &refine_extrinsics_,
+                  "COLMAP 3.8's name for the last two together");
+  parser->AddBool("BundleAdjustment.refine_points3D", &options->refine_points3D,
+                  "Points may move");
+  parser->AddBool("BundleAdjustment.constant_rig_from_world_rotation",
+                  &options->constant_rig_from_world_rotation,
+                  "Frames that may move keep their rotations");
+  parser->AddInteger("BundleAdjustment.min_track_length",
+                     &options->min_track_length, AtLeast(1, "observations"),
+                     "Leave out points with fewer usable observations; they "
+                     "stay in the model");
+}
+
+void AdjustmentOptions::AddCap(OptionParser* parser) {
+  const auto add = [&](const char* name, double* value, double min,
+                       const char* range, const char* description) {
+    parser->Add({name, description, range, "", false,
+                 [value, min](const std::string& text) {
+                   return ParseReal(text, value) && *value > min;
+                 }});
+  };
+  add("BundleAdjustment.max_error", &max_error_, 0, "a number > 0, pixels",
+      "Bounded bundle adjustment: every error stays below this");
+  add("BundleAdjustment.max_error_factor", &max_error_factor_, 1,
+      "a number > 1",
+      "The same, times the largest error of what krot solver finds");
+}
+
+void AdjustmentOptions::AddCeres(OptionParser* parser) {
+  BundleAdjustmentOptions* options = &adjustment_;
+  for (const char* group : {kCeres, kPlain}) {
+    const std::string prefix = group;
+    const std::string suffix =
+        prefix == kPlain ? "; COLMAP 3.8's name" : std::string();
+    parser->AddInteger(prefix + kMoved[0], &options->max_num_iterations,
+                       AtLeast(0),
+                       "Iterations after which to stop in any case" + suffix);
+    parser->AddInteger(prefix + kMoved[1],
+                       &options->max_linear_solver_iterations, AtLeast(1),
+                       "Those of conjugate gradients within one" + suffix);
+    parser->AddReal(
+        prefix + kMoved[2], &options->function_tolerance, AtLeast(0.0),
+        "Stop when the cost changes by less, relative to it" + suffix);
+    parser->AddReal(prefix + kMoved[3], &options->gradient_tolerance,
+                    AtLeast(0.0),
+                    "Stop when no entry of the gradient is larger" + suffix);
+    parser->AddReal(prefix + kMoved[4], &options->parameter_tolerance,
+                    AtLeast(0.0),
+                    "Stop when the parameters change by less, relative to "
+                    "them" +
+                        suffix);
+  }
+  parser->Add({"BundleAdjustmentCeres.loss_function_type",
+               "How large errors are weighed",
+               "one of {TRIVIAL, SOFT_L1, CAUCHY, HUBER}", "TRIVIAL", false,
+               [options](const std::string& text) {
+                 return ParseLoss(text, &options->loss);
+               }});
+  parser->AddReal("BundleAdjustmentCeres.loss_function_scale",
+                  &options->loss_scale, Above(0.0, "pixels"),
+                  "The error above which a loss other than TRIVIAL weighs "
+                  "less");
+  parser->AddInteger(
+      "BundleAdjustmentCeres.max_num_images_direct_dense_cpu_solver",
+      &options->max_num_images_direct_dense, AtLeast(0),
+      "Up to so many images the reduced camera system is dense");
+  parser->AddInteger(
+      "BundleAdjustmentCeres.max_num_images_direct_sparse_cpu_solver",
+      &options->max_num_images_direct_sparse, AtLeast(0),
+      "Up to so many images it is sparse; beyond them conjugate gradients "
+      "solve it");
+  parser->Add({"BundleAdjustmentCeres.num_threads",
+               "Threads, -1 being all; with more than one the last digits "
+               "differ from run to run",
+               "-1 or an integer in [1, 1024]", "-1", false,
+               [options](const std::string& text) {
+                 int threads = 0;
+                 if (!ParseInteger(text, &threads)) return false;
+                 options->num_threads = threads;
+                 return threads == -1 || (threads >= 1 && threads <= 1024);
+               }});
+}
+
+AdjustModelOptions AdjustmentOptions::Resolve(
+    const OptionParser& parser) const {
+  for (const std::string& name : kMoved) {
+    RefuseBoth(parser, kCeres + name, kPlain + name);
+  }
+  for (const char* name : {"BundleAdjustment.refine_rig_from_world",
+                           "BundleAdjustment.refine_sensor_from_rig"}) {
+    RefuseBoth(parser, "BundleAdjustment.refine_extrinsics", name);
+  }
+  RefuseBoth(parser, "BundleAdjustment.max_error",
+             "BundleAdjustment.max_error_factor");
+
+  AdjustModelOptions options;
+  options.adjustment = adjustment_;
+  BundleAdjustmentOptions& adjustment = options.adjustment;
+  if (!refine_extrinsics_) {
+    adjustment.refine_rig_from_world = false;
+    adjustment.refine_sensor_from_rig = false;
+  }
+  if (!adjustment.refine_rig_from_world) {
+    RefuseWith(parser, "BundleAdjustment.constant_rig_from_world_rotation",
+               "where frames may not move");
+  }
+  const bool is_trivial = adjustment.loss == RobustLoss::kTrivial;
+  if (is_trivial) {
+    RefuseWith(parser, "BundleAdjustmentCeres.loss_function_scale",
+               "without --BundleAdjustmentCeres.loss_function_type");
+  }
+  const bool has_cap = parser.IsGiven("BundleAdjustment.max_error");
+  const bool has_factor = parser.IsGiven("BundleAdjustment.max_error_factor");
+  if ((has_cap || has_factor) && !is_trivial) {
+    throw OptionError(
+        "--BundleAdjustment.max_error and max_error_factor need "
+        "--BundleAdjustmentCeres.loss_function_type TRIVIAL");
+  }
+  if (has_cap) adjustment.max_error = max_error_;
+  if (has_factor) options.max_error_factor = max_error_factor_;
+  return options;
+}
+
+}  // namespace krot

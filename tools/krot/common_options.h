@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "tools/krot/log.h"
+#include "tools/krot/option_parser.h"
+
+namespace krot {
+
+// What every command takes.
+struct CommonOptions {
+  uint64_t random_seed = 0;
+  LogOptions log;
+  std::string project_path;
+};
+
+void AddCommonOptions(const std::string& seed_description,
+                      CommonOptions* options, OptionParser* parser);
+
+}  // namespace krot

@@ -1,0 +1,150 @@
+// krot COMMAND [options]: the command table, and what becomes of exceptions.
+
+#include <algorithm>
+#include <functional>
+#include <iostream>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "krot/adjust/ceres_log.h"
+#include "krot/model/model_error.h"
+#include "krot/report/write_file.h"
+#include "tools/krot/command.h"
+#include "tools/krot/command_error.h"
+#include "tools/krot/option_value.h"
+
+namespace krot {
+namespace {
+
+struct Command {
+  const char* name;
+  const char* summary;
+  int (*run)(const std::vector<std::string>& arguments);
+};
+
+int RunHelp(const std::vector<std::string>& arguments);
+
+constexpr Command kCommands[] = {
+    {"solver", "lower the largest reprojection error of a model", &RunSolver},
+    {"point_triangulator", "re-estimate the points, frames fixed",
+     &RunPointTriangulator},
+    {"bundle_adjuster", "least squares, below a cap if you want",
+     &RunBundleAdjuster},
+    {"model_analyzer", "show what a model's errors look like",
+     &RunModelAnalyzer},
+    {"model_comparer", "show how two models differ", &RunModelComparer},
+    {"certificate_checker", "re-check the proof of a lower bound",
+     &RunCertificateChecker},
+    {"model_synthesizer", "make a model with ground truth",
+     &RunModelSynthesizer},
+    {"help", "print this text, or that of a command", &RunHelp},
+};
+
+constexpr char kHelpHead[] =
+    "krot: the known rotation problem for COLMAP models\n"
+    "\n"
+    "Usage:\n"
+    "  krot COMMAND [options]\n"
+    "  krot COMMAND -h\n"
+    "  krot --version\n"
+    "\n"
+    "Commands:\n";
+
+constexpr char kHelpTail[] =
+    "\n"
+    "Exit codes:\n"
+    "    0  done\n"
+    "    1  the options are wrong\n"
+    "    2  the model cannot be read or is inconsistent\n"
+    "    3  nothing to solve\n"
+    "    4  a certificate was refused\n"
+    "    5  the output cannot be written\n"
+    "    6  out of memory, or an error in KROT itself\n"
+    "    7  no estimate below the error that a start may have\n"
+    "  130  interrupted by SIGINT or SIGTERM\n";
+
+const Command* FindCommand(const std::string& name) {
+  const auto it = std::find_if(
+      std::begin(kCommands), std::end(kCommands),
+      [&](const Command& command) { return name == command.name; });
+  return it == std::end(kCommands) ? nullptr : &*it;
+}
+
+const Command& RequireCommand(const std::string& name) {
+  const Command* command = FindCommand(name);
+  if (command != nullptr) return *command;
+  std::vector<std::string> names;
+  for (const Command& known : kCommands) names.push_back(known.name);
+  const std::string nearest = NearestName(name, names);
+  throw OptionError(name + " is no command" +
+                    (nearest.empty() ? " (krot help lists them)"
+                                     : "; did you mean " + nearest + "?"));
+}
+
+int RunHelp(const std::vector<std::string>& arguments) {
+  if (!arguments.empty() && arguments.front().rfind('-', 0) != 0) {
+    return RequireCommand(arguments.front()).run({"--help"});
+  }
+  std::cout << kHelpHead;
+  for (const Command& command : kCommands) {
+    const std::string name = command.name;
+    std::cout << "  " << name << std::string(20 - name.size(), ' ')
+              << command.summary << '\n';
+  }
+  std::cout << kHelpTail;
+  return kExitDone;
+}
+
+int RunCommand(const std::vector<std::string>& arguments) {
+  if (arguments.empty()) return RunHelp({});
+  const std::string& name = arguments.front();
+  if (name == "--version") {
+    std::cout << "krot " KROT_VERSION "\n";
+    return kExitDone;
+  }
+  if (name == "-h" || name == "--help") return RunHelp({});
+  return RequireCommand(name).run({arguments.begin() + 1, arguments.end()});
+}
+
+// One line on stderr, whatever the message holds.
+int Fail(const std::string& who, std::string message, int exit_code) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::cerr << who << ": " << message << std::endl;
+  return exit_code;
+}
+
+int Main(const std::vector<std::string>& arguments) {
+  const std::string who =
+      arguments.empty() || FindCommand(arguments.front()) == nullptr
+          ? "krot"
+          : "krot " + arguments.front();
+  try {
+    const int exit_code = RunCommand(arguments);
+    if (!std::cout.flush()) {
+      return Fail(who, "stdout cannot be written", kExitNotWritten);
+    }
+    return exit_code;
+  } catch (const CommandError& error) {
+    return Fail(who, error.what(), error.exit_code());
+  } catch (const ModelError& error) {
+    return Fail(who, error.what(), kExitModel);
+  } catch (const WriteError& error) {
+    return Fail(who, error.what(), kExitNotWritten);
+  } catch (const std::bad_alloc&) {
+    return Fail(who, "out of memory", kExitInternal);
+  } catch (const std::exception& error) {
+    return Fail(who, std::string("internal error: ") + error.what(),
+                kExitInternal);
+  } catch (...) {
+    return Fail(who, "internal error", kExitInternal);
+  }
+}
+
+}  // namespace
+}  // namespace krot
+
+int main(int argc, char** argv) {
+  krot::SilenceCeres();
+  return krot::Main({argv + std::min(argc, 1), argv + argc});
+}

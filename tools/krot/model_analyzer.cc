@@ -1,0 +1,149 @@
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "krot/analysis/error_colors.h"
+#include "krot/analysis/pixel_errors.h"
+#include "krot/bridge/certificate_verdict.h"
+#include "krot/report/certificate_table.h"
+#include "krot/report/model_report.h"
+#include "krot/report/write_file.h"
+#include "tools/krot/command.h"
+#include "tools/krot/common_options.h"
+#include "tools/krot/model_files.h"
+
+namespace krot {
+namespace {
+
+struct AnalyzerOptions {
+  std::string path;
+  std::string input_path;
+  std::string report_path;
+  std::string certificate_path;
+  std::string error_colors_path;
+  double error_colors_top = 4;
+  bool overwrite = false;
+  int num_worst = 10;
+  CommonOptions common;
+};
+
+void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
+  parser->AddPath("path", &options->path, false, "a folder",
+                  "The COLMAP model to read; this or --input_path is required");
+  parser->AddPath("input_path", &options->input_path, false, "a folder",
+                  "Another name for --path");
+  parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
+                     "How many of the worst images and observations to list");
+  parser->AddPath("report_path", &options->report_path, false, "a file",
+                  "Where the report goes, as JSON");
+  parser->AddPath("certificate_path", &options->certificate_path, false,
+                  "a file",
+                  "A certificate of this model: show what it proves, and the "
+                  "observations that set the maximum");
+  parser->AddPath("error_colors_path", &options->error_colors_path, false,
+                  "a folder",
+                  "Where a copy of the model goes whose points are coloured by "
+                  "their largest error, for COLMAP's GUI; created if need be");
+  parser->AddReal("error_colors_top", &options->error_colors_top,
+                  Above(0.0, "pixels"),
+                  "The error from which on the copy's points are dark red; "
+                  "those without error are blue");
+  AddOverwrite(&options->overwrite, parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &options->common, parser);
+}
+
+// The path under either of its names.
+std::string ModelPath(const AnalyzerOptions& options,
+                      const OptionParser& parser) {
+  if (parser.IsGiven("path") && parser.IsGiven("input_path")) {
+    throw OptionError("--path and --input_path are the same; give one");
+  }
+  if (!parser.IsGiven("path") && !parser.IsGiven("input_path")) {
+    throw OptionError(
+        "--path is required (krot model_analyzer -h lists the options)");
+  }
+  return parser.IsGiven("path") ? options.path : options.input_path;
+}
+
+WriteModelOptions CopyOptions(const AnalyzerOptions& options,
+                              const std::string& input_path) {
+  WriteModelOptions write_options;
+  write_options.overwrite = options.overwrite;
+  write_options.copy_project_from = input_path;
+  return write_options;
+}
+
+// What can be known before the model is read.
+void CheckPaths(const AnalyzerOptions& options, const std::string& input_path,
+                const OptionParser& parser) {
+  CheckSidePath("report_path", options.report_path, options.error_colors_path);
+  if (!options.error_colors_path.empty()) {
+    std::error_code error;
+    if (std::filesystem::equivalent(input_path, options.error_colors_path,
+                                    error)) {
+      throw OptionError("--error_colors_path = " + options.error_colors_path +
+                        ", must not be the model itself");
+    }
+    CheckModelWritable(options.error_colors_path,
+                       CopyOptions(options, input_path));
+    return;
+  }
+  for (const char* name : {"error_colors_top", "overwrite"}) {
+    if (!parser.IsGiven(name)) continue;
+    throw OptionError("--" + std::string(name) +
+                      " speaks of the copy; give --error_colors_path, too");
+  }
+}
+
+void WriteColoredCopy(const AnalyzerOptions& options,
+                      const std::string& input_path, Model model) {
+  const std::vector<double> errors_px = PixelErrors(model);
+  UpdatePointErrors(errors_px, &model);
+  ColorPointsByError(errors_px, options.error_colors_top, &model);
+  WriteModelTo(model, options.error_colors_path,
+               CopyOptions(options, input_path));
+}
+
+// What the certificate says of the model; "" if none is given.
+std::string CertificateText(const AnalyzerOptions& options,
+                            const Model& model) {
+  if (options.certificate_path.empty()) return "";
+  const CertificateVerdict verdict = VerifyCertificateFile(
+      model, ReadCertificateFile(options.certificate_path));
+  if (!verdict.is_accepted) {
+    throw CommandError(kExitCertificateRefused, "refused: " + verdict.refusal);
+  }
+  return "\n" + CertificateTable(verdict, options.num_worst);
+}
+
+}  // namespace
+
+int RunModelAnalyzer(const std::vector<std::string>& arguments) {
+  AnalyzerOptions options;
+  OptionParser parser("model_analyzer",
+                      "shows a COLMAP model's reprojection errors by image "
+                      "and camera, its worst observations, tracks and depths");
+  AddAnalyzerOptions(&options, &parser);
+  if (!parser.Parse(arguments)) {
+    PrintTable(options.common.log, parser.Help());
+    return kExitDone;
+  }
+  const std::string path = ModelPath(options, parser);
+  CheckPaths(options, path, parser);
+  const Model model = ReadValidModel(path);
+  const std::string certificate = CertificateText(options, model);
+  const ModelReport report = AnalyzeModel(model, options.num_worst);
+  if (!options.error_colors_path.empty()) {
+    WriteColoredCopy(options, path, model);
+  }
+  if (!options.report_path.empty()) {
+    WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));
+  }
+  PrintTable(options.common.log,
+             ModelTable(report, options.num_worst) + certificate);
+  return kExitDone;
+}
+
+}  // namespace krot

@@ -1,0 +1,112 @@
+#include "tools/krot/model_files.h"
+
+#include <array>
+#include <filesystem>
+#include <system_error>
+
+#include "krot/model/model_error.h"
+#include "krot/model/validate.h"
+#include "krot/report/write_file.h"
+#include "tools/krot/html_path.h"
+
+namespace krot {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool IsSameFolder(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error) && !error;
+}
+
+ModelFormat OutputFormat(const ModelPaths& paths) {
+  const ModelFormat input_format = DetectModelFormat(paths.input_path);
+  if (paths.output_type == "BIN") return ModelFormat::kBinary;
+  if (paths.output_type == "TXT") return ModelFormat::kText;
+  return input_format;
+}
+
+// COLMAP's files are not for reports.
+void CheckSideName(const std::string& option, const std::string& path) {
+  constexpr std::array<const char*, 5> kStems = {"cameras", "rigs", "frames",
+                                                 "images", "points3D"};
+  const fs::path name = fs::path(path).filename();
+  for (const char* stem : kStems) {
+    if (name.stem() == stem &&
+        (name.extension() == ".bin" || name.extension() == ".txt")) {
+      throw OptionError("--" + option + " = " + path +
+                        ", must not bear the name of a model's file");
+    }
+  }
+}
+
+}  // namespace
+
+void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
+  parser->AddPath("input_path", &paths->input_path, true, "a folder",
+                  "The COLMAP model to read, binary or text");
+  parser->AddPath("output_path", &paths->output_path, true, "a folder",
+                  "Where the model goes; created if need be");
+  parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
+                    "The format to write; auto: the input's");
+  AddOverwrite(&paths->overwrite, parser);
+  parser->AddPath("report_path", &paths->report_path, false, "a file",
+                  "Where the report goes, as JSON");
+  AddHtmlPath(&paths->html_path, parser);
+}
+
+void AddOverwrite(bool* overwrite, OptionParser* parser) {
+  parser->AddBool("overwrite", overwrite,
+                  "Replace the model that the output folder holds; other "
+                  "files in it stay");
+}
+
+WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
+  CheckSideName("report_path", paths.report_path);
+  if (IsSameFolder(paths.input_path, paths.output_path) && !paths.overwrite) {
+    throw OptionError(
+        "--output_path is --input_path; add --overwrite 1 to replace the "
+        "model");
+  }
+  WriteModelOptions options;
+  options.format = OutputFormat(paths);
+  options.overwrite = paths.overwrite;
+  options.copy_project_from = paths.input_path;
+  CheckModelWritable(paths.output_path, options);
+  CheckSidePath("report_path", paths.report_path, paths.output_path);
+  CheckHtmlPath(paths.html_path, paths.report_path, paths.output_path);
+  return options;
+}
+
+void CheckSidePath(const std::string& option, const std::string& path,
+                   const std::string& folder_to_come) {
+  if (path.empty()) return;
+  CheckSideName(option, path);
+  CheckFileWritable(path, folder_to_come);
+}
+
+Model ReadValidModel(const std::string& path) {
+  Model model = ReadModel(path, DetectModelFormat(path));
+  ValidateModel(model);
+  return model;
+}
+
+void CheckModelWritable(const std::string& path,
+                        const WriteModelOptions& options) {
+  try {
+    CheckWritable(path, options);
+  } catch (const ModelError& error) {
+    throw CommandError(kExitNotWritten, error.what());
+  }
+}
+
+void WriteModelTo(const Model& model, const std::string& path,
+                  const WriteModelOptions& options) {
+  try {
+    WriteModel(model, path, options);
+  } catch (const ModelError& error) {
+    throw CommandError(kExitNotWritten, error.what());
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+
+#include "krot/model/model.h"
+#include "krot/model/model_io.h"
+#include "tools/krot/option_parser.h"
+
+namespace krot {
+
+// The paths of a command that reads a model and writes one.
+struct ModelPaths {
+  std::string input_path;
+  std::string output_path;
+  std::string output_type = "auto";
+  bool overwrite = false;
+  std::string report_path;
+  std::string html_path;
+};
+
+void AddModelPaths(ModelPaths* paths, OptionParser* parser);
+void AddOverwrite(bool* overwrite, OptionParser* parser);
+
+// Throws OptionError where the paths contradict each other, ModelError where
+// no model lies at input_path, CommandError (kExitNotWritten) where the output
+// or a report could not be written. Changes nothing and reads no model.
+// Returns how to write.
+WriteModelOptions CheckModelPaths(const ModelPaths& paths);
+
+// Whether a file beside the model, a report or a certificate, can be written to
+// `path`, the value of --`option`; "": none is. `folder_to_come` will exist by
+// then. Throws OptionError if it would take the place of one of COLMAP's files,
+// WriteError if it cannot be written.
+void CheckSidePath(const std::string& option, const std::string& path,
+                   const std::string& folder_to_come = "");
+
+// Reads and validates. Throws ModelError.
+Model ReadValidModel(const std::string& path);
+
+// As in model_io.h, but what they throw is a CommandError (kExitNotWritten).
+void CheckModelWritable(const std::string& path,
+                        const WriteModelOptions& options);
+void WriteModelTo(const Model& model, const std::string& path,
+                  const WriteModelOptions& options);
+
+}  // namespace krot

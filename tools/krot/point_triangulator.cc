@@ -1,0 +1,50 @@
+#include <string>
+#include <vector>
+
+#include "tools/krot/command.h"
+#include "tools/krot/solve_command.h"
+#include "tools/krot/solve_options.h"
+
+namespace krot {
+namespace {
+
+// COLMAP's command of this name makes new points from matches.
+void RefuseDatabase(OptionParser* parser) {
+  parser->Add({"database_path",
+               "Refused: this command re-estimates the points that the model "
+               "has and makes no new ones from matches",
+               "left out", "", false, [](const std::string&) -> bool {
+                 throw OptionError(
+                     "--database_path: this command only re-estimates the "
+                     "points that the model has; for new ones from matches "
+                     "use colmap point_triangulator");
+               }});
+}
+
+}  // namespace
+
+int RunPointTriangulator(const std::vector<std::string>& arguments) {
+  SolveCommand command;
+  command.name = "point_triangulator";
+  command.method_name = "intersection";
+  command.solve = &TriangulateModel;
+  OptionParser parser(command.name,
+                      "re-estimates every point of a COLMAP model for the "
+                      "lowest largest reprojection error of its track; the "
+                      "frames stay");
+  AddModelPaths(&command.paths, &parser);
+  AddSolveOptions(&command.options, &parser);
+  RefuseDatabase(&parser);
+  AddCommonOptions(
+      "Recorded in the report; this command draws no random "
+      "numbers",
+      &command.common, &parser);
+  if (!parser.Parse(arguments)) {
+    PrintTable(command.common.log, parser.Help());
+    return kExitDone;
+  }
+  CheckSolveOptions(command.options, parser);
+  return RunSolveCommand(command);
+}
+
+}  // namespace krot

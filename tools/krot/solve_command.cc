@@ -1,0 +1,194 @@
+#include "tools/krot/solve_command.h"
+
+#include <utility>
+#include <vector>
+
+#include "krot/base/parallel_for.h"
+#include "krot/base/timer.h"
+#include "krot/report/peak_memory.h"
+#include "krot/report/solve_report.h"
+#include "krot/report/text_table.h"
+#include "krot/report/write_file.h"
+#include "tools/krot/html_path.h"
+#include "tools/krot/interrupt.h"
+#include "tools/krot/solve_progress.h"
+
+namespace krot {
+namespace {
+
+SolveReport DescribeRun(const SolveCommand& command) {
+  SolveReport report;
+  report.version = KROT_VERSION;
+  report.command = command.name;
+  report.method = command.method_name;
+  report.threads = ResolveNumThreads(command.options.num_threads);
+  report.seed = command.common.random_seed;
+  return report;
+}
+
+SolveProgress::Goals ProgressGoals(const SolveModelOptions& options) {
+  SolveProgress::Goals goals;
+  goals.relative_gap = options.joint.relative_gap;
+  const bool is_auto = EffectiveMethod(options) == SolveMethod::kAuto;
+  goals.sweep_tolerance = is_auto ? options.leading_sweep_tolerance
+                                  : options.res_int.sweep_tolerance;
+  goals.max_sweeps =
+      is_auto ? options.max_leading_sweeps : options.res_int.max_sweeps;
+  return goals;
+}
+
+std::string ProblemWords(const SolveSummary& summary) {
+  return Counted(summary.num_images, "image") + ", " +
+         Counted(summary.num_points, "point") + ", " +
+         Counted(summary.num_observations, "observation") +
+         (summary.num_components > 1
+              ? " in " + std::to_string(summary.num_components) + " components"
+              : std::string());
+}
+
+std::string MemoryWords(const SolveSummary& summary) {
+  return "about " + FormatBytes(summary.likely_bytes) + " will be needed" +
+         (summary.largest_bytes > summary.likely_bytes
+              ? ", at most " + FormatBytes(summary.largest_bytes) +
+                    " if the joint solver has to take in every observation"
+              : std::string());
+}
+
+// The solve with its progress on stderr. Throws CommandError where there is
+// nothing to write afterwards.
+SolveModelResult Solve(const SolveCommand& command, const Model& model,
+                       const CancelFlag& cancel) {
+  const LogOptions& log = command.common.log;
+  SolveModelOptions options = command.options;
+  SolveProgress progress(log, ProgressGoals(options));
+  options.cancel = &cancel;
+  options.describe_certificate = !command.certificate_path.empty();
+  options.res_int.callback = [&progress](int sweep, const Sweep& state) {
+    progress.Update(sweep, state);
+  };
+  options.joint.callback = [&progress](int iteration,
+                                       const JointIteration& state) {
+    progress.Update(iteration, state);
+  };
+  options.on_note = [&log](const std::string& sentence) {
+    LogLine(log, 1, sentence);
+  };
+  options.on_built = [&](const SolveSummary& summary) {
+    ThrowIfInterrupted();
+    if (summary.num_observations == 0) {
+      throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
+    }
+    LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
+  };
+  SolveModelResult result = command.solve(model, options);
+  progress.Finish();
+  ThrowIfInterrupted();
+  return result;
+}
+
+void WriteCertificate(const SolveCommand& command,
+                      const SolveSummary& summary) {
+  if (!summary.certificate) return;
+  LogLine(command.common.log, 2, "writing " + command.certificate_path);
+  WriteFileAtomically(command.certificate_path,
+                      CertificateJson(*summary.certificate));
+}
+
+// Where no model can be written: all that is left is a proof, maybe.
+void ThrowIfNoStart(const SolveCommand& command, const SolveSummary& summary) {
+  if (summary.termination == SolveTermination::kNothingToSolve) {
+    throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
+  }
+  const std::string bound =
+      FormatNumber(command.options.init_max_error, 6) + " px";
+  if (summary.termination == SolveTermination::kInfeasible) {
+    WriteCertificate(command, summary);
+    throw CommandError(
+        kExitNoStart,
+        "infeasible: " +
+            (summary.lower_bound
+                 ? "the largest error of every estimate is proved to be at "
+                   "least " +
+                       FormatNumber(*summary.lower_bound, 6) + " px, above "
+                 : std::string("no estimate is below ")) +
+            "Problem.init_max_error = " + bound);
+  }
+  if (summary.termination == SolveTermination::kNoStart) {
+    throw CommandError(kExitNoStart,
+                       "no start was found below Problem.init_max_error = " +
+                           bound + ", and no proof that there is none");
+  }
+}
+
+void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
+  const LogOptions& log = command.common.log;
+  if (summary.method == SolveMethod::kResInt) return;
+  if (summary.termination != SolveTermination::kGapReached &&
+      !IsZeroUpToRounding(summary)) {
+    LogLine(log, 0, "warning: " + MissedGapSentence(summary));
+  }
+  if (!command.certificate_path.empty() && !summary.certificate) {
+    LogLine(log, 0,
+            "warning: there is no certificate, so " + command.certificate_path +
+                " is not written");
+  }
+}
+
+void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
+  const std::vector<std::string> names = ImageNamesWithWhiteSpace(model);
+  if (names.empty()) return;
+  LogLine(
+      log, 1,
+      "warning: " + Counted(static_cast<int64_t>(names.size()), "image name") +
+          " with white space, at which COLMAP ends a name when it reads "
+          "text: '" +
+          names.front() + "' for one; --output_type BIN avoids that");
+}
+
+}  // namespace
+
+int RunSolveCommand(const SolveCommand& command) {
+  const Timer total_timer;
+  const LogOptions& log = command.common.log;
+  const ModelPaths& paths = command.paths;
+  const CancelFlag& cancel = CatchInterrupts();
+  const WriteModelOptions write_options = CheckModelPaths(paths);
+  CheckSidePath("certificate_path", command.certificate_path,
+                paths.output_path);
+  SolveReport report = DescribeRun(command);
+
+  const Timer read_timer;
+  const Model model = ReadValidModel(paths.input_path);
+  report.seconds_read = read_timer.Seconds();
+  ThrowIfInterrupted();
+
+  SolveModelResult result = Solve(command, model, cancel);
+  report.summary = std::move(result.summary);
+  if (command.method_name.empty()) {
+    report.method = MethodName(report.summary.method);
+  }
+  ThrowIfNoStart(command, report.summary);
+
+  if (write_options.format == ModelFormat::kText) {
+    WarnOfWhiteSpace(log, result.model);
+  }
+  LogLine(log, 2, "writing " + paths.output_path);
+  const Timer write_timer;
+  WriteModelTo(result.model, paths.output_path, write_options);
+  report.seconds_write = write_timer.Seconds();
+  report.seconds_total = total_timer.Seconds();
+  report.peak_memory_bytes = PeakMemoryBytes();
+  const std::string report_json = SolveJson(report);
+  if (!paths.report_path.empty()) {
+    LogLine(log, 2, "writing " + paths.report_path);
+    WriteFileAtomically(paths.report_path, report_json);
+  }
+  WriteHtmlPage(paths.html_path, report_json, model, result.model,
+                command.options.num_threads, log);
+  WriteCertificate(command, report.summary);
+  PrintTable(log, SolveTable(report));
+  WarnOfMissedGap(command, report.summary);
+  return kExitDone;
+}
+
+}  // namespace krot

@@ -1,0 +1,123 @@
+#include "tools/krot/solve_options.h"
+
+#include <vector>
+
+namespace krot {
+namespace {
+
+// Those that FastDescentSettings::kFast does not look at.
+const std::vector<std::string> kPaperOnlyNames = {
+    "FastDescent.stationarity_tolerance",
+    "FastDescent.step_tolerance",
+    "FastDescent.slope_probe",
+    "FastDescent.active_tolerance",
+    "FastDescent.max_step",
+    "FastDescent.max_iterations"};
+
+bool ParseNorm(const std::string& text, Norm* norm) {
+  if (text == "inf") {
+    *norm = Norm::LInf();
+    return true;
+  }
+  double p = 0;
+  if (!ParseReal(text, &p) || p < 1) return false;
+  norm->p = p;
+  return true;
+}
+
+bool ParseSettings(const std::string& text, FastDescentSettings* settings) {
+  if (text != "fast" && text != "paper") return false;
+  *settings =
+      text == "fast" ? FastDescentSettings::kFast : FastDescentSettings::kPaper;
+  return true;
+}
+
+void AddFastDescentOptions(FastDescentOptions* options, OptionParser* parser) {
+  parser->AddReal("FastDescent.stationarity_tolerance",
+                  &options->stationarity_tolerance, AtLeast(0.0),
+                  "With paper settings: epsilon_0, the norm of the centre of "
+                  "the smallest ball around the normals at which to stop");
+  parser->AddReal("FastDescent.step_tolerance", &options->step_tolerance,
+                  Above(0.0, "scene units"),
+                  "With paper settings: epsilon_1, the interval at which the "
+                  "search for the step ends");
+  parser->AddReal("FastDescent.slope_probe", &options->slope_probe,
+                  Above(0.0, "scene units"),
+                  "With paper settings: epsilon_2, how far to look for the "
+                  "sign of the slope");
+  parser->AddReal("FastDescent.active_tolerance", &options->active_tolerance,
+                  InHalfOpen(0.0, 1.0, "relative to the cost"),
+                  "With paper settings: residuals this close to the largest "
+                  "are active");
+  parser->AddReal("FastDescent.max_step", &options->max_step,
+                  Above(0.0, "scene units"),
+                  "With paper settings: the longest step");
+  parser->AddInteger("FastDescent.max_iterations", &options->max_iterations,
+                     AtLeast(1), "Iterations per point or frame and sweep");
+}
+
+}  // namespace
+
+void AddSolveOptions(SolveModelOptions* options, OptionParser* parser) {
+  ResIntOptions* res_int = &options->res_int;
+  parser->Add({"Solver.norm", "The p of the residuals' norm",
+               "1, 2, inf or a number >= 1", "2", false,
+               [options](const std::string& text) {
+                 return ParseNorm(text, &options->norm);
+               }});
+  parser->Add({"Solver.num_threads",
+               "Threads, -1 being all; the result is the same, bit by bit",
+               "-1 or an integer in [1, 1024]", "-1", false,
+               [options](const std::string& text) {
+                 int threads = 0;
+                 if (!ParseInteger(text, &threads)) return false;
+                 options->num_threads = threads;
+                 return threads == -1 || (threads >= 1 && threads <= 1024);
+               }});
+  parser->Add({"Solver.settings",
+               "paper: Algorithms 2 to 4 to the letter; fast: the same "
+               "optima by better means",
+               "one of {fast, paper}", "fast", false,
+               [res_int](const std::string& text) {
+                 return ParseSettings(text, &res_int->fast_descent.settings);
+               }});
+  AddFastDescentOptions(&res_int->fast_descent, parser);
+  parser->AddInteger("Problem.min_track_length",
+                     &options->problem.min_track_length,
+                     AtLeast(1, "observations"),
+                     "Leave out points with fewer usable observations; they "
+                     "stay in the model");
+}
+
+void AddPolishOption(SolveModelOptions* options, OptionParser* parser) {
+  parser->Add({"Solver.polish",
+               "A least squares step at the end, after which the maximum is no "
+               "longer the lowest: rotations_fixed: translations and points; "
+               "full: as bundle_adjuster",
+               "one of {none, rotations_fixed, full}", "none", false,
+               [options](const std::string& text) {
+                 for (const Polish polish :
+                      {Polish::kNone, Polish::kRotationsFixed, Polish::kFull}) {
+                   if (text != PolishName(polish)) continue;
+                   options->polish = polish;
+                   return true;
+                 }
+                 return false;
+               }});
+}
+
+void CheckSolveOptions(const SolveModelOptions& options,
+                       const OptionParser& parser) {
+  if (options.res_int.fast_descent.settings == FastDescentSettings::kPaper) {
+    return;
+  }
+  for (const std::string& name : kPaperOnlyNames) {
+    if (parser.IsGiven(name)) {
+      throw OptionError("--" + name +
+                        " has no effect with --Solver.settings fast; add "
+                        "--Solver.settings paper or leave it out");
+    }
+  }
+}
+
+}  // namespace krot
