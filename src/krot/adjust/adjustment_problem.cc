@@ -21,7 +21,7 @@ using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
 // The gauge is free, so the normal equations are singular but for the damping,
 // which is the diagonal of J'J divided by the radius: a larger one would leave
 // it to rounding whether they are positive definite.
-constexpr double kMaxRadius = 1e8;
+constexpr double kLargestTrustRegion = 1e8;
 
 std::unique_ptr<ceres::CostFunction> MakeProjection(
     const AdjustmentObservation& observation, int camera_model) {
@@ -131,7 +131,7 @@ ceres::Solver::Options AdjustmentSolverOptions(
   solver.gradient_tolerance = options.gradient_tolerance;
   solver.parameter_tolerance = options.parameter_tolerance;
   solver.max_num_consecutive_invalid_steps = 10;
-  solver.max_trust_region_radius = kMaxRadius;
+  solver.max_trust_region_radius = kLargestTrustRegion;
   solver.num_threads = ResolveNumThreads(options.num_threads);
   if (!options.refine_points3D) {
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;

@@ -29,7 +29,7 @@ constexpr double kShortening = 0.7;
 // linearised errors promised.
 constexpr double kPoorShare = 0.3;
 // Trust regions: no larger, and smaller no more.
-constexpr double kMaxRadius = 1e6;
+constexpr double kLargestRadius = 1e6;
 constexpr double kMinRadius = 1e-6;
 // Where the derivative of the errors along a step is taken.
 constexpr double kProbe = 1e-4;
@@ -142,7 +142,7 @@ class BarrierPath {
   BarrierProblem bounded_;
   Errors errors_;    // at the blocks
   double cost_ = 0;  // half their squared norm
-  double radius_ = kMaxRadius;
+  double radius_ = kLargestRadius;
 };
 
 double BarrierPath::BarrierCost(const Errors& errors) const {
@@ -231,7 +231,7 @@ double BarrierPath::Step() {
     *bounded_.blocks = from;
     radius_ /= 100;
   }
-  radius_ = kMaxRadius;
+  radius_ = kLargestRadius;
   CenterMultipliers();
   return 0;
 }
@@ -240,7 +240,7 @@ void BarrierPath::UpdateRadius(double share) {
   if (share < kPoorShare) {
     radius_ = std::max(radius_ / 10, std::min(radius_, 1.0));
   } else if (share > 0.5) {
-    radius_ = std::min(10 * radius_, kMaxRadius);
+    radius_ = std::min(10 * radius_, kLargestRadius);
   }
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int64_t kPointsPerChunk = 256;
+constexpr int64_t kAnglesPerChunk = 256;
 constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr double kNoAngle = -1;
 
@@ -89,7 +89,7 @@ TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
   const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
   std::vector<double> angles(model.points3D.size(), kNoAngle);
   ParallelFor(
-      static_cast<int64_t>(angles.size()), kPointsPerChunk, num_threads,
+      static_cast<int64_t>(angles.size()), kAnglesPerChunk, num_threads,
       [&](int64_t begin, int64_t end, int) {
         std::vector<Vector3d> rays;
         for (int64_t k = begin; k < end; ++k) {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "krot/conic/interior_point.h"
-#include "krot/problem/cost.h"
 #include "krot/joint/feasible_start.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {
@@ -40,7 +40,7 @@ constexpr double kShareOfDepth = 0.1;
 constexpr double kHopelessGap = 1e-5;
 // Whether there is anything below the cost is asked at this share of the gap
 // that is to be shown.
-constexpr double kShareOfGap = 0.5;
+constexpr double kShareOfGapBelow = 0.5;
 // What is lost of a bound when it is proved, at most, relative.
 constexpr double kProofLoss = 1e-3;
 
@@ -173,8 +173,8 @@ bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
 bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
   bool is_fresh = false;
   if (gap_ <= kLargeGap) {
-    is_fresh =
-        TryBelow((1 - kShareOfGap * options_.relative_gap) * cost_, report);
+    is_fresh = TryBelow((1 - kShareOfGapBelow * options_.relative_gap) * cost_,
+                        report);
     if (IsGapReached()) return false;
   }
   is_fresh |= Bisect(width_, report);

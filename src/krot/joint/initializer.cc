@@ -6,10 +6,10 @@
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
-#include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
 #include "krot/joint/feasible_start.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/restrict.h"
 
 namespace krot {
 namespace {
@@ -19,7 +19,7 @@ namespace {
 constexpr double kBoundGrowth = 10;
 constexpr double kLargestBound = 1e7;  // pixels
 // When lowering a start that already meets the bound is given up.
-constexpr double kHopelessGap = 1e-2;
+constexpr double kHopelessStartGap = 1e-2;
 
 // Scales the estimate to a median depth of one.
 void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
@@ -139,7 +139,7 @@ InitializerTermination StartSearch::Run(Estimate* start) {
     const InitializerTermination decision = DecideByOptimum(start);
     if (decision != InitializerTermination::kFeasible) return decision;
   }
-  LowerByFeasibility(part_.problem, StartOptions(kHopelessGap), start);
+  LowerByFeasibility(part_.problem, StartOptions(kHopelessStartGap), start);
   return IsCancelled(options_.cancel) ? InitializerTermination::kInterrupted
                                       : InitializerTermination::kFeasible;
 }

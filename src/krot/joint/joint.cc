@@ -8,12 +8,12 @@
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
-#include "krot/problem/cost.h"
-#include "krot/problem/gauge.h"
-#include "krot/problem/restrict.h"
 #include "krot/joint/certified_solve.h"
 #include "krot/joint/extend_solution.h"
 #include "krot/joint/working_set.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
+#include "krot/problem/restrict.h"
 
 namespace krot {
 namespace {
@@ -24,7 +24,7 @@ constexpr double kShareOfLevel = 0.9;
 constexpr double kMaxGrowth = 3;
 // Of the gap asked for, the share that a working set's own proof may leave; the
 // rest is what other points may exceed its cost by.
-constexpr double kShareOfGap = 0.5;
+constexpr double kShareOfGapForProof = 0.5;
 // After so many rounds it takes in everything.
 constexpr int kMaxRounds = 12;
 
@@ -102,7 +102,7 @@ JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
                                            const IterationReport& report,
                                            Estimate* candidate) {
   JointOptions options = options_;
-  if (!set_.IsAll()) options.relative_gap *= kShareOfGap;
+  if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
   const Estimate start = RestrictEstimate(part, estimate_);
   CertifiedSolve solve(part.problem, options, start, lower_bound_);
   // What is below another part's bound already is good enough.
@@ -156,7 +156,7 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
 bool ComponentSolve::FitOthers(Estimate* candidate) {
   level_ = set_.Cost(*candidate, options_.norm);
   const double highest =
-      level_ / (1 - (1 - kShareOfGap) * options_.relative_gap);
+      level_ / (1 - (1 - kShareOfGapForProof) * options_.relative_gap);
   const bool do_fit =
       ExtendSolution(problem_, set_, options_, level_, highest, candidate);
   Keep(*candidate);

@@ -16,12 +16,13 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // Points outside a ball by less than this, relative to its radius, are on it.
-constexpr double kRounding = 1e-12;
+constexpr double kRadiusRounding = 1e-12;
 
 bool Holds(const Ball& ball, const Vector3d* points, int count) {
   for (int i = 0; i < count; ++i) {
     if (!((points[i] - ball.center).norm() <=
-          ball.radius * (1 + kRounding) + std::numeric_limits<double>::min())) {
+          ball.radius * (1 + kRadiusRounding) +
+              std::numeric_limits<double>::min())) {
       return false;
     }
   }

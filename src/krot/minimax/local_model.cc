@@ -16,7 +16,7 @@ constexpr double kSmallestWeight = 1e-9;
 // See DepthShare.
 constexpr double kSmallestDepthShare = 0.1;
 // Keeps H invertible where rounding would not: relative to its trace.
-constexpr double kRounding = 1e-14;
+constexpr double kPivotRounding = 1e-14;
 // G serves as long as (what has changed since, relative)^2 is below this.
 constexpr double kMetricReach = 1e-2;
 
@@ -33,7 +33,7 @@ double DistanceFromCamera(const Residual& residual, const Vector3d& x) {
 
 // The inverse of the Cholesky factor L of H = L L'; reads the lower triangle.
 Matrix3d InverseCholesky(const Matrix3d& H) {
-  const double floor = kRounding * H.trace();
+  const double floor = kPivotRounding * H.trace();
   const double i00 = 1 / std::sqrt(H(0, 0));
   const double l10 = H(1, 0) * i00;
   const double l20 = H(2, 0) * i00;

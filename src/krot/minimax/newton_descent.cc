@@ -27,7 +27,7 @@ constexpr double kGrow = 10;
 constexpr double kSufficientShare = 0.1;
 constexpr double kGoodShare = 0.5;
 // Promises below this, relative, are rounding if the trial does not keep them.
-constexpr double kRounding = 1e-10;
+constexpr double kPromiseRounding = 1e-10;
 constexpr double kFinestTolerance = DescentGoal{}.tolerance;
 // So often a failed trial may teach the model before kappa rises.
 constexpr int kMaxLessons = 5;
@@ -160,8 +160,8 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
         !norm.IsPolyhedral() && kappa <= kSmallestKappa && share == 1;
     const bool arrives =
         is_newton && LeftAfter(step, cost_trial) <= goal.tolerance * cost;
-    const bool is_rounding =
-        is_newton && !(kept > kSufficientShare) && promise <= kRounding * cost;
+    const bool is_rounding = is_newton && !(kept > kSufficientShare) &&
+                             promise <= kPromiseRounding * cost;
     if (is_last || arrives || is_rounding) {
       if (cost_trial < cost) {
         *x = x_trial;

@@ -26,7 +26,7 @@ void AppendWord(T value, std::string* text) {
   AppendNumber(value, text);
 }
 
-void AppendPose(const Pose& pose, std::string* text) {
+void AppendPoseWords(const Pose& pose, std::string* text) {
   for (const double value : pose.quaternion_wxyz) AppendWord(value, text);
   for (const double value : pose.translation) AppendWord(value, text);
 }
@@ -98,7 +98,8 @@ std::string FormatRigsText(const Model& model) {
       for (const RigSensor& sensor : rig.sensors) {
         AppendSensorId(sensor.sensor_id, &text);
         AppendWord(sensor.sensor_from_rig.has_value() ? 1 : 0, &text);
-        if (sensor.sensor_from_rig) AppendPose(*sensor.sensor_from_rig, &text);
+        if (sensor.sensor_from_rig)
+          AppendPoseWords(*sensor.sensor_from_rig, &text);
       }
     } else {
       AppendWord(0, &text);
@@ -118,7 +119,7 @@ std::string FormatFramesText(const Model& model) {
   for (const Frame& frame : model.frames) {
     AppendNumber(frame.id, &text);
     AppendWord(frame.rig_id, &text);
-    AppendPose(frame.rig_from_world, &text);
+    AppendPoseWords(frame.rig_from_world, &text);
     AppendWord(frame.data.size(), &text);
     for (const FrameData& data : frame.data) {
       AppendSensorId(data.sensor_id, &text);
@@ -139,7 +140,7 @@ std::string FormatImagesText(const Model& model) {
   for (const Image& image : model.images) {
     CheckNameFitsText(image);
     AppendNumber(image.id, &text);
-    AppendPose(image.cam_from_world, &text);
+    AppendPoseWords(image.cam_from_world, &text);
     AppendWord(image.camera_id, &text);
     text.append(" ").append(image.name).push_back('\n');
     const char* separator = "";

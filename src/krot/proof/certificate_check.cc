@@ -29,8 +29,6 @@ using Vector3 = Eigen::Matrix<Real, 3, 1>;
 
 constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
 constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
-// Covers a few roundings of non-negative bounds, and their cast to double.
-constexpr Real kOutward = 1 + 1e-9L;
 constexpr Real kRootTwo = 1.4142135623730951L;  // above it
 // Smaller multipliers, relative, might underflow.
 constexpr double kSmallestShare = 1e-100;

@@ -10,9 +10,6 @@ namespace {
 
 using Real = long double;
 
-// Covers the roundings of sums of non-negative bounds.
-constexpr Real kOutward = 1 + 1e-9L;
-
 // Points are nodes 0, 1, ...; frames come after them.
 struct Branch {
   int32_t node = 0;

@@ -6,6 +6,10 @@
 
 namespace krot {
 
+// A factor that covers the roundings of sums of non-negative bounds, in long
+// double, and their cast to double.
+inline constexpr long double kOutward = 1 + 1e-9L;
+
 // The identity (1) of certificate_check.h says that forces balance. With unit
 // vectors of the world, an observation pulls its point and its frame alike by
 // f_i = R_cw' E_i'(y_i; delta lambda_i), and (1) is sum f_i = 0 at every point

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 // Of some observations at a point or frame.
-struct Balance {
+struct ForceSum {
   Vector3d sum = Vector3d::Zero();  // of the forces
   double largest = 0;               // delta lambda
 
@@ -22,16 +22,16 @@ struct Balance {
   }
 };
 
-struct Balances {
-  std::vector<Balance> of_point;
-  std::vector<Balance> of_frame;
+struct ForceSums {
+  std::vector<ForceSum> of_point;
+  std::vector<ForceSum> of_frame;
 };
 
-Balances BalanceForces(const KnownRotationProblem& problem, double delta,
-                       const std::vector<Multiplier>& multipliers,
-                       const std::vector<int64_t>& observations) {
-  Balances balances{std::vector<Balance>(problem.num_points),
-                    std::vector<Balance>(problem.num_frames)};
+ForceSums BalanceForces(const KnownRotationProblem& problem, double delta,
+                        const std::vector<Multiplier>& multipliers,
+                        const std::vector<int64_t>& observations) {
+  ForceSums balances{std::vector<ForceSum>(problem.num_points),
+                     std::vector<ForceSum>(problem.num_frames)};
   for (const int64_t i : observations) {
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
@@ -40,8 +40,8 @@ Balances BalanceForces(const KnownRotationProblem& problem, double delta,
     const Vector3d force =
         view.cam_from_world_rotation.transpose() *
         Vector3d(q[0], q[1], delta_lambda - observation.u.dot(q));
-    for (Balance* balance : {&balances.of_point[observation.point],
-                             &balances.of_frame[view.frame]}) {
+    for (ForceSum* balance : {&balances.of_point[observation.point],
+                              &balances.of_frame[view.frame]}) {
       balance->sum += force;
       balance->largest = std::max(balance->largest, delta_lambda);
     }
@@ -85,7 +85,7 @@ std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     std::vector<int64_t> candidates,
                                     double tolerance) {
   for (;;) {
-    const Balances balances =
+    const ForceSums balances =
         BalanceForces(problem, delta, multipliers, candidates);
     std::vector<int64_t> balanced;
     for (const int64_t i : candidates) {
