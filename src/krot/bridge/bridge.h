@@ -51,6 +51,7 @@ struct BuiltProblem {
   std::vector<int32_t> image_of;    // problem view -> index in model.images
   std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
+  std::vector<Eigen::Vector2d> pixels;  // of the observations
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
 };

@@ -10,6 +10,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/point_repair.h"
 #include "krot/camera/camera_model.h"
+#include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 
@@ -40,6 +41,7 @@ struct PointOutcome {
 struct Slots {
   Observation* observations;
   int32_t* point2D;
+  Eigen::Vector2d* pixels;
 };
 
 void CheckImagePlanes(const Model& model) {
@@ -63,23 +65,29 @@ void CheckImagePlanes(const Model& model) {
   }
 }
 
-std::optional<LeftOut> Undistort(const Sources& sources,
-                                 const ImageGeometry& geometry,
-                                 const Point2D& point2D, const Vector3d& xyz,
-                                 Observation* observation) {
-  const Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
-                         geometry.cam_from_world_translation;
-  std::optional<Eigen::Vector2d> own_projection;
-  if (x_cam.z() > 0) own_projection = x_cam.hnormalized();
+// The row where the point projects.
+std::optional<Eigen::Matrix3d> RowAtPoint(const Sources& sources,
+                                          const ImageGeometry& geometry,
+                                          const Eigen::Vector2d& pixel,
+                                          const Vector3d& xyz) {
+  if (!IsInFront(geometry, xyz)) return std::nullopt;
+  const Camera& camera = sources.model.cameras[geometry.camera];
+  return RowAtProjection(camera.model_id, camera.params.data(), pixel,
+                         geometry.cam_from_world_rotation * xyz +
+                             geometry.cam_from_world_translation);
+}
 
+// The row at the pixel's own ray.
+std::optional<LeftOut> TakeRowAtRay(const Sources& sources,
+                                    const ImageGeometry& geometry,
+                                    const Eigen::Vector2d& pixel,
+                                    Observation* observation) {
   const Camera& camera = sources.model.cameras[geometry.camera];
   UndistortedObservation undistorted;
-  switch (UndistortPixel(camera.model_id, camera.params.data(),
-                         {point2D.x, point2D.y}, own_projection,
-                         &undistorted)) {
+  switch (UndistortPixel(camera.model_id, camera.params.data(), pixel,
+                         std::nullopt, &undistorted)) {
     case UndistortStatus::kOk:
-      observation->u = undistorted.u;
-      observation->J = undistorted.J;
+      observation->E = RowAtRay(undistorted.u, undistorted.J);
       return std::nullopt;
     case UndistortStatus::kNotConverged:
       return LeftOut::kUndistortion;
@@ -89,9 +97,10 @@ std::optional<LeftOut> Undistort(const Sources& sources,
   return LeftOut::kUndistortion;
 }
 
-// Fills the slots with the observations that have a pose and a ray.
-int CollectRays(const Sources& sources, int32_t point, Slots slots,
-                LeftOutCounts* left_out) {
+// Fills the slots with the observations that have a pose and a row: where the
+// point projects or, if it does not or must not count, at the pixel's ray.
+int CollectRows(const Sources& sources, int32_t point, bool only_rays,
+                Slots slots, LeftOutCounts* left_out) {
   const Point3D& point3D = sources.model.points3D[point];
   int num_kept = 0;
   for (uint64_t e = point3D.track_begin; e < point3D.track_end; ++e) {
@@ -102,31 +111,46 @@ int CollectRays(const Sources& sources, int32_t point, Slots slots,
     Observation& observation = slots.observations[num_kept];
     observation.view = image;
     observation.point = point;
-    const std::optional<LeftOut> reason =
-        geometry.has_pose
-            ? Undistort(
-                  sources, geometry,
-                  sources.model.images[image].points2D[element.point2D_idx],
-                  point3D.xyz, &observation)
-            : LeftOut::kNoPose;
+    const Point2D& point2D =
+        sources.model.images[image].points2D[element.point2D_idx];
+    const Eigen::Vector2d pixel(point2D.x, point2D.y);
+    std::optional<LeftOut> reason;
+    std::optional<Eigen::Matrix3d> row;
+    if (!geometry.has_pose) {
+      reason = LeftOut::kNoPose;
+    } else if (!only_rays) {
+      row = RowAtPoint(sources, geometry, pixel, point3D.xyz);
+    }
+    if (row) {
+      observation.E = *row;
+    } else if (!reason) {
+      reason = TakeRowAtRay(sources, geometry, pixel, &observation);
+    }
     if (reason) {
       ++(*left_out)[static_cast<size_t>(*reason)];
     } else {
-      slots.point2D[num_kept++] = static_cast<int32_t>(element.point2D_idx);
+      slots.point2D[num_kept] = static_cast<int32_t>(element.point2D_idx);
+      slots.pixels[num_kept++] = pixel;
     }
   }
   return num_kept;
 }
 
-// Removes the observations that the point is behind of.
+// Removes the observations that the point does not project in; the others' rows
+// are taken there.
 int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
                  Slots slots) {
   int num_kept = 0;
   for (int i = 0; i < count; ++i) {
     const Observation& observation = slots.observations[i];
-    if (!IsInFront(sources.geometries[observation.view], xyz)) continue;
+    const auto row =
+        RowAtPoint(sources, sources.geometries[observation.view],
+                   slots.pixels[i], xyz);
+    if (!row) continue;
     slots.point2D[num_kept] = slots.point2D[i];
-    slots.observations[num_kept++] = observation;
+    slots.pixels[num_kept] = slots.pixels[i];
+    slots.observations[num_kept] = observation;
+    slots.observations[num_kept++].E = *row;
   }
   return num_kept;
 }
@@ -134,7 +158,8 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
 PointOutcome ProcessPoint(const Sources& sources, int32_t point,
                           const BuildProblemOptions& options, Slots slots,
                           LeftOutCounts* left_out) {
-  const int num_rays = CollectRays(sources, point, slots, left_out);
+  const int num_rays = CollectRows(sources, point, options.ignore_translations,
+                                   slots, left_out);
   const Vector3d& xyz = sources.model.points3D[point].xyz;
   PointOutcome outcome;
   if (options.ignore_translations) {
@@ -162,6 +187,7 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
   const Model& model = sources.model;
   built->problem.observations.resize(model.track_elements.size());
   built->point2D_of.resize(model.track_elements.size());
+  built->pixels.resize(model.track_elements.size());
 
   const int64_t count = static_cast<int64_t>(model.points3D.size());
   std::vector<PointOutcome> outcomes(count);
@@ -174,7 +200,8 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
                   outcomes[k] =
                       ProcessPoint(sources, static_cast<int32_t>(k), options,
                                    {built->problem.observations.data() + first,
-                                    built->point2D_of.data() + first},
+                                    built->point2D_of.data() + first,
+                                    built->pixels.data() + first},
                                    &chunk_left_out[begin / kPointsPerChunk]);
                 }
               });
@@ -202,10 +229,12 @@ void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
       observations[num_kept] = observations[i];
       observations[num_kept].point = point;
       built->point2D_of[num_kept] = built->point2D_of[i];
+      built->pixels[num_kept] = built->pixels[i];
     }
   }
   observations.resize(num_kept);
   built->point2D_of.resize(num_kept);
+  built->pixels.resize(num_kept);
   built->problem.num_points = static_cast<int32_t>(built->point_of.size());
 }
 

@@ -149,8 +149,9 @@ CertificateFile DescribeCertificate(const Model& model,
     file.observations.push_back(
         {model.images[built.image_of[observation.view]].id,
          static_cast<uint32_t>(built.point2D_of[certified.observation]),
-         model.points3D[built.point_of[observation.point]].id, observation.u,
-         observation.J, certified.lambda, certified.y});
+         model.points3D[built.point_of[observation.point]].id,
+         Eigen::Vector2d::Zero(), observation.E.block<2, 2>(1, 0),
+         certified.lambda, certified.y});
   }
   return file;
 }

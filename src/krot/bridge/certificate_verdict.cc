@@ -22,8 +22,7 @@ std::string NameOf(const CertificateFile::SupportObservation& o) {
 // Also false for NaN.
 bool IsSameRay(const CertificateFile::SupportObservation& o,
                const Observation& own) {
-  return (o.u - own.u).norm() <= kRayTolerance * own.u.homogeneous().norm() &&
-         (o.J - own.J).norm() <= kRayTolerance * own.J.norm();
+  return (RowAtRay(o.u, o.J) - own.E).norm() <= kRayTolerance * own.E.norm();
 }
 
 // The certificate in terms of the problem, into which the file's u and J go.
@@ -62,8 +61,7 @@ Translation Translate(const Model& model, const CertificateFile& file,
       translation.refusal = "u or J of " + NameOf(o) + " is not the model's";
     }
     if (!translation.refusal.empty()) return translation;
-    own.u = o.u;
-    own.J = o.J;
+    own.E = RowAtRay(o.u, o.J);
     translation.certificate.observations.push_back(
         {static_cast<int64_t>(i), o.lambda, o.y});
   }

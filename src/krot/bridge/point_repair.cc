@@ -14,12 +14,14 @@ using Eigen::Vector3d;
 // of, may be rounding.
 constexpr double kDepthRounding = 1e-14;
 
-// C = -R' t, direction R' (u; 1).
+// C = -R' t; its direction is where v = 0 and w > 0.
 Ray RayOf(const ImageGeometry& image, const Observation& observation) {
   const Eigen::Matrix3d world_from_cam =
       image.cam_from_world_rotation.transpose();
+  Vector3d ray = observation.E.row(1).cross(observation.E.row(2));
+  if (observation.E.row(0).dot(ray) < 0) ray = -ray;
   return {-world_from_cam * image.cam_from_world_translation,
-          world_from_cam * observation.u.homogeneous().normalized()};
+          world_from_cam * ray.normalized()};
 }
 
 }  // namespace

@@ -86,9 +86,8 @@ bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
         T_.col(0) * program_.TopPerScalar(viewed[i].depth));
     const Observation& o = problem_.observations[i];
     const View& view = problem_.views[o.view];
-    Matrix3d E;
-    E.row(0) << 0, 0, top_per_depth;
-    E.template bottomRows<2>() << o.J, -o.J * o.u;
+    Matrix3d E = o.E;
+    E.row(0) *= top_per_depth;
     Rows rows;  // of x_cam
     for (int c = 0; c < 3; ++c) {
       rows.col(c) = scaling_[i].ApplyInverse(T_ * E.col(c));
@@ -123,11 +122,10 @@ void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
     const View& view = problem_.views[o.view];
     const double weight =
         1 / (static_cast<double>(loop_.count()) * viewed[i].depth);
-    gauge_.points[o.point] +=
-        weight * view.cam_from_world_rotation.row(2).transpose();
+    const Vector3d c = weight * o.E.row(0).transpose();
+    gauge_.points[o.point] += view.cam_from_world_rotation.transpose() * c;
     if (structure_.frame_is_fixed[view.frame]) continue;
-    gauge_.frames[view.frame] +=
-        weight * view.cam_from_rig_rotation.row(2).transpose();
+    gauge_.frames[view.frame] += view.cam_from_rig_rotation.transpose() * c;
   }
 }
 

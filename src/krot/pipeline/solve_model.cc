@@ -8,6 +8,8 @@
 #include "krot/pipeline/schedule.h"
 #include "krot/pipeline/solve_memory.h"
 #include "krot/pipeline/start.h"
+#include "krot/pipeline/trust_regions.h"
+#include "krot/pipeline/rounds.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
@@ -146,11 +148,37 @@ SolveModelResult Solve(const Model& model, const SolveModelOptions& options) {
     result.model = model;
     return result;
   }
-  const KnownRotationProblem& problem = start.built.problem;
-  const std::optional<Certificate> certificate = RunSchedule(
-      problem, options, summary.method, solve_timer, &estimate, &summary);
+  KnownRotationProblem& problem = start.built.problem;
+  const Reprojection reprojection(model, start.built);
+  std::optional<Certificate> certificate;
+  TrustRegions trust;
+  double true_cost = reprojection.TrueCost(estimate, options.norm, -1);
+  fprintf(stderr, "start %.9g linear %d\n", true_cost, reprojection.IsLinear());
+  for (int round = 1; round <= 12; ++round) {
+    reprojection.TakeRows(estimate, -1, &problem);
+    Estimate solved = estimate;
+    const size_t it0 = summary.iterations.size();
+    std::vector<int64_t> observation_of;
+    KnownRotationProblem bounded;
+    const KnownRotationProblem* now = &problem;
+    if (!trust.IsEmpty()) { bounded = trust.AddTo(problem, estimate, true_cost, &observation_of); now = &bounded; }
+    certificate = RunSchedule(*now, options, round == 1 ? summary.method : SolveMethod::kJoint, solve_timer,
+                              &solved, &summary);
+    { Estimate moved = solved; RestoreGauge(problem, estimate, &moved);
+      if (Cost(*now, moved, options.norm, -1) <= (1 + 1e-9) * Cost(*now, solved, options.norm, -1)) solved = moved; else fprintf(stderr, "gauge harms\n"); }
+    const Estimate at = estimate;
+    double step = 0;
+    const double before = true_cost;
+    const double linear = Cost(problem, solved, options.norm, -1);
+    estimate = BestOnSegment(reprojection, estimate, solved, options.norm, -1, &step, &true_cost);
+    fprintf(stderr, "round %d: it %zu linear %.9g bound %.9g at 1: %.9g  step %.4g true %.9g  t=%.3f\n", round, summary.iterations.size() - it0, linear,
+      certificate ? certificate->lower_bound : 0.0, reprojection.TrueCost(solved, options.norm, -1), step, true_cost, solve_timer.Seconds());
+    if (step < 1) { fprintf(stderr, "trust: %ld\n", trust.Shrink(reprojection, problem, at, solved, options.norm, linear * (1 + 1e-5))); }
+    if (reprojection.IsLinear() || !(true_cost < before * (1 - 1e-6))) break;
+  }
   if (options.res_int.update_frames) {
-    RestoreGauge(problem, start.built.start, &estimate);
+    { Estimate moved = estimate; RestoreGauge(problem, start.built.start, &moved);
+      if (reprojection.TrueCost(moved, options.norm, -1) <= (1 + 1e-9) * reprojection.TrueCost(estimate, options.norm, -1)) estimate = moved; else fprintf(stderr, "gauge harms\n"); }
     summary.cost_final =
         Cost(problem, estimate, options.norm, options.num_threads);
   }

@@ -22,8 +22,8 @@ inline ViewedPoint ViewPoint(const AffineMap& camera,
                              const Observation& observation,
                              const Eigen::Vector3d& point) {
   const Eigen::Vector3d x_cam = camera.leftCols<3>() * point + camera.col(3);
-  return {x_cam.z(),
-          observation.J * (x_cam.head<2>() - observation.u * x_cam.z())};
+  const Eigen::Vector3d wv = observation.E * x_cam;
+  return {wv[0], wv.tail<2>()};
 }
 ViewedPoint ViewPoint(const KnownRotationProblem& problem,
                       const Observation& observation, const Estimate& estimate);

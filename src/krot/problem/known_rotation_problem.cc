@@ -75,6 +75,13 @@ void IndexObservations(KnownRotationProblem* problem) {
   }
 }
 
+Eigen::Matrix3d RowAtRay(const Eigen::Vector2d& u, const Eigen::Matrix2d& J) {
+  Eigen::Matrix3d E;
+  E.row(0) = Eigen::RowVector3d::UnitZ();
+  E.bottomRows<2>() << J, -J * u;
+  return E;
+}
+
 bool HasBaseline(const KnownRotationProblem& problem) {
   return std::any_of(problem.views.begin(), problem.views.end(),
                      [](const View& view) {

@@ -11,11 +11,10 @@ namespace krot {
 // any number of cameras:
 //
 //   min over t_f, s_k   max_i  ||v_i||_p / w_i    subject to  w_i > 0,
-//   (w_i; v_i) = [e3'; J_i (I2 | -u_i)] x_cam,
-//   x_cam = R_sr (R_rw s_k + t_f) + t_sr.
+//   (w_i; v_i) = E_i x_cam,   x_cam = R_sr (R_rw s_k + t_f) + t_sr.
 //
 // w is the depth; the ratio is the reprojection error in pixels, linearised
-// at the observation (docs/method.md).
+// where the row E was taken (docs/method.md).
 
 // One image: how its camera sits in its frame.
 struct View {
@@ -25,13 +24,17 @@ struct View {
   int32_t frame = 0;
 };
 
-// One 2D observation of one point. 64 bytes.
+// One 2D observation of one point. 80 bytes.
 struct Observation {
-  Eigen::Vector2d u;  // on the plane z = 1
-  Eigen::Matrix2d J;  // d pixel / d u at u, pixels
+  // det E > 0. Row 0, the depth's, has length 1; rows 1 and 2 are pixels.
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> E;
   int32_t view = 0;
   int32_t point = 0;
 };
+
+// The row that is taken at the observation itself: u on the plane z = 1 is its
+// ray and J = d pixel / d u there, det J > 0. E = [e3'; J (I2 | -u)].
+Eigen::Matrix3d RowAtRay(const Eigen::Vector2d& u, const Eigen::Matrix2d& J);
 
 // Observations stand in the order of their points; an index lists them by
 // frame.

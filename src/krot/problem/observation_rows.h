@@ -13,9 +13,9 @@ namespace krot {
 //
 //   v = A x + b,   w = c'x + d                              [Zhang18, (2), (3)]
 //
-// are affine. With x_cam = R x + o and E = [e3'; J (I2 | -u)],
+// are affine. With x_cam = R x + o,
 //
-//   A = J (I2 | -u) R,   b = J (I2 | -u) o,   c' = e3' R,   d = e3' o.
+//   (c'; A) = E R,   (d; b) = E o.
 //
 // In the layout of residual_kernel.h:
 //   {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
@@ -24,14 +24,14 @@ namespace internal {
 
 inline void AffineRow(const Observation& observation, const AffineMap& map,
                       double row[kResidualRow]) {
-  const Eigen::Matrix2d& J = observation.J;
-  const Eigen::Vector2d& u = observation.u;
+  const auto& E = observation.E;
   for (int k = 0; k < 4; ++k) {  // columns: of x and of 1
-    const double v1 = map(0, k) - u[0] * map(2, k);
-    const double v2 = map(1, k) - u[1] * map(2, k);
-    row[k] = J(0, 0) * v1 + J(0, 1) * v2;
-    row[4 + k] = J(1, 0) * v1 + J(1, 1) * v2;
-    row[8 + k] = map(2, k);
+    const auto component = [&](int r) {
+      return E(r, 0) * map(0, k) + E(r, 1) * map(1, k) + E(r, 2) * map(2, k);
+    };
+    row[k] = component(1);
+    row[4 + k] = component(2);
+    row[8 + k] = component(0);
   }
 }
 

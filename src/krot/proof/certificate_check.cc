@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "krot/problem/restrict.h"
@@ -14,15 +15,13 @@
 
 // How (1) is proved. Forces (force_balance.h) balance but for g; changing those
 // of a spanning forest balances them exactly. The change F_i of a force is one
-// of y_i by J^-T of a vector of at most its length, and of delta lambda_i by at
-// most |(1, u_i)| times its length. Then |y_i|_dual / lambda_i is at most rho
+// of (delta lambda_i; y_i) by E_i^-T F_i. Then |y_i|_dual / lambda_i is at most rho
 // for all i, and (lambda_i, y_i / rho) is dual feasible and proves delta / rho.
 
 namespace krot {
 namespace {
 
 using Real = long double;
-using Matrix2 = Eigen::Matrix<Real, 2, 2>;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Vector2 = Eigen::Matrix<Real, 2, 1>;
 using Vector3 = Eigen::Matrix<Real, 3, 1>;
@@ -35,8 +34,7 @@ constexpr double kSmallestShare = 1e-100;
 // No lambda may have to change by more, relative.
 constexpr Real kLargestChange = 0.5L;
 
-// E'(y; delta lambda), E = (J (I2 | -u); e3), and what it sums up, before any
-// cancellation.
+// E'(delta lambda; y), and what it sums up, before any cancellation.
 struct Force {
   Vector3 sum;
   Vector3 terms;
@@ -44,35 +42,37 @@ struct Force {
 
 Force MakeForce(const Observation& observation, const Vector2& y,
                 Real delta_lambda) {
-  const Vector2 u = observation.u.cast<Real>();
-  const Matrix2 J = observation.J.cast<Real>();
-  Force force;
-  const Vector2 q = J.transpose() * y;
-  force.sum << q, delta_lambda - u.dot(q);
-  const Vector2 q_terms = J.cwiseAbs().transpose() * y.cwiseAbs();
-  force.terms << q_terms, delta_lambda + u.cwiseAbs().dot(q_terms);
-  return force;
+  const Matrix3 E = observation.E.cast<Real>();
+  const Vector3 multipliers(delta_lambda, y[0], y[1]);
+  return {E.transpose() * multipliers,
+          E.cwiseAbs().transpose() * multipliers.cwiseAbs()};
 }
 
-// How much the multipliers may change for a unit of a force's change.
+// How much the multipliers may change for a unit of a force's change: what the
+// rows of E^-T are long.
 struct Compliance {
-  Real y = 0;             // |J^-T|
-  Real delta_lambda = 0;  // |(1, u)|
+  Real y = 0;             // rows 1 and 2 together
+  Real delta_lambda = 0;  // row 0
 };
 
-// Infinite if J might be singular.
+// Infinite if E might be singular. With e_k the rows of E, those of E^-T are
+// e_1 x e_2, e_2 x e_0 and e_0 x e_1 over det E = e_0'(e_1 x e_2).
 Compliance MakeCompliance(const Observation& observation) {
-  const Matrix2 J = observation.J.cast<Real>();
-  const Real plus = J(0, 0) * J(1, 1);
-  const Real minus = J(0, 1) * J(1, 0);
-  const Real det = std::abs(plus - minus) -
-                   4 * kRealRoundoff * (std::abs(plus) + std::abs(minus));
-  Compliance compliance;
-  compliance.y = det > 0 ? J.norm() / det * kOutward
-                         : std::numeric_limits<Real>::infinity();
-  compliance.delta_lambda =
-      std::sqrt(1 + observation.u.cast<Real>().squaredNorm()) * kOutward;
-  return compliance;
+  const Matrix3 E = observation.E.cast<Real>();
+  const auto length = [&](int i, int j) {
+    const Vector3 a = E.row(i);
+    const Vector3 b = E.row(j);
+    return a.cross(b).norm() + 8 * kRealRoundoff * a.norm() * b.norm();
+  };
+  const Real det =
+      std::abs(E.determinant()) -
+      16 * kRealRoundoff * E.row(0).norm() * E.row(1).norm() * E.row(2).norm();
+  if (!(det > 0)) {
+    constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
+    return {kInfinity, kInfinity};
+  }
+  return {std::hypot(length(2, 0), length(0, 1)) / det * kOutward,
+          length(1, 2) / det * kOutward};
 }
 
 // The forces at a point or frame, their uncertainty, and what they sum up.

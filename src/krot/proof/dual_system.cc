@@ -26,8 +26,8 @@ DualSystem::DualSystem(const KnownRotationProblem& problem, double delta,
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
     Matrix3r E;
-    E << observation.J.cast<Real>(),
-        -observation.J.cast<Real>() * observation.u.cast<Real>(), 0, 0, delta;
+    E << observation.E.bottomRows<2>().cast<Real>(),
+        delta * observation.E.row(0).cast<Real>();
     Block block;
     block.point = E * view.cam_from_world_rotation.cast<Real>();
     block.frame = E * view.cam_from_rig_rotation.cast<Real>();

@@ -1,0 +1,97 @@
+#include "krot/bridge/reprojection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "krot/base/parallel_for.h"
+#include "krot/camera/camera_model.h"
+#include "krot/camera/projection_row.h"
+#include "krot/model/image_geometry.h"
+#include "krot/problem/cameras.h"
+
+namespace krot {
+namespace {
+
+constexpr int64_t kObservationsPerChunk = 4096;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double NormOfError(const Eigen::Vector2d& e, Norm norm) {
+  if (norm.p == 2) return e.norm();
+  if (norm.p == 1) return e.lpNorm<1>();
+  if (norm.IsPolyhedral()) return e.lpNorm<Eigen::Infinity>();
+  const double largest = e.lpNorm<Eigen::Infinity>();
+  if (!(largest > 0) || !std::isfinite(largest)) return largest;
+  return largest * std::pow(std::pow(std::abs(e[0]) / largest, norm.p) +
+                                std::pow(std::abs(e[1]) / largest, norm.p),
+                            1 / norm.p);
+}
+
+}  // namespace
+
+Reprojection::Reprojection(const Model& model, const BuiltProblem& built)
+    : built_(built) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  for (const int32_t image : built.image_of) {
+    const Camera& camera = model.cameras[geometries[image].camera];
+    sources_.push_back({camera.model_id, camera.params.data()});
+    is_linear_ = is_linear_ && IsPinhole(camera.model_id);
+  }
+}
+
+Eigen::Vector3d Reprojection::InCamera(const Estimate& estimate,
+                                       int64_t i) const {
+  const KnownRotationProblem& problem = built_.problem;
+  const Observation& observation = problem.observations[i];
+  const View& view = problem.views[observation.view];
+  const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
+  return map.leftCols<3>() * estimate.points[observation.point] + map.col(3);
+}
+
+double Reprojection::Error(const Estimate& estimate, Norm norm,
+                           int64_t i) const {
+  const Source& source = sources_[built_.problem.observations[i].view];
+  const std::optional<Eigen::Vector2d> pixel =
+      ProjectPoint(source.model_id, source.params, InCamera(estimate, i));
+  if (!pixel) return kInfinity;
+  const double error = NormOfError(
+      PixelDifference(source.model_id, source.params, *pixel, built_.pixels[i]),
+      norm);
+  return std::isfinite(error) ? error : kInfinity;
+}
+
+double Reprojection::TrueCost(const Estimate& estimate, Norm norm,
+                              int num_threads) const {
+  const int64_t count = static_cast<int64_t>(built_.pixels.size());
+  std::vector<double> largest(NumChunks(count, kObservationsPerChunk), 0);
+  ParallelFor(count, kObservationsPerChunk, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                double& cost = largest[begin / kObservationsPerChunk];
+                for (int64_t i = begin; i < end; ++i) {
+                  cost = std::max(cost, Error(estimate, norm, i));
+                }
+              });
+  double cost = 0;
+  for (const double chunk : largest) cost = std::max(cost, chunk);
+  return cost;
+}
+
+void Reprojection::TakeRows(const Estimate& estimate, int num_threads,
+                            KnownRotationProblem* problem) const {
+  if (is_linear_) return;
+  ParallelFor(static_cast<int64_t>(problem->observations.size()),
+              kObservationsPerChunk, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                for (int64_t i = begin; i < end; ++i) {
+                  Observation& observation = problem->observations[i];
+                  const Source& source = sources_[observation.view];
+                  const auto row = RowAtProjection(
+                      source.model_id, source.params, built_.pixels[i],
+                      InCamera(estimate, i));
+                  if (row) observation.E = *row;
+                }
+              });
+}
+
+}  // namespace krot

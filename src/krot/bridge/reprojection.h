@@ -1,0 +1,51 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/bridge/bridge.h"
+#include "krot/minimax/norm.h"
+#include "krot/model/model.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// The true residuals of a built problem, through the full cameras: what its
+// linear rows stand for. The problem's Cost is that of the rows; TrueCost is
+// what the user measures.
+class Reprojection {
+ public:
+  // Keeps references.
+  Reprojection(const Model& model, const BuiltProblem& built);
+
+  // Whether no row depends on where it is taken, as for pinholes: then Cost and
+  // TrueCost differ by rounding alone.
+  bool IsLinear() const { return is_linear_; }
+
+  // ||pi(x_cam) - pixel||_p of observation i, pixels; infinity where the point
+  // does not project, as behind its camera.
+  double Error(const Estimate& estimate, Norm norm, int64_t i) const;
+
+  // The largest error, pixels; 0 without observations. O(observations); the
+  // same bits at any number of threads.
+  double TrueCost(const Estimate& estimate, Norm norm, int num_threads) const;
+
+  // Takes every row where its point projects at the estimate, which all of
+  // them must: exact there, and to first order around.
+  void TakeRows(const Estimate& estimate, int num_threads,
+                KnownRotationProblem* problem) const;
+
+ private:
+  struct Source {
+    int model_id;
+    const double* params;
+  };
+  Eigen::Vector3d InCamera(const Estimate& estimate, int64_t i) const;
+
+  const BuiltProblem& built_;
+  std::vector<Source> sources_;  // per view
+  bool is_linear_ = true;
+};
+
+}  // namespace krot

@@ -1,0 +1,81 @@
+#include "krot/pipeline/trust_regions.h"
+
+#include <algorithm>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "krot/problem/cameras.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Vector3d;
+using Basis = Eigen::Matrix<double, 2, 3>;
+
+constexpr double kShareOfWay = 0.5;
+
+Vector3d InCamera(const KnownRotationProblem& problem, const Estimate& estimate,
+                  const Observation& observation) {
+  const View& view = problem.views[observation.view];
+  const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
+  return map.leftCols<3>() * estimate.points[observation.point] + map.col(3);
+}
+
+// Orthonormal, across the ray of x_hat.
+Basis BasisAcross(const Vector3d& x_hat) {
+  const Vector3d n = x_hat.normalized();
+  const Vector3d b1 = n.unitOrthogonal();
+  Basis basis;
+  basis << b1.transpose(), n.cross(b1).transpose();
+  return basis;
+}
+
+}  // namespace
+
+int64_t TrustRegions::Shrink(const Reprojection& reprojection,
+                             const KnownRotationProblem& problem,
+                             const Estimate& from, const Estimate& to,
+                             Norm norm, double level) {
+  int64_t count = 0;
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    const int64_t index = static_cast<int64_t>(i);
+    if (!(reprojection.Error(to, norm, index) > level)) continue;
+    const Observation& observation = problem.observations[i];
+    const Basis basis = BasisAcross(InCamera(problem, from, observation));
+    const Vector3d x_cam = InCamera(problem, to, observation);
+    const double way = (basis * x_cam).norm() / observation.E.row(0).dot(x_cam);
+    const auto [entry, is_new] = radii_.emplace(index, kShareOfWay * way);
+    if (!is_new) entry->second = kShareOfWay * std::min(entry->second, way);
+    ++count;
+  }
+  return count;
+}
+
+KnownRotationProblem TrustRegions::AddTo(
+    const KnownRotationProblem& rows, const Estimate& x_hat, double level,
+    std::vector<int64_t>* observation_of) const {
+  KnownRotationProblem problem = rows;
+  problem.observations.clear();
+  observation_of->clear();
+  for (int32_t k = 0; k < rows.num_points; ++k) {
+    const int64_t begin = rows.point_begin[k];
+    const int64_t end = rows.point_begin[k + 1];
+    for (int64_t i = begin; i < end; ++i) {
+      problem.observations.push_back(rows.observations[i]);
+      observation_of->push_back(i);
+    }
+    for (auto bound = radii_.lower_bound(begin);
+         bound != radii_.end() && bound->first < end; ++bound) {
+      Observation row = rows.observations[bound->first];
+      row.E.bottomRows<2>() = level / bound->second *
+                              BasisAcross(InCamera(rows, x_hat, row));
+      problem.observations.push_back(row);
+      observation_of->push_back(-1);
+    }
+  }
+  IndexObservations(&problem);
+  return problem;
+}
+
+}  // namespace krot

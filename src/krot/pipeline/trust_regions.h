@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include "krot/bridge/reprojection.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// Bounds on how far single observations' projections may move in one round:
+// those few, near the folds of strong lenses, whose linear rows promise what
+// the lens does not keep.
+//
+// A bound is one more cone, |u - u_hat| <= radius: as the row
+// (w; level/radius B x_cam), with B an orthonormal basis of the plane across
+// the ray of x_hat, it is one more observation whose residual is below `level`
+// exactly if the bound is kept.
+class TrustRegions {
+ public:
+  bool IsEmpty() const { return radii_.empty(); }
+  void Clear() { radii_.clear(); }
+
+  // Halves the way from `from` to `to` of every observation whose true error at
+  // `to` exceeds `level`, pixels. Returns how many there are. O(observations).
+  int64_t Shrink(const Reprojection& reprojection,
+                 const KnownRotationProblem& problem, const Estimate& from,
+                 const Estimate& to, Norm norm, double level);
+
+  // The rows with those of the bounds behind those of their points. Observation
+  // i of the result is `(*observation_of)[i]` of `rows`, or -1 if it is a bound.
+  KnownRotationProblem AddTo(const KnownRotationProblem& rows,
+                             const Estimate& x_hat, double level,
+                             std::vector<int64_t>* observation_of) const;
+
+ private:
+  std::map<int64_t, double> radii_;  // by observation
+};
+
+}  // namespace krot
