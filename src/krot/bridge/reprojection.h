@@ -36,13 +36,19 @@ class Reprojection {
   void TakeRows(const Estimate& estimate, int num_threads,
                 KnownRotationProblem* problem) const;
 
- private:
+  // The camera of observation i.
   struct Source {
     int model_id;
     const double* params;
   };
+  const Source& SourceOf(int64_t i) const {
+    return sources_[built_.problem.observations[i].view];
+  }
+
+  // x_cam of observation i.
   Eigen::Vector3d InCamera(const Estimate& estimate, int64_t i) const;
 
+ private:
   const BuiltProblem& built_;
   std::vector<Source> sources_;  // per view
   bool is_linear_ = true;

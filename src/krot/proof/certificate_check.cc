@@ -92,6 +92,7 @@ class Checker {
   std::optional<std::string> Run();
 
   double rho() const { return rho_; }
+  std::vector<MultiplierChange> Changes() const;
 
  private:
   std::optional<std::string> Restrict();
@@ -243,6 +244,19 @@ std::optional<std::string> Checker::BoundRho() {
   return std::nullopt;
 }
 
+std::vector<MultiplierChange> Checker::Changes() const {
+  std::vector<MultiplierChange> changes;
+  for (size_t i = 0; i < lambda_.size(); ++i) {
+    const Real unit = certificate_.observations[i].lambda / lambda_[i];
+    const Real correction = corrections_[i] * kOutward * kOutward;
+    changes.push_back(
+        {static_cast<double>(correction * unit * compliances_[i].y),
+         static_cast<double>(correction * compliances_[i].delta_lambda /
+                             (lambda_[i] * certificate_.lower_bound))});
+  }
+  return changes;
+}
+
 std::optional<std::string> Checker::Run() {
   if (auto refusal = RefuseNumbers(whole_, norm_, certificate_)) return refusal;
   if (auto refusal = Restrict()) return refusal;
@@ -270,6 +284,7 @@ CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
     return check;
   }
   check.is_accepted = true;
+  check.changes = checker.Changes();
   check.proved_bound =
       certificate.lower_bound / checker.rho() * (1 - 4 * kUnitRoundoff);
   check.defect = std::max(0.0, checker.rho() - 1);

@@ -41,11 +41,20 @@ struct Certificate {
 
 inline constexpr double kMaxDefect = 1e-6;
 
+// How much one observation's multipliers have to change, at most, for (1) to
+// hold exactly.
+struct MultiplierChange {
+  double y = 0;      // |change of y|
+  double depth = 0;  // change of delta lambda, relative to it
+};
+
 struct CertificateCheck {
   bool is_accepted = false;
   double proved_bound = 0;  // pixels; 0 unless accepted
   double defect = 0;        // 1 - proved_bound / lower_bound, relative
   std::string refusal;      // one sentence; empty if accepted
+  // Of the certificate's observations, if accepted.
+  std::vector<MultiplierChange> changes;
 };
 
 // Judges a certificate from the problem alone. Accepted if and only if it is

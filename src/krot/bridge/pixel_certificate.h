@@ -1,0 +1,70 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/bridge/bridge.h"
+#include "krot/minimax/norm.h"
+#include "krot/model/model.h"
+#include "krot/proof/certificate_check.h"
+
+namespace krot {
+
+// A proof in true pixels: no translations and points bring every reprojection
+// error of the support below `lower_bound`.
+//
+// Let S_i be the rays of observation i whose true error is at most gamma, of
+// the region that krot/camera/support_bound.h speaks of. The multipliers of
+// `rows`, with x_cam at depth w_i and v_i = w_i L_i(u) linear in it, satisfy
+//
+//   sum_i (delta lambda_i w_i + y_i'v_i) <= 0      for all translations, points
+//
+// (certificate_check.h, (1) and (2)). If every support line keeps to its side,
+//
+//   (3)  -y_i'L_i(u) <= delta lambda_i             for all u in S_i,
+//
+// then no estimate has all its rays in the interior of the S_i. So whatever a
+// lens does, it enters by the support function of S_i in the one direction
+// -y_i; at an optimum that direction is the error's own, its supporting line
+// touches S_i where the point projects, and gamma = delta.
+struct PixelCertificate {
+  // Of the problem whose row i is RowAtProjection at bearings[i].
+  Certificate rows;
+  // In the cameras' frames, one per observation of the support.
+  std::vector<Eigen::Vector3d> bearings;
+  double lower_bound = 0;  // gamma, true pixels; <= rows.lower_bound
+};
+
+struct PixelCertificateCheck {
+  bool is_accepted = false;
+  double lower_bound = 0;  // true pixels; 0 unless accepted
+  double defect = 0;       // of the rows' certificate, relative
+  std::string refusal;     // one sentence; empty if accepted
+};
+
+// Judges a certificate from the model alone: rows, forces and support lines are
+// computed anew, with bounds on every rounding. `built` only names the
+// observations. Whatever is wrong is a refusal and never an exception.
+PixelCertificateCheck CheckPixelCertificate(const Model& model,
+                                            const BuiltProblem& built,
+                                            Norm norm,
+                                            const PixelCertificate& certificate);
+
+// The certificate with the largest gamma for these rows, which were taken at
+// `x_hat`; none if an observation of the support has no region. Verifies
+// nothing.
+std::optional<PixelCertificate> MakePixelCertificate(
+    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
+    Norm norm, const Certificate& rows);
+
+// The observation's (3), largest -y_i'L_i over S_i at `gamma` pixels, relative
+// to delta lambda_i: at most 1 where it holds. Infinity without a region.
+std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
+                                 Norm norm, const Certificate& rows,
+                                 const std::vector<Eigen::Vector3d>& bearings,
+                                 double gamma);
+
+}  // namespace krot
