@@ -68,6 +68,8 @@ class RandomCamera {
   double Draw(std::string_view name) {
     if (name[0] == 'f') return Uniform(300, 5000);
     if (name[0] == 'c') return Uniform(200, 2500);
+    if (name == "w") return Uniform(2000, 8000);  // EQUIRECTANGULAR
+    if (name == "h") return Uniform(1000, 4000);
     if (name == "omega") return Uniform(0.3, 1.5);
     if (name == "alpha") return Uniform(0.1, 0.9);
     if (name == "beta") return Uniform(0.5, 2);
@@ -96,6 +98,15 @@ inline std::vector<int> ImagePlaneModelIds() {
     if (info.has_image_plane) ids.push_back(info.id);
   }
   return ids;
+}
+
+// A unit vector up to `max_angle` off the axis.
+inline Eigen::Vector3d RandomBearing(double max_angle, std::mt19937* random) {
+  std::uniform_real_distribution<double> unit(0, 1);
+  const double theta = max_angle * unit(*random);
+  const double phi = 6.283185307179586 * unit(*random);
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+          std::cos(theta)};
 }
 
 inline std::string ModelName(int model_id) {

@@ -87,6 +87,10 @@ template <typename S>
 inline bool operator<(const Dual<S>& a, double b) {
   return a.value < b;
 }
+template <typename S>
+inline bool operator<(const Dual<S>& a, const Dual<S>& b) {
+  return a.value < b.value;
+}
 
 // sqrt' = 1 / (2 sqrt)
 template <typename S>
@@ -103,6 +107,15 @@ inline Dual<S> atan(const Dual<S>& a) {
   using std::atan;
   const S slope = 1.0 / (1.0 + a.value * a.value);
   return {atan(a.value), slope * a.du, slope * a.dv};
+}
+
+// atan2(y, x)' = (x y' - y x') / (x^2 + y^2)
+template <typename S>
+inline Dual<S> atan2(const Dual<S>& y, const Dual<S>& x) {
+  using std::atan2;
+  const S norm2 = x.value * x.value + y.value * y.value;
+  return {atan2(y.value, x.value), (x.value * y.du - y.value * x.du) / norm2,
+          (x.value * y.dv - y.value * x.dv) / norm2};
 }
 
 }  // namespace krot

@@ -11,6 +11,14 @@ namespace krot {
 //   ToRay(lens, a, b, &u, &v)     its closed-form inverse; false if the ray
 //                                 is 90 degrees or more off the axis.
 //
+// and, beyond 90 degrees too, the direction of (X, Y, Z) of any length:
+//
+//   Sees(lens, X, Y, Z)           whether the lens has a point for it; the set
+//                                 of these directions is connected;
+//   FromPoint(lens, X, Y, Z, &a, &b)     the point, for any scalar; continues
+//                                 FromRay(X / Z, Y / Z) to where it sees;
+//   ToPoint(lens, a, b, &X, &Y, &Z)      its inverse; false if there is none.
+//
 // `lens` points at kNumParams parameters. Every lens is radial, a = u h(r)
 // with r^2 = u^2 + v^2, and the radial slope (r h)' changes its sign at most
 // once between the axis and any ray, so that det d(a, b)/d(u, v) > 0 at a ray
@@ -31,7 +39,24 @@ T AtanOverRoot(const T& z2) {
   return atan(z) / z;
 }
 
+// The angle of (Z, r) over r, by r^2 and Z: atan(r / Z) / r where Z > 0, and on
+// from there to all directions but that of -Z. Homogeneous of degree -1.
+template <typename T>
+T AngleOverRadius(const T& r2, const T& Z) {
+  using std::atan2;
+  using std::sqrt;
+  if (-Z < 0.0 && r2 < Z * Z) return AtanOverRoot(T(r2 / (Z * Z))) / Z;
+  const T r = sqrt(r2);
+  return atan2(r, Z) / r;
+}
+
 inline constexpr double kHalfPi = 1.5707963267948966;
+inline constexpr double kPi = 2 * kHalfPi;
+
+// sin(angle) / angle
+inline double SineOverAngle(double angle) {
+  return angle == 0 ? 1 : std::sin(angle) / angle;
+}
 
 inline double TanOverAngle(double angle) {
   return angle == 0 ? 1 : std::tan(angle) / angle;
@@ -50,6 +75,23 @@ struct PerspectiveLens {
   static bool ToRay(const double*, double a, double b, double* u, double* v) {
     *u = a;
     *v = b;
+    return true;
+  }
+
+  static bool Sees(const double*, double, double, double Z) { return Z > 0; }
+
+  template <typename P, typename T>
+  static void FromPoint(const P*, const T& X, const T& Y, const T& Z, T* a,
+                        T* b) {
+    *a = X / Z;
+    *b = Y / Z;
+  }
+
+  static bool ToPoint(const double*, double a, double b, double* X, double* Y,
+                      double* Z) {
+    *X = a;
+    *Y = b;
+    *Z = 1;
     return true;
   }
 };
@@ -74,6 +116,29 @@ struct EquidistantLens {
     *v = b * scale;
     return true;
   }
+
+  static bool Sees(const double*, double X, double Y, double Z) {
+    return Z > 0 || X != 0 || Y != 0;
+  }
+
+  template <typename P, typename T>
+  static void FromPoint(const P*, const T& X, const T& Y, const T& Z, T* a,
+                        T* b) {
+    const T scale = AngleOverRadius(T(X * X + Y * Y), Z);
+    *a = X * scale;
+    *b = Y * scale;
+  }
+
+  static bool ToPoint(const double*, double a, double b, double* X, double* Y,
+                      double* Z) {
+    const double theta = std::hypot(a, b);
+    if (!(theta < kPi)) return false;
+    const double scale = SineOverAngle(theta);
+    *X = a * scale;
+    *Y = b * scale;
+    *Z = std::cos(theta);
+    return true;
+  }
 };
 
 // Field of view omega [Devernay, Faugeras 2001]:
@@ -82,7 +147,9 @@ struct EquidistantLens {
 //   |(a, b)| = r (1 + omega^2 (r^2 / 3 - 1 / 12)),
 // and so does KROT: parameters mean what the program that wrote them computes.
 // (The Taylor series of the first formula has the opposite sign; the two
-// differ by less than 0.02 px at r = 1 and a focal length of 1000 px.)
+// differ by less than 0.02 px at r = 1 and a focal length of 1000 px.) That
+// polynomial ends at 90 degrees; the first formula goes on as
+//   |(a, b)| = angle of (Z, 2 R tan(omega / 2)) / omega,  R^2 = X^2 + Y^2.
 struct FovLens {
   static constexpr int kNumParams = 1;
   static constexpr double kSmallOmega2 = 1e-4;
@@ -121,6 +188,44 @@ struct FovLens {
     return true;
   }
 
+  static bool Sees(const double* lens, double X, double Y, double Z) {
+    return Z > 0 || (lens[0] * lens[0] >= kSmallOmega2 && (X != 0 || Y != 0));
+  }
+
+  template <typename P, typename T>
+  static void FromPoint(const P* lens, const T& X, const T& Y, const T& Z, T* a,
+                        T* b) {
+    using std::tan;
+    const P& omega = lens[0];
+    if (omega * omega < kSmallOmega2) {
+      FromRay(lens, T(X / Z), T(Y / Z), a, b);
+      return;
+    }
+    const P stretch = 2.0 * tan(omega * 0.5);
+    const T scale =
+        AngleOverRadius(T((X * X + Y * Y) * (stretch * stretch)), Z) *
+        (stretch / omega);
+    *a = X * scale;
+    *b = Y * scale;
+  }
+
+  static bool ToPoint(const double* lens, double a, double b, double* X,
+                      double* Y, double* Z) {
+    const double omega = lens[0];
+    if (omega * omega < kSmallOmega2) {
+      *Z = 1;
+      return ToRay(lens, a, b, X, Y);
+    }
+    const double angle = std::hypot(a, b) * std::abs(omega);
+    if (!(angle < kPi)) return false;
+    const double scale =
+        SineOverAngle(angle) * omega / (2 * std::tan(omega / 2));
+    *X = a * scale;
+    *Y = b * scale;
+    *Z = std::cos(angle);
+    return true;
+  }
+
  private:
   // r / radius where r (1 - omega2 / 12) + r^3 omega2 / 3 = radius: a convex
   // increasing function, on which Newton descends to the root from above.
@@ -134,63 +239,6 @@ struct FovLens {
       r = next;
     }
     return r / radius;
-  }
-};
-
-// Division model of Fitzgibbon (2001): the ray of the lens point is
-// (a, b, 1 + k (a^2 + b^2)), so that
-//   (a, b) = (u, v) 2 / (1 + sqrt(1 - 4 k r^2)).
-// Not a number where 4 k r^2 > 1: no lens point has that ray.
-struct DivisionLens {
-  static constexpr int kNumParams = 1;
-
-  template <typename P, typename T>
-  static void FromRay(const P* lens, const T& u, const T& v, T* a, T* b) {
-    using std::sqrt;
-    const T r2 = u * u + v * v;
-    const T scale = 2.0 / (1.0 + sqrt(T(1.0 - r2 * (4.0 * lens[0]))));
-    *a = u * scale;
-    *b = v * scale;
-  }
-
-  static bool ToRay(const double* lens, double a, double b, double* u,
-                    double* v) {
-    const double depth = 1 + lens[0] * (a * a + b * b);
-    if (depth <= 0) return false;
-    *u = a / depth;
-    *v = b / depth;
-    return true;
-  }
-};
-
-// Enhanced unified camera [Khomutenko, Garcia, Martinet 2016]:
-//   (a, b) = (u, v) / (alpha sqrt(1 + beta r^2) + 1 - alpha)
-// Assumes 0 <= alpha <= 1 and beta > 0. alpha = 0 is the pinhole.
-struct EucmLens {
-  static constexpr int kNumParams = 2;
-
-  template <typename P, typename T>
-  static void FromRay(const P* lens, const T& u, const T& v, T* a, T* b) {
-    using std::sqrt;
-    const P& alpha = lens[0];
-    const P& beta = lens[1];
-    const T rho = sqrt(T((u * u + v * v) * beta + 1.0));
-    const T denominator = rho * alpha + (1.0 - alpha);
-    *a = u / denominator;
-    *b = v / denominator;
-  }
-
-  static bool ToRay(const double* lens, double a, double b, double* u,
-                    double* v) {
-    const double alpha = lens[0];
-    const double beta_r2 = lens[1] * (a * a + b * b);
-    const double root = std::sqrt(1 - (2 * alpha - 1) * beta_r2);
-    const double depth =
-        (1 - alpha * alpha * beta_r2) / (alpha * root + (1 - alpha));
-    if (depth <= 0) return false;
-    *u = a / depth;
-    *v = b / depth;
-    return true;
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include "krot/camera/distortion.h"
 #include "krot/camera/lens.h"
+#include "krot/camera/root_lens.h"
 
 namespace krot {
 
@@ -58,6 +59,31 @@ struct ImagePlaneModel {
     Distortion::Apply(DistortionParams(params), a, b, x, y);
     *x = *x * FocalX(params) + CenterX(params);
     *y = *y * FocalY(params) + CenterY(params);
+  }
+
+  // The pixel of the direction (X, Y, Z), which may be more than 90 degrees off
+  // the axis if the lens sees it.
+  template <typename P, typename T>
+  static void ProjectPoint(const P* params, const T& X, const T& Y, const T& Z,
+                           T* x, T* y) {
+    T a, b;
+    Lens::FromPoint(LensParams(params), X, Y, Z, &a, &b);
+    Distortion::Apply(DistortionParams(params), a, b, x, y);
+    *x = *x * FocalX(params) + CenterX(params);
+    *y = *y * FocalY(params) + CenterY(params);
+  }
+
+  // That pixel less (x, y).
+  template <typename P, typename T>
+  static void ErrorAt(const P* params, double x, double y, const T& X,
+                      const T& Y, const T& Z, T* error_x, T* error_y) {
+    ProjectPoint(params, X, Y, Z, error_x, error_y);
+    *error_x = *error_x - x;
+    *error_y = *error_y - y;
+  }
+
+  static bool Sees(const double* params, double X, double Y, double Z) {
+    return Lens::Sees(LensParams(params), X, Y, Z);
   }
 };
 
@@ -173,13 +199,41 @@ struct Eucm : ImagePlaneModel<2, EucmLens, NoDistortion> {
   static constexpr std::string_view kParamNames = "fx, fy, cx, cy, alpha, beta";
 };
 
-// The sphere of directions on a w x h panorama. It has no image plane z = 1:
-// KROT names it in order to refuse it.
+// The sphere of directions on a w x h panorama, which has no image plane z = 1:
+//   pixel = (w (1/2 + azimuth / 2 pi), h (1/2 + elevation / pi)),
+// azimuth the angle of (Z, X), elevation that of (|(X, Z)|, Y).
 struct Equirectangular {
   static constexpr int kId = 17;
   static constexpr std::string_view kName = "EQUIRECTANGULAR";
   static constexpr std::string_view kParamNames = "w, h";
   static constexpr int kNumParams = 2;
+
+  template <typename P, typename T>
+  static void ProjectPoint(const P* params, const T& X, const T& Y, const T& Z,
+                           T* x, T* y) {
+    using std::atan2;
+    using std::sqrt;
+    *x = (atan2(X, Z) * (0.5 / kPi) + 0.5) * params[0];
+    *y = (atan2(Y, T(sqrt(T(X * X + Z * Z)))) * (1 / kPi) + 0.5) * params[1];
+  }
+
+  // That pixel less (x, y), the shorter way round: with the azimuth taken from
+  // that of x, nothing jumps at the seam.
+  template <typename P, typename T>
+  static void ErrorAt(const P* params, double x, double y, const T& X,
+                      const T& Y, const T& Z, T* error_x, T* error_y) {
+    using std::cos;
+    using std::sin;
+    const P azimuth = (x / params[0] - 0.5) * (2 * kPi);
+    const P c = cos(azimuth);
+    const P s = sin(azimuth);
+    ProjectPoint(params, T(X * c - Z * s), Y, T(Z * c + X * s), error_x,
+                 error_y);
+    *error_x = *error_x - params[0] * 0.5;
+    *error_y = *error_y - y;
+  }
+
+  static bool Sees(const double*, double, double, double) { return true; }
 };
 
 // visitor(Model{}) for the model of this id, so that a loop over observations
@@ -227,6 +281,13 @@ decltype(auto) VisitCameraModel(int model_id, Visitor&& visitor) {
           "model_id = " + std::to_string(model_id) +
           ", must be a camera model of COLMAP with an image plane");
   }
+}
+
+// The same, EQUIRECTANGULAR included.
+template <typename Visitor>
+decltype(auto) VisitEveryCameraModel(int model_id, Visitor&& visitor) {
+  if (model_id == Equirectangular::kId) return visitor(Equirectangular{});
+  return VisitCameraModel(model_id, visitor);
 }
 
 }  // namespace krot

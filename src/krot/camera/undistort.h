@@ -74,37 +74,17 @@ std::optional<Eigen::Vector2d> InvertDistortion(const double* k,
   return q;
 }
 
-template <typename Model>
-UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
-                          const std::optional<Eigen::Vector2d>& u_start,
-                          UndistortedObservation* result) {
-  using Lens = typename Model::Lens;
+// Where the search for the lens plane's point of a pixel may start, and what it
+// must end at: calls `accept` with one candidate after the other, each a root
+// of the distortion, until it answers anything but kNotConverged. `start` is
+// tried first, if there is one and the model has a distortion.
+template <typename Model, typename Accept>
+UndistortStatus SearchLensPlane(const double* params,
+                                const Eigen::Vector2d& pixel,
+                                const std::optional<Eigen::Vector2d>& start,
+                                const Accept& accept) {
   using Distortion = typename Model::Distortion;
-  constexpr double kMaxPixelError = 1e-8;
-  const double* lens = Model::LensParams(params);
   const double* k = Model::DistortionParams(params);
-
-  // From the lens plane's q to the ray; kNotConverged unless q is the answer.
-  const auto accept = [&](const Eigen::Vector2d& q) {
-    if (!IsRegularSegment<Distortion>(k, q)) {
-      return UndistortStatus::kNotConverged;
-    }
-    Eigen::Vector2d u;
-    if (!Lens::ToRay(lens, q.x(), q.y(), &u.x(), &u.y())) {
-      return UndistortStatus::kOffAxis;
-    }
-    const PlaneMap projection = Differentiate(
-        u, [params](const auto& a, const auto& b, auto* x, auto* y) {
-          Model::Project(params, a, b, x, y);
-        });
-    if (!((projection.value - pixel).norm() <= kMaxPixelError) ||
-        !(projection.derivative.determinant() > 0)) {
-      return UndistortStatus::kNotConverged;
-    }
-    *result = {u, projection.derivative};
-    return UndistortStatus::kOk;
-  };
-
   const Eigen::Vector2d distorted(
       (pixel.x() - Model::CenterX(params)) / Model::FocalX(params),
       (pixel.y() - Model::CenterY(params)) / Model::FocalY(params));
@@ -114,18 +94,56 @@ UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
     const auto solve_from = [&](const Eigen::Vector2d& q, bool stay_regular) {
       const auto solution =
           InvertDistortion<Distortion>(k, distorted, q, stay_regular);
-      return solution ? accept(*solution) : UndistortStatus::kNotConverged;
+      if (!solution || !IsRegularSegment<Distortion>(k, *solution)) {
+        return UndistortStatus::kNotConverged;
+      }
+      return accept(*solution);
     };
-    if (u_start && u_start->allFinite()) {
-      Eigen::Vector2d q;
-      Lens::FromRay(lens, u_start->x(), u_start->y(), &q.x(), &q.y());
-      const UndistortStatus status = solve_from(q, false);
+    if (start) {
+      const UndistortStatus status = solve_from(*start, false);
       if (status != UndistortStatus::kNotConverged) return status;
     }
     const UndistortStatus status = solve_from(distorted, false);
     if (status != UndistortStatus::kNotConverged) return status;
     return solve_from(Eigen::Vector2d::Zero(), true);
   }
+}
+
+constexpr double kMaxUndistortionErrorPx = 1e-8;
+
+template <typename Model>
+UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
+                          const std::optional<Eigen::Vector2d>& u_start,
+                          UndistortedObservation* result) {
+  using Lens = typename Model::Lens;
+  const double* lens = Model::LensParams(params);
+
+  // From the lens plane's q to the ray; kNotConverged unless q is the answer.
+  const auto accept = [&](const Eigen::Vector2d& q) {
+    if (!q.allFinite()) return UndistortStatus::kNotConverged;
+    Eigen::Vector2d u;
+    if (!Lens::ToRay(lens, q.x(), q.y(), &u.x(), &u.y())) {
+      return UndistortStatus::kOffAxis;
+    }
+    const PlaneMap projection = Differentiate(
+        u, [params](const auto& a, const auto& b, auto* x, auto* y) {
+          Model::Project(params, a, b, x, y);
+        });
+    if (!((projection.value - pixel).norm() <= kMaxUndistortionErrorPx) ||
+        !(projection.derivative.determinant() > 0)) {
+      return UndistortStatus::kNotConverged;
+    }
+    *result = {u, projection.derivative};
+    return UndistortStatus::kOk;
+  };
+
+  std::optional<Eigen::Vector2d> q_start;
+  if (u_start && u_start->allFinite()) {
+    q_start.emplace();
+    Lens::FromRay(lens, u_start->x(), u_start->y(), &q_start->x(),
+                  &q_start->y());
+  }
+  return SearchLensPlane<Model>(params, pixel, q_start, accept);
 }
 
 }  // namespace krot

@@ -1,0 +1,221 @@
+#include "krot/camera/remainder_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+namespace krot {
+namespace {
+
+constexpr int kMaxCells = 4000;
+constexpr int kMaxBoundaryDepth = 8;
+constexpr double kRelativeSlack = 0.1;  // of max |m| - 1
+constexpr double kAbsoluteSlack = 1e-6;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+struct Box {
+  Interval q[2];
+};
+
+double Middle(const Interval& a) { return 0.5 * a.lo + 0.5 * a.hi; }
+
+// The numbers |x| for x in a; not a number if a is.
+Interval Absolute(const Interval& a) {
+  if (!(a.lo <= a.hi)) return {kNotANumber, kNotANumber};
+  if (a.lo >= 0) return a;
+  if (a.hi <= 0) return -a;
+  return {0, std::max(-a.lo, a.hi)};
+}
+
+// What is not below -1 or above 1, of a that meets [-1, 1].
+Interval ClipToUnit(const Interval& a) {
+  return {std::max(a.lo, -1.0), std::min(a.hi, 1.0)};
+}
+
+Interval Norm(const Interval& x, const Interval& y, double p) {
+  const Interval a = Absolute(x);
+  const Interval b = Absolute(y);
+  if (p == 1) return a + b;
+  if (p == 2) {
+    const Interval square = a * a + b * b;
+    return sqrt(Interval{std::max(square.lo, 0.0), square.hi});
+  }
+  if (!(a.hi + b.hi >= 0)) return {kNotANumber, kNotANumber};
+  return {std::max(a.lo, b.lo), std::max(a.hi, b.hi)};
+}
+
+// What is known of f and m on a box, by the mean value theorem from its middle.
+struct Enclosure {
+  Interval f[2];
+  Interval m[2];
+  Interval remainder[2];  // f - m
+  Interval determinant;   // det f'
+};
+
+Enclosure Enclose(const ErrorMap& map, const Box& box) {
+  const double middle[2] = {Middle(box.q[0]), Middle(box.q[1])};
+  const auto at_middle =
+      map.Values({middle[0], middle[0]}, {middle[1], middle[1]});
+  const auto on_box = map.Derivatives(box.q[0], box.q[1]);
+  const Interval dx = box.q[0] - middle[0];
+  const Interval dy = box.q[1] - middle[1];
+  Enclosure enclosure;
+  for (int i = 0; i < 2; ++i) {
+    const Dual<Interval>& f = on_box.f[i];
+    const Dual<Interval>& m = on_box.m[i];
+    enclosure.f[i] = at_middle.f[i] + f.du * dx + f.dv * dy;
+    enclosure.m[i] = at_middle.m[i] + m.du * dx + m.dv * dy;
+    enclosure.remainder[i] = (at_middle.f[i] - at_middle.m[i]) +
+                             (f.du - m.du) * dx + (f.dv - m.dv) * dy;
+  }
+  enclosure.determinant =
+      on_box.f[0].du * on_box.f[1].dv - on_box.f[0].dv * on_box.f[1].du;
+  return enclosure;
+}
+
+bool IsOutside(const Enclosure& enclosure, double p) {
+  return Norm(enclosure.f[0], enclosure.f[1], p).lo > 1;
+}
+
+// An upper bound of |m| where |f| <= 1, from m = f - r:
+//   p = 2:         |m|^2 = |f|^2 - r'(f + m) <= 1 - r'(2 f - r)
+//   p = 1, inf:    s'm = s'f - s'r <= 1 - s'r for all s with |s|_* = 1,
+// and s'f <= its own enclosure where that is less. NaN if nothing is known.
+double BoundLinearError(const Enclosure& enclosure, double p) {
+  const Interval* r = enclosure.remainder;
+  const double direct = Norm(enclosure.m[0], enclosure.m[1], p).hi;
+  const Interval f[2] = {ClipToUnit(enclosure.f[0]),
+                         ClipToUnit(enclosure.f[1])};
+  double bound = 0;
+  if (p == 2) {
+    const Interval square =
+        1.0 - (r[0] * (f[0] * 2.0 - r[0]) + r[1] * (f[1] * 2.0 - r[1]));
+    bound = sqrt(Interval{0, std::max(square.hi, 0.0)}).hi;
+    if (!(square.hi < kInfinity)) return kNotANumber;
+  } else if (p == 1) {
+    for (const double s : {-1.0, 1.0}) {
+      for (const double t : {-1.0, 1.0}) {
+        const Interval sf = f[0] * s + f[1] * t;
+        const Interval sr = r[0] * s + r[1] * t;
+        const Interval sm = Interval{0, std::min(sf.hi, 1.0)} - sr;
+        if (!(sm.hi < kInfinity)) return kNotANumber;
+        bound = std::max(bound, sm.hi);
+      }
+    }
+  } else {
+    for (int i = 0; i < 2; ++i) {
+      for (const double s : {-1.0, 1.0}) {
+        const Interval sm = Interval{0, (f[i] * s).hi} - r[i] * s;
+        if (!(sm.hi < kInfinity)) return kNotANumber;
+        bound = std::max(bound, sm.hi);
+      }
+    }
+  }
+  return direct < bound ? direct : bound;
+}
+
+// A box some of whose points may have |f| <= 1, and a bound of |m| there:
+// infinite as long as det f' > 0 is not proved.
+struct Cell {
+  Box box;
+  double bound;
+};
+
+bool ComesLater(const Cell& a, const Cell& b) { return a.bound < b.bound; }
+
+// The two halves of a box, across its longer side.
+std::pair<Box, Box> Halves(const Box& box) {
+  const auto length = [&](int i) { return box.q[i].hi - box.q[i].lo; };
+  const int longer = length(1) > length(0) ? 1 : 0;
+  std::pair<Box, Box> halves = {box, box};
+  halves.first.q[longer].hi = halves.second.q[longer].lo =
+      Middle(box.q[longer]);
+  return halves;
+}
+
+// The largest |m| found at some points with |f| near 1, over |f|: what the
+// search compares its bound with.
+double SampleLinearError(const ErrorMap& map, double p) {
+  constexpr int kDirections = 16;
+  constexpr int kCorrections = 3;
+  double largest = 1;
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = i * 2 * 3.14159265358979323846 / kDirections;
+    const double d[2] = {std::cos(angle), std::sin(angle)};
+    const double norm = Norm({d[0], d[0]}, {d[1], d[1]}, p).hi;
+    double q[2] = {d[0] / norm, d[1] / norm};
+    for (int j = 0;; ++j) {
+      const auto at = map.Values({q[0], q[0]}, {q[1], q[1]});
+      const double f[2] = {Middle(at.f[0]), Middle(at.f[1])};
+      if (j < kCorrections) {
+        for (int k = 0; k < 2; ++k) q[k] += d[k] / norm - f[k];
+        continue;
+      }
+      const double size = Norm({f[0], f[0]}, {f[1], f[1]}, p).hi;
+      const double linear = Norm(at.m[0], at.m[1], p).lo;
+      if (size < 1.5 && size > 0.5) largest = std::max(largest, linear / size);
+      break;
+    }
+  }
+  return largest;
+}
+
+bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
+                      int depth) {
+  if (IsOutside(Enclose(map, segment), p)) return true;
+  if (depth == kMaxBoundaryDepth) return false;
+  const auto [first, second] = Halves(segment);
+  return SegmentIsOutside(map, p, first, depth + 1) &&
+         SegmentIsOutside(map, p, second, depth + 1);
+}
+
+}  // namespace
+
+bool BoundaryIsOutside(const ErrorMap& map, double p, double reach) {
+  const Interval side = {-reach, reach};
+  for (const double end : {-reach, reach}) {
+    const Interval at_end = {end, end};
+    if (!SegmentIsOutside(map, p, {{side, at_end}}, 0) ||
+        !SegmentIsOutside(map, p, {{at_end, side}}, 0)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+std::optional<double> LargestLinearError(const ErrorMap& map, double p,
+                                         double reach) {
+  std::vector<Cell> heap;
+  int num_cells = 0;
+  const auto add = [&](const Box& box) {
+    ++num_cells;
+    const Enclosure enclosure = Enclose(map, box);
+    if (IsOutside(enclosure, p)) return;
+    const double bound = enclosure.determinant.lo > 0
+                             ? BoundLinearError(enclosure, p)
+                             : kNotANumber;
+    heap.push_back({box, bound < kInfinity ? bound : kInfinity});
+    std::push_heap(heap.begin(), heap.end(), ComesLater);
+  };
+
+  const double sampled = SampleLinearError(map, p);
+  const double target =
+      sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
+  const Interval side = {-reach, reach};
+  add({{side, side}});
+  while (!heap.empty() && heap.front().bound > target &&
+         num_cells < kMaxCells) {
+    const auto [first, second] = Halves(heap.front().box);
+    std::pop_heap(heap.begin(), heap.end(), ComesLater);
+    heap.pop_back();
+    add(first);
+    add(second);
+  }
+  // The pixel's own ray is never outside.
+  if (heap.empty() || heap.front().bound == kInfinity) return std::nullopt;
+  return heap.front().bound;
+}
+
+}  // namespace krot

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+
+#include "krot/camera/error_map.h"
+
+namespace krot {
+
+// Branch and bound over the box |q|_inf <= reach of an ErrorMap, in the norm
+// p = 1, 2 or infinity: what remainder_bound.h is proved with.
+
+// Whether |f| > 1 is proved on all of the box's boundary.
+bool BoundaryIsOutside(const ErrorMap& map, double p, double reach);
+
+// An upper bound of max |m| over the points of the box with |f| <= 1, near it:
+// at most 10 % of (max |m| - 1), or 1e-6, too large unless the budget of cells
+// ends. nullopt if det f' > 0 cannot be proved at all these points.
+std::optional<double> LargestLinearError(const ErrorMap& map, double p,
+                                         double reach);
+
+}  // namespace krot

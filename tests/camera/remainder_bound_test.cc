@@ -1,0 +1,166 @@
+#include "krot/camera/remainder_bound.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "krot/camera/projection_row.h"
+#include "tests/camera/random_camera.h"
+
+namespace krot {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double NormOf(const Eigen::Vector2d& v, double p) {
+  if (p == 1) return v.lpNorm<1>();
+  return p == 2 ? v.norm() : v.lpNorm<Eigen::Infinity>();
+}
+
+struct Trial {
+  Eigen::Vector2d pixel;
+  Eigen::Vector3d x_hat;
+  double level_px;
+  double p;
+};
+
+// A pixel with a ray up to `max_angle` off the axis, and a point up to a level
+// or so away from it.
+std::optional<Trial> DrawTrial(int model_id, const double* params,
+                               double max_angle, std::mt19937* random) {
+  constexpr double kNorms[] = {1, 2, kInfinity};
+  std::uniform_real_distribution<double> unit(0, 1);
+  Trial trial;
+  trial.level_px = 1 + 9 * unit(*random);
+  trial.p = kNorms[(*random)() % 3];
+  const Eigen::Vector3d bearing = RandomBearing(max_angle, random);
+  const auto pixel = ProjectPoint(model_id, params, bearing);
+  if (!pixel) return std::nullopt;
+  trial.pixel = *pixel;
+  const auto x_hat = PixelBearing(
+      model_id, params, *pixel + 1.2 * trial.level_px * RandomRay(1, random),
+      bearing);
+  if (!x_hat) return std::nullopt;
+  trial.x_hat = *x_hat;
+  return trial;
+}
+
+// The largest |v / w| / level over rays with |f| <= level, most of them near
+// it, found from the pixels around the trial's; -1 below it are none.
+double SampleKappa(int model_id, const double* params, const Trial& trial,
+                   int num_rays, std::mt19937* random) {
+  const Eigen::Matrix3d E =
+      *RowAtProjection(model_id, params, trial.pixel, trial.x_hat);
+  std::uniform_real_distribution<double> unit(0, 1);
+  double largest = 0;
+  for (int i = 0; i < num_rays; ++i) {
+    Eigen::Vector2d offset = RandomRay(1, random);
+    const double share = i % 4 ? 1 - 1e-9 : unit(*random);
+    offset *= share * trial.level_px / NormOf(offset, trial.p);
+    const auto ray =
+        PixelBearing(model_id, params, trial.pixel + offset, trial.x_hat);
+    if (!ray) continue;
+    const auto error = ProjectionError(model_id, params, trial.pixel, *ray);
+    if (!error || NormOf(*error, trial.p) > trial.level_px) continue;
+    const Eigen::Vector3d row = E * *ray;
+    EXPECT_GT(row[0], 0);
+    const double linear = NormOf(row.tail<2>() / row[0], trial.p);
+    largest = std::max(largest, linear / trial.level_px);
+  }
+  return largest - 1;
+}
+
+class RemainderBoundOf : public testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(EveryModel, RemainderBoundOf, testing::Range(0, 18),
+                         [](const auto& model) {
+                           return ModelName(model.param);
+                         });
+
+TEST_P(RemainderBoundOf, IsNeverExceededAndNearlyReached) {
+  std::mt19937 random(1);
+  const bool perspective = GetParam() <= 4 || GetParam() == 6;
+  const double max_angle = GetParam() == 17 ? kPi : perspective ? 0.9 : 1.9;
+  // Rays of these are slow to find.
+  const int num_rays = GetParam() == 10 || GetParam() == 11 ? 200 : 1000;
+  int num_bounded = 0;
+  for (int i = 0; i < 100; ++i) {
+    const RandomCamera camera(GetParam(), &random);
+    const double* params = camera.params().data();
+    const auto trial = DrawTrial(GetParam(), params, max_angle, &random);
+    if (!trial) continue;
+    const auto kappa = RemainderBound(GetParam(), params, trial->pixel,
+                                      trial->x_hat, trial->level_px, trial->p);
+    if (!kappa) continue;
+    ++num_bounded;
+    const double sampled =
+        SampleKappa(GetParam(), params, *trial, num_rays, &random);
+    EXPECT_LE(sampled, *kappa + 1e-9);
+    EXPECT_LE(*kappa, 2 * std::max(sampled, 0.0) + 1e-4)
+        << "trial " << i << ", level " << trial->level_px << ", p " << trial->p;
+  }
+  EXPECT_GT(num_bounded, 40);
+}
+
+TEST(RemainderBound, OfPinholesIsZero) {
+  const double params[] = {500, 600, 320, 240};
+  EXPECT_EQ(RemainderBound(1, params, {10, 20}, {0.1, 0.2, 1}, 3, 2), 0.0);
+  EXPECT_FALSE(RemainderBound(1, params, {10, 20}, {0.1, 0.2, -1}, 3, 2));
+}
+
+// SIMPLE_RADIAL with k = -0.3 and f = 1000 folds 702.728 px from the centre.
+TEST(RemainderBound, HasNoRegionWhereTheDiscCrossesAFold) {
+  const double params[] = {1000, 0, 0, -0.3};
+  const auto bound = [&](double radius, double level_px) {
+    const Eigen::Vector2d pixel(radius, 0);
+    return RemainderBound(2, params, pixel, *PixelBearing(2, params, pixel),
+                          level_px, 2);
+  };
+  EXPECT_TRUE(bound(690, 3));
+  EXPECT_FALSE(bound(690, 13));
+  EXPECT_FALSE(bound(700, 3));
+  EXPECT_FALSE(bound(702.72, 1));
+  EXPECT_GT(*bound(697, 3), 10 * *bound(600, 3));
+}
+
+// On the axis of SIMPLE_RADIAL: f = F u (1 + k r^2) about u = 0, so that
+// m = F u, and |f| = gamma at F r (1 + k r^2) = gamma.
+TEST(RemainderBound, OnTheAxisIsTheCubicTerm) {
+  const double params[] = {100, 0, 0, -0.4};
+  double r = 0.08;
+  for (int i = 0; i < 50; ++i) r = 0.08 / (1 - 0.4 * r * r);
+  const double exact = 100 * r / 8 - 1;
+  const auto kappa = RemainderBound(2, params, {0, 0}, {0, 0, 1}, 8, 2);
+  ASSERT_TRUE(kappa);
+  EXPECT_GE(*kappa, exact);
+  EXPECT_LE(*kappa, 1.11 * exact + 1e-6);
+}
+
+TEST(RemainderBound, IsTheSameAtTheSeamOfAPanorama) {
+  const double params[] = {3600, 1800};
+  const auto bound = [&](double x) {
+    const Eigen::Vector2d pixel(x, 500);
+    return RemainderBound(17, params, pixel,
+                          *PixelBearing(17, params, {x + 2, 501}), 4, 2);
+  };
+  ASSERT_TRUE(bound(1800) && bound(0.5));
+  EXPECT_NEAR(*bound(0.5), *bound(1800), 0.05 * *bound(1800));
+  EXPECT_FALSE(RemainderBound(17, params, {1800, 2},
+                              *PixelBearing(17, params, {1800, 5}), 4, 2));
+}
+
+TEST(RemainderBound, NamesArgumentsThatAreOutOfRange) {
+  const double params[] = {500, 600, 320, 240};
+  EXPECT_THROW(RemainderBound(1, params, {0, 0}, {0, 0, 1}, 0, 2),
+               std::invalid_argument);
+  EXPECT_THROW(RemainderBound(1, params, {0, 0}, {0, 0, 1}, 1, 3),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace krot
