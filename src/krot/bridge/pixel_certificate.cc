@@ -7,12 +7,11 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/camera/remainder_bound.h"
-#include "krot/camera/support_bound.h"
 
 namespace krot {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoRegion = std::numeric_limits<double>::infinity();
 // Corrections of gamma that MakePixelCertificate takes; two mostly do.
 constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
@@ -40,7 +39,7 @@ std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
         source.model_id, source.params, built.pixels[o.observation],
         bearings[n], o.y, gamma, norm.p);
     lines.push_back(largest ? *largest / (rows.lower_bound * o.lambda)
-                            : kInfinity);
+                            : kNoRegion);
   }
   return lines;
 }
@@ -121,7 +120,7 @@ PixelCertificateCheck CheckPixelCertificate(
     const double reach =
         kappa ? 1.5 * gamma * (1 + *kappa) /
                     (certificate.rows.lower_bound * support[n].lambda)
-              : kInfinity;
+              : kNoRegion;
     const MultiplierChange& change = rows.changes[n];
     if (!(lines[n] + change.y * reach + change.depth <= 1)) {
       check.refusal = NameOf(model, built, i) +

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "krot/base/parallel_for.h"
-#include "krot/camera/camera_model.h"
+#include "krot/camera/models.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 #include "krot/problem/cameras.h"
@@ -36,7 +36,8 @@ Reprojection::Reprojection(const Model& model, const BuiltProblem& built)
   for (const int32_t image : built.image_of) {
     const Camera& camera = model.cameras[geometries[image].camera];
     sources_.push_back({camera.model_id, camera.params.data()});
-    is_linear_ = is_linear_ && IsPinhole(camera.model_id);
+    is_linear_ =
+        is_linear_ && camera.model_id <= Pinhole::kId;
   }
 }
 
@@ -52,12 +53,11 @@ Eigen::Vector3d Reprojection::InCamera(const Estimate& estimate,
 double Reprojection::Error(const Estimate& estimate, Norm norm,
                            int64_t i) const {
   const Source& source = sources_[built_.problem.observations[i].view];
-  const std::optional<Eigen::Vector2d> pixel =
-      ProjectPoint(source.model_id, source.params, InCamera(estimate, i));
-  if (!pixel) return kInfinity;
-  const double error = NormOfError(
-      PixelDifference(source.model_id, source.params, *pixel, built_.pixels[i]),
-      norm);
+  const std::optional<Eigen::Vector2d> e =
+      ProjectionError(source.model_id, source.params, built_.pixels[i],
+                      InCamera(estimate, i));
+  if (!e) return kInfinity;
+  const double error = NormOfError(*e, norm);
   return std::isfinite(error) ? error : kInfinity;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include <Eigen/LU>
 
@@ -23,21 +24,29 @@ constexpr std::array<double, 4> kReaches = {1.125, 1.5, 2.5, 4};
 // The pixel's ray may be this far from x_hat in the latter's chart.
 constexpr double kSmallestDepth = 0.1;
 
-}  // namespace
+// Above the relative error of a few operations on doubles.
+constexpr double kRounding = 1e-14;
 
-std::optional<double> RemainderBound(int model_id, const double* params,
-                                     const Eigen::Vector2d& pixel,
-                                     const Eigen::Vector3d& x_hat,
-                                     double level_px, double p) {
+bool IsPinhole(int model_id) {
+  return model_id == SimplePinhole::kId || model_id == Pinhole::kId;
+}
+
+struct Region {
+  std::unique_ptr<ErrorMap> map;
+  double reach = 0;
+};
+
+// U of remainder_bound.h.
+std::optional<Region> FindRegion(int model_id, const double* params,
+                                 const Eigen::Vector2d& pixel,
+                                 const Eigen::Vector3d& x_hat, double level_px,
+                                 double p) {
   CheckArgument(level_px > 0, "level_px", level_px, "> 0");
   CheckArgument(p == 1 || p == 2 || std::isinf(p), "p", p, "1, 2 or infinity");
   const auto E = RowAtProjection(model_id, params, pixel, x_hat);
-  if (!E) return std::nullopt;
-  if (model_id == SimplePinhole::kId || model_id == Pinhole::kId) return 0;
-
   const auto bearing = PixelBearing(model_id, params, pixel, x_hat);
   const auto chart = ChartAt(model_id, params, x_hat);
-  if (!bearing || !chart) return std::nullopt;
+  if (!E || !bearing || !chart) return std::nullopt;
   const double depth = chart->n.dot(*bearing);
   if (!(depth > kSmallestDepth * bearing->norm())) return std::nullopt;
   const Eigen::Vector3d X0 = *bearing / depth;
@@ -53,16 +62,62 @@ std::optional<double> RemainderBound(int model_id, const double* params,
                             chart->B.isIdentity(0) && X0.z() == 1;
   geometry.level_px = level_px;
   if (!geometry.G.allFinite()) return std::nullopt;
-  const auto map = MakeErrorMap(model_id, params, geometry);
-
+  Region region;
+  region.map = MakeErrorMap(model_id, params, geometry);
   for (const double reach : kReaches) {
-    if (!BoundaryIsOutside(*map, p, reach)) continue;
-    if (const auto largest = LargestLinearError(*map, p, reach)) {
-      return std::max(0.0, *largest - 1);
-    }
-    return std::nullopt;
+    if (!BoundaryIsOutside(*region.map, p, reach)) continue;
+    region.reach = reach;
+    return region;
   }
   return std::nullopt;
+}
+
+double DualNorm(const Eigen::Vector2d& y, double p) {
+  if (p == 2) return y.norm();
+  return p == 1 ? y.lpNorm<Eigen::Infinity>() : y.lpNorm<1>();
+}
+
+}  // namespace
+
+std::optional<double> RemainderBound(int model_id, const double* params,
+                                     const Eigen::Vector2d& pixel,
+                                     const Eigen::Vector3d& x_hat,
+                                     double level_px, double p) {
+  if (IsPinhole(model_id)) {
+    if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
+    return 0;
+  }
+  const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
+  if (!region) return std::nullopt;
+  const auto largest = LargestLinearError(*region->map, p, region->reach);
+  if (!largest) return std::nullopt;
+  return std::max(0.0, *largest - 1);
+}
+
+std::optional<double> SupportBound(int model_id, const double* params,
+                                   const Eigen::Vector2d& pixel,
+                                   const Eigen::Vector3d& x_hat,
+                                   const Eigen::Vector2d& y, double level_px,
+                                   double p) {
+  const double length = DualNorm(y, p) * (1 + kRounding);
+  if (!(length > 0)) return length == 0 ? std::optional<double>(0) : std::nullopt;
+  if (IsPinhole(model_id)) {
+    if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
+    // The linear error is the true one but for the rounding of the row, which
+    // is relative to what it is the difference of.
+    const Eigen::Vector2d centre = model_id == SimplePinhole::kId
+                                       ? Eigen::Vector2d(params[1], params[2])
+                                       : Eigen::Vector2d(params[2], params[3]);
+    const double terms =
+        pixel.lpNorm<1>() + centre.lpNorm<1>() + 2 * level_px;
+    return length * (level_px + 2 * kRounding * terms);
+  }
+  const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
+  if (!region) return std::nullopt;
+  const auto largest =
+      LargestAlong(*region->map, p, region->reach, y / length);
+  if (!largest) return std::nullopt;
+  return std::max(0.0, *largest) * length * level_px * (1 + kRounding);
 }
 
 }  // namespace krot

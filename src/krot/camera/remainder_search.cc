@@ -13,6 +13,7 @@ constexpr int kMaxCells = 4000;
 constexpr int kMaxBoundaryDepth = 8;
 constexpr double kRelativeSlack = 0.1;  // of max |m| - 1
 constexpr double kAbsoluteSlack = 1e-6;
+constexpr double kAlongSlack = 1e-7;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Box {
@@ -135,12 +136,13 @@ std::pair<Box, Box> Halves(const Box& box) {
   return halves;
 }
 
-// The largest |m| found at some points with |f| near 1, over |f|: what the
-// search compares its bound with.
-double SampleLinearError(const ErrorMap& map, double p) {
+// The largest value(f, m) found at some points with |f| near 1: what a search
+// compares its bound with.
+template <typename Value>
+double SampleLargest(const ErrorMap& map, double p, const Value& value) {
   constexpr int kDirections = 16;
   constexpr int kCorrections = 3;
-  double largest = 1;
+  double largest = -kInfinity;
   for (int i = 0; i < kDirections; ++i) {
     const double angle = i * 2 * 3.14159265358979323846 / kDirections;
     const double d[2] = {std::cos(angle), std::sin(angle)};
@@ -154,8 +156,7 @@ double SampleLinearError(const ErrorMap& map, double p) {
         continue;
       }
       const double size = Norm({f[0], f[0]}, {f[1], f[1]}, p).hi;
-      const double linear = Norm(at.m[0], at.m[1], p).lo;
-      if (size < 1.5 && size > 0.5) largest = std::max(largest, linear / size);
+      if (size < 1.5 && size > 0.5) largest = std::max(largest, value(at, size));
       break;
     }
   }
@@ -169,6 +170,38 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
   const auto [first, second] = Halves(segment);
   return SegmentIsOutside(map, p, first, depth + 1) &&
          SegmentIsOutside(map, p, second, depth + 1);
+}
+
+// Branch and bound: an upper bound, of what `bound_on` bounds on a box, over all
+// points of the box |q|_inf <= reach with |f| <= 1.
+template <typename BoundOn>
+std::optional<double> Search(const ErrorMap& map, double p, double reach,
+                             double target, const BoundOn& bound_on) {
+  std::vector<Cell> heap;
+  int num_cells = 0;
+  const auto add = [&](const Box& box) {
+    ++num_cells;
+    const Enclosure enclosure = Enclose(map, box);
+    if (IsOutside(enclosure, p)) return;
+    const double bound =
+        enclosure.determinant.lo > 0 ? bound_on(enclosure) : kNotANumber;
+    heap.push_back({box, bound < kInfinity ? bound : kInfinity});
+    std::push_heap(heap.begin(), heap.end(), ComesLater);
+  };
+
+  const Interval side = {-reach, reach};
+  add({{side, side}});
+  while (!heap.empty() && heap.front().bound > target &&
+         num_cells < kMaxCells) {
+    const auto [first, second] = Halves(heap.front().box);
+    std::pop_heap(heap.begin(), heap.end(), ComesLater);
+    heap.pop_back();
+    add(first);
+    add(second);
+  }
+  // The pixel's own ray is never outside.
+  if (heap.empty() || heap.front().bound == kInfinity) return std::nullopt;
+  return heap.front().bound;
 }
 
 }  // namespace
@@ -187,35 +220,38 @@ bool BoundaryIsOutside(const ErrorMap& map, double p, double reach) {
 
 std::optional<double> LargestLinearError(const ErrorMap& map, double p,
                                          double reach) {
-  std::vector<Cell> heap;
-  int num_cells = 0;
-  const auto add = [&](const Box& box) {
-    ++num_cells;
-    const Enclosure enclosure = Enclose(map, box);
-    if (IsOutside(enclosure, p)) return;
-    const double bound = enclosure.determinant.lo > 0
-                             ? BoundLinearError(enclosure, p)
-                             : kNotANumber;
-    heap.push_back({box, bound < kInfinity ? bound : kInfinity});
-    std::push_heap(heap.begin(), heap.end(), ComesLater);
-  };
-
-  const double sampled = SampleLinearError(map, p);
+  const double sampled = std::max(
+      1.0, SampleLargest(map, p, [p](const auto& at, double size) {
+        return Norm(at.m[0], at.m[1], p).lo / size;
+      }));
   const double target =
       sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
-  const Interval side = {-reach, reach};
-  add({{side, side}});
-  while (!heap.empty() && heap.front().bound > target &&
-         num_cells < kMaxCells) {
-    const auto [first, second] = Halves(heap.front().box);
-    std::pop_heap(heap.begin(), heap.end(), ComesLater);
-    heap.pop_back();
-    add(first);
-    add(second);
-  }
-  // The pixel's own ray is never outside.
-  if (heap.empty() || heap.front().bound == kInfinity) return std::nullopt;
-  return heap.front().bound;
+  return Search(map, p, reach, target, [p](const Enclosure& enclosure) {
+    return BoundLinearError(enclosure, p);
+  });
+}
+
+std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
+                                   const Eigen::Vector2d& y) {
+  const auto along = [&y](const Interval* v) {
+    return v[0] * -y[0] + v[1] * -y[1];
+  };
+  const double sampled =
+      SampleLargest(map, p, [&](const auto& at, double size) {
+        return along(at.m).lo / std::max(size, 1.0);
+      });
+  // -y'm = -y'f + y'r, of which the first is at most |f| <= 1, and the second
+  // small of second order around x_hat.
+  return Search(map, p, reach, sampled + kAlongSlack,
+                [&](const Enclosure& enclosure) {
+                  const double direct = along(enclosure.m).hi;
+                  const double first = along(enclosure.f).hi;
+                  const Interval sum =
+                      Interval{0, first < 1 ? first : 1.0} -
+                      along(enclosure.remainder);
+                  if (!(sum.hi < kInfinity)) return direct;
+                  return direct < sum.hi ? direct : sum.hi;
+                });
 }
 
 }  // namespace krot
