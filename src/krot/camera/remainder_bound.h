@@ -29,7 +29,7 @@ namespace krot {
 // computes it, to the last bit. A function of its arguments alone. kappa
 // exceeds its smallest value by some 10 % of itself + 1e-6, more where the
 // budget of cells ends first. 0 for pinholes, whose U is all rays with z > 0.
-// 50 to 200 microseconds for ordinary lenses, up to some milliseconds near
+// Some hundreds of microseconds for ordinary lenses, milliseconds near
 // folds.
 //
 // Requires gamma > 0 and p = 1, 2 or infinity.
