@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 #include "tests/problem/random_problem.h"
 
 namespace krot {
@@ -28,11 +28,10 @@ struct Solved {
         set(scene.problem),
         estimate(scene.estimate) {
     set.AddTies(ties);
-    const RestrictedProblem part =
-        RestrictProblem(scene.problem, set.Observations());
-    Estimate optimum = RestrictEstimate(part, estimate);
-    SolveJoint(part.problem, Options(), &optimum);
-    ReplaceEstimate(part, optimum, &estimate);
+    const ProblemSubset part(scene.problem, set.Observations());
+    Estimate optimum = part.Restrict(estimate);
+    SolveJoint(part.problem(), Options(), &optimum);
+    part.Replace(optimum, &estimate);
     level = set.Cost(estimate, Norm::L2());
   }
 

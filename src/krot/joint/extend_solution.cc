@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
 
 namespace krot {
@@ -36,12 +36,12 @@ bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
     }
   }
   if (observations.empty()) return !is_behind;
-  const RestrictedProblem part = RestrictProblem(problem, observations);
-  Estimate placed = RestrictEstimate(part, *estimate);
-  BlockSweep(part.problem, FastDescentOptions(), options.norm,
+  const ProblemSubset part(problem, std::move(observations));
+  Estimate placed = part.Restrict(*estimate);
+  BlockSweep(part.problem(), FastDescentOptions(), options.norm,
              options.num_threads, options.cancel)
       .IntersectPoints(&placed);
-  ReplaceEstimate(part, placed, estimate);
+  part.Replace(placed, estimate);
   return !is_behind;
 }
 

@@ -1,15 +1,15 @@
 #include "krot/joint/initializer.h"
 
-#include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
 #include "krot/joint/feasible_start.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/components.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/gauge.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -21,18 +21,11 @@ constexpr double kLargestBound = 1e7;  // pixels
 // When lowering a start that already meets the bound is given up.
 constexpr double kHopelessStartGap = 1e-2;
 
-// Scales the estimate to a median depth of one.
-void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
-  const double median = MedianDepth(problem, *estimate);
-  for (Eigen::Vector3d& t : estimate->translations) t /= median;
-  for (Eigen::Vector3d& s : estimate->points) s /= median;
-}
-
 // A component's way to a start.
 class StartSearch {
  public:
   // Keeps references. Adds iterations to `summary`, and what was proved.
-  StartSearch(const RestrictedProblem& part, const InitializerOptions& options,
+  StartSearch(const ProblemSubset& part, const InitializerOptions& options,
               const Timer& timer, InitializerSummary* summary)
       : part_(part), options_(options), timer_(timer), summary_(*summary) {}
 
@@ -45,7 +38,7 @@ class StartSearch {
   bool Proves(Certificate certificate);
   void Record(JointIteration iteration);
 
-  const RestrictedProblem& part_;
+  const ProblemSubset& part_;
   const InitializerOptions& options_;
   const Timer& timer_;
   InitializerSummary& summary_;
@@ -81,7 +74,7 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
   for (double bound = kBoundGrowth * options_.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
     const InteriorPointTermination found = FindEstimateBelow(
-        part_.problem, bound, StartOptions(0), estimate, &multipliers);
+        part_.problem(), bound, StartOptions(0), estimate, &multipliers);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
@@ -94,7 +87,7 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
     joint.callback = [this](int, const JointIteration& iteration) {
       Record(iteration);
     };
-    const JointSummary optimum = SolveJoint(part_.problem, joint, estimate);
+    const JointSummary optimum = SolveJoint(part_.problem(), joint, estimate);
     if (optimum.certificate && Proves(*optimum.certificate)) {
       return InitializerTermination::kInfeasible;
     }
@@ -112,26 +105,24 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
 // then.
 bool StartSearch::Proves(Certificate certificate) {
   const CertificateCheck check =
-      CheckCertificate(part_.problem, options_.norm, certificate);
+      CheckCertificate(part_.problem(), options_.norm, certificate);
   if (!(check.proved_bound > options_.max_error)) return false;
-  for (CertifiedObservation& o : certificate.observations) {
-    o.observation = part_.observation_of[o.observation];
-  }
   summary_.lower_bound = check.proved_bound;
-  summary_.certificate = std::move(certificate);
+  summary_.certificate = InWhole(part_, std::move(certificate));
   return true;
 }
 
 InitializerTermination StartSearch::Run(Estimate* start) {
   std::vector<Multiplier> multipliers;
-  const InteriorPointTermination found = FindEstimateBelow(
-      part_.problem, options_.max_error, StartOptions(0), start, &multipliers);
+  const InteriorPointTermination found =
+      FindEstimateBelow(part_.problem(), options_.max_error, StartOptions(0),
+                        start, &multipliers);
   if (found == InteriorPointTermination::kInterrupted) {
     return InitializerTermination::kInterrupted;
   }
   if (found != InteriorPointTermination::kFeasible) {
     const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
-        part_.problem, options_.norm, options_.max_error, multipliers,
+        part_.problem(), options_.norm, options_.max_error, multipliers,
         CertificateOptions());
     if (certificate && Proves(*certificate)) {
       return InitializerTermination::kInfeasible;
@@ -139,7 +130,7 @@ InitializerTermination StartSearch::Run(Estimate* start) {
     const InitializerTermination decision = DecideByOptimum(start);
     if (decision != InitializerTermination::kFeasible) return decision;
   }
-  LowerByFeasibility(part_.problem, StartOptions(kHopelessStartGap), start);
+  LowerByFeasibility(part_.problem(), StartOptions(kHopelessStartGap), start);
   return IsCancelled(options_.cancel) ? InitializerTermination::kInterrupted
                                       : InitializerTermination::kFeasible;
 }
@@ -155,19 +146,16 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
   Estimate found = *estimate;
   found.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
   found.points.resize(problem.num_points, Eigen::Vector3d::Zero());
-  std::vector<int64_t> all(problem.observations.size());
-  std::iota(all.begin(), all.end(), 0);
-  for (const std::vector<int64_t>& observations :
-       SplitIntoComponents(problem, all)) {
-    const RestrictedProblem part = RestrictProblem(problem, observations);
+  for (std::vector<int64_t>& observations : SplitIntoComponents(problem)) {
+    const ProblemSubset part(problem, std::move(observations));
     Estimate start;
     summary.termination =
         StartSearch(part, options, timer, &summary).Run(&start);
     if (summary.termination != InitializerTermination::kFeasible) {
       return summary;
     }
-    if (!HasBaseline(part.problem)) NormalizeScale(part.problem, &start);
-    ReplaceEstimate(part, start, &found);
+    if (!HasBaseline(part.problem())) NormalizeScale(part.problem(), &start);
+    part.Replace(start, &found);
   }
   summary.termination = InitializerTermination::kFeasible;
   summary.cost = Cost(problem, found, options.norm, options.num_threads);

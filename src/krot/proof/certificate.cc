@@ -4,8 +4,9 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/problem/components.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/dual_repair.h"
 #include "krot/proof/support.h"
 
@@ -106,14 +107,14 @@ class Maker {
   static int64_t NumUnknowns(const KnownRotationProblem& part) {
     return 3 * (int64_t{part.num_points} + part.num_frames - 1);
   }
-  void SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
+  void SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
                       double threshold, int num_reductions);
   std::vector<int64_t> OfferBalanced(double delta,
                                      const std::vector<Multiplier>& multipliers,
                                      const std::vector<int64_t>& candidates,
                                      double tolerance);
   // Returns the misfits of the part.
-  std::vector<int64_t> Offer(const RestrictedProblem& part, double delta,
+  std::vector<int64_t> Offer(const ProblemSubset& part, double delta,
                              const std::vector<Multiplier>& multipliers);
 
   const KnownRotationProblem& problem_;
@@ -124,11 +125,11 @@ class Maker {
 
 void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
                 const std::vector<Multiplier>& multipliers, double threshold) {
-  const RestrictedProblem part = RestrictProblem(problem_, observations);
-  if (NumUnknowns(part.problem) > options_.max_unknowns) return;
+  const ProblemSubset part(problem_, observations);
+  if (NumUnknowns(part.problem()) > options_.max_unknowns) return;
   const std::vector<Multiplier> known = Pick(multipliers, observations);
   const double delta =
-      SuggestedBound(part.problem, RestrictEstimate(part, whole), known);
+      SuggestedBound(part.problem(), part.Restrict(whole), known);
   Offer(part, delta, known);
   if (!IsEnough()) TryBalanced(delta, multipliers, observations);
   if (!IsEnough()) SolveAndReduce(part, whole, threshold, kMaxReductions);
@@ -158,7 +159,7 @@ std::vector<int64_t> Maker::OfferBalanced(
   for (const std::vector<int64_t>& component :
        SplitIntoComponents(problem_, balanced)) {
     const std::vector<int64_t> misfits =
-        Offer(RestrictProblem(problem_, component), delta,
+        Offer(ProblemSubset(problem_, component), delta,
               Pick(multipliers, component));
     if (misfits.empty()) continue;
     auto misfit = misfits.begin();
@@ -174,7 +175,7 @@ std::vector<int64_t> Maker::OfferBalanced(
   return left;
 }
 
-void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
+void Maker::SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
                            double threshold, int num_reductions) {
   InteriorPointOptions options;
   options.norm = norm_;
@@ -182,56 +183,54 @@ void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
   options.max_iterations = kMaxIterations;
   options.num_threads = options_.num_threads;
   options.cancel = options_.cancel;
-  if (NumUnknowns(part.problem) > kLargeUnknowns) {
+  if (NumUnknowns(part.problem()) > kLargeUnknowns) {
     // Its optimum is below every cost it reaches.
     options.stop = [this](const ConicIterate& iterate) {
       return iterate.cost < options_.sufficient_bound;
     };
   }
-  Estimate estimate = RestrictEstimate(part, whole);
+  Estimate estimate = part.Restrict(whole);
   std::vector<Multiplier> multipliers;
   const InteriorPointSummary summary =
-      MinimizeJointly(part.problem, options, &estimate, &multipliers);
+      MinimizeJointly(part.problem(), options, &estimate, &multipliers);
   if (summary.termination == InteriorPointTermination::kStopped) return;
-  Offer(part, SuggestedBound(part.problem, estimate, multipliers), multipliers);
+  Offer(part, SuggestedBound(part.problem(), estimate, multipliers),
+        multipliers);
 
-  const std::vector<int64_t> support = SelectSupport(
-      part.problem,
-      SupportScores(part.problem, norm_, estimate, summary.gamma, multipliers),
-      threshold);
+  const std::vector<int64_t> support =
+      SelectSupport(part.problem(),
+                    SupportScores(part.problem(), norm_, estimate,
+                                  summary.gamma, multipliers),
+                    threshold);
   if (num_reductions == 0 ||
-      support.size() == part.problem.observations.size()) {
+      support.size() == part.problem().observations.size()) {
     return;
   }
   for (const std::vector<int64_t>& component :
-       SplitIntoComponents(part.problem, support)) {
+       SplitIntoComponents(part.problem(), support)) {
     if (IsEnough()) return;
-    std::vector<int64_t> rest;
-    for (const int64_t i : component) rest.push_back(part.observation_of[i]);
-    SolveAndReduce(RestrictProblem(problem_, rest), whole, threshold,
-                   num_reductions - 1);
+    SolveAndReduce(ProblemSubset(problem_, part.InWhole(component)), whole,
+                   threshold, num_reductions - 1);
   }
 }
 
-std::vector<int64_t> Maker::Offer(const RestrictedProblem& part, double delta,
+std::vector<int64_t> Maker::Offer(const ProblemSubset& part, double delta,
                                   const std::vector<Multiplier>& multipliers) {
-  if (!(delta > 0) || NumUnknowns(part.problem) > options_.max_unknowns) {
+  if (!(delta > 0) || NumUnknowns(part.problem()) > options_.max_unknowns) {
     return {};
   }
   RepairedMultipliers repaired =
-      RepairMultipliers(part.problem, norm_, delta, multipliers);
-  std::optional<Certificate>& certificate = repaired.certificate;
-  if (!certificate || !IsBetter(*certificate, best_)) return repaired.misfits;
-  for (CertifiedObservation& o : certificate->observations) {
-    o.observation = part.observation_of[o.observation];
+      RepairMultipliers(part.problem(), norm_, delta, multipliers);
+  if (!repaired.certificate || !IsBetter(*repaired.certificate, best_)) {
+    return repaired.misfits;
   }
-  certificate->defect = kMaxDefect;
-  const CertificateCheck check =
-      CheckCertificate(problem_, norm_, *certificate);
+  Certificate certificate = InWhole(part, std::move(*repaired.certificate));
+  certificate.defect = kMaxDefect;
+  const CertificateCheck check = CheckCertificate(problem_, norm_, certificate);
   if (!check.is_accepted) return {};
-  certificate->defect =
+  certificate.defect =
       std::clamp(kDefectFactor * check.defect, kSmallestDefect, kMaxDefect);
-  best_ = std::move(*certificate);
+  best_ = std::move(certificate);
   return {};
 }
 
@@ -279,6 +278,13 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
     if (maker.IsEnough()) break;
   }
   return maker.best();
+}
+
+Certificate InWhole(const ProblemSubset& part, Certificate certificate) {
+  for (CertifiedObservation& o : certificate.observations) {
+    o.observation = part.InWhole(o.observation);
+  }
+  return certificate;
 }
 
 }  // namespace krot

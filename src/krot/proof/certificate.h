@@ -8,6 +8,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/certificate_check.h"
 
 namespace krot {
@@ -44,5 +45,8 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
     const KnownRotationProblem& problem, Norm norm, double bound,
     const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options);
+
+// A part's certificate as one of the whole.
+Certificate InWhole(const ProblemSubset& part, Certificate certificate);
 
 }  // namespace krot

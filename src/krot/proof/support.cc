@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
