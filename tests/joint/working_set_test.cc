@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/problem/cost.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
 namespace krot {
@@ -115,7 +115,7 @@ TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
     options.norm = Norm::L2();
     options.relative_gap = 1e-6;
     const JointSummary summary =
-        SolveJoint(scene.problem, options, &scene.estimate);
+        SolveJoint(scene.problem, options, {}, &scene.estimate);
     EXPECT_EQ(summary.termination, JointTermination::kGapReached);
     EXPECT_LT(5 * summary.num_working_observations,
               3 * static_cast<int64_t>(scene.problem.observations.size()));

@@ -36,15 +36,15 @@ std::string IterationLine(const BundleAdjustmentIteration& iteration) {
 // The adjustment with its progress on stderr. Throws CommandError where there
 // is nothing to write afterwards.
 AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
-                         const LogOptions& log) {
+                         Context context, const LogOptions& log) {
   options.adjustment.callback =
       [&log](const BundleAdjustmentIteration& iteration) {
         LogLine(log, 1, IterationLine(iteration));
       };
-  options.on_note = [&log](const std::string& sentence) {
+  context.on_note = [&log](const std::string& sentence) {
     LogLine(log, 1, sentence);
   };
-  AdjustModelResult result = AdjustModel(model, options);
+  AdjustModelResult result = AdjustModel(model, options, context);
   ThrowIfInterrupted();
   const AdjustModelSummary& summary = result.summary;
   switch (summary.adjustment.termination) {
@@ -59,13 +59,13 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
 }
 
 int Run(const ModelPaths& paths, const CommonOptions& common,
-        AdjustModelOptions options) {
+        AdjustModelOptions options, int num_threads) {
   const Timer total_timer;
-  const CancelFlag& cancel = CatchInterrupts();
+  const Context context{num_threads, &CatchInterrupts()};
   const WriteModelOptions write_options = CheckModelPaths(paths);
   AdjustmentReport report;
   report.version = KROT_VERSION;
-  report.threads = ResolveNumThreads(options.adjustment.num_threads);
+  report.threads = ResolveNumThreads(num_threads);
   report.seed = common.random_seed;
 
   const Timer read_timer;
@@ -73,8 +73,8 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   report.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 
-  options.adjustment.cancel = &cancel;
-  AdjustModelResult result = Adjust(model, std::move(options), common.log);
+  AdjustModelResult result =
+      Adjust(model, std::move(options), context, common.log);
   report.summary = std::move(result.summary);
 
   LogLine(common.log, 2, "writing " + paths.output_path);
@@ -113,7 +113,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
     PrintTable(common.log, parser.Help());
     return kExitDone;
   }
-  return Run(paths, common, options.Resolve(parser));
+  return Run(paths, common, options.Resolve(parser), options.num_threads());
 }
 
 }  // namespace krot

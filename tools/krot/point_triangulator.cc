@@ -33,7 +33,7 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
                       "lowest largest reprojection error of its track; the "
                       "frames stay");
   AddModelPaths(&command.paths, &parser);
-  AddSolveOptions(&command.options, &parser);
+  AddSolveOptions(&command.options, &command.context, &parser);
   RefuseDatabase(&parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "

@@ -21,7 +21,7 @@ SolveReport DescribeRun(const SolveCommand& command) {
   report.version = KROT_VERSION;
   report.command = command.name;
   report.method = command.method_name;
-  report.threads = ResolveNumThreads(command.options.num_threads);
+  report.threads = ResolveNumThreads(command.context.num_threads);
   report.seed = command.common.random_seed;
   return report;
 }
@@ -61,7 +61,8 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
   const LogOptions& log = command.common.log;
   SolveModelOptions options = command.options;
   SolveProgress progress(log, ProgressGoals(options));
-  options.cancel = &cancel;
+  Context context = command.context;
+  context.cancel = &cancel;
   options.describe_certificate = !command.certificate_path.empty();
   options.res_int.callback = [&progress](int sweep, const Sweep& state) {
     progress.Update(sweep, state);
@@ -70,7 +71,7 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
                                        const JointIteration& state) {
     progress.Update(iteration, state);
   };
-  options.on_note = [&log](const std::string& sentence) {
+  context.on_note = [&log](const std::string& sentence) {
     LogLine(log, 1, sentence);
   };
   options.on_built = [&](const SolveSummary& summary) {
@@ -80,7 +81,7 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
     }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
-  SolveModelResult result = command.solve(model, options);
+  SolveModelResult result = command.solve(model, options, context);
   progress.Finish();
   ThrowIfInterrupted();
   return result;
@@ -184,7 +185,7 @@ int RunSolveCommand(const SolveCommand& command) {
     WriteFileAtomically(paths.report_path, report_json);
   }
   WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                command.options.num_threads, log);
+                command.context.num_threads, log);
   WriteCertificate(command, report.summary);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);

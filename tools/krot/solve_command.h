@@ -17,8 +17,10 @@ struct SolveCommand {
   ModelPaths paths;
   std::string certificate_path;  // "": not wanted
   CommonOptions common;
-  SolveModelOptions options;  // its callbacks and flag are set by the run
-  SolveModelResult (*solve)(const Model&, const SolveModelOptions&) = nullptr;
+  SolveModelOptions options;  // its callbacks are set by the run
+  Context context;            // likewise, and the flag
+  SolveModelResult (*solve)(const Model&, const SolveModelOptions&,
+                            const Context&) = nullptr;
 };
 
 // Returns an exit code or throws; nothing is written unless all went well.

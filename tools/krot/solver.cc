@@ -154,7 +154,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
                  "certificate_checker");
   AddScheduleOptions(&command.options, &parser);
   AddPolishOption(&command.options, &parser);
-  AddSolveOptions(&command.options, &parser);
+  AddSolveOptions(&command.options, &command.context, &parser);
   AddResIntOptions(SolveModelOptions(), &command.options.res_int, &parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "

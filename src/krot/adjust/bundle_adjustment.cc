@@ -109,12 +109,13 @@ void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
 // Half the sum of the squared errors under the loss, if there is one; none
 // where an error is not finite or reaches the cap.
 std::optional<double> RobustCost(const BundleAdjustmentOptions& options,
+                                 const Context& context,
                                  const ceres::LossFunction* loss,
                                  const AdjustmentBlocks& blocks) {
   const auto errors = ProjectErrors(
       blocks,
       options.max_error.value_or(std::numeric_limits<double>::infinity()),
-      options.num_threads);
+      context.num_threads);
   if (!errors) return std::nullopt;
   if (loss == nullptr) return HalfSquaredNorm(*errors);
   double sum = 0;
@@ -139,10 +140,10 @@ BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
 }
 
 // Solves a problem without a cap.
-void Minimize(const BundleAdjustmentOptions& options,
+void Minimize(const BundleAdjustmentOptions& options, const Context& context,
               ceres::Solver::Options solver_options, ceres::Problem* problem,
               BundleAdjustmentSummary* summary) {
-  IterationObserver observer(options);
+  IterationObserver observer(options.callback, context);
   solver_options.callbacks.push_back(&observer);
   ceres::Solver::Summary solve;
   ceres::Solve(solver_options, problem, &solve);
@@ -153,7 +154,8 @@ void Minimize(const BundleAdjustmentOptions& options,
 }  // namespace
 
 BundleAdjustmentResult AdjustBundle(const Model& model,
-                                    const BundleAdjustmentOptions& options) {
+                                    const BundleAdjustmentOptions& options,
+                                    const Context& context) {
   CheckOptions(options);
   const Timer timer;
   const AdjustmentBlocks before =
@@ -182,9 +184,10 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   BundleAdjustmentSummary& summary = result.summary;
   Count(blocks, problem, &summary);
   const ceres::Solver::Options solver_options =
-      AdjustmentSolverOptions(options, &blocks, problem);
+      AdjustmentSolverOptions(options, context, &blocks, problem);
   summary.linear_solver = SolverName(solver_options);
-  const std::optional<double> cost = RobustCost(options, loss.get(), blocks);
+  const std::optional<double> cost =
+      RobustCost(options, context, loss.get(), blocks);
   if (summary.num_parameters == 0) {
     summary.termination = BundleAdjustmentTermination::kNothingToAdjust;
   } else if (!cost) {
@@ -194,13 +197,13 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
     const BundleAdjustmentOptions recorded =
         RecordIterations(options, &summary);
     if (options.max_error) {
-      FollowBarrierPath(recorded, solver_options,
+      FollowBarrierPath(recorded, context, solver_options,
                         {&problem, &blocks, &barrier, &multipliers, &recorder},
                         &summary);
     } else {
-      Minimize(recorded, solver_options, &problem, &summary);
+      Minimize(recorded, context, solver_options, &problem, &summary);
     }
-    summary.cost_final = *RobustCost(options, loss.get(), blocks);
+    summary.cost_final = *RobustCost(options, context, loss.get(), blocks);
     if (!options.max_error) {
       summary.stationarity = Stationarity(solver_options.num_threads,
                                           summary.cost_final, &problem);

@@ -24,10 +24,16 @@ constexpr double kHopelessStartGap = 1e-2;
 // A component's way to a start.
 class StartSearch {
  public:
-  // Keeps references. Adds iterations to `summary`, and what was proved.
+  // Keeps references to the part, the timer and the summary. Adds iterations to
+  // `summary`, and what was proved.
   StartSearch(const ProblemSubset& part, const InitializerOptions& options,
-              const Timer& timer, InitializerSummary* summary)
-      : part_(part), options_(options), timer_(timer), summary_(*summary) {}
+              const Context& context, const Timer& timer,
+              InitializerSummary* summary)
+      : part_(part),
+        options_(options),
+        context_(context),
+        timer_(timer),
+        summary_(*summary) {}
 
   // `*start` is meaningful if feasible.
   InitializerTermination Run(Estimate* start);
@@ -39,7 +45,8 @@ class StartSearch {
   void Record(JointIteration iteration);
 
   const ProblemSubset& part_;
-  const InitializerOptions& options_;
+  const InitializerOptions options_;
+  const Context context_;
   const Timer& timer_;
   InitializerSummary& summary_;
 };
@@ -56,8 +63,6 @@ FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
   start.norm = options_.norm;
   start.max_iterations = options_.max_iterations;
   start.hopeless_gap = hopeless_gap;
-  start.num_threads = options_.num_threads;
-  start.cancel = options_.cancel;
   start.callback = [this](double bound) {
     JointIteration iteration;
     iteration.target = bound;
@@ -73,8 +78,9 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
   std::vector<Multiplier> multipliers;
   for (double bound = kBoundGrowth * options_.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
-    const InteriorPointTermination found = FindEstimateBelow(
-        part_.problem(), bound, StartOptions(0), estimate, &multipliers);
+    const InteriorPointTermination found =
+        FindEstimateBelow(part_.problem(), bound, StartOptions(0), context_,
+                          estimate, &multipliers);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
@@ -82,12 +88,11 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
     JointOptions joint;
     joint.norm = options_.norm;
     joint.max_iterations = options_.max_iterations;
-    joint.num_threads = options_.num_threads;
-    joint.cancel = options_.cancel;
     joint.callback = [this](int, const JointIteration& iteration) {
       Record(iteration);
     };
-    const JointSummary optimum = SolveJoint(part_.problem(), joint, estimate);
+    const JointSummary optimum =
+        SolveJoint(part_.problem(), joint, context_, estimate);
     if (optimum.certificate && Proves(*optimum.certificate)) {
       return InitializerTermination::kInfeasible;
     }
@@ -116,30 +121,31 @@ InitializerTermination StartSearch::Run(Estimate* start) {
   std::vector<Multiplier> multipliers;
   const InteriorPointTermination found =
       FindEstimateBelow(part_.problem(), options_.max_error, StartOptions(0),
-                        start, &multipliers);
+                        context_, start, &multipliers);
   if (found == InteriorPointTermination::kInterrupted) {
     return InitializerTermination::kInterrupted;
   }
   if (found != InteriorPointTermination::kFeasible) {
     const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
         part_.problem(), options_.norm, options_.max_error, multipliers,
-        CertificateOptions());
+        CertificateOptions(), context_);
     if (certificate && Proves(*certificate)) {
       return InitializerTermination::kInfeasible;
     }
     const InitializerTermination decision = DecideByOptimum(start);
     if (decision != InitializerTermination::kFeasible) return decision;
   }
-  LowerByFeasibility(part_.problem(), StartOptions(kHopelessStartGap), start);
-  return IsCancelled(options_.cancel) ? InitializerTermination::kInterrupted
-                                      : InitializerTermination::kFeasible;
+  LowerByFeasibility(part_.problem(), StartOptions(kHopelessStartGap), context_,
+                     start);
+  return context_.IsCancelled() ? InitializerTermination::kInterrupted
+                                : InitializerTermination::kFeasible;
 }
 
 }  // namespace
 
 InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
-                             Estimate* estimate) {
+                             const Context& context, Estimate* estimate) {
   CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
   const Timer timer;
   InitializerSummary summary;
@@ -150,7 +156,7 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
     const ProblemSubset part(problem, std::move(observations));
     Estimate start;
     summary.termination =
-        StartSearch(part, options, timer, &summary).Run(&start);
+        StartSearch(part, options, context, timer, &summary).Run(&start);
     if (summary.termination != InitializerTermination::kFeasible) {
       return summary;
     }
@@ -158,7 +164,7 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
     part.Replace(start, &found);
   }
   summary.termination = InitializerTermination::kFeasible;
-  summary.cost = Cost(problem, found, options.norm, options.num_threads);
+  summary.cost = Cost(problem, found, options.norm, context.num_threads);
   *estimate = std::move(found);
   return summary;
 }

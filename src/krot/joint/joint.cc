@@ -42,9 +42,11 @@ void CheckOptions(const JointOptions& options) {
 class ComponentSolve {
  public:
   ComponentSolve(const KnownRotationProblem& problem,
-                 const JointOptions& options, const Estimate& start)
+                 const JointOptions& options, const Context& context,
+                 const Estimate& start)
       : problem_(problem),
         options_(options),
+        context_(context),
         estimate_(start),
         cost_(CostOf(start)),
         set_(FirstWorkingSet(problem, start, options.norm, cost_)) {}
@@ -60,7 +62,7 @@ class ComponentSolve {
 
  private:
   double CostOf(const Estimate& estimate) const {
-    return Cost(problem_, estimate, options_.norm, options_.num_threads);
+    return Cost(problem_, estimate, options_.norm, context_.num_threads);
   }
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
@@ -74,7 +76,8 @@ class ComponentSolve {
   void Keep(const Estimate& candidate);
 
   const KnownRotationProblem& problem_;
-  const JointOptions& options_;
+  const JointOptions options_;
+  const Context context_;
   Estimate estimate_;  // the best so far
   double cost_ = 0;
   WorkingSet set_;
@@ -96,7 +99,7 @@ JointTermination ComponentSolve::SolvePart(const ProblemSubset& part,
   JointOptions options = options_;
   if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
   const Estimate start = part.Restrict(estimate_);
-  CertifiedSolve solve(part.problem(), options, start, lower_bound_);
+  CertifiedSolve solve(part.problem(), options, context_, start, lower_bound_);
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
@@ -149,8 +152,8 @@ bool ComponentSolve::FitOthers(Estimate* candidate) {
   level_ = set_.Cost(*candidate, options_.norm);
   const double highest =
       level_ / (1 - (1 - kShareOfGapForProof) * options_.relative_gap);
-  const bool do_fit =
-      ExtendSolution(problem_, set_, options_, level_, highest, candidate);
+  const bool do_fit = ExtendSolution(problem_, set_, options_.norm, context_,
+                                     level_, highest, candidate);
   Keep(*candidate);
   return do_fit;
 }
@@ -183,12 +186,13 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
 }  // namespace
 
 JointSummary SolveJoint(const KnownRotationProblem& problem,
-                        const JointOptions& options, Estimate* estimate) {
+                        const JointOptions& options, const Context& context,
+                        Estimate* estimate) {
   CheckOptions(options);
   const Timer timer;
   JointSummary summary;
   summary.cost_initial =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
                 summary.cost_initial, "finite: all depths positive");
 
@@ -198,7 +202,8 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
   double cost_of_solved = 0;
   for (std::vector<int64_t>& observations : components) {
     const ProblemSubset part(problem, std::move(observations));
-    ComponentSolve solve(part.problem(), options, part.Restrict(*estimate));
+    ComponentSolve solve(part.problem(), options, context,
+                         part.Restrict(*estimate));
     const JointTermination termination =
         solve.Run([&](JointIteration iteration) {
           iteration.cost = std::max(cost_of_solved, solve.cost());
@@ -225,7 +230,7 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
     if (termination == JointTermination::kInterrupted) break;
   }
   summary.cost_final =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   // A component that fell short matters only if it sets the maximum.
   if (summary.termination != JointTermination::kInterrupted &&
       summary.RelativeGap() <= options.relative_gap) {

@@ -80,8 +80,8 @@ void CheckInput(const KnownRotationProblem& problem,
 class Maker {
  public:
   Maker(const KnownRotationProblem& problem, Norm norm,
-        const CertificateOptions& options)
-      : problem_(problem), norm_(norm), options_(options) {}
+        const CertificateOptions& options, const Context& context)
+      : problem_(problem), norm_(norm), options_(options), context_(context) {}
 
   // Tries the multipliers of these observations, connected, as they are; then
   // those of their sub-problem, solved from `estimate` of the whole; then that
@@ -94,7 +94,7 @@ class Maker {
                    const std::vector<int64_t>& candidates);
 
   bool IsEnough() const {
-    return IsCancelled(options_.cancel) ||
+    return context_.IsCancelled() ||
            best_.lower_bound >= options_.sufficient_bound;
   }
 
@@ -119,7 +119,8 @@ class Maker {
 
   const KnownRotationProblem& problem_;
   const Norm norm_;
-  const CertificateOptions& options_;
+  const CertificateOptions options_;
+  const Context context_;
   Certificate best_;
 };
 
@@ -181,8 +182,6 @@ void Maker::SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
   options.norm = norm_;
   options.smallest_gap = kSmallestGap;
   options.max_iterations = kMaxIterations;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
   if (NumUnknowns(part.problem()) > kLargeUnknowns) {
     // Its optimum is below every cost it reaches.
     options.stop = [this](const ConicIterate& iterate) {
@@ -191,8 +190,8 @@ void Maker::SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
   }
   Estimate estimate = part.Restrict(whole);
   std::vector<Multiplier> multipliers;
-  const InteriorPointSummary summary =
-      MinimizeJointly(part.problem(), options, &estimate, &multipliers);
+  const InteriorPointSummary summary = MinimizeJointly(
+      part.problem(), options, context_, &estimate, &multipliers);
   if (summary.termination == InteriorPointTermination::kStopped) return;
   Offer(part, SuggestedBound(part.problem(), estimate, multipliers),
         multipliers);
@@ -239,11 +238,11 @@ std::vector<int64_t> Maker::Offer(const ProblemSubset& part, double delta,
 std::optional<Certificate> MakeCertificate(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
     double gamma, const std::vector<Multiplier>& multipliers,
-    const CertificateOptions& options) {
+    const CertificateOptions& options, const Context& context) {
   CheckInput(problem, multipliers, options);
   const std::vector<double> scores =
       SupportScores(problem, norm, estimate, gamma, multipliers);
-  Maker maker(problem, norm, options);
+  Maker maker(problem, norm, options, context);
   std::vector<int64_t> previous;
   for (const double threshold : kThresholds) {
     const std::vector<int64_t> support =
@@ -262,11 +261,11 @@ std::optional<Certificate> MakeCertificate(
 std::optional<Certificate> MakeInfeasibilityCertificate(
     const KnownRotationProblem& problem, Norm norm, double bound,
     const std::vector<Multiplier>& multipliers,
-    const CertificateOptions& options) {
+    const CertificateOptions& options, const Context& context) {
   CheckInput(problem, multipliers, options);
   double largest = 0;
   for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
-  Maker maker(problem, norm, options);
+  Maker maker(problem, norm, options, context);
   for (const double share : kSharesOfLargest) {
     std::vector<int64_t> candidates;
     for (size_t i = 0; i < multipliers.size(); ++i) {
