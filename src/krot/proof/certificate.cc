@@ -5,7 +5,6 @@
 
 #include "krot/base/check.h"
 #include "krot/problem/components.h"
-#include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/dual_repair.h"
 #include "krot/proof/support.h"
@@ -13,40 +12,34 @@
 namespace krot {
 namespace {
 
-// Of SelectBalanced.
+// Of SelectBalanced. A strict one drops observations that a proof may need, a
+// lax one keeps what does not balance. Tried on models with outliers together,
+// never one by one.
 constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
-// How often misfits are dropped and the rest is tried again.
+// How often misfits are dropped and the rest is tried again, each time at the
+// cost of a repair.
 constexpr int kMaxDrops = 20;
-// Smaller multipliers, by the largest, are left out at first.
+// Smaller multipliers, by the largest, are left out at first: a smaller
+// support is easier to balance, but may lack what decides.
 constexpr double kSharesOfLargest[] = {1e-3, 1e-5, 0};
+// Of SelectSupport, the cheapest first: a strict one gives a small support,
+// which may lack what decides. Multipliers that matter span eight decades.
 constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
-// Of the sub-problems.
+// Of the sub-problems: far below any gap that is asked for, as what is left of
+// it is missing from the bound.
 constexpr double kSmallestGap = 1e-9;
 constexpr int kMaxIterations = 100;
-// Larger ones are given up as soon as they cannot prove enough.
+// Larger ones are only worth their time if they prove enough: they are given
+// up as soon as they cannot.
 constexpr int64_t kLargeUnknowns = 1500;
-constexpr double kEqualBounds = 1e-7;  // relative
+// What a smaller support may cost of the bound, relative: far below any gap.
+constexpr double kEqualBounds = 1e-7;
+// How often a sub-problem is cut down to what sets its maximum.
 constexpr int kMaxReductions = 4;
 // The defect that a certificate states allows for another machine's
 // arithmetic, which may find a little more than was found here.
 constexpr double kDefectFactor = 2;
 constexpr double kSmallestDefect = 1e-12;
-
-// The bound that multipliers would prove, pixels, if (1) held: the estimate
-// times (1).
-double SuggestedBound(const KnownRotationProblem& problem,
-                      const Estimate& estimate,
-                      const std::vector<Multiplier>& multipliers) {
-  double weighted_residual = 0;
-  double weighted_depth = 0;
-  for (size_t i = 0; i < multipliers.size(); ++i) {
-    const ViewedPoint viewed =
-        ViewPoint(problem, problem.observations[i], estimate);
-    weighted_residual -= multipliers[i].y.dot(viewed.v);
-    weighted_depth += multipliers[i].lambda * viewed.depth;
-  }
-  return weighted_residual / weighted_depth;
-}
 
 std::vector<Multiplier> Pick(const std::vector<Multiplier>& multipliers,
                              const std::vector<int64_t>& observations) {
@@ -77,10 +70,20 @@ void CheckInput(const KnownRotationProblem& problem,
                 options.max_unknowns, ">= 1");
 }
 
-class Maker {
+// Looks for certificates among given observations in three ways, the cheapest
+// first, and keeps the best that the check accepts:
+//
+//   as they are   repairs the multipliers in hand               Offer
+//   balanced      of those, what balances, without misfits      TryBalanced
+//   solved        those of the sub-problem's own optimum, then  SolveAndReduce
+//                 of what sets the maximum of that, and so on
+//
+// Every way ends in Offer, which alone writes the best, and none goes on once
+// IsEnough().
+class CertificateSearch {
  public:
-  Maker(const KnownRotationProblem& problem, Norm norm,
-        const CertificateOptions& options, const Context& context)
+  CertificateSearch(const KnownRotationProblem& problem, Norm norm,
+                    const CertificateOptions& options, const Context& context)
       : problem_(problem), norm_(norm), options_(options), context_(context) {}
 
   // Tries the multipliers of these observations, connected, as they are; then
@@ -113,7 +116,8 @@ class Maker {
                                      const std::vector<Multiplier>& multipliers,
                                      const std::vector<int64_t>& candidates,
                                      double tolerance);
-  // Returns the misfits of the part.
+  // Repairs the part's multipliers, and keeps what comes of them if it is
+  // better than the best so far. Returns the misfits of the part.
   std::vector<int64_t> Offer(const ProblemSubset& part, double delta,
                              const std::vector<Multiplier>& multipliers);
 
@@ -124,8 +128,10 @@ class Maker {
   Certificate best_;
 };
 
-void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
-                const std::vector<Multiplier>& multipliers, double threshold) {
+void CertificateSearch::Try(const std::vector<int64_t>& observations,
+                            const Estimate& whole,
+                            const std::vector<Multiplier>& multipliers,
+                            double threshold) {
   const ProblemSubset part(problem_, observations);
   if (NumUnknowns(part.problem()) > options_.max_unknowns) return;
   const std::vector<Multiplier> known = Pick(multipliers, observations);
@@ -136,9 +142,9 @@ void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
   if (!IsEnough()) SolveAndReduce(part, whole, threshold, kMaxReductions);
 }
 
-void Maker::TryBalanced(double delta,
-                        const std::vector<Multiplier>& multipliers,
-                        const std::vector<int64_t>& candidates) {
+void CertificateSearch::TryBalanced(double delta,
+                                    const std::vector<Multiplier>& multipliers,
+                                    const std::vector<int64_t>& candidates) {
   for (const double tolerance : kBalanceTolerances) {
     std::vector<int64_t> left = candidates;
     for (int drop = 0; drop < kMaxDrops && !left.empty() && !IsEnough();
@@ -151,7 +157,7 @@ void Maker::TryBalanced(double delta,
 
 // The balanced ones of the candidates; returns those of them that are worth
 // another try, without their misfits.
-std::vector<int64_t> Maker::OfferBalanced(
+std::vector<int64_t> CertificateSearch::OfferBalanced(
     double delta, const std::vector<Multiplier>& multipliers,
     const std::vector<int64_t>& candidates, double tolerance) {
   std::vector<int64_t> left;
@@ -176,8 +182,9 @@ std::vector<int64_t> Maker::OfferBalanced(
   return left;
 }
 
-void Maker::SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
-                           double threshold, int num_reductions) {
+void CertificateSearch::SolveAndReduce(const ProblemSubset& part,
+                                       const Estimate& whole, double threshold,
+                                       int num_reductions) {
   InteriorPointOptions options;
   options.norm = norm_;
   options.smallest_gap = kSmallestGap;
@@ -213,8 +220,9 @@ void Maker::SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
   }
 }
 
-std::vector<int64_t> Maker::Offer(const ProblemSubset& part, double delta,
-                                  const std::vector<Multiplier>& multipliers) {
+std::vector<int64_t> CertificateSearch::Offer(
+    const ProblemSubset& part, double delta,
+    const std::vector<Multiplier>& multipliers) {
   if (!(delta > 0) || NumUnknowns(part.problem()) > options_.max_unknowns) {
     return {};
   }
@@ -242,7 +250,7 @@ std::optional<Certificate> MakeCertificate(
   CheckInput(problem, multipliers, options);
   const std::vector<double> scores =
       SupportScores(problem, norm, estimate, gamma, multipliers);
-  Maker maker(problem, norm, options, context);
+  CertificateSearch search(problem, norm, options, context);
   std::vector<int64_t> previous;
   for (const double threshold : kThresholds) {
     const std::vector<int64_t> support =
@@ -251,11 +259,11 @@ std::optional<Certificate> MakeCertificate(
     previous = support;
     for (const std::vector<int64_t>& component :
          SplitIntoComponents(problem, support)) {
-      maker.Try(component, estimate, multipliers, threshold);
-      if (maker.IsEnough()) return maker.best();
+      search.Try(component, estimate, multipliers, threshold);
+      if (search.IsEnough()) return search.best();
     }
   }
-  return maker.best();
+  return search.best();
 }
 
 std::optional<Certificate> MakeInfeasibilityCertificate(
@@ -265,7 +273,7 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
   CheckInput(problem, multipliers, options);
   double largest = 0;
   for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
-  Maker maker(problem, norm, options, context);
+  CertificateSearch search(problem, norm, options, context);
   for (const double share : kSharesOfLargest) {
     std::vector<int64_t> candidates;
     for (size_t i = 0; i < multipliers.size(); ++i) {
@@ -273,10 +281,10 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
         candidates.push_back(static_cast<int64_t>(i));
       }
     }
-    maker.TryBalanced(bound, multipliers, candidates);
-    if (maker.IsEnough()) break;
+    search.TryBalanced(bound, multipliers, candidates);
+    if (search.IsEnough()) break;
   }
-  return maker.best();
+  return search.best();
 }
 
 Certificate InWhole(const ProblemSubset& part, Certificate certificate) {
