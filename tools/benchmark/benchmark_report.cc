@@ -1,6 +1,6 @@
 #include "tools/benchmark/benchmark_report.h"
 
-#include "krot/report/write_file.h"
+#include "krot/base/write_file.h"
 
 namespace krot {
 namespace {
