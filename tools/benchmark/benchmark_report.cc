@@ -53,7 +53,7 @@ void PublishReport(const BenchmarkReport& report,
     WriteFileAtomically(options.report_path, json.dump(2) + "\n");
   }
   if (!options.plot_path.empty() && report.plot) {
-    WriteFileAtomically(options.plot_path, ToSvg(*report.plot));
+    WriteFileAtomically(options.plot_path, ToGnuplot(*report.plot));
   }
 }
 
