@@ -12,7 +12,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/file_bytes.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
@@ -47,8 +46,8 @@ std::string ReadingError(const fs::path& folder) {
 std::string WritingError(const fs::path& folder) {
   const WriteModelOptions options;
   const std::string error =
-      ModelErrorOf([&] { CheckWritable(folder, options); });
-  EXPECT_EQ(ModelErrorOf([&] { WriteModel(TinyModel(), folder, options); }),
+      WriteErrorOf([&] { CheckWritable(folder, options); });
+  EXPECT_EQ(WriteErrorOf([&] { WriteModel(TinyModel(), folder, options); }),
             error);
   return error;
 }
@@ -266,7 +265,7 @@ TEST(ModelIo, LeavesTheOldModelAndNoTracesIfWritingFails) {
   Model unwritable = TinyModel();
   unwritable.images[0].name = "not\ntext";
   for (const char* target : {"model", "new/deep"}) {
-    EXPECT_THAT(ModelErrorOf([&] {
+    EXPECT_THAT(WriteErrorOf([&] {
                   Write(unwritable, folder / target, ModelFormat::kText);
                 }),
                 HasSubstr("found the name"));
@@ -274,11 +273,6 @@ TEST(ModelIo, LeavesTheOldModelAndNoTracesIfWritingFails) {
   EXPECT_THAT(ReadModel(folder / "model", ModelFormat::kBinary),
               IsModel(TinyModel()));
   EXPECT_THAT(FileNames(folder.path()), ElementsAre("model"));
-}
-
-TEST(ModelIo, ReportsAFullDisk) {
-  EXPECT_EQ(ModelErrorOf([] { WriteFileBytes("/dev/full", "bytes"); }),
-            "/dev/full: cannot be written: No space left on device");
 }
 
 // A process that keeps replacing one model by another is killed at any time:

@@ -14,11 +14,11 @@ using ::testing::Not;
 
 SolveReport SomeReport() {
   SolveReport report;
-  report.version = "1.2.3";
+  report.run.version = "1.2.3";
   report.command = "solver";
   report.method = "res_int";
-  report.threads = 2;
-  report.seed = 18446744073709551615u;
+  report.run.threads = 2;
+  report.run.seed = 18446744073709551615u;
   SolveSummary& summary = report.summary;
   summary.termination = SolveTermination::kStalled;
   summary.method = SolveMethod::kResInt;

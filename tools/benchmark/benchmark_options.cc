@@ -18,7 +18,8 @@ void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser) {
   parser->AddPath("report_path", &options->report_path, false, "a file",
                   "Where the same goes as JSON");
   parser->AddPath("plot_path", &options->plot_path, false, "a file",
-                  "Where the plot goes as SVG");
+                  "Where the plot goes, as a script with which gnuplot "
+                  "prints an SVG");
   parser->Add({"random_seed", "What random instances are made from",
                "an integer >= 0", std::to_string(options->random_seed), false,
                [options](const std::string& text) {

@@ -4,11 +4,11 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
+#include "krot/base/write_file.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/adjustment_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/adjustment_options.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
@@ -64,13 +64,13 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   const Context context{num_threads, &CatchInterrupts()};
   const WriteModelOptions write_options = CheckModelPaths(paths);
   AdjustmentReport report;
-  report.version = KROT_VERSION;
-  report.threads = ResolveNumThreads(num_threads);
-  report.seed = common.random_seed;
+  report.run.version = KROT_VERSION;
+  report.run.threads = ResolveNumThreads(num_threads);
+  report.run.seed = common.random_seed;
 
   const Timer read_timer;
   const Model model = ReadValidModel(paths.input_path);
-  report.seconds_read = read_timer.Seconds();
+  report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 
   AdjustModelResult result =
@@ -79,17 +79,17 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
 
   LogLine(common.log, 2, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModelTo(result.model, paths.output_path, write_options);
-  report.seconds_write = write_timer.Seconds();
-  report.seconds_total = total_timer.Seconds();
-  report.peak_memory_bytes = PeakMemoryBytes();
+  WriteModel(result.model, paths.output_path, write_options);
+  report.run.seconds_write = write_timer.Seconds();
+  report.run.seconds_total = total_timer.Seconds();
+  report.run.peak_memory_bytes = PeakMemoryBytes();
   const std::string report_json = AdjustmentJson(report);
   if (!paths.report_path.empty()) {
     LogLine(common.log, 2, "writing " + paths.report_path);
     WriteFileAtomically(paths.report_path, report_json);
   }
   WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                report.threads, common.log);
+                report.run.threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
   return kExitDone;
 }

@@ -1,7 +1,7 @@
 #include "tools/krot/html_path.h"
 
+#include "krot/base/write_file.h"
 #include "krot/report/html_page.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/model_files.h"
 
 namespace krot {

@@ -6,9 +6,9 @@
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/analysis/overlay.h"
+#include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/report/comparison_report.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/html_path.h"
@@ -88,13 +88,9 @@ WriteModelOptions OverlayWriteOptions(const ComparerOptions& options) {
   return write;
 }
 
-bool IsSameFolder(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::equivalent(a, b, error) && !error;
-}
-
 // What can be known before the models are read.
-void CheckPaths(const ComparerOptions& options, const OptionParser& parser) {
+void CheckComparerPaths(const ComparerOptions& options,
+                        const OptionParser& parser) {
   if (options.overlay_path.empty()) {
     for (const char* name : {"output_type", "overwrite"}) {
       if (parser.IsGiven(name)) {
@@ -110,7 +106,7 @@ void CheckPaths(const ComparerOptions& options, const OptionParser& parser) {
                           ", must not be a model that is compared");
       }
     }
-    CheckModelWritable(options.overlay_path, OverlayWriteOptions(options));
+    CheckWritable(options.overlay_path, OverlayWriteOptions(options));
   }
   if (!options.output_path.empty()) {
     const fs::path folder = options.output_path;
@@ -194,7 +190,7 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
     PrintTable(options.common.log, parser.Help());
     return kExitDone;
   }
-  CheckPaths(options, parser);
+  CheckComparerPaths(options, parser);
   const Model model1 = ReadValidModel(options.input_path1);
   const Model model2 = ReadValidModel(options.input_path2);
 
@@ -208,8 +204,8 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   const Model aligned =
       TransformModel(model2, report.summary.world1_from_world2);
   if (!options.overlay_path.empty()) {
-    WriteModelTo(OverlayModels(model1, aligned), options.overlay_path,
-                 OverlayWriteOptions(options));
+    WriteModel(OverlayModels(model1, aligned), options.overlay_path,
+               OverlayWriteOptions(options));
   }
   if (!options.output_path.empty()) {
     WriteErrorFiles(options.output_path, report.summary, table);

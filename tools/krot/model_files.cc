@@ -4,20 +4,14 @@
 #include <filesystem>
 #include <system_error>
 
-#include "krot/model/model_error.h"
+#include "krot/base/write_file.h"
 #include "krot/model/validate.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/html_path.h"
 
 namespace krot {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool IsSameFolder(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::equivalent(a, b, error) && !error;
-}
 
 ModelFormat OutputFormat(const ModelPaths& paths) {
   const ModelFormat input_format = DetectModelFormat(paths.input_path);
@@ -72,7 +66,7 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   options.format = OutputFormat(paths);
   options.overwrite = paths.overwrite;
   options.copy_project_from = paths.input_path;
-  CheckModelWritable(paths.output_path, options);
+  CheckWritable(paths.output_path, options);
   CheckSidePath("report_path", paths.report_path, paths.output_path);
   CheckHtmlPath(paths.html_path, paths.report_path, paths.output_path);
   return options;
@@ -85,28 +79,15 @@ void CheckSidePath(const std::string& option, const std::string& path,
   CheckFileWritable(path, folder_to_come);
 }
 
+bool IsSameFolder(const std::string& a, const std::string& b) {
+  std::error_code error;
+  return fs::equivalent(a, b, error) && !error;
+}
+
 Model ReadValidModel(const std::string& path) {
   Model model = ReadModel(path, DetectModelFormat(path));
   ValidateModel(model);
   return model;
-}
-
-void CheckModelWritable(const std::string& path,
-                        const WriteModelOptions& options) {
-  try {
-    CheckWritable(path, options);
-  } catch (const ModelError& error) {
-    throw CommandError(kExitNotWritten, error.what());
-  }
-}
-
-void WriteModelTo(const Model& model, const std::string& path,
-                  const WriteModelOptions& options) {
-  try {
-    WriteModel(model, path, options);
-  } catch (const ModelError& error) {
-    throw CommandError(kExitNotWritten, error.what());
-  }
 }
 
 }  // namespace krot

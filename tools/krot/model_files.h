@@ -22,8 +22,8 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
 
 // Throws OptionError where the paths contradict each other, ModelError where
-// no model lies at input_path, CommandError (kExitNotWritten) where the output
-// or a report could not be written. Changes nothing and reads no model.
+// no model lies at input_path, WriteError where the output or a report could
+// not be written. Changes nothing and reads no model.
 // Returns how to write.
 WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 
@@ -34,13 +34,10 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 void CheckSidePath(const std::string& option, const std::string& path,
                    const std::string& folder_to_come = "");
 
+// Whether both exist and are the same, under whatever names.
+bool IsSameFolder(const std::string& a, const std::string& b);
+
 // Reads and validates. Throws ModelError.
 Model ReadValidModel(const std::string& path);
-
-// As in model_io.h, but what they throw is a CommandError (kExitNotWritten).
-void CheckModelWritable(const std::string& path,
-                        const WriteModelOptions& options);
-void WriteModelTo(const Model& model, const std::string& path,
-                  const WriteModelOptions& options);
 
 }  // namespace krot

@@ -175,16 +175,16 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   write_options.format =
       options.output_type == "TXT" ? ModelFormat::kText : ModelFormat::kBinary;
   write_options.overwrite = options.overwrite;
-  CheckModelWritable(options.output_path, write_options);
+  CheckWritable(options.output_path, write_options);
   const bool wants_ground_truth = !options.ground_truth_path.empty();
   if (wants_ground_truth) {
-    CheckModelWritable(options.ground_truth_path, write_options);
+    CheckWritable(options.ground_truth_path, write_options);
   }
 
   const SyntheticScene scene = Synthesize(scene_options);
-  WriteModelTo(scene.model, options.output_path, write_options);
+  WriteModel(scene.model, options.output_path, write_options);
   if (wants_ground_truth) {
-    WriteModelTo(scene.ground_truth, options.ground_truth_path, write_options);
+    WriteModel(scene.ground_truth, options.ground_truth_path, write_options);
   }
   PrintTable(options.common.log, SceneTable(scene));
   return kExitDone;

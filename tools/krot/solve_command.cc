@@ -5,10 +5,10 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
+#include "krot/base/write_file.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/solve_progress.h"
@@ -18,11 +18,11 @@ namespace {
 
 SolveReport DescribeRun(const SolveCommand& command) {
   SolveReport report;
-  report.version = KROT_VERSION;
+  report.run.version = KROT_VERSION;
   report.command = command.name;
   report.method = command.method_name;
-  report.threads = ResolveNumThreads(command.context.num_threads);
-  report.seed = command.common.random_seed;
+  report.run.threads = ResolveNumThreads(command.context.num_threads);
+  report.run.seed = command.common.random_seed;
   return report;
 }
 
@@ -160,7 +160,7 @@ int RunSolveCommand(const SolveCommand& command) {
 
   const Timer read_timer;
   const Model model = ReadValidModel(paths.input_path);
-  report.seconds_read = read_timer.Seconds();
+  report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 
   SolveModelResult result = Solve(command, model, cancel);
@@ -175,10 +175,10 @@ int RunSolveCommand(const SolveCommand& command) {
   }
   LogLine(log, 2, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModelTo(result.model, paths.output_path, write_options);
-  report.seconds_write = write_timer.Seconds();
-  report.seconds_total = total_timer.Seconds();
-  report.peak_memory_bytes = PeakMemoryBytes();
+  WriteModel(result.model, paths.output_path, write_options);
+  report.run.seconds_write = write_timer.Seconds();
+  report.run.seconds_total = total_timer.Seconds();
+  report.run.peak_memory_bytes = PeakMemoryBytes();
   const std::string report_json = SolveJson(report);
   if (!paths.report_path.empty()) {
     LogLine(log, 2, "writing " + paths.report_path);
