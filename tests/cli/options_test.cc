@@ -2,6 +2,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -230,6 +231,25 @@ TEST_F(Options, OfThePaperAreTakenWithItsSettings) {
        "1e-3", "--FastDescent.max_step", "5", "--FastDescent.max_iterations",
        "20", "--ResInt.max_sweeps", "2"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+// The one option of the descent that both settings obey.
+TEST_F(Options, ForIterationsPerBlockCountWithFastSettings) {
+  for (const Words& command : {Words{"solver", "--Solver.method", "res_int",
+                                     "--ResInt.max_sweeps", "1"},
+                               Words{"point_triangulator"}}) {
+    const auto cost_with = [&](const char* max_iterations) {
+      const KrotResult result = RunKrot(
+          command + Paths() +
+          Words{"--FastDescent.max_iterations", max_iterations, "--overwrite",
+                "1", "--report_path", folder_ / "report.json"});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      return nlohmann::json::parse(
+                 ReadBytes(folder_ / "report.json"))["cost_final"]
+          .get<double>();
+    };
+    EXPECT_GT(cost_with("1"), cost_with("100")) << command[0];
+  }
 }
 
 TEST_F(Options, ComeFromAProjectFileUnlessGivenExplicitly) {
