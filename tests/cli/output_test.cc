@@ -51,7 +51,7 @@ TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
     return Solve(folder_ / "output", {"--report_path", path});
   };
   ExpectNotWritten(report(folder_ / "missing/r.json"), names, "no folder");
-  ExpectNotWritten(report(folder_ / "input"), names, "is a folder");
+  ExpectNotWritten(report(folder_.path()), names, "is a folder");
   ExpectNotWritten(report("/dev/null"), names, "not a regular file");
 }
 

@@ -1,6 +1,4 @@
-#include <filesystem>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "krot/analysis/error_colors.h"
@@ -12,6 +10,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -35,8 +34,8 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "Another name for --path");
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many of the worst images and observations to list");
-  parser->AddPath("report_path", &options->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the report goes, as JSON");
   parser->AddPath("certificate_path", &options->certificate_path, false,
                   "a file",
                   "A certificate of this model: show what it proves, and the "
@@ -80,9 +79,7 @@ void CheckPaths(const AnalyzerOptions& options, const std::string& input_path,
                 const OptionParser& parser) {
   CheckSidePath("report_path", options.report_path, options.error_colors_path);
   if (!options.error_colors_path.empty()) {
-    std::error_code error;
-    if (std::filesystem::equivalent(input_path, options.error_colors_path,
-                                    error)) {
+    if (IsSamePath(input_path, options.error_colors_path)) {
       throw OptionError("--error_colors_path = " + options.error_colors_path +
                         ", must not be the model itself");
     }

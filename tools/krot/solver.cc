@@ -149,9 +149,9 @@ int RunSolver(const std::vector<std::string>& arguments) {
                       "model, and proves it; rotations, intrinsics and the "
                       "coordinate frame stay");
   AddModelPaths(&command.paths, &parser);
-  parser.AddPath("certificate_path", &command.certificate_path, false, "a file",
-                 "Where the proof of the lower bound goes, as JSON; see "
-                 "certificate_checker");
+  parser.AddOutputFile("certificate_path", &command.certificate_path,
+                       "Where the proof of the lower bound goes, as JSON; see "
+                       "certificate_checker");
   AddScheduleOptions(&command.options, &parser);
   AddPolishOption(&command.options, &parser);
   AddSolveOptions(&command.options, &parser);
