@@ -115,6 +115,24 @@ TEST_F(Output, HoldsTheReportIfToldSo) {
                                       "points3D.bin", "report.json"}));
 }
 
+// A solve is not thrown away with its report.
+TEST_F(Output, KeepsModelAndCertificateWhereTheReportCannotBeWritten) {
+  ASSERT_EQ(Solve(folder_ / "expected").exit_code, 0);
+  // Short enough for a name, too long with what it is called until complete.
+  const fs::path report = folder_ / std::string(250, 'r');
+  const KrotResult result =
+      Solve(folder_ / "output",
+            {"--report_path", report, "--html_path", folder_ / "page.html",
+             "--certificate_path", folder_ / "certificate.json"});
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, ::testing::EndsWith("cannot be written: File name "
+                                              "too long\n"));
+  EXPECT_EQ(FileNames(folder_.path()),
+            (std::vector<std::string>{"certificate.json", "expected", "input",
+                                      "output"}));
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "expected")));
+}
+
 TEST_F(Output, SplitsTablesFromProgress) {
   const KrotResult usual = Solve(folder_ / "a");
   EXPECT_THAT(usual.out, ::testing::HasSubstr("max error"));

@@ -158,6 +158,7 @@ int RunSolveCommand(const SolveCommand& command) {
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
+  WriteCertificate(command, report.summary);
   const Model model = ReadValidModel(paths.input_path);
   report.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
@@ -185,7 +186,6 @@ int RunSolveCommand(const SolveCommand& command) {
   }
   WriteHtmlPage(paths.html_path, report_json, model, result.model,
                 command.options.num_threads, log);
-  WriteCertificate(command, report.summary);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);
   return kExitDone;
