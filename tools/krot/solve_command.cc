@@ -124,7 +124,7 @@ void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   const LogOptions& log = command.common.log;
   if (summary.method == SolveMethod::kResInt) return;
   if (summary.termination != SolveTermination::kGapReached &&
-      !IsZeroUpToRounding(summary)) {
+      summary.termination != SolveTermination::kZeroCost) {
     LogLine(log, 0, "warning: " + MissedGapSentence(summary));
   }
   if (!command.certificate_path.empty() && !summary.certificate) {

@@ -3,9 +3,10 @@
 #include <functional>
 #include <optional>
 
+#include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
-#include "krot/joint/joint.h"
 
 namespace krot {
 
@@ -44,7 +45,8 @@ class CertifiedSolve {
 
  private:
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
+           IsZeroUpToRounding(cost_);
   }
   InteriorPointTermination RunFromEstimate(
       double start_margin, const IsWorthProving& is_worth_proving,

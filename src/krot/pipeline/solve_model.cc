@@ -78,8 +78,10 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
                   summary->cost_final
             : 0;
   }
-  if (summary->termination == SolveTermination::kGapReached &&
-      !(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
+  if (summary->termination != SolveTermination::kGapReached) return;
+  if (IsZeroUpToRounding(summary->cost_final)) {
+    summary->termination = SolveTermination::kZeroCost;
+  } else if (!(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
     summary->termination = SolveTermination::kStalled;
   }
 }

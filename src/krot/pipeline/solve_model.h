@@ -11,9 +11,9 @@
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
 #include "krot/bridge/certificate_support.h"
+#include "krot/joint/joint.h"
 #include "krot/model/model.h"
 #include "krot/pipeline/polish.h"
-#include "krot/joint/joint.h"
 #include "krot/sweeps/res_int.h"
 
 namespace krot {
@@ -37,6 +37,7 @@ enum class SolveTermination {
   kNotRun,
   kNothingToSolve,  // every observation was left out
   kGapReached,      // a certificate shows the relative gap asked for
+  kZeroCost,        // every residual is zero up to rounding: no gap is needed
   kStalled,         // no further progress, and no proof that there is none
   kMaxSweeps,
   kMaxIterations,

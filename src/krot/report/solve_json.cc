@@ -14,6 +14,8 @@ const char* TerminationName(SolveTermination termination) {
   switch (termination) {
     case SolveTermination::kGapReached:
       return "gap_reached";
+    case SolveTermination::kZeroCost:
+      return "zero_cost";
     case SolveTermination::kStalled:
       return "stalled";
     case SolveTermination::kMaxSweeps:

@@ -8,11 +8,6 @@
 
 namespace krot {
 
-bool IsZeroUpToRounding(const SolveSummary& summary) {
-  constexpr double kRoundingPx = 1e-9;
-  return summary.cost_final < kRoundingPx;
-}
-
 std::string MissedGapSentence(const SolveSummary& summary) {
   const std::string why =
       summary.termination == SolveTermination::kMaxIterations
