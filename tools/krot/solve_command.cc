@@ -26,17 +26,6 @@ SolveReport DescribeRun(const SolveCommand& command) {
   return report;
 }
 
-SolveProgress::Goals ProgressGoals(const SolveModelOptions& options) {
-  SolveProgress::Goals goals;
-  goals.relative_gap = options.joint.relative_gap;
-  const bool is_auto = EffectiveMethod(options) == SolveMethod::kAuto;
-  goals.sweep_tolerance = is_auto ? options.leading_sweep_tolerance
-                                  : options.res_int.sweep_tolerance;
-  goals.max_sweeps =
-      is_auto ? options.max_leading_sweeps : options.res_int.max_sweeps;
-  return goals;
-}
-
 std::string ProblemWords(const SolveSummary& summary) {
   return Counted(summary.num_images, "image") + ", " +
          Counted(summary.num_points, "point") + ", " +
@@ -60,19 +49,10 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
                        const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   SolveModelOptions options = command.options;
-  SolveProgress progress(log, ProgressGoals(options));
+  SolveProgress progress(log, SolveProgress::GoalsOf(options));
+  progress.Follow(&options);
   options.cancel = &cancel;
   options.describe_certificate = !command.certificate_path.empty();
-  options.res_int.callback = [&progress](int sweep, const Sweep& state) {
-    progress.Update(sweep, state);
-  };
-  options.joint.callback = [&progress](int iteration,
-                                       const JointIteration& state) {
-    progress.Update(iteration, state);
-  };
-  options.on_note = [&log](const std::string& sentence) {
-    LogLine(log, 1, sentence);
-  };
   options.on_built = [&](const SolveSummary& summary) {
     ThrowIfInterrupted();
     if (summary.num_observations == 0) {
@@ -80,7 +60,7 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
     }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
-  SolveModelResult result = command.solve(model, options);
+  SolveModelResult result = SolveModel(model, options);
   progress.Finish();
   ThrowIfInterrupted();
   return result;
@@ -158,7 +138,6 @@ int RunSolveCommand(const SolveCommand& command) {
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
-  WriteCertificate(command, report.summary);
   const Model model = ReadValidModel(paths.input_path);
   report.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
@@ -179,6 +158,7 @@ int RunSolveCommand(const SolveCommand& command) {
   report.seconds_write = write_timer.Seconds();
   report.seconds_total = total_timer.Seconds();
   report.peak_memory_bytes = PeakMemoryBytes();
+  WriteCertificate(command, report.summary);
   const std::string report_json = SolveJson(report);
   if (!paths.report_path.empty()) {
     LogLine(log, 2, "writing " + paths.report_path);

@@ -18,7 +18,6 @@ struct SolveCommand {
   std::string certificate_path;  // "": not wanted
   CommonOptions common;
   SolveModelOptions options;  // its callbacks and flag are set by the run
-  SolveModelResult (*solve)(const Model&, const SolveModelOptions&) = nullptr;
 };
 
 // Returns an exit code or throws. Nothing is written before the solve is done:

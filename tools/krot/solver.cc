@@ -143,7 +143,6 @@ void ExplainMethod(const SolveCommand& command) {
 int RunSolver(const std::vector<std::string>& arguments) {
   SolveCommand command;
   command.name = "solver";
-  command.solve = &SolveModel;
   OptionParser parser(command.name,
                       "finds the lowest largest reprojection error of a COLMAP "
                       "model, and proves it; rotations, intrinsics and the "

@@ -119,7 +119,18 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
-SolveModelResult Solve(const Model& model, const SolveModelOptions& options) {
+}  // namespace
+
+SolveMethod EffectiveMethod(const SolveModelOptions& options) {
+  if (options.method != SolveMethod::kAuto) return options.method;
+  const bool as_in_paper =
+      options.res_int.fast_descent.settings == FastDescentSettings::kPaper;
+  return as_in_paper || !HasJointSolver(options.norm) ? SolveMethod::kResInt
+                                                      : SolveMethod::kAuto;
+}
+
+SolveModelResult SolveModel(const Model& model,
+                            const SolveModelOptions& options) {
   CheckOptions(options);
   SolveModelResult result;
   SolveSummary& summary = result.summary;
@@ -172,30 +183,18 @@ SolveModelResult Solve(const Model& model, const SolveModelOptions& options) {
   return result;
 }
 
-}  // namespace
-
-SolveMethod EffectiveMethod(const SolveModelOptions& options) {
-  if (options.method != SolveMethod::kAuto) return options.method;
-  const bool as_in_paper =
-      options.res_int.fast_descent.settings == FastDescentSettings::kPaper;
-  return as_in_paper || !HasJointSolver(options.norm) ? SolveMethod::kResInt
-                                                      : SolveMethod::kAuto;
-}
-
-SolveModelResult SolveModel(const Model& model,
-                            const SolveModelOptions& options) {
-  return Solve(model, options);
-}
-
 SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options) {
-  SolveModelOptions points_only = options;
-  points_only.method = SolveMethod::kResInt;
-  points_only.init = SolveInit::kModel;
-  points_only.polish = Polish::kNone;
-  points_only.res_int.update_frames = false;
-  points_only.res_int.max_sweeps = 1;
-  return Solve(model, points_only);
+  return SolveModel(model, PointsOnly(options));
+}
+
+SolveModelOptions PointsOnly(SolveModelOptions options) {
+  options.method = SolveMethod::kResInt;
+  options.init = SolveInit::kModel;
+  options.polish = Polish::kNone;
+  options.res_int.update_frames = false;
+  options.res_int.max_sweeps = 1;
+  return options;
 }
 
 }  // namespace krot

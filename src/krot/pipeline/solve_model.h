@@ -151,10 +151,13 @@ struct SolveModelResult {
 SolveModelResult SolveModel(const Model& model,
                             const SolveModelOptions& options);
 
-// The same with all frames fixed. Points do not depend on each other then, so
-// one sweep is all there is: method, init and the number of sweeps are ignored.
+// The same with all frames fixed: SolveModel with PointsOnly(options).
 SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options);
+
+// Points do not depend on each other with the frames fixed, so one sweep is all
+// there is: method, init, polish and the number of sweeps are replaced.
+SolveModelOptions PointsOnly(SolveModelOptions options);
 
 // The method that SolveModel uses for these options.
 SolveMethod EffectiveMethod(const SolveModelOptions& options);
