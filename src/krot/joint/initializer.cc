@@ -130,9 +130,10 @@ InitializerTermination StartSearch::Run(Estimate* start) {
     return InitializerTermination::kInterrupted;
   }
   if (found != InteriorPointTermination::kFeasible) {
+    CertificateOptions proof;
+    proof.cancel = options_.cancel;
     const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
-        part_.problem, options_.norm, options_.max_error, multipliers,
-        CertificateOptions());
+        part_.problem, options_.norm, options_.max_error, multipliers, proof);
     if (certificate && Proves(*certificate)) {
       return InitializerTermination::kInfeasible;
     }
