@@ -100,6 +100,7 @@ std::string SolveJson(const SolveReport& report) {
     left_out[LeftOutName(static_cast<LeftOut>(reason))] =
         summary.left_out[reason];
   }
+  left_out["single_ray"] = 0;  // a key that once was stays
   Json sweeps = Json::array();
   for (const Sweep& sweep : summary.sweeps) {
     sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
