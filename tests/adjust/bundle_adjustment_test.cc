@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <ceres/autodiff_cost_function.h>
@@ -291,15 +293,59 @@ TEST(AdjustBundle, StopsWhenCancelled) {
   EXPECT_LT(CostOf(result.model), CostOf(model));
 }
 
-TEST(AdjustBundle, RefusesPanoramasAndOptionsOutOfRange) {
+TEST(AdjustBundle, RefusesOptionsOutOfRangeByName) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  using Options = BundleAdjustmentOptions;
+  const auto message = [&](const auto& set) -> std::string {
+    Options options;
+    set(&options);
+    try {
+      AdjustBundle(model, options);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  for (const auto& [name, member] :
+       {std::pair("min_track_length", &Options::min_track_length),
+        std::pair("max_linear_solver_iterations",
+                  &Options::max_linear_solver_iterations)}) {
+    EXPECT_EQ(message([m = member](Options* options) { options->*m = 0; }),
+              std::string(name) + " = 0, must be >= 1");
+  }
+  for (const auto& [name, member] :
+       {std::pair("max_num_iterations", &Options::max_num_iterations),
+        std::pair("max_num_images_direct_dense",
+                  &Options::max_num_images_direct_dense),
+        std::pair("max_num_images_direct_sparse",
+                  &Options::max_num_images_direct_sparse)}) {
+    EXPECT_EQ(message([m = member](Options* options) { options->*m = -1; }),
+              std::string(name) + " = -1, must be >= 0");
+  }
+  for (const auto& [name, member] :
+       {std::pair("function_tolerance", &Options::function_tolerance),
+        std::pair("gradient_tolerance", &Options::gradient_tolerance),
+        std::pair("parameter_tolerance", &Options::parameter_tolerance)}) {
+    for (const double value : {-1.0, std::nan("")}) {
+      EXPECT_THAT(
+          message([&, m = member](Options* options) { options->*m = value; }),
+          testing::AllOf(testing::StartsWith(name),
+                         testing::EndsWith(", must be >= 0")));
+    }
+  }
+  EXPECT_EQ(message([](Options* options) { options->loss_scale = 0; }),
+            "loss_scale = 0, must be > 0");
+  EXPECT_EQ(message([](Options* options) { options->max_error = 0; }),
+            "max_error = 0, must be > 0");
+  EXPECT_THAT(message([](Options* options) {
+                options->max_error = 3;
+                options->loss = RobustLoss::kHuber;
+              }),
+              testing::HasSubstr("trivial with a max_error"));
+}
+
+TEST(AdjustBundle, RefusesPanoramas) {
   Model model = SynthesizeScene(SmallScene()).model;
-  BundleAdjustmentOptions options;
-  options.loss_scale = 0;
-  EXPECT_THROW(AdjustBundle(model, options, kOneThread), std::invalid_argument);
-  options = {};
-  options.max_error = 3;
-  options.loss = RobustLoss::kHuber;
-  EXPECT_THROW(AdjustBundle(model, options, kOneThread), std::invalid_argument);
   model.cameras[0].model_id = 17;
   model.cameras[0].params = {1024, 512};
   EXPECT_THROW(AdjustBundle(model, {}, kOneThread), ModelError);

@@ -217,6 +217,25 @@ TEST(FindStart, ReportsEveryIterationWithTheBoundThatItSeeks) {
   EXPECT_LT(summary.iterations.back().target, 100);  // lowered
 }
 
+// Set behind the last iteration, when the proof is all that is left to do.
+TEST(FindStart, IsInterruptedWhileInfeasibilityIsBeingProved) {
+  const RandomScene scene = MakeSmallScene(33);
+  Estimate estimate;
+  const InitializerSummary proved =
+      FindStart(scene.problem, Options(Norm::L2(), 1e-3), &estimate);
+  ASSERT_EQ(proved.termination, InitializerTermination::kInfeasible);
+  CancelFlag is_cancelled = false;
+  InitializerOptions options = Options(Norm::L2(), 1e-3);
+  options.cancel = &is_cancelled;
+  options.callback = [&](int iteration, const JointIteration&) {
+    is_cancelled = iteration == static_cast<int>(proved.iterations.size());
+  };
+  const InitializerSummary summary =
+      FindStart(scene.problem, options, &estimate);
+  EXPECT_EQ(summary.termination, InitializerTermination::kInterrupted);
+  EXPECT_FALSE(summary.certificate);
+}
+
 TEST(FindStart, IsInterruptedAtAnyIteration) {
   const RandomScene scene = MakeSmallScene(33);
   for (const double max_error : {100.0, 1e-3}) {

@@ -230,10 +230,33 @@ TEST(ModelIo, RefusesFoldersThatCannotBeCreatedOrReplaced) {
   EXPECT_THAT(FileNames(folder.path()), ElementsAre("file"));
 }
 
+// Root may read and write everywhere: for as long as this lives it is nobody,
+// whom the folder belongs to.
+class WithoutRoot {
+ public:
+  explicit WithoutRoot(const fs::path& folder) : is_root_(::geteuid() == 0) {
+    if (!is_root_) return;
+    constexpr uid_t kNobody = 65534;
+    EXPECT_EQ(::chown(folder.c_str(), kNobody, kNobody), 0);
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      EXPECT_EQ(::chown(entry.path().c_str(), kNobody, kNobody), 0);
+    }
+    EXPECT_EQ(::setresuid(kNobody, kNobody, 0), 0);
+  }
+  ~WithoutRoot() {
+    if (is_root_) {
+      EXPECT_EQ(::setresuid(0, 0, 0), 0);
+    }
+  }
+
+ private:
+  const bool is_root_;
+};
+
 TEST(ModelIo, RefusesFoldersWithoutWritePermission) {
-  if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
   const TempFolder folder;
   fs::create_directories(folder / "parent/model");
+  const WithoutRoot without_root(folder.path());
   fs::permissions(folder / "parent",
                   fs::perms::owner_read | fs::perms::owner_exec);
   EXPECT_THAT(WritingError(folder / "parent/new"),
@@ -244,9 +267,9 @@ TEST(ModelIo, RefusesFoldersWithoutWritePermission) {
 }
 
 TEST(ModelIo, RefusesFoldersWithoutReadPermission) {
-  if (::geteuid() == 0) GTEST_SKIP() << "root may read everywhere";
   const TempFolder folder;
   Write(TinyModel(), folder / "model");
+  const WithoutRoot without_root(folder.path());
   fs::permissions(folder / "model", fs::perms::owner_read);
   EXPECT_THAT(DetectionError(folder / "model"),
               HasSubstr("cannot be read: Permission denied"));

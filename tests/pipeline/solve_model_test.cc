@@ -84,7 +84,7 @@ TEST(SolveModel, CountsIterationsAndSecondsOverAllStages) {
     EXPECT_EQ(iteration, ++calls);
   };
   const SolveSummary summary =
-      SolveModel(SynthesizeScene({}).model, options).summary;
+      SolveModel(SynthesizeScene(NoisyScene()).model, options).summary;
   EXPECT_EQ(static_cast<int>(summary.iterations.size()), calls);
   const auto is_joint = [](const JointIteration& state) {
     return !state.target;
@@ -114,6 +114,34 @@ TEST(SolveModel, ListsTheSupportWorstFirstWithMultipliersOfSumOne) {
   EXPECT_NEAR(sum, 1, 1e-12);
   // All of it lies at the maximum, but for the gap.
   EXPECT_GT(last_px, 0.98 * summary.cost_final);
+}
+
+TEST(SolveModel, IsDoneAtOnceWhereEveryErrorIsZero) {
+  SceneOptions scene;
+  scene.num_frames = 8;
+  scene.num_points = 100;
+  const Model model = SynthesizeScene(scene).model;
+  ASSERT_LT(CostOf(model), 1e-9);
+  for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kJoint}) {
+    SolveModelOptions options;
+    options.method = method;
+    const SolveModelResult result = SolveModel(model, options);
+    EXPECT_EQ(result.summary.termination, SolveTermination::kZeroCost);
+    EXPECT_TRUE(result.summary.sweeps.empty());
+    EXPECT_TRUE(result.summary.iterations.empty());
+    EXPECT_LT(CostOf(result.model), 1e-9);
+  }
+}
+
+TEST(SolveModel, EndsWhereEveryErrorHasBecomeZero) {
+  SceneOptions scene = NoisyScene();
+  scene.pixel_noise = 0;
+  const Model model = SynthesizeScene(scene).model;
+  ASSERT_GT(CostOf(model), 1);
+  const SolveModelResult result = SolveModel(model, {});
+  EXPECT_EQ(result.summary.termination, SolveTermination::kZeroCost);
+  EXPECT_LT(result.summary.iterations.size(), 60u);
+  EXPECT_LT(CostOf(result.model), 1e-9);
 }
 
 TEST(SolveModel, BoundsNothingBySweepsAlone) {

@@ -15,6 +15,7 @@
 #include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/solve_progress.h"
 
 namespace krot {
 namespace {
@@ -41,10 +42,10 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
       [&log](const BundleAdjustmentIteration& iteration) {
         LogLine(log, 1, IterationLine(iteration));
       };
-  context.on_note = [&log](const std::string& sentence) {
-    LogLine(log, 1, sentence);
-  };
+  SolveProgress progress(log, SolveProgress::GoalsOf(options.start));
+  progress.Follow(&options.start, &context);
   AdjustModelResult result = AdjustModel(model, options, context);
+  progress.Finish();
   ThrowIfInterrupted();
   const AdjustModelSummary& summary = result.summary;
   switch (summary.adjustment.termination) {

@@ -10,6 +10,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -33,8 +34,8 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "Another name for --path");
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many of the worst images and observations to list");
-  parser->AddPath("report_path", &options->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the report goes, as JSON");
   parser->AddPath("certificate_path", &options->certificate_path, false,
                   "a file",
                   "A certificate of this model: show what it proves, and the "
@@ -79,7 +80,7 @@ void CheckAnalyzerPaths(const AnalyzerOptions& options,
                         const OptionParser& parser) {
   CheckSidePath("report_path", options.report_path, options.error_colors_path);
   if (!options.error_colors_path.empty()) {
-    if (IsSameFolder(input_path, options.error_colors_path)) {
+    if (IsSamePath(input_path, options.error_colors_path)) {
       throw OptionError("--error_colors_path = " + options.error_colors_path +
                         ", must not be the model itself");
     }

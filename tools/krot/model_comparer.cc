@@ -2,6 +2,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "krot/analysis/model_comparison.h"
@@ -13,6 +14,7 @@
 #include "tools/krot/common_options.h"
 #include "tools/krot/html_path.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -55,8 +57,8 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
   parser->AddPath("output_path", &options->output_path, false, "a folder",
                   "Where errors.csv (per image, as COLMAP's) and "
                   "errors_summary.txt (the tables) go; created if need be");
-  parser->AddPath("report_path", &options->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the report goes, as JSON");
   AddHtmlPath(&options->html_path, parser);
   parser->AddPath("certificate_path1", &options->certificate_path1, false,
                   "a file",
@@ -101,7 +103,7 @@ void CheckComparerPaths(const ComparerOptions& options,
   } else {
     for (const std::string& input :
          {options.input_path1, options.input_path2}) {
-      if (IsSameFolder(input, options.overlay_path)) {
+      if (IsSamePath(input, options.overlay_path)) {
         throw OptionError("--overlay_path = " + options.overlay_path +
                           ", must not be a model that is compared");
       }
@@ -113,10 +115,17 @@ void CheckComparerPaths(const ComparerOptions& options,
     const fs::path folder_to_come = fs::exists(folder) ? fs::path() : folder;
     for (const char* name : {kErrorsName, kTableName}) {
       CheckFileWritable(folder / name, folder_to_come);
+      for (const auto& [option, path] :
+           {std::pair("report_path", options.report_path),
+            std::pair("html_path", options.html_path)}) {
+        if (!IsSamePath(folder / name, path)) continue;
+        throw OptionError("--" + std::string(option) + " = " + path +
+                          ", must not be " + name + " of --output_path");
+      }
     }
   }
   CheckSidePath("report_path", options.report_path, options.overlay_path);
-  CheckHtmlPath(options.html_path, options.report_path, options.overlay_path);
+  CheckSidePath("html_path", options.html_path, options.overlay_path);
 }
 
 std::optional<CertificateVerdict> Verify(const Model& model,

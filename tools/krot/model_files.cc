@@ -2,11 +2,11 @@
 
 #include <array>
 #include <filesystem>
-#include <system_error>
 
 #include "krot/base/write_file.h"
 #include "krot/model/validate.h"
 #include "tools/krot/html_path.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -25,13 +25,14 @@ void CheckSideName(const std::string& option, const std::string& path) {
   constexpr std::array<const char*, 5> kStems = {"cameras", "rigs", "frames",
                                                  "images", "points3D"};
   const fs::path name = fs::path(path).filename();
+  bool is_taken = name == "project.ini";
   for (const char* stem : kStems) {
-    if (name.stem() == stem &&
-        (name.extension() == ".bin" || name.extension() == ".txt")) {
-      throw OptionError("--" + option + " = " + path +
-                        ", must not bear the name of a model's file");
-    }
+    is_taken |= name.stem() == stem &&
+                (name.extension() == ".bin" || name.extension() == ".txt");
   }
+  if (!is_taken) return;
+  throw OptionError("--" + option + " = " + path +
+                    ", must not bear the name of a model's file");
 }
 
 }  // namespace
@@ -44,8 +45,8 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);
-  parser->AddPath("report_path", &paths->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &paths->report_path,
+                        "Where the report goes, as JSON");
   AddHtmlPath(&paths->html_path, parser);
 }
 
@@ -57,7 +58,7 @@ void AddOverwrite(bool* overwrite, OptionParser* parser) {
 
 WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   CheckSideName("report_path", paths.report_path);
-  if (IsSameFolder(paths.input_path, paths.output_path) && !paths.overwrite) {
+  if (IsSamePath(paths.input_path, paths.output_path) && !paths.overwrite) {
     throw OptionError(
         "--output_path is --input_path; add --overwrite 1 to replace the "
         "model");
@@ -68,7 +69,7 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   options.copy_project_from = paths.input_path;
   CheckWritable(paths.output_path, options);
   CheckSidePath("report_path", paths.report_path, paths.output_path);
-  CheckHtmlPath(paths.html_path, paths.report_path, paths.output_path);
+  CheckSidePath("html_path", paths.html_path, paths.output_path);
   return options;
 }
 
@@ -77,11 +78,6 @@ void CheckSidePath(const std::string& option, const std::string& path,
   if (path.empty()) return;
   CheckSideName(option, path);
   CheckFileWritable(path, folder_to_come);
-}
-
-bool IsSameFolder(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::equivalent(a, b, error) && !error;
 }
 
 Model ReadValidModel(const std::string& path) {

@@ -34,9 +34,6 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 void CheckSidePath(const std::string& option, const std::string& path,
                    const std::string& folder_to_come = "");
 
-// Whether both exist and are the same, under whatever names.
-bool IsSameFolder(const std::string& a, const std::string& b);
-
 // Reads and validates. Throws ModelError.
 Model ReadValidModel(const std::string& path);
 

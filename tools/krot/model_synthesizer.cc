@@ -1,5 +1,4 @@
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "krot/camera/camera_model.h"
@@ -8,6 +7,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -103,24 +103,13 @@ void AddSynthesizerOptions(SynthesizerOptions* options, OptionParser* parser) {
                    &options->common, parser);
 }
 
-bool IsSamePath(const std::string& a, const std::string& b) {
-  const auto normal = [](const std::string& path) {
-    std::error_code ignored;
-    return (std::filesystem::weakly_canonical(path, ignored) / "")
-        .lexically_normal();
-  };
-  return normal(a) == normal(b);
-}
-
 SceneOptions ToSceneOptions(const SynthesizerOptions& options) {
   SceneOptions scene = options.scene;
   scene.layout =
       options.layout == "orbit" ? SceneLayout::kOrbit : SceneLayout::kStreet;
   scene.camera_model_id = FindCameraModel(options.camera_model)->id;
   scene.random_seed = options.common.random_seed;
-  if (options.ground_truth_path == options.output_path ||
-      (!options.ground_truth_path.empty() &&
-       IsSamePath(options.ground_truth_path, options.output_path))) {
+  if (IsSamePath(options.ground_truth_path, options.output_path)) {
     throw OptionError("--ground_truth_path is --output_path");
   }
   if (!scene.has_rigs && scene.sensors_per_rig > 1) {

@@ -27,7 +27,6 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   SolveCommand command;
   command.name = "point_triangulator";
   command.method_name = "intersection";
-  command.solve = &TriangulateModel;
   OptionParser parser(command.name,
                       "re-estimates every point of a COLMAP model for the "
                       "lowest largest reprojection error of its track; the "
@@ -44,6 +43,7 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   CheckSolveOptions(command.options, parser);
+  command.options = PointsOnly(command.options);
   return RunSolveCommand(command);
 }
 

@@ -26,17 +26,6 @@ SolveReport DescribeRun(const SolveCommand& command) {
   return report;
 }
 
-SolveProgress::Goals ProgressGoals(const SolveModelOptions& options) {
-  SolveProgress::Goals goals;
-  goals.relative_gap = options.joint.relative_gap;
-  const bool is_auto = EffectiveMethod(options) == SolveMethod::kAuto;
-  goals.sweep_tolerance = is_auto ? options.leading_sweep_tolerance
-                                  : options.res_int.sweep_tolerance;
-  goals.max_sweeps =
-      is_auto ? options.max_leading_sweeps : options.res_int.max_sweeps;
-  return goals;
-}
-
 std::string ProblemWords(const SolveSummary& summary) {
   return Counted(summary.num_images, "image") + ", " +
          Counted(summary.num_points, "point") + ", " +
@@ -60,20 +49,11 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
                        const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   SolveModelOptions options = command.options;
-  SolveProgress progress(log, ProgressGoals(options));
   Context context = command.context;
   context.cancel = &cancel;
+  SolveProgress progress(log, SolveProgress::GoalsOf(options));
+  progress.Follow(&options, &context);
   options.describe_certificate = !command.certificate_path.empty();
-  options.res_int.callback = [&progress](int sweep, const Sweep& state) {
-    progress.Update(sweep, state);
-  };
-  options.joint.callback = [&progress](int iteration,
-                                       const JointIteration& state) {
-    progress.Update(iteration, state);
-  };
-  context.on_note = [&log](const std::string& sentence) {
-    LogLine(log, 1, sentence);
-  };
   options.on_built = [&](const SolveSummary& summary) {
     ThrowIfInterrupted();
     if (summary.num_observations == 0) {
@@ -81,7 +61,7 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
     }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
-  SolveModelResult result = command.solve(model, options, context);
+  SolveModelResult result = SolveModel(model, options, context);
   progress.Finish();
   ThrowIfInterrupted();
   return result;
@@ -125,7 +105,7 @@ void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   const LogOptions& log = command.common.log;
   if (summary.method == SolveMethod::kResInt) return;
   if (summary.termination != SolveTermination::kGapReached &&
-      !IsZeroUpToRounding(summary)) {
+      summary.termination != SolveTermination::kZeroCost) {
     LogLine(log, 0, "warning: " + MissedGapSentence(summary));
   }
   if (!command.certificate_path.empty() && !summary.certificate) {
@@ -179,6 +159,7 @@ int RunSolveCommand(const SolveCommand& command) {
   report.run.seconds_write = write_timer.Seconds();
   report.run.seconds_total = total_timer.Seconds();
   report.run.peak_memory_bytes = PeakMemoryBytes();
+  WriteCertificate(command, report.summary);
   const std::string report_json = SolveJson(report);
   if (!paths.report_path.empty()) {
     LogLine(log, 2, "writing " + paths.report_path);
@@ -186,7 +167,6 @@ int RunSolveCommand(const SolveCommand& command) {
   }
   WriteHtmlPage(paths.html_path, report_json, model, result.model,
                 command.context.num_threads, log);
-  WriteCertificate(command, report.summary);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);
   return kExitDone;

@@ -7,12 +7,9 @@ namespace {
 
 // Those that FastDescentSettings::kFast does not look at.
 const std::vector<std::string> kPaperOnlyNames = {
-    "FastDescent.stationarity_tolerance",
-    "FastDescent.step_tolerance",
-    "FastDescent.slope_probe",
-    "FastDescent.active_tolerance",
-    "FastDescent.max_step",
-    "FastDescent.max_iterations"};
+    "FastDescent.stationarity_tolerance", "FastDescent.step_tolerance",
+    "FastDescent.slope_probe", "FastDescent.active_tolerance",
+    "FastDescent.max_step"};
 
 bool ParseNorm(const std::string& text, Norm* norm) {
   if (text == "inf") {

@@ -26,12 +26,22 @@ namespace krot {
 namespace {
 
 void CheckOptions(const BundleAdjustmentOptions& options) {
-  CheckArgument(options.min_track_length >= 1, "min_track_length",
-                options.min_track_length, ">= 1");
+  const auto at_least = [](auto least, const char* name, auto value) {
+    CheckArgument(value >= least, name, value, ">= " + std::to_string(least));
+  };
+  at_least(1, "min_track_length", options.min_track_length);
   CheckArgument(options.loss_scale > 0, "loss_scale", options.loss_scale,
                 "> 0");
-  CheckArgument(options.max_num_iterations >= 0, "max_num_iterations",
-                options.max_num_iterations, ">= 0");
+  at_least(0, "max_num_iterations", options.max_num_iterations);
+  at_least(1, "max_linear_solver_iterations",
+           options.max_linear_solver_iterations);
+  at_least(0, "function_tolerance", options.function_tolerance);
+  at_least(0, "gradient_tolerance", options.gradient_tolerance);
+  at_least(0, "parameter_tolerance", options.parameter_tolerance);
+  at_least(0, "max_num_images_direct_dense",
+           options.max_num_images_direct_dense);
+  at_least(0, "max_num_images_direct_sparse",
+           options.max_num_images_direct_sparse);
   if (!options.max_error) return;
   CheckArgument(*options.max_error > 0, "max_error", *options.max_error, "> 0");
   CheckArgument(options.loss == RobustLoss::kTrivial, "loss",

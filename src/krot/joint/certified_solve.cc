@@ -186,7 +186,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
                                      const IterationReport& report) {
   max_iterations_ = max_iterations;
   width_ = kFirstWidth;
-  if (!(cost_ > 0)) return JointTermination::kGapReached;
+  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
   double start_margin = kStartMargin;
   for (;;) {
     const InteriorPointTermination termination =

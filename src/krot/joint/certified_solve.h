@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 
@@ -45,7 +46,8 @@ class CertifiedSolve {
 
  private:
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
+           IsZeroUpToRounding(cost_);
   }
   InteriorPointTermination RunFromEstimate(double start_margin,
                                            const TakeEstimate& take,

@@ -65,7 +65,8 @@ class ComponentSolve {
     return Cost(problem_, estimate, options_.norm, context_.num_threads);
   }
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
+           IsZeroUpToRounding(cost_);
   }
   JointTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
@@ -166,7 +167,7 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
-  if (!(cost_ > 0)) return JointTermination::kGapReached;
+  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);

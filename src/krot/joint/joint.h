@@ -41,7 +41,7 @@ struct JointOptions {
 
 enum class JointTermination {
   kNotRun,
-  kGapReached,  // certified
+  kGapReached,  // certified, or a cost that is zero up to rounding
   kMaxIterations,
   kStalled,  // rounding ended the progress before the gap was reached
   kInterrupted,

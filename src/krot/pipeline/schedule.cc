@@ -164,6 +164,11 @@ std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
   summary->cost_initial =
       Cost(problem, *estimate, options.norm, context.num_threads);
   summary->cost_final = summary->cost_initial;
+  if (method != SolveMethod::kResInt &&
+      IsZeroUpToRounding(summary->cost_initial)) {
+    summary->termination = SolveTermination::kZeroCost;
+    return std::nullopt;
+  }
   Schedule schedule(problem, options, context, timer, estimate, summary);
   switch (method) {
     case SolveMethod::kResInt:

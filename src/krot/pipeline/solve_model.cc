@@ -78,8 +78,10 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
                   summary->cost_final
             : 0;
   }
-  if (summary->termination == SolveTermination::kGapReached &&
-      !(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
+  if (summary->termination != SolveTermination::kGapReached) return;
+  if (IsZeroUpToRounding(summary->cost_final)) {
+    summary->termination = SolveTermination::kZeroCost;
+  } else if (!(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
     summary->termination = SolveTermination::kStalled;
   }
 }
@@ -116,8 +118,19 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
-SolveModelResult Solve(const Model& model, const SolveModelOptions& options,
-                       const Context& context) {
+}  // namespace
+
+SolveMethod EffectiveMethod(const SolveModelOptions& options) {
+  if (options.method != SolveMethod::kAuto) return options.method;
+  const bool as_in_paper =
+      options.res_int.fast_descent.settings == FastDescentSettings::kPaper;
+  return as_in_paper || !HasJointSolver(options.norm) ? SolveMethod::kResInt
+                                                      : SolveMethod::kAuto;
+}
+
+SolveModelResult SolveModel(const Model& model,
+                            const SolveModelOptions& options,
+                            const Context& context) {
   CheckOptions(options);
   SolveModelResult result;
   SolveSummary& summary = result.summary;
@@ -171,32 +184,19 @@ SolveModelResult Solve(const Model& model, const SolveModelOptions& options,
   return result;
 }
 
-}  // namespace
-
-SolveMethod EffectiveMethod(const SolveModelOptions& options) {
-  if (options.method != SolveMethod::kAuto) return options.method;
-  const bool as_in_paper =
-      options.res_int.fast_descent.settings == FastDescentSettings::kPaper;
-  return as_in_paper || !HasJointSolver(options.norm) ? SolveMethod::kResInt
-                                                      : SolveMethod::kAuto;
-}
-
-SolveModelResult SolveModel(const Model& model,
-                            const SolveModelOptions& options,
-                            const Context& context) {
-  return Solve(model, options, context);
-}
-
 SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options,
                                   const Context& context) {
-  SolveModelOptions points_only = options;
-  points_only.method = SolveMethod::kResInt;
-  points_only.init = SolveInit::kModel;
-  points_only.polish = Polish::kNone;
-  points_only.res_int.update_frames = false;
-  points_only.res_int.max_sweeps = 1;
-  return Solve(model, points_only, context);
+  return SolveModel(model, PointsOnly(options), context);
+}
+
+SolveModelOptions PointsOnly(SolveModelOptions options) {
+  options.method = SolveMethod::kResInt;
+  options.init = SolveInit::kModel;
+  options.polish = Polish::kNone;
+  options.res_int.update_frames = false;
+  options.res_int.max_sweeps = 1;
+  return options;
 }
 
 }  // namespace krot

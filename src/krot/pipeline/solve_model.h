@@ -38,6 +38,7 @@ enum class SolveTermination {
   kNotRun,
   kNothingToSolve,  // every observation was left out
   kGapReached,      // a certificate shows the relative gap asked for
+  kZeroCost,        // every residual is zero up to rounding: no gap is needed
   kStalled,         // no further progress, and no proof that there is none
   kMaxSweeps,
   kMaxIterations,
@@ -148,11 +149,14 @@ SolveModelResult SolveModel(const Model& model,
                             const SolveModelOptions& options,
                             const Context& context = {});
 
-// The same with all frames fixed. Points do not depend on each other then, so
-// one sweep is all there is: method, init and the number of sweeps are ignored.
+// The same with all frames fixed: SolveModel with PointsOnly(options).
 SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options,
                                   const Context& context = {});
+
+// Points do not depend on each other with the frames fixed, so one sweep is all
+// there is: method, init, polish and the number of sweeps are replaced.
+SolveModelOptions PointsOnly(SolveModelOptions options);
 
 // The method that SolveModel uses for these options.
 SolveMethod EffectiveMethod(const SolveModelOptions& options);

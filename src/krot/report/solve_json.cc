@@ -11,6 +11,8 @@ const char* TerminationName(SolveTermination termination) {
   switch (termination) {
     case SolveTermination::kGapReached:
       return "gap_reached";
+    case SolveTermination::kZeroCost:
+      return "zero_cost";
     case SolveTermination::kStalled:
       return "stalled";
     case SolveTermination::kMaxSweeps:
@@ -73,6 +75,8 @@ Json PolishJson(const std::optional<PolishSummary>& polish) {
 
 std::string SolveJson(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
+  Json left_out = LeftOutJson(LeftOutByReason(summary));
+  left_out["single_ray"] = 0;  // a key that once was stays
   Json sweeps = Json::array();
   for (const Sweep& sweep : summary.sweeps) {
     sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
@@ -90,7 +94,7 @@ std::string SolveJson(const SolveReport& report) {
       {"working_observations", summary.num_working_observations
                                    ? Json(*summary.num_working_observations)
                                    : Json()},
-      {"left_out", LeftOutJson(LeftOutByReason(summary))},
+      {"left_out", left_out},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},

@@ -8,11 +8,6 @@
 
 namespace krot {
 
-bool IsZeroUpToRounding(const SolveSummary& summary) {
-  constexpr double kRoundingPx = 1e-9;
-  return summary.cost_final < kRoundingPx;
-}
-
 LeftOutCounts LeftOutByReason(const SolveSummary& summary) {
   LeftOutCounts counts;
   for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {

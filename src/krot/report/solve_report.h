@@ -29,9 +29,6 @@ LeftOutCounts LeftOutByReason(const SolveSummary& summary);
 // the termination kNothingToSolve.
 std::string NothingToSolveSentence(const SolveSummary& summary);
 
-// Whether all errors are zero up to rounding, so that no gap means anything.
-bool IsZeroUpToRounding(const SolveSummary& summary);
-
 // "the gap asked for is not reached after 300 iterations, as many as ...".
 std::string MissedGapSentence(const SolveSummary& summary);
 

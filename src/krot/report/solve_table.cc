@@ -2,6 +2,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "krot/problem/cost.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/error_rows.h"
 #include "krot/report/solve_error_table.h"
@@ -18,7 +19,7 @@ constexpr int kListedSupport = 10;
 std::string Verdict(const SolveSummary& summary) {
   const std::string maximum =
       "Maximum " + FormatNumber(summary.cost_final, 4) + " px (linearised)";
-  if (IsZeroUpToRounding(summary)) {
+  if (IsZeroUpToRounding(summary.cost_final)) {
     return "Every error is zero up to rounding (" +
            Scientific(summary.cost_final) + " px at most).";
   }
@@ -77,6 +78,8 @@ std::string SolveEndSentence(const SolveSummary& summary) {
                   ? ": the last one gained less than the tolerance; whether a "
                     "lower cost exists is not known."
                   : ": no further progress was made.");
+    case SolveTermination::kZeroCost:
+      return "Ended" + after + " with nothing left to lower.";
     case SolveTermination::kMaxSweeps:
       return "Ended" + after + ", as many as were allowed.";
     case SolveTermination::kInterrupted:
