@@ -44,12 +44,14 @@ void Move(const BlockVector& direction, double step, Estimate* x) {
 template <typename Cone>
 ConicSolver<Cone>::ConicSolver(const KnownRotationProblem& problem,
                                const InteriorPointOptions& options,
+                               const Context& context,
                                const ConeProgram& program,
                                const Estimate& start, double scalar)
     : problem_(problem),
       options_(options),
+      context_(context),
       program_(program),
-      system_(problem, program, options.norm, options.num_threads),
+      system_(problem, program, options.norm, context.num_threads),
       dz_(problem.observations.size()),
       best_(start),
       multipliers_(problem.observations.size()) {
@@ -226,7 +228,7 @@ InteriorPointSummary ConicSolver<Cone>::Run() {
   summary.termination = InteriorPointTermination::kMaxIterations;
   double step = 1;
   while (summary.iterations < options_.max_iterations) {
-    if (IsCancelled(options_.cancel)) {
+    if (context_.IsCancelled()) {
       summary.termination = InteriorPointTermination::kInterrupted;
       break;
     }

@@ -18,8 +18,8 @@ template <typename Cone>
 class ConicSolver {
  public:
   ConicSolver(const KnownRotationProblem& problem,
-              const InteriorPointOptions& options, const ConeProgram& program,
-              const Estimate& start, double scalar);
+              const InteriorPointOptions& options, const Context& context,
+              const ConeProgram& program, const Estimate& start, double scalar);
 
   InteriorPointSummary Run();
 
@@ -58,7 +58,8 @@ class ConicSolver {
   void ExportMultipliers();
 
   const KnownRotationProblem& problem_;
-  const InteriorPointOptions& options_;
+  const InteriorPointOptions options_;
+  const Context context_;
   const ConeProgram program_;
   NewtonSystem<Cone> system_;
   State now_;
