@@ -21,7 +21,7 @@ using Rows = Eigen::Matrix<double, kRows, 1>;
 constexpr double kHighLeverage = 0.5;
 constexpr int kMaxHighLeverage = 6;
 constexpr int kRefinements = 1;
-// Starting a thread takes longer than its share of so few observations.
+// Waking a thread takes longer than its share of so few observations.
 constexpr int64_t kFewObservations = 4000;
 
 }  // namespace
