@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "tests/problem/random_problem.h"
