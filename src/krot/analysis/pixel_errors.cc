@@ -10,7 +10,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/camera_model.h"
+#include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -54,11 +54,10 @@ std::optional<CameraPose> CameraPoseOf(const Model& model,
 double PixelError(const CameraPose& pose, const Camera& camera,
                   const Point2D& point2D, const Eigen::Vector3d& xyz) {
   const Eigen::Vector3d x_cam = pose.rotation * xyz + pose.translation;
-  if (!(x_cam.z() > 0)) return kNaN;
-  if (!FindCameraModel(camera.model_id)->has_image_plane) return kNaN;
-  const Eigen::Vector2d pixel =
-      ProjectRay(camera.model_id, camera.params.data(), x_cam.hnormalized());
-  const double error = (pixel - Eigen::Vector2d(point2D.x, point2D.y)).norm();
+  const std::optional<Eigen::Vector2d> difference = ProjectionError(
+      camera.model_id, camera.params.data(), {point2D.x, point2D.y}, x_cam);
+  if (!difference) return kNaN;
+  const double error = difference->norm();
   return std::isfinite(error) ? error : kNaN;
 }
 

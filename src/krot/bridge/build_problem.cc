@@ -21,6 +21,9 @@ using Eigen::Vector3d;
 using LeftOutCounts = std::array<int64_t, kNumLeftOutReasons>;
 
 constexpr int64_t kPointsPerChunk = 256;
+// Depths below this, relative to the coordinates that they are the difference
+// of, may be rounding.
+constexpr double kDepthRounding = 1e-14;
 
 // What is looked up for every observation.
 struct Sources {
@@ -44,57 +47,32 @@ struct Slots {
   Eigen::Vector2d* pixels;
 };
 
-void CheckImagePlanes(const Model& model) {
-  std::unordered_map<CameraId, const CameraModelInfo*> without_plane;
-  for (const Camera& camera : model.cameras) {
-    const CameraModelInfo* info = FindCameraModel(camera.model_id);
-    if (!info->has_image_plane) without_plane.emplace(camera.id, info);
-  }
-  if (without_plane.empty()) return;
-  for (const Image& image : model.images) {
-    const auto found = without_plane.find(image.camera_id);
-    if (found == without_plane.end()) continue;
-    for (const Point2D& point2D : image.points2D) {
-      if (point2D.point3D_id == kInvalidPoint3DId) continue;
-      throw ModelError("camera " + std::to_string(image.camera_id) +
-                       " of image \"" + image.name + "\" is " +
-                       std::string(found->second->name) +
-                       ", which has no image plane: expected a model that "
-                       "projects onto a plane");
-    }
-  }
-}
-
-// The row where the point projects.
+// The row where the point projects, at a depth that is not rounding alone.
 std::optional<Eigen::Matrix3d> RowAtPoint(const Sources& sources,
                                           const ImageGeometry& geometry,
                                           const Eigen::Vector2d& pixel,
                                           const Vector3d& xyz) {
-  if (!IsInFront(geometry, xyz)) return std::nullopt;
   const Camera& camera = sources.model.cameras[geometry.camera];
-  return RowAtProjection(camera.model_id, camera.params.data(), pixel,
-                         geometry.cam_from_world_rotation * xyz +
-                             geometry.cam_from_world_translation);
+  const Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
+                         geometry.cam_from_world_translation;
+  const auto row =
+      RowAtProjection(camera.model_id, camera.params.data(), pixel, x_cam);
+  const double rounding =
+      kDepthRounding *
+      (xyz.norm() + geometry.cam_from_world_translation.norm());
+  if (!row || !(row->row(0).dot(x_cam) > rounding)) return std::nullopt;
+  return row;
 }
 
 // The row at the pixel's own ray.
-std::optional<LeftOut> TakeRowAtRay(const Sources& sources,
-                                    const ImageGeometry& geometry,
-                                    const Eigen::Vector2d& pixel,
-                                    Observation* observation) {
+std::optional<Eigen::Matrix3d> RowAtPixel(const Sources& sources,
+                                          const ImageGeometry& geometry,
+                                          const Eigen::Vector2d& pixel) {
   const Camera& camera = sources.model.cameras[geometry.camera];
-  UndistortedObservation undistorted;
-  switch (UndistortPixel(camera.model_id, camera.params.data(), pixel,
-                         std::nullopt, &undistorted)) {
-    case UndistortStatus::kOk:
-      observation->E = RowAtRay(undistorted.u, undistorted.J);
-      return std::nullopt;
-    case UndistortStatus::kNotConverged:
-      return LeftOut::kUndistortion;
-    case UndistortStatus::kOffAxis:
-      return LeftOut::kOffAxis;
-  }
-  return LeftOut::kUndistortion;
+  const double* params = camera.params.data();
+  const auto bearing = PixelBearing(camera.model_id, params, pixel);
+  if (!bearing) return std::nullopt;
+  return RowAtProjection(camera.model_id, params, pixel, *bearing);
 }
 
 // Fills the slots with the observations that have a pose and a row: where the
@@ -121,11 +99,11 @@ int CollectRows(const Sources& sources, int32_t point, bool only_rays,
     } else if (!only_rays) {
       row = RowAtPoint(sources, geometry, pixel, point3D.xyz);
     }
-    if (row) {
-      observation.E = *row;
-    } else if (!reason) {
-      reason = TakeRowAtRay(sources, geometry, pixel, &observation);
+    if (!reason && !row) {
+      row = RowAtPixel(sources, geometry, pixel);
+      if (!row) reason = LeftOut::kUndistortion;
     }
+    if (row) observation.E = *row;
     if (reason) {
       ++(*left_out)[static_cast<size_t>(*reason)];
     } else {
@@ -143,9 +121,8 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
   int num_kept = 0;
   for (int i = 0; i < count; ++i) {
     const Observation& observation = slots.observations[i];
-    const auto row =
-        RowAtPoint(sources, sources.geometries[observation.view],
-                   slots.pixels[i], xyz);
+    const auto row = RowAtPoint(sources, sources.geometries[observation.view],
+                                slots.pixels[i], xyz);
     if (!row) continue;
     slots.point2D[num_kept] = slots.point2D[i];
     slots.pixels[num_kept] = slots.pixels[i];
@@ -158,16 +135,21 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
 PointOutcome ProcessPoint(const Sources& sources, int32_t point,
                           const BuildProblemOptions& options, Slots slots,
                           LeftOutCounts* left_out) {
-  const int num_rays = CollectRows(sources, point, options.ignore_translations,
-                                   slots, left_out);
+  const int num_rays =
+      CollectRows(sources, point, options.ignore_translations, slots, left_out);
   const Vector3d& xyz = sources.model.points3D[point].xyz;
   PointOutcome outcome;
   if (options.ignore_translations) {
     outcome.point.xyz = xyz;
     outcome.num_kept = num_rays;
   } else {
-    outcome.point =
-        RepairPoint(sources.geometries, slots.observations, num_rays, xyz);
+    const auto is_seen = [&](int i, const Vector3d& position) {
+      return RowAtPoint(sources, sources.geometries[slots.observations[i].view],
+                        slots.pixels[i], position)
+          .has_value();
+    };
+    outcome.point = RepairPoint(sources.geometries, slots.observations,
+                                num_rays, xyz, is_seen);
     outcome.num_kept =
         RemoveBehind(sources, outcome.point.xyz, num_rays, slots);
     (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
@@ -303,7 +285,6 @@ BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options) {
   CheckArgument(options.min_track_length >= 1, "options.min_track_length",
                 options.min_track_length, ">= 1");
-  CheckImagePlanes(model);
   Sources sources{model, ImageGeometries(model), ImageIndices(model)};
   if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;

@@ -85,7 +85,20 @@ Norm ReadNorm(const Reader& reader, const Json& value) {
   reader.Fail("norm", value, "\"1\", \"2\" or \"inf\"");
 }
 
+// Version 1: u and J.
+void ReadRow(const Reader& reader, const Json& u, const Json& J,
+             const std::string& place,
+             CertificateFile::SupportObservation* observation) {
+  observation->u = reader.Pair(u, place + ".u");
+  if (!J.is_array() || J.size() != 2) {
+    reader.Fail(place + ".J", J, "two rows of two numbers");
+  }
+  observation->J.row(0) = reader.Pair(J[0], place + ".J[0]").transpose();
+  observation->J.row(1) = reader.Pair(J[1], place + ".J[1]").transpose();
+}
+
 CertificateFile::SupportObservation ReadObservation(const Reader& reader,
+                                                    int version,
                                                     const Json& json,
                                                     const std::string& place) {
   const auto member = [&](const char* key) -> const Json& {
@@ -99,13 +112,17 @@ CertificateFile::SupportObservation ReadObservation(const Reader& reader,
       reader.Id(member("point2D_idx"), place + ".point2D_idx", kLargest32));
   o.point3D_id = reader.Id(member("point3D_id"), place + ".point3D_id",
                            std::numeric_limits<uint64_t>::max());
-  o.u = reader.Pair(member("u"), place + ".u");
-  const Json& J = member("J");
-  if (!J.is_array() || J.size() != 2) {
-    reader.Fail(place + ".J", J, "two rows of two numbers");
+  if (version == 1) {
+    ReadRow(reader, member("u"), member("J"), place, &o);
+  } else {
+    const Json& bearing = member("bearing");
+    if (!bearing.is_array() || bearing.size() != 3) {
+      reader.Fail(place + ".bearing", bearing, "an array of three numbers");
+    }
+    for (int k = 0; k < 3; ++k) {
+      o.bearing[k] = reader.Number(bearing[k], place + ".bearing");
+    }
   }
-  o.J.row(0) = reader.Pair(J[0], place + ".J[0]").transpose();
-  o.J.row(1) = reader.Pair(J[1], place + ".J[1]").transpose();
   o.lambda = reader.Number(member("lambda"), place + ".lambda");
   o.y = reader.Pair(member("y"), place + ".y");
   return o;
@@ -116,19 +133,25 @@ CertificateFile ReadCertificate(const Reader& reader, const Json& json) {
     return reader.Member(json, "the file", key);
   };
   const Json& version = member("version");
-  if (version != kCertificateVersion) {
-    reader.Fail("version", version, std::to_string(kCertificateVersion));
+  if (version != 1 && version != kCertificateVersion) {
+    reader.Fail("version", version,
+                "1 or " + std::to_string(kCertificateVersion));
   }
   CertificateFile file;
+  file.version = version.get<int>();
   file.norm = ReadNorm(reader, member("norm"));
   file.lower_bound = reader.Number(member("lower_bound"), "lower_bound");
+  file.rows_bound = file.version == 1
+                        ? file.lower_bound
+                        : reader.Number(member("rows_bound"), "rows_bound");
   file.defect = reader.Number(member("defect"), "defect");
   file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
   const Json& observations =
       reader.Array(member("observations"), "observations");
   for (size_t n = 0; n < observations.size(); ++n) {
-    file.observations.push_back(ReadObservation(
-        reader, observations[n], "observations[" + std::to_string(n) + "]"));
+    file.observations.push_back(
+        ReadObservation(reader, file.version, observations[n],
+                        "observations[" + std::to_string(n) + "]"));
   }
   return file;
 }
@@ -137,21 +160,26 @@ CertificateFile ReadCertificate(const Reader& reader, const Json& json) {
 
 CertificateFile DescribeCertificate(const Model& model,
                                     const BuiltProblem& built, Norm norm,
-                                    const Certificate& certificate) {
+                                    const PixelCertificate& certificate) {
   CertificateFile file;
   file.norm = norm;
   file.lower_bound = certificate.lower_bound;
-  file.defect = certificate.defect;
+  file.rows_bound = certificate.rows.lower_bound;
+  file.defect = certificate.rows.defect;
   file.model_sha256 = ModelSha256(model);
-  for (const CertifiedObservation& certified : certificate.observations) {
+  for (size_t n = 0; n < certificate.bearings.size(); ++n) {
+    const CertifiedObservation& certified = certificate.rows.observations[n];
     const Observation& observation =
         built.problem.observations[certified.observation];
-    file.observations.push_back(
-        {model.images[built.image_of[observation.view]].id,
-         static_cast<uint32_t>(built.point2D_of[certified.observation]),
-         model.points3D[built.point_of[observation.point]].id,
-         Eigen::Vector2d::Zero(), observation.E.block<2, 2>(1, 0),
-         certified.lambda, certified.y});
+    CertificateFile::SupportObservation o;
+    o.image_id = model.images[built.image_of[observation.view]].id;
+    o.point2D_idx =
+        static_cast<uint32_t>(built.point2D_of[certified.observation]);
+    o.point3D_id = model.points3D[built.point_of[observation.point]].id;
+    o.bearing = certificate.bearings[n];
+    o.lambda = certified.lambda;
+    o.y = certified.y;
+    file.observations.push_back(o);
   }
   return file;
 }
@@ -159,21 +187,26 @@ CertificateFile DescribeCertificate(const Model& model,
 std::string CertificateJson(const CertificateFile& file) {
   Json observations = Json::array();
   for (const CertificateFile::SupportObservation& o : file.observations) {
-    observations.push_back(
-        {{"image_id", o.image_id},
-         {"point2D_idx", o.point2D_idx},
-         {"point3D_id", o.point3D_id},
-         {"u", {o.u[0], o.u[1]}},
-         {"J", {{o.J(0, 0), o.J(0, 1)}, {o.J(1, 0), o.J(1, 1)}}},
-         {"lambda", o.lambda},
-         {"y", {o.y[0], o.y[1]}}});
+    Json json = {{"image_id", o.image_id},
+                 {"point2D_idx", o.point2D_idx},
+                 {"point3D_id", o.point3D_id}};
+    if (file.version == 1) {
+      json["u"] = {o.u[0], o.u[1]};
+      json["J"] = {{o.J(0, 0), o.J(0, 1)}, {o.J(1, 0), o.J(1, 1)}};
+    } else {
+      json["bearing"] = {o.bearing[0], o.bearing[1], o.bearing[2]};
+    }
+    json["lambda"] = o.lambda;
+    json["y"] = {o.y[0], o.y[1]};
+    observations.push_back(std::move(json));
   }
-  const Json json = {{"version", kCertificateVersion},
-                     {"norm", NormJson(file.norm)},
-                     {"lower_bound", file.lower_bound},
-                     {"defect", file.defect},
-                     {"model_sha256", file.model_sha256},
-                     {"observations", std::move(observations)}};
+  Json json = {{"version", file.version},
+               {"norm", NormJson(file.norm)},
+               {"lower_bound", file.lower_bound}};
+  if (file.version != 1) json["rows_bound"] = file.rows_bound;
+  json["defect"] = file.defect;
+  json["model_sha256"] = file.model_sha256;
+  json["observations"] = std::move(observations);
   return json.dump(1) + "\n";
 }
 

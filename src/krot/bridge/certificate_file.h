@@ -8,11 +8,16 @@
 #include <Eigen/Core>
 
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/pixel_certificate.h"
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
-#include "krot/proof/certificate_check.h"
 
 namespace krot {
+
+// Version 2 proves a bound in true pixels (pixel_certificate.h). Version 1,
+// which is still read, proves one of rows that are linearised at the
+// observations.
+inline constexpr int kCertificateVersion = 2;
 
 // A certificate in terms of the model's ids: what is written to a file, and
 // can be checked by anyone who has the model (docs/formats.md).
@@ -21,25 +26,28 @@ struct CertificateFile {
     ImageId image_id = 0;
     uint32_t point2D_idx = 0;
     Point3DId point3D_id = 0;
+    // Version 2: where the row is taken, in the camera's frame.
+    Eigen::Vector3d bearing = Eigen::Vector3d::Zero();
+    // Version 1: the row at the pixel's own ray.
     Eigen::Vector2d u = Eigen::Vector2d::Zero();
     Eigen::Matrix2d J = Eigen::Matrix2d::Zero();  // pixels
     double lambda = 0;
     Eigen::Vector2d y = Eigen::Vector2d::Zero();
   };
 
+  int version = kCertificateVersion;
   Norm norm;
-  double lower_bound = 0;  // linearised pixels
-  double defect = 0;       // relative
+  double lower_bound = 0;  // true pixels; version 1: of the rows
+  double rows_bound = 0;   // delta of the rows, pixels; version 2
+  double defect = 0;       // of the rows' identities, relative
   std::string model_sha256;
   std::vector<SupportObservation> observations;
 };
 
-inline constexpr int kCertificateVersion = 1;
-
 // `certificate` must be one of built.problem.
 CertificateFile DescribeCertificate(const Model& model,
                                     const BuiltProblem& built, Norm norm,
-                                    const Certificate& certificate);
+                                    const PixelCertificate& certificate);
 
 // JSON. Doubles come back with the same bits.
 std::string CertificateJson(const CertificateFile& file);

@@ -6,6 +6,9 @@
 #include <utility>
 
 #include "krot/bridge/model_digest.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/bridge/reprojection.h"
+#include "krot/camera/camera_model.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -19,17 +22,24 @@ std::string NameOf(const CertificateFile::SupportObservation& o) {
          std::to_string(o.image_id);
 }
 
-// Also false for NaN.
+// Whether u and J, of version 1, are the pixel's. Also false for NaN.
 bool IsSameRay(const CertificateFile::SupportObservation& o,
-               const Observation& own) {
-  return (RowAtRay(o.u, o.J) - own.E).norm() <= kRayTolerance * own.E.norm();
+               const Reprojection::Source& source,
+               const Eigen::Vector2d& pixel) {
+  UndistortedObservation own;
+  return FindCameraModel(source.model_id)->has_image_plane &&
+         UndistortPixel(source.model_id, source.params, pixel, std::nullopt,
+                        &own) == UndistortStatus::kOk &&
+         (o.u - own.u).norm() <= kRayTolerance * own.u.homogeneous().norm() &&
+         (o.J - own.J).norm() <= kRayTolerance * own.J.norm();
 }
 
-// The certificate in terms of the problem, into which the file's u and J go.
+// The certificate in terms of the problem, into which the rows of a file of
+// version 1 go.
 struct Translation {
   std::string refusal;
   bool is_unseen = false;  // the problem has not all of its observations
-  Certificate certificate;
+  PixelCertificate certificate;
 };
 
 Translation Translate(const Model& model, const CertificateFile& file,
@@ -43,8 +53,11 @@ Translation Translate(const Model& model, const CertificateFile& file,
       return translation;
     }
   }
+  Certificate& rows = translation.certificate.rows;
   translation.certificate.lower_bound = file.lower_bound;
-  translation.certificate.defect = file.defect;
+  rows.lower_bound = file.rows_bound;
+  rows.defect = file.defect;
+  const Reprojection reprojection(model, *built);
   KnownRotationProblem& problem = built->problem;
   for (size_t i = 0; i < problem.observations.size(); ++i) {
     Observation& own = problem.observations[i];
@@ -57,13 +70,15 @@ Translation Translate(const Model& model, const CertificateFile& file,
     if (o.point3D_id != model.points3D[built->point_of[own.point]].id) {
       translation.refusal = NameOf(o) + " is not of point " +
                             std::to_string(o.point3D_id) + " in the model";
-    } else if (!IsSameRay(o, own)) {
+    } else if (file.version == 1 &&
+               !IsSameRay(o, reprojection.SourceOf(static_cast<int64_t>(i)),
+                          built->pixels[i])) {
       translation.refusal = "u or J of " + NameOf(o) + " is not the model's";
     }
     if (!translation.refusal.empty()) return translation;
-    own.E = RowAtRay(o.u, o.J);
-    translation.certificate.observations.push_back(
-        {static_cast<int64_t>(i), o.lambda, o.y});
+    if (file.version == 1) own.E = RowAtRay(o.u, o.J);
+    translation.certificate.bearings.push_back(o.bearing);
+    rows.observations.push_back({static_cast<int64_t>(i), o.lambda, o.y});
   }
   if (!by_key.empty()) {
     translation.is_unseen = true;
@@ -95,21 +110,32 @@ CertificateVerdict VerifyCertificateFile(const Model& model,
   verdict.refusal = translation.refusal;
   if (!verdict.refusal.empty()) return verdict;
 
-  const CertificateCheck check =
-      CheckCertificate(built.problem, file.norm, translation.certificate);
-  verdict.refusal = check.refusal;
-  if (!check.is_accepted) return verdict;
+  if (file.version == 1) {
+    const CertificateCheck check = CheckCertificate(
+        built.problem, file.norm, translation.certificate.rows);
+    verdict.is_accepted = check.is_accepted;
+    verdict.lower_bound = check.proved_bound;
+    verdict.defect = check.defect;
+    verdict.refusal = check.refusal;
+  } else {
+    const PixelCertificateCheck check = CheckPixelCertificate(
+        model, built, file.norm, translation.certificate, {});
+    verdict.is_accepted = check.is_accepted;
+    verdict.lower_bound = check.lower_bound;
+    verdict.defect = check.defect;
+    verdict.refusal = check.refusal;
+  }
+  if (!verdict.is_accepted) return verdict;
 
-  verdict.is_accepted = true;
-  verdict.lower_bound = check.proved_bound;
-  verdict.defect = check.defect;
-  const double cost = Cost(built.problem, built.start, file.norm, -1);
+  verdict.is_linearised = file.version == 1;
+  const double cost =
+      Reprojection(model, built).TrueCost(built.start, file.norm, -1);
   if (std::isfinite(cost)) {
     verdict.cost = cost;
     verdict.relative_gap = (cost - verdict.lower_bound) / cost;
   }
   verdict.support = ListSupport(model, built, built.start, file.norm,
-                                translation.certificate);
+                                translation.certificate.rows);
   return verdict;
 }
 

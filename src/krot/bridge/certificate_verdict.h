@@ -20,6 +20,8 @@ struct CertificateVerdict {
   // observation behind its camera.
   std::optional<double> cost;
   std::optional<double> relative_gap;  // (cost - lower_bound) / cost
+  // Version 1: the bound is one of rows linearised at the observations.
+  bool is_linearised = false;
   double defect = 0;  // what rounding takes from the stated bound
   std::vector<SupportObservation> support;  // worst first
 };

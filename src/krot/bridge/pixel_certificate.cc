@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "krot/base/parallel_for.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/camera/remainder_bound.h"
@@ -24,40 +26,74 @@ std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
                  .id);
 }
 
+// (3) at the rows' bearings.
+std::vector<double> LinesAt(const Reprojection& reprojection,
+                            const BuiltProblem& built, Norm norm,
+                            const Certificate& rows,
+                            const std::vector<Eigen::Vector3d>& bearings,
+                            double gamma, const Context& context) {
+  std::vector<double> lines(rows.observations.size(), kNoRegion);
+  ParallelFor(static_cast<int64_t>(lines.size()), 1, context.num_threads,
+              [&](int64_t n, int64_t, int) {
+                const CertifiedObservation& o = rows.observations[n];
+                const Reprojection::Source& source =
+                    reprojection.SourceOf(o.observation);
+                const std::optional<double> largest = SupportBound(
+                    source.model_id, source.params, built.pixels[o.observation],
+                    bearings[n], o.y, gamma, norm.p);
+                if (largest)
+                  lines[n] = *largest / (rows.lower_bound * o.lambda);
+              });
+  return lines;
+}
+
 }  // namespace
+
+std::vector<Eigen::Vector3d> BearingsOfPoints(const Model& model,
+                                              const BuiltProblem& built,
+                                              const Estimate& x_hat,
+                                              const Certificate& rows) {
+  const Reprojection reprojection(model, built);
+  std::vector<Eigen::Vector3d> bearings;
+  for (const CertifiedObservation& o : rows.observations) {
+    bearings.push_back(
+        reprojection.InCamera(x_hat, o.observation).normalized());
+  }
+  return bearings;
+}
+
+std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
+                                              const BuiltProblem& built,
+                                              const Certificate& rows) {
+  const Reprojection reprojection(model, built);
+  std::vector<Eigen::Vector3d> bearings;
+  for (const CertifiedObservation& o : rows.observations) {
+    const Reprojection::Source& source = reprojection.SourceOf(o.observation);
+    bearings.push_back(PixelBearing(source.model_id, source.params,
+                                    built.pixels[o.observation])
+                           .value_or(Eigen::Vector3d::Zero()));
+  }
+  return bearings;
+}
 
 std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
                                  Norm norm, const Certificate& rows,
                                  const std::vector<Eigen::Vector3d>& bearings,
-                                 double gamma) {
-  const Reprojection reprojection(model, built);
-  std::vector<double> lines;
-  for (size_t n = 0; n < rows.observations.size(); ++n) {
-    const CertifiedObservation& o = rows.observations[n];
-    const Reprojection::Source& source = reprojection.SourceOf(o.observation);
-    const std::optional<double> largest = SupportBound(
-        source.model_id, source.params, built.pixels[o.observation],
-        bearings[n], o.y, gamma, norm.p);
-    lines.push_back(largest ? *largest / (rows.lower_bound * o.lambda)
-                            : kNoRegion);
-  }
-  return lines;
+                                 double gamma, const Context& context) {
+  return LinesAt(Reprojection(model, built), built, norm, rows, bearings, gamma,
+                 context);
 }
 
 std::optional<PixelCertificate> MakePixelCertificate(
-    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    Norm norm, const Certificate& rows) {
+    const Model& model, const BuiltProblem& built, Norm norm,
+    const Certificate& rows, std::vector<Eigen::Vector3d> bearings,
+    const Context& context) {
   const Reprojection reprojection(model, built);
-  PixelCertificate certificate;
-  certificate.rows = rows;
-  for (const CertifiedObservation& o : rows.observations) {
-    certificate.bearings.push_back(
-        reprojection.InCamera(x_hat, o.observation).normalized());
-  }
+  PixelCertificate certificate{rows, std::move(bearings), 0};
   double gamma = rows.lower_bound * (1 - kRoom);
   for (int n = 0; n < kMaxCorrections; ++n) {
-    const std::vector<double> lines = SupportLines(
-        model, built, norm, rows, certificate.bearings, gamma);
+    const std::vector<double> lines = LinesAt(
+        reprojection, built, norm, rows, certificate.bearings, gamma, context);
     const double highest = *std::max_element(lines.begin(), lines.end());
     if (!std::isfinite(highest)) return std::nullopt;
     if (highest <= 1 - kRoom / 2) {
@@ -69,9 +105,11 @@ std::optional<PixelCertificate> MakePixelCertificate(
   return std::nullopt;
 }
 
-PixelCertificateCheck CheckPixelCertificate(
-    const Model& model, const BuiltProblem& built, Norm norm,
-    const PixelCertificate& certificate) {
+PixelCertificateCheck CheckPixelCertificate(const Model& model,
+                                            const BuiltProblem& built,
+                                            Norm norm,
+                                            const PixelCertificate& certificate,
+                                            const Context& context) {
   PixelCertificateCheck check;
   const std::vector<CertifiedObservation>& support =
       certificate.rows.observations;
@@ -96,8 +134,8 @@ PixelCertificateCheck CheckPixelCertificate(
     const auto row = RowAtProjection(source.model_id, source.params,
                                      built.pixels[i], certificate.bearings[n]);
     if (!row) {
-      check.refusal = "the bearing of " + NameOf(model, built, i) +
-                      " does not project";
+      check.refusal =
+          "the bearing of " + NameOf(model, built, i) + " does not project";
       return check;
     }
     problem.observations[i].E = *row;
@@ -108,8 +146,9 @@ PixelCertificateCheck CheckPixelCertificate(
     check.refusal = rows.refusal;
     return check;
   }
-  const std::vector<double> lines = SupportLines(
-      model, built, norm, certificate.rows, certificate.bearings, gamma);
+  const std::vector<double> lines =
+      LinesAt(reprojection, built, norm, certificate.rows, certificate.bearings,
+              gamma, context);
   for (size_t n = 0; n < support.size(); ++n) {
     const int64_t i = support[n].observation;
     const Reprojection::Source& source = reprojection.SourceOf(i);

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
@@ -51,20 +52,33 @@ struct PixelCertificateCheck {
 PixelCertificateCheck CheckPixelCertificate(const Model& model,
                                             const BuiltProblem& built,
                                             Norm norm,
-                                            const PixelCertificate& certificate);
+                                            const PixelCertificate& certificate,
+                                            const Context& context);
+
+// Where the rows of a certificate's observations were taken: at the points of
+// an estimate, or, for a start from nothing, at the pixels' own rays.
+std::vector<Eigen::Vector3d> BearingsOfPoints(const Model& model,
+                                              const BuiltProblem& built,
+                                              const Estimate& x_hat,
+                                              const Certificate& rows);
+std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
+                                              const BuiltProblem& built,
+                                              const Certificate& rows);
 
 // The certificate with the largest gamma for these rows, which were taken at
-// `x_hat`; none if an observation of the support has no region. Verifies
+// `bearings`; none if an observation of the support has no region. Verifies
 // nothing.
 std::optional<PixelCertificate> MakePixelCertificate(
-    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    Norm norm, const Certificate& rows);
+    const Model& model, const BuiltProblem& built, Norm norm,
+    const Certificate& rows, std::vector<Eigen::Vector3d> bearings,
+    const Context& context);
 
-// The observation's (3), largest -y_i'L_i over S_i at `gamma` pixels, relative
-// to delta lambda_i: at most 1 where it holds. Infinity without a region.
+// Per observation of `rows`, taken at `bearings`, its (3): the largest -y_i'L_i
+// over S_i at `gamma` pixels, relative to delta lambda_i: at most 1 where it
+// holds. Infinity without a region.
 std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
                                  Norm norm, const Certificate& rows,
                                  const std::vector<Eigen::Vector3d>& bearings,
-                                 double gamma);
+                                 double gamma, const Context& context);
 
 }  // namespace krot

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -9,23 +10,21 @@
 
 namespace krot {
 
-// Points in front of the cameras that see them, or brought there.
-
-// Whether the depth of a point is positive, rounding considered.
-bool IsInFront(const ImageGeometry& image, const Eigen::Vector3d& xyz);
+// Points that their images see, or brought there.
 
 struct RepairedPoint {
   Eigen::Vector3d xyz;
   bool is_retriangulated = false;
 };
 
-// Leaves the point where it is if it is in front of all its cameras, or if
-// re-triangulation from all its rays does not lower the number of cameras
-// that it is behind. Requires that the observations have poses and that their
-// `view` is the image's index in `images`. O(count); allocates only if a
-// camera is behind.
-RepairedPoint RepairPoint(const std::vector<ImageGeometry>& images,
-                          const Observation* observations, int count,
-                          const Eigen::Vector3d& xyz);
+// Leaves the point where it is if all its images see it, or if re-triangulation
+// from all its rays (where v = 0) does not lower the number of those that do
+// not; `is_seen` tells for the i-th observation and a position. Requires that
+// the observations have poses and that their `view` is the image's index in
+// `images`. O(count); allocates only if an image does not see it.
+RepairedPoint RepairPoint(
+    const std::vector<ImageGeometry>& images, const Observation* observations,
+    int count, const Eigen::Vector3d& xyz,
+    const std::function<bool(int, const Eigen::Vector3d&)>& is_seen);
 
 }  // namespace krot

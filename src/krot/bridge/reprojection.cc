@@ -36,8 +36,7 @@ Reprojection::Reprojection(const Model& model, const BuiltProblem& built)
   for (const int32_t image : built.image_of) {
     const Camera& camera = model.cameras[geometries[image].camera];
     sources_.push_back({camera.model_id, camera.params.data()});
-    is_linear_ =
-        is_linear_ && camera.model_id <= Pinhole::kId;
+    is_linear_ = is_linear_ && camera.model_id <= Pinhole::kId;
   }
 }
 
@@ -53,9 +52,8 @@ Eigen::Vector3d Reprojection::InCamera(const Estimate& estimate,
 double Reprojection::Error(const Estimate& estimate, Norm norm,
                            int64_t i) const {
   const Source& source = sources_[built_.problem.observations[i].view];
-  const std::optional<Eigen::Vector2d> e =
-      ProjectionError(source.model_id, source.params, built_.pixels[i],
-                      InCamera(estimate, i));
+  const std::optional<Eigen::Vector2d> e = ProjectionError(
+      source.model_id, source.params, built_.pixels[i], InCamera(estimate, i));
   if (!e) return kInfinity;
   const double error = NormOfError(*e, norm);
   return std::isfinite(error) ? error : kInfinity;
@@ -86,9 +84,9 @@ void Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                 for (int64_t i = begin; i < end; ++i) {
                   Observation& observation = problem->observations[i];
                   const Source& source = sources_[observation.view];
-                  const auto row = RowAtProjection(
-                      source.model_id, source.params, built_.pixels[i],
-                      InCamera(estimate, i));
+                  const auto row =
+                      RowAtProjection(source.model_id, source.params,
+                                      built_.pixels[i], InCamera(estimate, i));
                   if (row) observation.E = *row;
                 }
               });

@@ -100,7 +100,8 @@ std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector2d& y, double level_px,
                                    double p) {
   const double length = DualNorm(y, p) * (1 + kRounding);
-  if (!(length > 0)) return length == 0 ? std::optional<double>(0) : std::nullopt;
+  if (!(length > 0))
+    return length == 0 ? std::optional<double>(0) : std::nullopt;
   if (IsPinhole(model_id)) {
     if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
     // The linear error is the true one but for the rounding of the row, which
@@ -108,14 +109,12 @@ std::optional<double> SupportBound(int model_id, const double* params,
     const Eigen::Vector2d centre = model_id == SimplePinhole::kId
                                        ? Eigen::Vector2d(params[1], params[2])
                                        : Eigen::Vector2d(params[2], params[3]);
-    const double terms =
-        pixel.lpNorm<1>() + centre.lpNorm<1>() + 2 * level_px;
+    const double terms = pixel.lpNorm<1>() + centre.lpNorm<1>() + 2 * level_px;
     return length * (level_px + 2 * kRounding * terms);
   }
   const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
   if (!region) return std::nullopt;
-  const auto largest =
-      LargestAlong(*region->map, p, region->reach, y / length);
+  const auto largest = LargestAlong(*region->map, p, region->reach, y / length);
   if (!largest) return std::nullopt;
   return std::max(0.0, *largest) * length * level_px * (1 + kRounding);
 }

@@ -38,13 +38,13 @@ std::optional<double> RemainderBound(int model_id, const double* params,
                                      const Eigen::Vector3d& x_hat,
                                      double level_px, double p);
 
-// The least that is known to be at least -y'm(u), pixels times |y|, for all u in
-// U with |f(u)|_p <= gamma: the support function, in the direction -y, of what
-// the true error's ball looks like in the row. As m is tangent to f at x_hat,
-// it is gamma |y| to first order, in the dual norm, if x_hat lies on the ball
-// in that direction, however strong the lens: what a proof needs, which has one
-// direction per observation. U, nullopt and cost as above; 1e-7 gamma |y| above
-// its smallest value unless the budget of cells ends first.
+// The least that is known to be at least -y'm(u), pixels times |y|, for all u
+// in U with |f(u)|_p <= gamma: the support function, in the direction -y, of
+// what the true error's ball looks like in the row. As m is tangent to f at
+// x_hat, it is gamma |y| to first order, in the dual norm, if x_hat lies on the
+// ball in that direction, however strong the lens: what a proof needs, which
+// has one direction per observation. U, nullopt and cost as above; 1e-7 gamma
+// |y| above its smallest value unless the budget of cells ends first.
 std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector2d& pixel,
                                    const Eigen::Vector3d& x_hat,

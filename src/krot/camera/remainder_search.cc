@@ -136,31 +136,25 @@ std::pair<Box, Box> Halves(const Box& box) {
   return halves;
 }
 
-// The largest value(f, m) found at some points with |f| near 1: what a search
-// compares its bound with.
+// value(f, m) at a point with |f| near 1 in direction d, if one is found there:
+// what a search compares its bound with.
 template <typename Value>
-double SampleLargest(const ErrorMap& map, double p, const Value& value) {
-  constexpr int kDirections = 16;
-  constexpr int kCorrections = 3;
-  double largest = -kInfinity;
-  for (int i = 0; i < kDirections; ++i) {
-    const double angle = i * 2 * 3.14159265358979323846 / kDirections;
-    const double d[2] = {std::cos(angle), std::sin(angle)};
-    const double norm = Norm({d[0], d[0]}, {d[1], d[1]}, p).hi;
-    double q[2] = {d[0] / norm, d[1] / norm};
-    for (int j = 0;; ++j) {
-      const auto at = map.Values({q[0], q[0]}, {q[1], q[1]});
-      const double f[2] = {Middle(at.f[0]), Middle(at.f[1])};
-      if (j < kCorrections) {
-        for (int k = 0; k < 2; ++k) q[k] += d[k] / norm - f[k];
-        continue;
-      }
-      const double size = Norm({f[0], f[0]}, {f[1], f[1]}, p).hi;
-      if (size < 1.5 && size > 0.5) largest = std::max(largest, value(at, size));
-      break;
+double Sample(const ErrorMap& map, double p, double d1, double d2,
+              const Value& value) {
+  constexpr int kCorrections = 6;
+  const double norm = Norm({d1, d1}, {d2, d2}, p).hi;
+  const double wanted[2] = {d1 / norm, d2 / norm};
+  double q[2] = {wanted[0], wanted[1]};
+  for (int j = 0;; ++j) {
+    const auto at = map.Values({q[0], q[0]}, {q[1], q[1]});
+    const double f[2] = {Middle(at.f[0]), Middle(at.f[1])};
+    if (j < kCorrections) {
+      for (int k = 0; k < 2; ++k) q[k] += wanted[k] - f[k];
+      continue;
     }
+    const double size = Norm({f[0], f[0]}, {f[1], f[1]}, p).hi;
+    return size < 1.5 && size > 0.5 ? value(at, size) : -kInfinity;
   }
-  return largest;
 }
 
 bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
@@ -172,8 +166,8 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
          SegmentIsOutside(map, p, second, depth + 1);
 }
 
-// Branch and bound: an upper bound, of what `bound_on` bounds on a box, over all
-// points of the box |q|_inf <= reach with |f| <= 1.
+// Branch and bound: an upper bound, of what `bound_on` bounds on a box, over
+// all points of the box |q|_inf <= reach with |f| <= 1.
 template <typename BoundOn>
 std::optional<double> Search(const ErrorMap& map, double p, double reach,
                              double target, const BoundOn& bound_on) {
@@ -220,10 +214,16 @@ bool BoundaryIsOutside(const ErrorMap& map, double p, double reach) {
 
 std::optional<double> LargestLinearError(const ErrorMap& map, double p,
                                          double reach) {
-  const double sampled = std::max(
-      1.0, SampleLargest(map, p, [p](const auto& at, double size) {
-        return Norm(at.m[0], at.m[1], p).lo / size;
-      }));
+  constexpr int kDirections = 16;
+  double sampled = 1;
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = i * 2 * 3.14159265358979323846 / kDirections;
+    sampled =
+        std::max(sampled, Sample(map, p, std::cos(angle), std::sin(angle),
+                                 [p](const auto& at, double size) {
+                                   return Norm(at.m[0], at.m[1], p).lo / size;
+                                 }));
+  }
   const double target =
       sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
   return Search(map, p, reach, target, [p](const Enclosure& enclosure) {
@@ -236,22 +236,27 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
   const auto along = [&y](const Interval* v) {
     return v[0] * -y[0] + v[1] * -y[1];
   };
+  // Where a plane with normal -y touches the ball |f| <= 1.
+  double d[2] = {-y[0], -y[1]};
+  if (p == 1) d[std::abs(y[0]) < std::abs(y[1]) ? 0 : 1] = 0;
+  if (std::isinf(p)) {
+    for (double& x : d) x = x < 0 ? -1 : 1;
+  }
   const double sampled =
-      SampleLargest(map, p, [&](const auto& at, double size) {
+      Sample(map, p, d[0], d[1], [&](const auto& at, double size) {
         return along(at.m).lo / std::max(size, 1.0);
       });
   // -y'm = -y'f + y'r, of which the first is at most |f| <= 1, and the second
   // small of second order around x_hat.
-  return Search(map, p, reach, sampled + kAlongSlack,
-                [&](const Enclosure& enclosure) {
-                  const double direct = along(enclosure.m).hi;
-                  const double first = along(enclosure.f).hi;
-                  const Interval sum =
-                      Interval{0, first < 1 ? first : 1.0} -
-                      along(enclosure.remainder);
-                  if (!(sum.hi < kInfinity)) return direct;
-                  return direct < sum.hi ? direct : sum.hi;
-                });
+  return Search(
+      map, p, reach, sampled + kAlongSlack, [&](const Enclosure& enclosure) {
+        const double direct = along(enclosure.m).hi;
+        const double first = along(enclosure.f).hi;
+        const Interval sum =
+            Interval{0, first < 1 ? first : 1.0} - along(enclosure.remainder);
+        if (!(sum.hi < kInfinity)) return direct;
+        return direct < sum.hi ? direct : sum.hi;
+      });
 }
 
 }  // namespace krot

@@ -107,7 +107,8 @@ JointTermination ComponentSolve::SolvePart(const ProblemSubset& part,
     return JointTermination::kMaxIterations;
   }
   const auto replace = [&](Estimate optimum) {
-    RestoreGauge(part.problem(), start, &optimum);
+    RestoreGaugeIfHarmless(part.problem(), start, options_.norm,
+                           context_.num_threads, &optimum);
     part.Replace(optimum, candidate);
   };
   const JointTermination termination = solve.Run(

@@ -1,46 +1,217 @@
 #include "krot/pipeline/rounds.h"
 
+#include <cmath>
+#include <limits>
 #include <utility>
+#include <vector>
+
+#include "krot/bridge/reprojection.h"
+#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/schedule.h"
+#include "krot/pipeline/segment.h"
+#include "krot/pipeline/trust_regions.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
 
 namespace krot {
 namespace {
 
-// Steps tried: 1, then shorter ones by this factor, until they get worse.
-constexpr double kShorter = 0.7;
-constexpr double kShortestStep = 1e-3;
+constexpr int kMaxRounds = 30;
+// A round that lowers the true cost by less, relative, lowers nothing.
+constexpr double kStationary = 1e-6;
+// So many such rounds in a row end it while bounds are being tightened.
+constexpr int kPatience = 3;
+// What the rows' cost may be exceeded by for a linear promise to be kept.
+constexpr double kKeptPromise = 1e-5;
+// Sweeps behind the last round: after them a third would hardly lower any
+// block's own maximum.
+constexpr int kFinishingSweeps = 2;
+// What a finishing sweep may add to the cost by rounding, relative.
+constexpr double kCostRounding = 1e-12;
 
-Estimate Between(const Estimate& from, const Estimate& to, double step) {
-  Estimate estimate = from;
-  for (size_t f = 0; f < from.translations.size(); ++f) {
-    estimate.translations[f] +=
-        step * (to.translations[f] - from.translations[f]);
+class Rounds {
+ public:
+  Rounds(const Model& model, const SolveModelOptions& options,
+         SolveMethod method, const Context& context, const Timer& timer,
+         BuiltProblem* built, Estimate* estimate, SolveSummary* summary)
+      : model_(model),
+        options_(options),
+        method_(method),
+        context_(context),
+        timer_(timer),
+        reprojection_(model, *built),
+        built_(*built),
+        estimate_(*estimate),
+        summary_(*summary),
+        cost_(TrueCost(estimate_)) {}
+
+  void Run();
+  void Finish();
+  std::optional<PixelCertificate> certificate() && {
+    return std::move(certificate_);
   }
-  for (size_t k = 0; k < from.points.size(); ++k) {
-    estimate.points[k] += step * (to.points[k] - from.points[k]);
+
+ private:
+  double TrueCost(const Estimate& estimate) const {
+    return reprojection_.TrueCost(estimate, options_.norm,
+                                  context_.num_threads);
   }
-  return estimate;
+  bool IsGapReached() const {
+    return certificate_ && cost_ - certificate_->lower_bound <=
+                               options_.joint.relative_gap * cost_;
+  }
+  bool IsInterrupted() const {
+    return summary_.termination == SolveTermination::kInterrupted;
+  }
+  bool RunOne();
+  void Prove(const Certificate& certificate,
+             const std::vector<int64_t>& observation_of);
+
+  const Model& model_;
+  const SolveModelOptions& options_;
+  const SolveMethod method_;
+  const Context& context_;
+  const Timer& timer_;
+  const Reprojection reprojection_;
+  BuiltProblem& built_;
+  Estimate& estimate_;
+  SolveSummary& summary_;
+  double cost_;  // true, pixels
+  TrustRegions trust_;
+  int num_idle_rounds_ = 0;
+  std::optional<PixelCertificate> certificate_;
+};
+
+// `observation_of`: what the certificate's observations are called among the
+// rows, or -1; empty: the same.
+void Rounds::Prove(const Certificate& certificate,
+                   const std::vector<int64_t>& observation_of) {
+  std::optional<PixelCertificate> proof;
+  if (reprojection_.IsLinear()) {
+    proof = MakePixelCertificate(
+        model_, built_, options_.norm, certificate,
+        BearingsOfPoints(model_, built_, estimate_, certificate), context_);
+  } else {
+    std::vector<int64_t> support;
+    for (const CertifiedObservation& o : certificate.observations) {
+      const int64_t i = observation_of.empty() ? o.observation
+                                               : observation_of[o.observation];
+      if (i >= 0) support.push_back(i);
+    }
+    proof = ProveInPixels(model_, built_, estimate_, options_.norm,
+                          std::move(support), context_);
+  }
+  if (proof &&
+      (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
+    certificate_ = std::move(proof);
+  }
+}
+
+// Whether another round may lower the cost.
+bool Rounds::RunOne() {
+  const KnownRotationProblem& rows = built_.problem;
+  std::vector<int64_t> observation_of;
+  std::optional<KnownRotationProblem> bounded;
+  if (!trust_.IsEmpty()) {
+    bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
+  }
+  Estimate solved = estimate_;
+  const std::optional<Certificate> certificate =
+      SolveRows(bounded ? *bounded : rows, options_, method_,
+                summary_.rounds.empty(), context_, timer_, &solved, &summary_);
+  if (options_.res_int.update_frames) {
+    RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_.num_threads,
+                           &solved);
+  }
+
+  Round round;
+  round.linear_cost = Cost(rows, solved, options_.norm, context_.num_threads);
+  if (certificate && !bounded) {
+    round.linear_lower_bound = certificate->lower_bound;
+  }
+  const double before = cost_;
+  Estimate from = std::exchange(estimate_, Estimate());
+  if (options_.res_int.update_frames) {
+    estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
+                              context_.num_threads, &round.step);
+  } else {
+    estimate_ = BestPointsOnSegments(reprojection_, rows, from, solved,
+                                     options_.norm, context_.num_threads);
+    round.step = 1;
+  }
+  cost_ = TrueCost(estimate_);
+  int64_t num_bounded = 0;
+  if (round.step < 1) {
+    num_bounded =
+        trust_.Shrink(reprojection_, rows, from, solved, options_.norm,
+                      (1 + kKeptPromise) * round.linear_cost);
+  } else {
+    trust_.Clear();
+  }
+  reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+  if (certificate) Prove(*certificate, observation_of);
+
+  round.cost = cost_;
+  if (certificate_) round.lower_bound = certificate_->lower_bound;
+  round.seconds = timer_.Seconds();
+  summary_.rounds.push_back(round);
+  if (reprojection_.IsLinear() || IsInterrupted() || IsGapReached()) {
+    return false;
+  }
+  const bool is_idle = !(cost_ < (1 - kStationary) * before);
+  num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
+  if (num_bounded == 0) return !is_idle;
+  return num_idle_rounds_ < kPatience;
+}
+
+void Rounds::Run() {
+  summary_.cost_initial = cost_;
+  if (method_ != SolveMethod::kResInt && IsZeroUpToRounding(cost_)) {
+    summary_.termination = SolveTermination::kZeroCost;
+    summary_.cost_final = cost_;
+    return;
+  }
+  reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+  while (RunOne() && summary_.rounds.size() < kMaxRounds) {
+  }
+  if (method_ == SolveMethod::kAuto && !IsInterrupted()) Finish();
+  summary_.cost_final = cost_;
+  if (!summary_.rounds.empty() && certificate_ && !IsInterrupted()) {
+    summary_.termination = IsGapReached() ? SolveTermination::kGapReached
+                                          : SolveTermination::kStalled;
+  }
+}
+
+void Rounds::Finish() {
+  for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
+    Estimate swept = estimate_;
+    const double highest = (1 + kCostRounding) * cost_;
+    if (!SweepToFinish(built_.problem, options_, context_, highest, &swept)) {
+      return;
+    }
+    const double cost = TrueCost(swept);
+    if (!(cost <= highest)) return;
+    estimate_ = std::move(swept);
+    cost_ = cost;
+    summary_.sweeps.push_back({cost, timer_.Seconds()});
+    if (options_.res_int.callback) {
+      options_.res_int.callback(static_cast<int>(summary_.sweeps.size()),
+                                summary_.sweeps.back());
+    }
+    reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+  }
 }
 
 }  // namespace
 
-Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
-                       const Estimate& to, Norm norm, int num_threads,
-                       double* step, double* true_cost) {
-  Estimate best = from;
-  *step = 0;
-  *true_cost = reprojection.TrueCost(from, norm, num_threads);
-  for (double trial = 1; trial >= kShortestStep; trial *= kShorter) {
-    Estimate candidate = trial == 1 ? to : Between(from, to, trial);
-    const double cost = reprojection.TrueCost(candidate, norm, num_threads);
-    if (cost < *true_cost) {
-      best = std::move(candidate);
-      *true_cost = cost;
-      *step = trial;
-    } else if (*step > 0) {
-      break;
-    }
-  }
-  return best;
+std::optional<PixelCertificate> SolveInRounds(
+    const Model& model, const SolveModelOptions& options, SolveMethod method,
+    const Context& context, const Timer& timer, BuiltProblem* built,
+    Estimate* estimate, SolveSummary* summary) {
+  Rounds rounds(model, options, method, context, timer, built, estimate,
+                summary);
+  rounds.Run();
+  return std::move(rounds).certificate();
 }
 
 }  // namespace krot

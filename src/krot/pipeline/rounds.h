@@ -1,21 +1,31 @@
 #pragma once
 
-#include <functional>
+#include <optional>
 
-#include "krot/bridge/reprojection.h"
-#include "krot/minimax/norm.h"
-#include "krot/problem/known_rotation_problem.h"
+#include "krot/base/context.h"
+#include "krot/base/timer.h"
+#include "krot/bridge/bridge.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/pipeline/solve_model.h"
 
 namespace krot {
 
-// From the solution of the linear rows to one of the true residuals: how far to
-// go along the way.
-
-// The best estimate found on the segment from `from` (of finite true cost, its
-// rows' point) to `to`, by true cost; on it the rows' cost is quasi-convex. Returns `from` where
-// nothing is below it. `*step` in [0, 1], `*true_cost` in pixels.
-Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
-                       const Estimate& to, Norm norm, int num_threads,
-                       double* step, double* true_cost);
+// Minimises the largest *true* error in rounds: takes every row where its point
+// projects, solves the linear problem (SolveRows), goes as far along the way to
+// its solution as lowers the true cost most, and takes the rows anew, until a
+// certificate in true pixels shows the gap asked for or a round lowers nothing.
+// A fixed point satisfies the first-order conditions of the true problem. One
+// round where rows do not depend on where they are taken.
+//
+// The true cost never rises. Where a full step would raise it, the next round
+// bounds how far the observations to blame may move (trust_regions.h).
+//
+// Fills in costs, rounds, termination, sweeps and iterations of the summary and
+// returns the highest certificate, unchecked. The rows of `built` are in the
+// end those at `*estimate`.
+std::optional<PixelCertificate> SolveInRounds(
+    const Model& model, const SolveModelOptions& options, SolveMethod method,
+    const Context& context, const Timer& timer, BuiltProblem* built,
+    Estimate* estimate, SolveSummary* summary);
 
 }  // namespace krot

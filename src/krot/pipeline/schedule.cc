@@ -10,13 +10,9 @@
 namespace krot {
 namespace {
 
-// Sweeps behind the joint solver: after them a third would hardly lower any
-// block's own maximum.
-constexpr int kFinishingSweeps = 2;
-// What a finishing sweep may add to the cost by rounding, relative.
-constexpr double kCostRounding = 1e-12;
-// Leaves room in the gap for finishing sweeps' and the gauge's rounding.
-constexpr double kShareOfGap = 0.999;
+// Of the gap asked for, what the rows' own proof may leave: the rest is for the
+// lenses, finishing sweeps and the gauge.
+constexpr double kShareOfGap = 0.9;
 
 SolveTermination FromResInt(ResIntTermination termination) {
   switch (termination) {
@@ -58,12 +54,12 @@ class Schedule {
         context_(context),
         timer_(timer),
         estimate_(*estimate),
-        summary_(*summary) {}
+        summary_(*summary),
+        cost_(Cost(problem, *estimate, options.norm, context.num_threads)) {}
 
   void Sweeps(ResIntOptions res_int);
   void LeadingSweeps();
   std::optional<Certificate> Joint();
-  void FinishingSweeps();
   // Leaves an estimate that is still worse than a start found from nothing.
   void StartAfresh();
 
@@ -85,6 +81,7 @@ class Schedule {
   const Timer& timer_;
   Estimate& estimate_;
   SolveSummary& summary_;
+  double cost_;  // of the rows, pixels
 };
 
 void Schedule::Sweeps(ResIntOptions res_int) {
@@ -93,7 +90,7 @@ void Schedule::Sweeps(ResIntOptions res_int) {
   const ResIntSummary result =
       SolveResInt(problem_, res_int, context_, &estimate_);
   summary_.termination = FromResInt(result.termination);
-  summary_.cost_final = result.cost_final;
+  cost_ = result.cost_final;
 }
 
 void Schedule::LeadingSweeps() {
@@ -111,33 +108,13 @@ std::optional<Certificate> Schedule::Joint() {
   joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
   const JointSummary result = SolveJoint(problem_, joint, context_, &estimate_);
   summary_.termination = FromJoint(result.termination);
-  summary_.cost_final = result.cost_final;
+  cost_ = result.cost_final;
   summary_.num_working_observations = result.num_working_observations;
   return result.certificate;
 }
 
-void Schedule::FinishingSweeps() {
-  BlockSweep blocks(problem_, options_.res_int.fast_descent, options_.norm,
-                    context_);
-  for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
-    Estimate swept = estimate_;
-    blocks.IntersectPoints(&swept);
-    blocks.ResectFrames(&swept);
-    if (context_.IsCancelled()) {
-      summary_.termination = SolveTermination::kInterrupted;
-      return;
-    }
-    const double cost =
-        Cost(problem_, swept, options_.norm, context_.num_threads);
-    if (!(cost <= (1 + kCostRounding) * summary_.cost_final)) return;
-    estimate_ = std::move(swept);
-    summary_.cost_final = cost;
-    AddSweep(cost);
-  }
-}
-
 void Schedule::StartAfresh() {
-  if (!(summary_.cost_final > options_.init_max_error)) return;
+  if (!(cost_ > options_.init_max_error)) return;
   context_.Note("the start is a rough one; looking for a better");
   FoundStart found = FindFeasibleStart(
       problem_, options_, context_,
@@ -148,43 +125,54 @@ void Schedule::StartAfresh() {
   if (!found.estimate) return;
   const double cost =
       Cost(problem_, *found.estimate, options_.norm, context_.num_threads);
-  if (!(cost < summary_.cost_final)) return;
+  if (!(cost < cost_)) return;
   estimate_ = *std::move(found.estimate);
-  summary_.cost_final = cost;
+  cost_ = cost;
 }
 
 }  // namespace
 
-std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
-                                       const SolveModelOptions& options,
-                                       SolveMethod method,
-                                       const Context& context,
-                                       const Timer& timer, Estimate* estimate,
-                                       SolveSummary* summary) {
-  summary->cost_initial =
-      Cost(problem, *estimate, options.norm, context.num_threads);
-  summary->cost_final = summary->cost_initial;
-  if (method != SolveMethod::kResInt &&
-      IsZeroUpToRounding(summary->cost_initial)) {
-    summary->termination = SolveTermination::kZeroCost;
-    return std::nullopt;
-  }
+std::optional<Certificate> SolveRows(const KnownRotationProblem& problem,
+                                     const SolveModelOptions& options,
+                                     SolveMethod method, bool is_first_round,
+                                     const Context& context, const Timer& timer,
+                                     Estimate* estimate,
+                                     SolveSummary* summary) {
   Schedule schedule(problem, options, context, timer, estimate, summary);
   switch (method) {
-    case SolveMethod::kResInt:
-      schedule.Sweeps(options.res_int);
+    case SolveMethod::kResInt: {
+      ResIntOptions res_int = options.res_int;
+      if (!is_first_round && res_int.update_frames) {
+        res_int.max_sweeps -= static_cast<int>(summary->sweeps.size());
+      }
+      schedule.Sweeps(res_int);
       return std::nullopt;
+    }
     case SolveMethod::kJoint:
       return schedule.Joint();
     case SolveMethod::kAuto:
       break;
   }
   schedule.LeadingSweeps();
-  if (!schedule.IsInterrupted()) schedule.StartAfresh();
+  if (is_first_round && !schedule.IsInterrupted()) schedule.StartAfresh();
   if (schedule.IsInterrupted()) return std::nullopt;
-  const std::optional<Certificate> certificate = schedule.Joint();
-  if (!schedule.IsInterrupted()) schedule.FinishingSweeps();
-  return certificate;
+  return schedule.Joint();
+}
+
+bool SweepToFinish(const KnownRotationProblem& problem,
+                   const SolveModelOptions& options, const Context& context,
+                   double highest, Estimate* estimate) {
+  Estimate swept = *estimate;
+  BlockSweep blocks(problem, options.res_int.fast_descent, options.norm,
+                    context);
+  blocks.IntersectPoints(&swept);
+  blocks.ResectFrames(&swept);
+  if (context.IsCancelled() ||
+      !(Cost(problem, swept, options.norm, context.num_threads) <= highest)) {
+    return false;
+  }
+  *estimate = std::move(swept);
+  return true;
 }
 
 }  // namespace krot

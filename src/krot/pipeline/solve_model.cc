@@ -1,11 +1,17 @@
 #include "krot/pipeline/solve_model.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
+#include "krot/bridge/carry_left_out.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/bridge/reprojection.h"
 #include "krot/pipeline/iteration_log.h"
-#include "krot/pipeline/schedule.h"
+#include "krot/pipeline/rounds.h"
 #include "krot/pipeline/solve_memory.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/components.h"
@@ -14,6 +20,9 @@
 
 namespace krot {
 namespace {
+
+// What rounding may add to the largest error, relative.
+constexpr double kErrorRounding = 1e-9;
 
 bool HasJointSolver(Norm norm) { return norm.p == 2 || norm.IsPolyhedral(); }
 
@@ -47,24 +56,37 @@ void CountProblem(const Model& model, const BuiltProblem& built,
 // Checks the certificate once more, apart from the solver that made it, and
 // says what it proves about the estimate.
 void Certify(const Model& model, const Start& start, const Estimate& estimate,
-             const SolveModelOptions& options,
-             const std::optional<Certificate>& certificate,
+             const SolveModelOptions& options, const Context& context,
+             const std::optional<PixelCertificate>& certificate,
              SolveSummary* summary) {
   if (!certificate) return;
   const Timer timer;
-  const CertificateCheck check =
-      CheckCertificate(start.built.problem, options.norm, *certificate);
+  const PixelCertificateCheck check = CheckPixelCertificate(
+      model, start.built, options.norm, *certificate, context);
   if (check.is_accepted) {
     summary->is_certified = true;
-    summary->lower_bound = check.proved_bound;
-    summary->support =
-        ListSupport(model, start.built, estimate, options.norm, *certificate);
+    summary->lower_bound = check.lower_bound;
+    summary->support = ListSupport(model, start.built, estimate, options.norm,
+                                   certificate->rows);
     if (options.describe_certificate) {
       summary->certificate =
           DescribeCertificate(model, start.built, options.norm, *certificate);
     }
   }
   summary->seconds_certify = timer.Seconds();
+}
+
+// That no estimate is below a start's bound, in true pixels.
+void CertifyInfeasible(const Model& model, const Start& start,
+                       const SolveModelOptions& options, const Context& context,
+                       const std::optional<Certificate>& certificate,
+                       SolveSummary* summary) {
+  if (!certificate) return;
+  Certify(model, start, start.built.start, options, context,
+          MakePixelCertificate(
+              model, start.built, options.norm, *certificate,
+              BearingsOfPixels(model, start.built, *certificate), context),
+          summary);
 }
 
 // With the final cost. What is claimed is what the numbers say, whatever the
@@ -105,8 +127,8 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   summary->termination = found.termination;
   const bool was_asked = options.init == SolveInit::kFeasible;
   if (found.termination == SolveTermination::kInterrupted || was_asked) {
-    Certify(model, *start, start->built.start, options, found.certificate,
-            summary);
+    CertifyInfeasible(model, *start, options, context, found.certificate,
+                      summary);
     return false;
   }
   context.Note("there is none; going on without those observations");
@@ -116,6 +138,23 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   *estimate = start->built.start;
   summary->termination = SolveTermination::kNothingToSolve;
   return !start->built.problem.observations.empty();
+}
+
+// Whether an error that was finite is now above the largest that was.
+bool IsWorse(const std::vector<double>& errors_before_px,
+             const std::vector<double>& errors_after_px) {
+  double largest = 0;
+  for (const double error : errors_before_px) {
+    if (std::isfinite(error)) largest = std::max(largest, error);
+  }
+  largest *= 1 + kErrorRounding;
+  for (size_t i = 0; i < errors_before_px.size(); ++i) {
+    if (std::isfinite(errors_before_px[i]) &&
+        !(errors_after_px[i] <= largest)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -141,8 +180,9 @@ SolveModelResult SolveModel(const Model& model,
   Start start = ChooseStart(model, options, summary.method, context);
   summary.init = start.init;
   CountProblem(model, start.built, &summary);
-  summary.pixel_error_before =
-      Summarize(PixelErrors(model, context.num_threads));
+  const std::vector<double> errors_before_px =
+      PixelErrors(model, context.num_threads);
+  summary.pixel_error_before = Summarize(errors_before_px);
   summary.pixel_error_after = summary.pixel_error_before;
   summary.seconds_build = build_timer.Seconds();
   if (options.on_built) options.on_built(summary);
@@ -160,23 +200,31 @@ SolveModelResult SolveModel(const Model& model,
     result.model = model;
     return result;
   }
-  const KnownRotationProblem& problem = start.built.problem;
-  const std::optional<Certificate> certificate =
-      RunSchedule(problem, options, summary.method, context, solve_timer,
-                  &estimate, &summary);
+  const std::optional<PixelCertificate> certificate =
+      SolveInRounds(model, options, summary.method, context, solve_timer,
+                    &start.built, &estimate, &summary);
   if (options.res_int.update_frames) {
-    RestoreGauge(problem, start.built.start, &estimate);
+    RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
+                           context.num_threads, &estimate);
     summary.cost_final =
-        Cost(problem, estimate, options.norm, context.num_threads);
+        Reprojection(model, start.built)
+            .TrueCost(estimate, options.norm, context.num_threads);
   }
   result.model = ApplyEstimate(model, start.built, estimate);
-  const std::vector<double> errors_px =
+  CarryLeftOutPoints(model, errors_before_px, start.built, summary.cost_final,
+                     &result.model);
+  std::vector<double> errors_px =
       PixelErrors(result.model, context.num_threads);
+  if (options.norm.p == 2 && IsWorse(errors_before_px, errors_px)) {
+    result.model = model;
+    errors_px = errors_before_px;
+    summary.is_given_back = true;
+  }
   UpdatePointErrors(errors_px, &result.model);
   summary.pixel_error_after = Summarize(errors_px);
   summary.seconds_solve = solve_timer.Seconds();
 
-  Certify(model, start, estimate, options, certificate, &summary);
+  Certify(model, start, estimate, options, context, certificate, &summary);
   MeasureGap(options.joint.relative_gap, &summary);
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
     summary.polish = PolishModel(options.polish, context, &result.model);

@@ -47,6 +47,16 @@ enum class SolveTermination {
   kInterrupted,  // the estimate is the best so far
 };
 
+// A solve of the linear rows, and the step that was taken from it.
+struct Round {
+  double linear_cost = 0;                    // of the rows' solution, pixels
+  std::optional<double> linear_lower_bound;  // proved of the rows, pixels
+  double step = 0;                           // of the way there, in [0, 1]
+  double cost = 0;                           // true, after it, pixels
+  std::optional<double> lower_bound;         // highest so far, true pixels
+  double seconds = 0;                        // since the solve's start
+};
+
 struct SolveSummary {
   SolveTermination termination = SolveTermination::kNotRun;
   SolveMethod method = SolveMethod::kAuto;  // that was used, not asked for
@@ -62,24 +72,30 @@ struct SolveSummary {
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
 
-  // The largest residual, in pixels linearised at the observations; initial:
-  // of the start, after re-triangulation; final: of the model that is given
-  // back.
+  // The largest true error of the observations in the optimisation, pixels;
+  // initial: of the start, after re-triangulation; final: of the model that is
+  // given back.
   double cost_initial = 0;
   double cost_final = 0;
-  std::vector<Sweep> sweeps;  // the leading and the finishing ones
+  std::vector<Round> rounds;
+  // Of all rounds. The costs of sweeps and iterations are those of the rows.
+  std::vector<Sweep> sweeps;
   // Of the joint solver, and towards a start; seconds since the solve's start.
   std::vector<JointIteration> iterations;
   // That the joint solver looked at in the end; none if it did not run.
   std::optional<int64_t> num_working_observations;
 
-  // What a certificate proves that CheckCertificate accepted in the end.
+  // What a certificate proves that CheckPixelCertificate accepted in the end.
   bool is_certified = false;
-  std::optional<double> lower_bound;  // linearised pixels
+  std::optional<double> lower_bound;  // true pixels
   std::optional<double>
       relative_gap;  // (cost_final - lower_bound) / cost_final
   std::vector<SupportObservation> support;     // worst first
   std::optional<CertificateFile> certificate;  // if asked for
+
+  // No estimate was found whose largest error, over all observations that had
+  // a finite one, is not above the input's: the input is what is given back.
+  bool is_given_back = false;
 
   // Over all observations of the model, those left out included.
   PixelErrorStatistics pixel_error_before;

@@ -68,8 +68,8 @@ KnownRotationProblem TrustRegions::AddTo(
     for (auto bound = radii_.lower_bound(begin);
          bound != radii_.end() && bound->first < end; ++bound) {
       Observation row = rows.observations[bound->first];
-      row.E.bottomRows<2>() = level / bound->second *
-                              BasisAcross(InCamera(rows, x_hat, row));
+      row.E.bottomRows<2>() =
+          level / bound->second * BasisAcross(InCamera(rows, x_hat, row));
       problem.observations.push_back(row);
       observation_of->push_back(-1);
     }

@@ -29,7 +29,8 @@ class TrustRegions {
                  const Estimate& to, Norm norm, double level);
 
   // The rows with those of the bounds behind those of their points. Observation
-  // i of the result is `(*observation_of)[i]` of `rows`, or -1 if it is a bound.
+  // i of the result is `(*observation_of)[i]` of `rows`, or -1 if it is a
+  // bound.
   KnownRotationProblem AddTo(const KnownRotationProblem& rows,
                              const Estimate& x_hat, double level,
                              std::vector<int64_t>* observation_of) const;

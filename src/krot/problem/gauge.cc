@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "krot/problem/components.h"
@@ -11,6 +12,9 @@
 
 namespace krot {
 namespace {
+
+// What a change of coordinates may add to the cost, relative.
+constexpr double kHarmless = 1e-9;
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -202,6 +206,18 @@ void RestoreGauge(const KnownRotationProblem& problem,
     const int32_t component = components.of_point[k];
     if (component < 0) continue;
     estimate->points[k] += moves[component].Shift(estimate->points[k]);
+  }
+}
+
+void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
+                            const Estimate& reference, Norm norm,
+                            int num_threads, Estimate* estimate) {
+  Estimate moved = *estimate;
+  RestoreGauge(problem, reference, &moved);
+  const double limit =
+      (1 + kHarmless) * Cost(problem, *estimate, norm, num_threads);
+  if (Cost(problem, moved, norm, num_threads) <= limit) {
+    *estimate = std::move(moved);
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -23,6 +24,13 @@ namespace krot {
 // keeps its bits. O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate);
+
+// The same, unless it would raise the cost of its own rows, pixels, by more
+// than rounding: what is small and near the origin loses its digits elsewhere.
+// Then the estimate stays as it is.
+void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
+                            const Estimate& reference, Norm norm,
+                            int num_threads, Estimate* estimate);
 
 // Scales an estimate to a median depth of one: that of a problem without
 // baselines (HasBaseline), whose scale is free. O(observations).

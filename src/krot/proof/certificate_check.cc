@@ -15,8 +15,9 @@
 
 // How (1) is proved. Forces (force_balance.h) balance but for g; changing those
 // of a spanning forest balances them exactly. The change F_i of a force is one
-// of (delta lambda_i; y_i) by E_i^-T F_i. Then |y_i|_dual / lambda_i is at most rho
-// for all i, and (lambda_i, y_i / rho) is dual feasible and proves delta / rho.
+// of (delta lambda_i; y_i) by E_i^-T F_i. Then |y_i|_dual / lambda_i is at most
+// rho for all i, and (lambda_i, y_i / rho) is dual feasible and proves delta /
+// rho.
 
 namespace krot {
 namespace {

@@ -36,10 +36,10 @@ ForceSums BalanceForces(const KnownRotationProblem& problem, double delta,
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
     const double delta_lambda = delta * multipliers[i].lambda;
-    const Vector3d force = view.cam_from_world_rotation.transpose() *
-                           (observation.E.transpose() *
-                            Vector3d(delta_lambda, multipliers[i].y[0],
-                                     multipliers[i].y[1]));
+    const Vector3d force =
+        view.cam_from_world_rotation.transpose() *
+        (observation.E.transpose() *
+         Vector3d(delta_lambda, multipliers[i].y[0], multipliers[i].y[1]));
     for (ForceSum* balance : {&balances.of_point[observation.point],
                               &balances.of_frame[view.frame]}) {
       balance->sum += force;

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/bridge/bridge.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Points that took no part in the optimisation, in a model whose frames have
+// moved: where the largest error of such a point, finite before, has risen
+// above both its own old one and `level`, pixels, the point moves along with
+// the image, of those of its track, that serves it best, and stays where it is
+// if none does. A point of one observation keeps its error exactly to rounding.
+// `errors_px` are PixelErrors of `before`. O(observations of such points).
+void CarryLeftOutPoints(const Model& before,
+                        const std::vector<double>& errors_px,
+                        const BuiltProblem& built, double level, Model* after);
+
+}  // namespace krot

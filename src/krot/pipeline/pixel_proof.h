@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/bridge/bridge.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/minimax/norm.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// A lower bound in true pixels for all estimates, from the observations that
+// set the maximum of the linear rows: `support`, ascending indices. `built` has
+// the rows that were taken at `x_hat`; the nearer that is to the optimum of the
+// true errors, the higher is the bound.
+//
+// The support's own problem, which is small, is solved once more for these
+// rows; a row whose support line (pixel_certificate.h) is crossed by its
+// observation's true set is widened until it is not, and the problem solved
+// again. None if nothing is proved.
+std::optional<PixelCertificate> ProveInPixels(const Model& model,
+                                              const BuiltProblem& built,
+                                              const Estimate& x_hat, Norm norm,
+                                              std::vector<int64_t> support,
+                                              const Context& context);
+
+}  // namespace krot
