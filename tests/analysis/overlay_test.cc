@@ -74,10 +74,10 @@ TEST_P(Overlay, SaysTheSamePosesInImagesAndFrames) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(overlay_);
   for (size_t n = 0; n < geometries.size(); ++n) {
     const Pose& pose = overlay_.images[n].cam_from_world;
-    EXPECT_LE((pose.Rotation() - geometries[n].cam_from_world_rotation).norm(),
+    EXPECT_LE((pose.Rotation() - geometries[n].cam_from_world.rotation).norm(),
               1e-14);
     EXPECT_LE(
-        (pose.translation - geometries[n].cam_from_world_translation).norm(),
+        (pose.translation - geometries[n].cam_from_world.translation).norm(),
         1e-14);
   }
 }

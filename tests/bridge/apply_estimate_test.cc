@@ -67,10 +67,10 @@ TEST_P(ApplyEstimateToModel, MakesImagesAgreeWithTheirFrames) {
   for (size_t n = 0; n < result.images.size(); ++n) {
     const Pose& pose = result.images[n].cam_from_world;
     EXPECT_NEAR(
-        (pose.translation - geometries[n].cam_from_world_translation).norm(), 0,
+        (pose.translation - geometries[n].cam_from_world.translation).norm(), 0,
         1e-15);
     EXPECT_NEAR(
-        (pose.Rotation() - geometries[n].cam_from_world_rotation).norm(), 0,
+        (pose.Rotation() - geometries[n].cam_from_world.rotation).norm(), 0,
         1e-14);
   }
 }

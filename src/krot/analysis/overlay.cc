@@ -7,8 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
@@ -132,10 +130,7 @@ void AddTrivialRigs(Model* model) {
 void FollowFrames(Model* model) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
   for (size_t n = 0; n < model->images.size(); ++n) {
-    const ImageGeometry& geometry = geometries[n];
-    const Eigen::Quaterniond q(geometry.cam_from_world_rotation);
-    model->images[n].cam_from_world = {{q.w(), q.x(), q.y(), q.z()},
-                                       geometry.cam_from_world_translation};
+    model->images[n].cam_from_world = ToPose(geometries[n].cam_from_world);
   }
 }
 
