@@ -159,7 +159,7 @@ TEST(ModelViewJson, SaysNullForAnImageWithoutPose) {
   SceneOptions options;
   options.has_rigs = false;
   Model model = SynthesizeScene(options).model;
-  model.images[0].cam_from_world.translation.setConstant(
+  model.frames[0].rig_from_world.translation.setConstant(
       std::numeric_limits<double>::quiet_NaN());
   const json view = json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
   EXPECT_TRUE(view["images"][0]["center"].is_null());

@@ -112,14 +112,8 @@ Eigen::Map<const Vector3d> TranslationOf(const PoseBlock& block) {
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
                                       int min_track_length) {
   AdjustmentBlocks blocks;
-  if (model.has_rigs) {
-    for (const Frame& frame : model.frames) {
-      blocks.frames.push_back(ToBlock(frame.rig_from_world));
-    }
-  } else {
-    for (const Image& image : model.images) {
-      blocks.frames.push_back(ToBlock(image.cam_from_world));
-    }
+  for (const Frame& frame : model.frames) {
+    blocks.frames.push_back(ToBlock(frame.rig_from_world));
   }
   for (const Rig& rig : model.rigs) {
     for (const RigSensor& sensor : rig.sensors) {
@@ -158,11 +152,8 @@ Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
   }
   for (size_t f = 0; f < after.frames.size(); ++f) {
     if (after.frames[f] == before.frames[f]) continue;
-    (model.has_rigs ? result.frames[f].rig_from_world
-                    : result.images[f].cam_from_world) =
-        ToPose(after.frames[f]);
+    result.frames[f].rig_from_world = ToPose(after.frames[f]);
   }
-  if (!model.has_rigs) return result;
 
   const std::vector<int32_t> sensor_offsets = SensorOffsets(model);
   const std::vector<ImageGeometry> images = ImageGeometries(result);

@@ -45,9 +45,7 @@ std::optional<CameraPose> CameraPoseOf(const Model& model,
     return CameraPose{Eigen::Quaterniond(geometry.cam_from_world.rotation),
                       geometry.cam_from_world.translation};
   }
-  const Pose& pose = model.has_rigs
-                         ? model.frames[geometry.frame].rig_from_world
-                         : model.images[geometry.frame].cam_from_world;
+  const Pose& pose = model.frames[geometry.frame].rig_from_world;
   return CameraPose{NormalizedTwice(pose), pose.translation};
 }
 

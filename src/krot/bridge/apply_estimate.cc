@@ -51,11 +51,9 @@ Model ApplyEstimate(const Model& model, const BuiltProblem& built,
   for (size_t k = 0; k < built.point_of.size(); ++k) {
     result.points3D[built.point_of[k]].xyz = estimate.points[k];
   }
-  if (model.has_rigs) {
-    for (size_t f = 0; f < built.frame_of.size(); ++f) {
-      result.frames[built.frame_of[f]].rig_from_world.translation =
-          estimate.translations[f];
-    }
+  for (size_t f = 0; f < built.frame_of.size(); ++f) {
+    result.frames[built.frame_of[f]].rig_from_world.translation =
+        estimate.translations[f];
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (size_t j = 0; j < built.image_of.size(); ++j) {

@@ -212,9 +212,7 @@ void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
 void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
   const std::vector<ImageGeometry>& geometries = sources.geometries;
   KnownRotationProblem& problem = built->problem;
-  const size_t num_model_frames = sources.model.has_rigs
-                                      ? sources.model.frames.size()
-                                      : sources.model.images.size();
+  const size_t num_model_frames = sources.model.frames.size();
   std::vector<int32_t> frame_index(num_model_frames, -1);
   for (const Observation& observation : problem.observations) {
     frame_index[geometries[observation.view].frame] = 0;

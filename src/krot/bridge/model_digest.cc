@@ -96,14 +96,9 @@ void AddCamera(const Camera& camera, Digest* digest) {
 void AddPlace(const Model& model, const ImageGeometry& image, Digest* digest) {
   digest->Integer(image.frame >= 0);
   if (image.frame < 0) return;
-  if (model.has_rigs) {
-    const Frame& frame = model.frames[image.frame];
-    digest->Integer(frame.id);
-    AddQuaternion(frame.rig_from_world, digest);
-  } else {
-    digest->Integer(model.images[image.frame].id);
-    AddQuaternion(model.images[image.frame].cam_from_world, digest);
-  }
+  const Frame& frame = model.frames[image.frame];
+  digest->Integer(frame.id);
+  AddQuaternion(frame.rig_from_world, digest);
   const Pose cam_from_rig =
       image.sensor < 0
           ? Pose()

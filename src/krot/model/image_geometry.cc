@@ -23,9 +23,16 @@ void Place(const Pose& rig_from_world, const Pose& cam_from_rig,
   image->has_pose = image->cam_from_world.translation.allFinite();
 }
 
-void PlaceByFrames(const Model& model, std::vector<ImageGeometry>* images) {
+}  // namespace
+
+std::vector<ImageGeometry> ImageGeometries(const Model& model) {
+  const auto camera_index = IndicesById<CameraId>(model.cameras);
   const auto rig_index = IndicesById<RigId>(model.rigs);
   const auto image_index = ImageIndices(model);
+  std::vector<ImageGeometry> images(model.images.size());
+  for (size_t n = 0; n < images.size(); ++n) {
+    images[n].camera = camera_index.at(model.images[n].camera_id);
+  }
   for (size_t f = 0; f < model.frames.size(); ++f) {
     const Frame& frame = model.frames[f];
     const int32_t rig = rig_index.at(frame.rig_id);
@@ -36,29 +43,13 @@ void PlaceByFrames(const Model& model, std::vector<ImageGeometry>* images) {
       if (!place || !place->sensor_from_rig) continue;
       const auto found = image_index.find(static_cast<ImageId>(data.data_id));
       if (found == image_index.end()) continue;
-      ImageGeometry& image = (*images)[found->second];
+      ImageGeometry& image = images[found->second];
       image.frame = static_cast<int32_t>(f);
       image.rig = rig;
       image.sensor = place->index;
       Place(frame.rig_from_world, *place->sensor_from_rig, &image);
     }
   }
-}
-
-}  // namespace
-
-std::vector<ImageGeometry> ImageGeometries(const Model& model) {
-  const auto camera_index = IndicesById<CameraId>(model.cameras);
-  std::vector<ImageGeometry> images(model.images.size());
-  for (size_t n = 0; n < images.size(); ++n) {
-    const Image& image = model.images[n];
-    images[n].camera = camera_index.at(image.camera_id);
-    if (!model.has_rigs) {
-      images[n].frame = static_cast<int32_t>(n);
-      Place(image.cam_from_world, Pose(), &images[n]);
-    }
-  }
-  if (model.has_rigs) PlaceByFrames(model, &images);
   return images;
 }
 

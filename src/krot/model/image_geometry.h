@@ -12,15 +12,14 @@ namespace krot {
 
 // Where the image stands: x_cam = cam_from_rig * (rig_from_world * x_world).
 //
-// In a model with rigs the frame's pose and the rig's calibration decide, as
-// in COLMAP since 3.12, and the pose in the images file is ignored; in a
-// legacy model every image is its own frame and cam_from_rig the identity.
+// The frame's pose and the rig's calibration decide, as in COLMAP since 3.12;
+// the pose in the images file is ignored.
 struct ImageGeometry {
   int32_t camera = -1;  // index in Model::cameras
-  // Index in Model::frames (in Model::images if !has_rigs); -1: the image
-  // belongs to no frame, or its sensor's place in the rig is unknown.
+  // Index in Model::frames; -1: the image belongs to no frame, or its sensor's
+  // place in the rig is unknown.
   int32_t frame = -1;
-  int32_t rig = -1;     // index in Model::rigs; -1 if there is none
+  int32_t rig = -1;     // index in Model::rigs; -1 if frame is
   int32_t sensor = -1;  // index in Rig::sensors; -1: the reference sensor
   // False if frame is -1 or any translation below is not finite.
   bool has_pose = false;

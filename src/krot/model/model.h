@@ -17,8 +17,9 @@ namespace krot {
 // A COLMAP sparse model as plain data, every record in the order of its file
 // and every number with the bits it was stored with.
 //
-// Identifiers are COLMAP's. Files that hold no rigs and frames ("legacy",
-// COLMAP 3.8 to 3.11) have `has_rigs` false and both lists empty.
+// Identifiers are COLMAP's. Every image belongs to a frame, and every frame to
+// a rig, also in a model whose files hold neither ("legacy", COLMAP 3.8
+// to 3.11): there they are trivial (trivial_rigs.h), and only writing tells.
 
 using CameraId = uint32_t;
 using RigId = uint32_t;
@@ -120,8 +121,8 @@ struct Point3D {
 };
 
 struct Model {
+  bool stores_rigs = false;  // whether the files hold rigs and frames
   std::vector<Camera> cameras;
-  bool has_rigs = false;
   std::vector<Rig> rigs;
   std::vector<Frame> frames;
   std::vector<Image> images;
