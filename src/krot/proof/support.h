@@ -37,4 +37,10 @@ std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     std::vector<int64_t> candidates,
                                     double tolerance);
 
+// The bound that multipliers would prove, pixels, if (1) of certificate_check.h
+// held: the estimate times (1).
+double SuggestedBound(const KnownRotationProblem& problem,
+                      const Estimate& estimate,
+                      const std::vector<Multiplier>& multipliers);
+
 }  // namespace krot
