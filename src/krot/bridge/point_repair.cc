@@ -14,21 +14,19 @@ using Eigen::Vector3d;
 // of, may be rounding.
 constexpr double kDepthRounding = 1e-14;
 
-// C = -R' t, direction R' (u; 1).
 Ray RayOf(const ImageGeometry& image, const Observation& observation) {
-  const Eigen::Matrix3d world_from_cam =
-      image.cam_from_world_rotation.transpose();
-  return {-world_from_cam * image.cam_from_world_translation,
-          world_from_cam * observation.u.homogeneous().normalized()};
+  const RigidTransform world_from_cam = Inverse(image.cam_from_world);
+  return {world_from_cam.translation,
+          world_from_cam.rotation * observation.u.homogeneous().normalized()};
 }
 
 }  // namespace
 
 bool IsInFront(const ImageGeometry& image, const Vector3d& xyz) {
-  const double depth = image.cam_from_world_rotation.row(2).dot(xyz) +
-                       image.cam_from_world_translation.z();
+  const double depth = image.cam_from_world.rotation.row(2).dot(xyz) +
+                       image.cam_from_world.translation.z();
   return depth > kDepthRounding *
-                     (xyz.norm() + image.cam_from_world_translation.norm());
+                     (xyz.norm() + image.cam_from_world.translation.norm());
 }
 
 RepairedPoint RepairPoint(const std::vector<ImageGeometry>& images,
