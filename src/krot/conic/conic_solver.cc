@@ -9,7 +9,7 @@ namespace {
 
 // Every pair keeps its smallest eigenvalue above this share of their mean.
 constexpr double kNeighbourhood = 1e-3;
-// No depth grows by more than this factor in a step.
+// No depth that is not small grows by more than this factor in a step.
 constexpr double kMaxDepthGrowth = 3;
 // After a step shorter than this, the next one only centres.
 constexpr double kShortStep = 0.1;
@@ -177,7 +177,8 @@ bool ConicSolver<Cone>::IsInside(const State& trial) const {
     const Vector s = system_.Slack(viewed, trial.scalar);
     if (program_.IsCost() &&
         (!(viewed.depth > 0) ||
-         viewed.depth > kMaxDepthGrowth * now_.viewed[i].depth)) {
+         viewed.depth > kMaxDepthGrowth * std::max(now_.viewed[i].depth,
+                                                   system_.small_depth()))) {
       return -1.0;
     }
     if (!(Cone::SmallestEigenvalue(s) > 0) ||

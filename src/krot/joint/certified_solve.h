@@ -3,9 +3,10 @@
 #include <functional>
 #include <optional>
 
+#include "krot/joint/feasible_start.h"
+#include "krot/joint/joint.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
-#include "krot/joint/joint.h"
 
 namespace krot {
 
@@ -46,9 +47,11 @@ class CertifiedSolve {
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_;
   }
-  InteriorPointTermination RunFromEstimate(
-      double start_margin, const IsWorthProving& is_worth_proving,
-      const IterationReport& report);
+  InteriorPointTermination RunFrom(Estimate start, double start_margin,
+                                   const IsWorthProving& is_worth_proving,
+                                   const IterationReport& report);
+  FeasibleStartOptions OptionsForStart(const IterationReport& report);
+  void LeaveCameras(const IterationReport& report, Estimate* start);
   bool FindFreshStart(const IterationReport& report);
   bool Bisect(double width, const IterationReport& report);
   bool TryBelow(double bound, const IterationReport& report);

@@ -18,6 +18,7 @@ constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
 constexpr int kMaxDrops = 20;
 // Smaller multipliers, by the largest, are left out at first.
 constexpr double kSharesOfLargest[] = {1e-3, 1e-5, 0};
+constexpr double kSharesBesideScores[] = {1e-3, 1e-5};
 constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
 // Of the sub-problems.
 constexpr double kSmallestGap = 1e-9;
@@ -45,6 +46,20 @@ double SuggestedBound(const KnownRotationProblem& problem,
     weighted_depth += multipliers[i].lambda * viewed.depth;
   }
   return weighted_residual / weighted_depth;
+}
+
+// The observations whose multipliers exceed a share of the largest.
+std::vector<int64_t> LargeOnes(const std::vector<Multiplier>& multipliers,
+                               double share) {
+  double largest = 0;
+  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
+  std::vector<int64_t> large;
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    if (multipliers[i].lambda > share * largest) {
+      large.push_back(static_cast<int64_t>(i));
+    }
+  }
+  return large;
 }
 
 std::vector<Multiplier> Pick(const std::vector<Multiplier>& multipliers,
@@ -257,6 +272,12 @@ std::optional<Certificate> MakeCertificate(
       if (maker.IsEnough()) return maker.best();
     }
   }
+  // Scores do not tell an observation whose depth vanishes at the optimum.
+  const double delta = SuggestedBound(problem, estimate, multipliers);
+  for (const double share : kSharesBesideScores) {
+    maker.TryBalanced(delta, multipliers, LargeOnes(multipliers, share));
+    if (maker.IsEnough()) break;
+  }
   return maker.best();
 }
 
@@ -265,17 +286,9 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
     const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options) {
   CheckInput(problem, multipliers, options);
-  double largest = 0;
-  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
   Maker maker(problem, norm, options);
   for (const double share : kSharesOfLargest) {
-    std::vector<int64_t> candidates;
-    for (size_t i = 0; i < multipliers.size(); ++i) {
-      if (multipliers[i].lambda > share * largest) {
-        candidates.push_back(static_cast<int64_t>(i));
-      }
-    }
-    maker.TryBalanced(bound, multipliers, candidates);
+    maker.TryBalanced(bound, multipliers, LargeOnes(multipliers, share));
     if (maker.IsEnough()) break;
   }
   return maker.best();
