@@ -4,16 +4,39 @@
 # Chromium looks at the report page, POV-Ray takes the photos that go through
 # COLMAP and back.
 # Set KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
+# Tests that are skipped are listed in the end, each with its reason; with
+# KROT_NO_SKIPS=1 there must be none.
 #
 # Usage: tools/run_tests.sh
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
+# Of ctest's log: "name: reason" for every test that was skipped.
+list_skipped() {
+  awk '/^[0-9]+\/[0-9]+ Test(ing)?: / { name = $3 }
+       /: Skipped$/ { getline reason; print name ": " reason }
+       /^skipped: / { print name ": " substr($0, 10) }' "$1" | sort -u
+}
+
 install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
   coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
   chromium:chromium chromedriver:chromium-driver povray:povray jq:jq \
   shellcheck:shellcheck
-build_krot -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=ON
+build_krot -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=OFF
 
 say "Testing"
-ctest --test-dir "$root/build" --output-on-failure -j2
+closing=$root/build/ctest.out
+status=0
+ctest --test-dir "$root/build" --output-on-failure -j2 | tee "$closing" \
+  || status=$?
+
+skipped=$(list_skipped "$root/build/Testing/Temporary/LastTest.log")
+if [[ -n $skipped ]]; then
+  say "Skipped: $(wc -l <<<"$skipped")"
+  echo "$skipped"
+  if [[ ${KROT_NO_SKIPS:-0} == 1 ]]; then status=1; fi
+else
+  say "Skipped: none"
+fi
+grep 'tests passed' "$closing"
+exit "$status"

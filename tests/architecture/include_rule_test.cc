@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <regex>
@@ -78,6 +79,38 @@ TEST(IncludeRule, AFolderIncludesOnlyWhatStandsBelowIt) {
         << line.Place() << ": " << folder << " must not include " << match[1];
   }
   EXPECT_GT(num_includes, 0);
+}
+
+// Adds the file and all that it includes of the library, directly or not.
+void AddIncluded(const std::string& file, std::set<std::string>* included) {
+  if (!included->insert(file).second) return;
+  const std::regex own_include(R"(^\s*#\s*include\s*["<](krot/[^">]+)[">])");
+  std::ifstream stream(std::filesystem::path(KROT_SOURCE_DIR) / "src" / file);
+  EXPECT_TRUE(stream.is_open()) << file;
+  std::smatch match;
+  for (std::string text; std::getline(stream, text);) {
+    if (std::regex_search(text, match, own_include)) {
+      AddIncluded(match[1], included);
+    }
+  }
+}
+
+// What judges a proof has nothing in common with what finds it.
+TEST(IncludeRule, TheCertificatesCheckerSeesNothingOfTheSolvers) {
+  std::set<std::string> included;
+  for (const char* name :
+       {"certificate_check", "certificate_input", "force_balance"}) {
+    for (const char* extension : {".h", ".cc"}) {
+      AddIncluded(std::string("krot/proof/") + name + extension, &included);
+    }
+  }
+  EXPECT_EQ(included.count("krot/problem/known_rotation_problem.h"), 1u);
+  for (const std::string& file : included) {
+    for (const char* folder : {"conic", "joint", "sweeps"}) {
+      EXPECT_NE(file.rfind(std::string("krot/") + folder + "/", 0), 0u)
+          << "the checker must not include " << file;
+    }
+  }
 }
 
 TEST(IncludeRule, TheLibraryNamesItsHeadersFromTheSourceRoot) {

@@ -51,6 +51,22 @@ TEST(ParallelFor, RethrowsTheFirstExceptionByChunk) {
   }
 }
 
+TEST(ParallelFor, RethrowsFromACallWithinACall) {
+  for (const int threads : {1, 3}) {
+    std::atomic<int> caught{0};
+    ParallelFor(4, 1, threads, [&](int64_t outer, int64_t, int) {
+      try {
+        ParallelFor(4, 1, threads, [&](int64_t inner, int64_t, int) {
+          if (inner == outer) throw std::runtime_error(std::to_string(inner));
+        });
+      } catch (const std::runtime_error& error) {
+        caught += error.what() == std::to_string(outer);
+      }
+    });
+    EXPECT_EQ(caught, 4);
+  }
+}
+
 TEST(ParallelFor, RefusesChunksWithoutItems) {
   EXPECT_THROW(ParallelFor(1, 0, 1, [](int64_t, int64_t, int) {}),
                std::invalid_argument);

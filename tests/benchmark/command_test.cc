@@ -41,7 +41,7 @@ TEST(BenchmarkCommand, ReportsTheSameAsJsonAndAsPlot) {
   const ScratchFolder folder;
   const std::string report = folder / "report.json";
   ASSERT_EQ(ExitCodeOf({"triangulation", "--repeats", "1", "--report_path",
-                        report, "--plot_path", folder / "plot.svg"}),
+                        report, "--plot_path", folder / "plot.gp"}),
             0);
   std::ifstream stream(report);
   const auto json = nlohmann::json::parse(stream);
@@ -51,7 +51,7 @@ TEST(BenchmarkCommand, ReportsTheSameAsJsonAndAsPlot) {
   EXPECT_EQ(table["name"], "figure4");
   EXPECT_EQ(table["rows"].size(), 8u);
   for (const auto& row : table["rows"]) EXPECT_GT(row["Gugat"], 0);
-  EXPECT_GT(std::filesystem::file_size(folder / "plot.svg"), 1000u);
+  EXPECT_GT(std::filesystem::file_size(folder / "plot.gp"), 1000u);
 }
 
 TEST(BenchmarkCommand, MeasuresModelsOfItsOwn) {

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/problem/cost.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/synthetic_model.h"
 
@@ -44,7 +44,7 @@ class FullRivals : public testing::Test {
 
 TEST_F(FullRivals, GugatReachesTheCertifiedOptimum) {
   Estimate joint = model_.built.start;
-  const JointSummary summary = SolveJoint(problem(), {}, &joint);
+  const JointSummary summary = SolveJoint(problem(), {}, {}, &joint);
   ASSERT_EQ(summary.termination, JointTermination::kGapReached);
   const double cost = CostOf(Solve(MakeFullGugat().get()));
   EXPECT_GE(cost, summary.lower_bound);
@@ -53,7 +53,7 @@ TEST_F(FullRivals, GugatReachesTheCertifiedOptimum) {
 
 TEST_F(FullRivals, ProximalSplittingComesWithinAPercentOfTheOptimum) {
   Estimate joint = model_.built.start;
-  const JointSummary summary = SolveJoint(problem(), {}, &joint);
+  const JointSummary summary = SolveJoint(problem(), {}, {}, &joint);
   const double cost = CostOf(Solve(MakeFullProximalSplitting(1).get()));
   EXPECT_GE(cost, summary.lower_bound);
   EXPECT_LE(cost, 1.01 * summary.cost_final);

@@ -67,7 +67,7 @@ TEST(LeftOutName, IsTheKeyOfTheReport) {
     names.push_back(LeftOutName(static_cast<LeftOut>(r)));
   }
   EXPECT_THAT(names, ElementsAre("behind", "undistortion", "off_axis",
-                                 "short_track", "no_pose", "single_ray"));
+                                 "short_track", "no_pose"));
 }
 
 TEST(LeftOut, NothingDependsOnTranslationsThatAreIgnored) {

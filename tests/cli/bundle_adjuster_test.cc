@@ -102,6 +102,18 @@ TEST_F(BundleAdjuster, StaysBelowACapThatIsAFactor) {
   EXPECT_LT(errors.max, report["max_error"]);
 }
 
+TEST_F(BundleAdjuster, TellsOfTheSolveThatItsCapRefersTo) {
+  const KrotResult result =
+      Adjust({"--BundleAdjustment.max_error_factor", "1.1"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const size_t sweep = result.err.find("\nsweep 1: cost ");
+  const size_t joint = result.err.find("proved bound ");
+  const size_t adjustment = result.err.find("trust region ");
+  EXPECT_LT(sweep, joint);
+  EXPECT_LT(joint, adjustment);
+  EXPECT_LT(adjustment, result.err.size());
+}
+
 TEST_F(BundleAdjuster, SaysWhichBoundForbidsACap) {
   const KrotResult result =
       Adjust({"--BundleAdjustment.max_error", "0.01", "--log_level", "0"});

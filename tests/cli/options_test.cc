@@ -1,7 +1,11 @@
+#include <algorithm>
+#include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -146,6 +150,66 @@ TEST_F(Options, ThatContradictEachOtherAreRefused) {
                 "must be at most the number of images, 3");
 }
 
+// All outputs of all commands, and what else they read, by whatever way the
+// file is named.
+TEST_F(Options, ThatNameOneFileTwiceAreRefused) {
+  std::filesystem::create_directory_symlink(folder_.path(), folder_ / "link");
+  const std::string file = folder_ / "file";
+  WriteBytes(file, "");
+  const Words twins = {file, folder_ / "input/../file", folder_ / "link/file"};
+  const Words missing_twins = {folder_ / "new", folder_ / "./new",
+                               folder_ / "link/new"};
+  const Words model = {"--path", folder_ / "input"};
+  const Words models = {"--input_path1", folder_ / "input", "--input_path2",
+                        folder_ / "input"};
+  const std::vector<std::pair<std::string, Words>> commands = {
+      {"solver", Paths()},
+      {"point_triangulator", Paths()},
+      {"bundle_adjuster", Paths()},
+      {"model_analyzer", model},
+      {"model_comparer", models}};
+  const std::vector<Words> pairs = {
+      {"solver", "--report_path", "--html_path"},
+      {"solver", "--report_path", "--certificate_path"},
+      {"solver", "--html_path", "--certificate_path"},
+      {"solver", "--report_path", "--project_path"},
+      {"point_triangulator", "--report_path", "--html_path"},
+      {"bundle_adjuster", "--report_path", "--html_path"},
+      {"model_analyzer", "--report_path", "--certificate_path"},
+      {"model_analyzer", "--report_path", "--error_colors_path"},
+      {"model_comparer", "--report_path", "--html_path"},
+      {"model_comparer", "--html_path", "--certificate_path1"},
+      {"model_comparer", "--report_path", "--certificate_path2"},
+      {"model_comparer", "--report_path", "--output_path"},
+      {"model_comparer", "--html_path", "--overlay_path"}};
+  for (const Words& pair : pairs) {
+    SCOPED_TRACE(pair[0] + " " + pair[1] + " " + pair[2]);
+    const auto paths =
+        std::find_if(commands.begin(), commands.end(),
+                     [&](const auto& c) { return c.first == pair[0]; });
+    for (const Words& names : {twins, missing_twins}) {
+      if (pair[2] == "--project_path" && names == missing_twins) continue;
+      for (const std::string& name : names) {
+        ExpectRefused(pair[0],
+                      paths->second + Words{pair[1], name, pair[2], names[0]},
+                      pair[1] + " = " + name + ", must not be " + pair[2]);
+      }
+    }
+  }
+  ExpectRefused("solver", Paths() + Words{"--report_path", folder_ / "output"},
+                "must not be --output_path");
+  for (const char* name : {"errors.csv", "errors_summary.txt"}) {
+    ExpectRefused("model_comparer",
+                  models + Words{"--output_path", folder_.path(),
+                                 "--report_path", folder_ / name},
+                  std::string("must not be ") + name + " of --output_path");
+  }
+  ExpectRefused(
+      "solver",
+      Paths() + Words{"--report_path", folder_ / "output/project.ini"},
+      "must not bear the name of a model's file");
+}
+
 TEST_F(Options, ThatTheMethodDoesNotLookAtAreRefused) {
   const std::vector<Words> contradictions = {
       {"--Solver.relative_gap", "1e-3", "--Solver.method", "res_int"},
@@ -230,6 +294,25 @@ TEST_F(Options, OfThePaperAreTakenWithItsSettings) {
        "1e-3", "--FastDescent.max_step", "5", "--FastDescent.max_iterations",
        "20", "--ResInt.max_sweeps", "2"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+// The one option of the descent that both settings obey.
+TEST_F(Options, ForIterationsPerBlockCountWithFastSettings) {
+  for (const Words& command : {Words{"solver", "--Solver.method", "res_int",
+                                     "--ResInt.max_sweeps", "1"},
+                               Words{"point_triangulator"}}) {
+    const auto cost_with = [&](const char* max_iterations) {
+      const KrotResult result = RunKrot(
+          command + Paths() +
+          Words{"--FastDescent.max_iterations", max_iterations, "--overwrite",
+                "1", "--report_path", folder_ / "report.json"});
+      EXPECT_EQ(result.exit_code, 0) << result.err;
+      return nlohmann::json::parse(
+                 ReadBytes(folder_ / "report.json"))["cost_final"]
+          .get<double>();
+    };
+    EXPECT_GT(cost_with("1"), cost_with("100")) << command[0];
+  }
 }
 
 TEST_F(Options, ComeFromAProjectFileUnlessGivenExplicitly) {

@@ -51,7 +51,7 @@ TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
     return Solve(folder_ / "output", {"--report_path", path});
   };
   ExpectNotWritten(report(folder_ / "missing/r.json"), names, "no folder");
-  ExpectNotWritten(report(folder_ / "input"), names, "is a folder");
+  ExpectNotWritten(report(folder_.path()), names, "is a folder");
   ExpectNotWritten(report("/dev/null"), names, "not a regular file");
 }
 
@@ -113,6 +113,24 @@ TEST_F(Output, HoldsTheReportIfToldSo) {
   EXPECT_EQ(FileNames(folder_ / "output"),
             (std::vector<std::string>{"cameras.bin", "images.bin",
                                       "points3D.bin", "report.json"}));
+}
+
+// A solve is not thrown away with its report.
+TEST_F(Output, KeepsModelAndCertificateWhereTheReportCannotBeWritten) {
+  ASSERT_EQ(Solve(folder_ / "expected").exit_code, 0);
+  // Short enough for a name, too long with what it is called until complete.
+  const fs::path report = folder_ / std::string(250, 'r');
+  const KrotResult result =
+      Solve(folder_ / "output",
+            {"--report_path", report, "--html_path", folder_ / "page.html",
+             "--certificate_path", folder_ / "certificate.json"});
+  EXPECT_EQ(result.exit_code, 5);
+  EXPECT_THAT(result.err, ::testing::EndsWith("cannot be written: File name "
+                                              "too long\n"));
+  EXPECT_EQ(FileNames(folder_.path()),
+            (std::vector<std::string>{"certificate.json", "expected", "input",
+                                      "output"}));
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "expected")));
 }
 
 TEST_F(Output, SplitsTablesFromProgress) {

@@ -54,6 +54,17 @@ TEST(SolveProgress, RewritesOneLineWithABarOnATerminal) {
               HasSubstr("[##############################] iteration 2: "));
 }
 
+// One sweep is all there is.
+TEST(SolveProgress, FillsTheBarWhenPointsAloneAreSolved) {
+  testing::internal::CaptureStderr();
+  SolveProgress progress({}, SolveProgress::GoalsOf(PointsOnly({})),
+                         SolveProgress::Style::kBar);
+  progress.Update(1, Sweep{8.0, 0.5});
+  progress.Finish();
+  EXPECT_THAT(testing::internal::GetCapturedStderr(),
+              HasSubstr("[##############################] sweep 1: "));
+}
+
 TEST(SolveProgress, IsSilentAtLogLevelZero) {
   LogOptions quiet;
   quiet.level = 0;

@@ -24,7 +24,6 @@ RandomScene MakeScene(unsigned seed, int num_points, double baseline = 0) {
 InteriorPointOptions Options(Norm norm) {
   InteriorPointOptions options;
   options.norm = norm;
-  options.num_threads = 1;
   return options;
 }
 
@@ -65,7 +64,7 @@ TEST_P(InteriorPoint, StaysInsideAndEndsNoWorseThanItBegan) {
       };
       std::vector<Multiplier> multipliers;
       const InteriorPointSummary summary = MinimizeJointly(
-          scene.problem, options, &scene.estimate, &multipliers);
+          scene.problem, options, {}, &scene.estimate, &multipliers);
       EXPECT_EQ(summary.iterations, calls);
       EXPECT_LT(summary.gap, 1e-8);
       EXPECT_EQ(Cost(scene.problem, scene.estimate, norm(), 1), least);
@@ -80,8 +79,8 @@ TEST_P(InteriorPoint, MultipliersAreStationaryAtTheEnd) {
   InteriorPointOptions options = Options(norm());
   options.smallest_gap = 1e-8;
   std::vector<Multiplier> multipliers;
-  const InteriorPointSummary summary =
-      MinimizeJointly(scene.problem, options, &scene.estimate, &multipliers);
+  const InteriorPointSummary summary = MinimizeJointly(
+      scene.problem, options, {}, &scene.estimate, &multipliers);
   std::vector<Eigen::Vector3d> of_point(scene.problem.num_points,
                                         Eigen::Vector3d::Zero());
   std::vector<Eigen::Vector3d> of_frame(scene.problem.num_frames,
@@ -112,11 +111,11 @@ TEST_P(InteriorPoint, HasTheSameBitsAtAnyNumberOfThreads) {
   std::vector<Multiplier> expected_multipliers;
   for (const int num_threads : {1, 2, 3}) {
     InteriorPointOptions options = Options(norm());
-    options.num_threads = num_threads;
     options.max_iterations = 12;
     Estimate estimate = scene.estimate;
     std::vector<Multiplier> multipliers;
-    MinimizeJointly(scene.problem, options, &estimate, &multipliers);
+    MinimizeJointly(scene.problem, options, {num_threads}, &estimate,
+                    &multipliers);
     if (num_threads == 1) {
       expected = estimate;
       expected_multipliers = multipliers;
@@ -136,7 +135,7 @@ TEST_P(InteriorPoint, DoesNotMoveTheScaleOrTheFrameThatSeesMost) {
   RandomScene scene = MakeScene(7, 30);
   const Estimate start = scene.estimate;
   std::vector<Multiplier> multipliers;
-  MinimizeJointly(scene.problem, Options(norm()), &scene.estimate,
+  MinimizeJointly(scene.problem, Options(norm()), {}, &scene.estimate,
                   &multipliers);
   EXPECT_EQ(scene.estimate.translations[0], start.translations[0]);
   double log_growth = 0;
@@ -150,11 +149,12 @@ TEST_P(InteriorPoint, DoesNotMoveTheScaleOrTheFrameThatSeesMost) {
 
 TEST_P(InteriorPoint, TellsWhyItEnded) {
   const RandomScene scene = MakeScene(8, 30);
-  const auto run = [&](const InteriorPointOptions& options) {
+  const auto run = [&](const InteriorPointOptions& options,
+                       const Context& context = {}) {
     Estimate estimate = scene.estimate;
     std::vector<Multiplier> multipliers;
-    const InteriorPointSummary summary =
-        MinimizeJointly(scene.problem, options, &estimate, &multipliers);
+    const InteriorPointSummary summary = MinimizeJointly(
+        scene.problem, options, context, &estimate, &multipliers);
     EXPECT_LE(Cost(scene.problem, estimate, norm(), 1),
               Cost(scene.problem, scene.estimate, norm(), 1));
     return summary;
@@ -176,8 +176,7 @@ TEST_P(InteriorPoint, TellsWhyItEnded) {
   EXPECT_EQ(summary.iterations, 1);
 
   const CancelFlag cancelled = true;
-  options.cancel = &cancelled;
-  summary = run(options);
+  summary = run(options, {1, &cancelled});
   EXPECT_EQ(summary.termination, InteriorPointTermination::kInterrupted);
   EXPECT_EQ(summary.iterations, 0);
 }
@@ -188,8 +187,9 @@ TEST_P(InteriorPoint, FindsAnEstimateBelowAnAttainableBoundFromNothing) {
     const double bound = 0.9 * Cost(scene.problem, scene.estimate, norm(), 1);
     Estimate estimate;
     std::vector<Multiplier> multipliers;
-    const InteriorPointSummary summary = FindFeasible(
-        scene.problem, Options(norm()), bound, 1e-2, &estimate, &multipliers);
+    const InteriorPointSummary summary =
+        FindFeasible(scene.problem, Options(norm()), {}, bound, 1e-2, &estimate,
+                     &multipliers);
     EXPECT_EQ(summary.termination, InteriorPointTermination::kFeasible);
     EXPECT_LT(Cost(scene.problem, estimate, norm(), 1), bound);
   }
@@ -199,11 +199,12 @@ TEST_P(InteriorPoint, LeavesTheEstimateAloneWhereTheBoundIsUnattainable) {
   RandomScene scene = MakeScene(10, 30);
   Estimate optimum = scene.estimate;
   std::vector<Multiplier> multipliers;
-  MinimizeJointly(scene.problem, Options(norm()), &optimum, &multipliers);
+  MinimizeJointly(scene.problem, Options(norm()), {}, &optimum, &multipliers);
   const double bound = 0.9 * Cost(scene.problem, optimum, norm(), 1);
   const Estimate before = scene.estimate;
-  const InteriorPointSummary summary = FindFeasible(
-      scene.problem, Options(norm()), bound, 1, &scene.estimate, &multipliers);
+  const InteriorPointSummary summary =
+      FindFeasible(scene.problem, Options(norm()), {}, bound, 1,
+                   &scene.estimate, &multipliers);
   EXPECT_NE(summary.termination, InteriorPointTermination::kFeasible);
   EXPECT_GE(summary.gamma, 1 - 1e-6);
   EXPECT_EQ(scene.estimate.translations, before.translations);
@@ -225,7 +226,7 @@ TEST(MinimizeJointly, HasNothingToDoWhereTheCostIsZero) {
   const Estimate start = scene.estimate;
   std::vector<Multiplier> multipliers;
   const InteriorPointSummary summary = MinimizeJointly(
-      scene.problem, Options(Norm::L2()), &scene.estimate, &multipliers);
+      scene.problem, Options(Norm::L2()), {}, &scene.estimate, &multipliers);
   EXPECT_EQ(summary.termination, InteriorPointTermination::kSmallestGap);
   EXPECT_EQ(multipliers.size(), scene.problem.observations.size());
   EXPECT_EQ(scene.estimate.points, start.points);
@@ -235,7 +236,7 @@ TEST(MinimizeJointly, RefusesStartsBehindACameraAndBadOptions) {
   RandomScene scene = MakeScene(12, 5);
   std::vector<Multiplier> multipliers;
   const auto run = [&](const InteriorPointOptions& options) {
-    MinimizeJointly(scene.problem, options, &scene.estimate, &multipliers);
+    MinimizeJointly(scene.problem, options, {}, &scene.estimate, &multipliers);
   };
   InteriorPointOptions options = Options({3});
   EXPECT_THROW(run(options), std::invalid_argument);
@@ -256,7 +257,7 @@ TEST(FindFeasible, RefusesBoundsAndDepthsThatAreNotPositive) {
   RandomScene scene = MakeScene(13, 5);
   std::vector<Multiplier> multipliers;
   const auto run = [&](double bound, double unit_depth) {
-    FindFeasible(scene.problem, Options(Norm::L2()), bound, unit_depth,
+    FindFeasible(scene.problem, Options(Norm::L2()), {}, bound, unit_depth,
                  &scene.estimate, &multipliers);
   };
   EXPECT_THROW(run(0, 1), std::invalid_argument);

@@ -4,21 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 #include "tests/problem/random_problem.h"
 
 namespace krot {
 namespace {
 
 constexpr double kRoom = 1 + 1e-3;
-
-JointOptions Options() {
-  JointOptions options;
-  options.norm = Norm::L2();
-  options.num_threads = 1;
-  return options;
-}
 
 // A working set solved for itself: `estimate` is its optimum, the points
 // outside stand where the scene has them.
@@ -28,11 +22,10 @@ struct Solved {
         set(scene.problem),
         estimate(scene.estimate) {
     set.AddTies(ties);
-    const RestrictedProblem part =
-        RestrictProblem(scene.problem, set.Observations());
-    Estimate optimum = RestrictEstimate(part, estimate);
-    SolveJoint(part.problem, Options(), &optimum);
-    ReplaceEstimate(part, optimum, &estimate);
+    const ProblemSubset part(scene.problem, set.Observations());
+    Estimate optimum = part.Restrict(estimate);
+    SolveJoint(part.problem(), {}, {}, &optimum);
+    part.Replace(optimum, &estimate);
     level = set.Cost(estimate, Norm::L2());
   }
 
@@ -47,7 +40,7 @@ struct Solved {
   }
   bool Extend(double highest, Estimate* extended) const {
     *extended = estimate;
-    return ExtendSolution(scene.problem, set, Options(), level, highest,
+    return ExtendSolution(scene.problem, set, Norm::L2(), {}, level, highest,
                           extended);
   }
 
@@ -80,8 +73,7 @@ TEST(ExtendSolution, FailsWhereNoEstimateIsBelow) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     const Solved solved(seed, 60, 5);
     Estimate optimum = solved.scene.estimate;
-    const JointSummary all =
-        SolveJoint(solved.scene.problem, Options(), &optimum);
+    const JointSummary all = SolveJoint(solved.scene.problem, {}, {}, &optimum);
     ASSERT_EQ(all.termination, JointTermination::kGapReached);
     if (all.lower_bound <= kRoom * solved.level) continue;
     ++num_impossible;
@@ -95,8 +87,8 @@ TEST(ExtendSolution, LeavesAloneWhatFits) {
   const Solved solved(1, 40, 15);
   const double cost = solved.CostOf(solved.estimate);
   Estimate extended = solved.estimate;
-  EXPECT_TRUE(ExtendSolution(solved.scene.problem, solved.set, Options(), cost,
-                             cost, &extended));
+  EXPECT_TRUE(ExtendSolution(solved.scene.problem, solved.set, Norm::L2(), {},
+                             cost, cost, &extended));
   EXPECT_EQ(extended.points, solved.estimate.points);
   EXPECT_EQ(extended.translations, solved.estimate.translations);
 }
@@ -115,11 +107,9 @@ TEST(ExtendSolution, HasTheSameBitsAtAnyNumberOfThreads) {
   const Solved solved(3, 200, 15);
   Estimate expected;
   for (const int num_threads : {1, 2, 3}) {
-    JointOptions options = Options();
-    options.num_threads = num_threads;
     Estimate extended = solved.estimate;
-    ExtendSolution(solved.scene.problem, solved.set, options, solved.level,
-                   kRoom * solved.level, &extended);
+    ExtendSolution(solved.scene.problem, solved.set, Norm::L2(), {num_threads},
+                   solved.level, kRoom * solved.level, &extended);
     if (num_threads == 1) expected = extended;
     EXPECT_EQ(extended.points, expected.points);
     EXPECT_EQ(extended.translations, expected.translations);

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "krot/bridge/bridge.h"
-#include "krot/problem/cost.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/joint/small_scenes.h"
 
@@ -19,16 +19,14 @@ InitializerOptions Options(Norm norm, double max_error) {
   InitializerOptions options;
   options.norm = norm;
   options.max_error = max_error;
-  options.num_threads = 1;
   return options;
 }
 
 double OptimalCost(const RandomScene& scene, Norm norm) {
   JointOptions options;
   options.norm = norm;
-  options.num_threads = 1;
   Estimate estimate = scene.estimate;
-  return SolveJoint(scene.problem, options, &estimate).cost_final;
+  return SolveJoint(scene.problem, options, {}, &estimate).cost_final;
 }
 
 // Cost is finite only if all depths are positive.
@@ -68,7 +66,7 @@ TEST_P(FindStartTest, MeetsTheBoundFromNothing) {
       const InitializerOptions options = Options(norm(), 100);
       Estimate estimate;
       const InitializerSummary summary =
-          FindStart(scene.problem, options, &estimate);
+          FindStart(scene.problem, options, {}, &estimate);
       ExpectFeasible(scene.problem, options, estimate, summary);
       EXPECT_FALSE(summary.iterations.empty());
     }
@@ -84,7 +82,7 @@ TEST_P(FindStartTest, MeetsABoundJustAboveTheOptimum) {
           Options(norm(), 1.01 * OptimalCost(scene, norm()));
       Estimate estimate;
       const InitializerSummary summary =
-          FindStart(scene.problem, options, &estimate);
+          FindStart(scene.problem, options, {}, &estimate);
       ExpectFeasible(scene.problem, options, estimate, summary);
     }
   }
@@ -100,7 +98,7 @@ TEST_P(FindStartTest, ProvesThatABoundBelowTheOptimumIsUnattainable) {
         const InitializerOptions options = Options(norm(), share * optimum);
         Estimate estimate = scene.estimate;
         const InitializerSummary summary =
-            FindStart(scene.problem, options, &estimate);
+            FindStart(scene.problem, options, {}, &estimate);
         ExpectProvedInfeasible(scene.problem, options, summary);
         EXPECT_EQ(estimate.points, scene.estimate.points);
         EXPECT_EQ(estimate.translations, scene.estimate.translations);
@@ -118,7 +116,7 @@ TEST_P(FindStartTest, NamesTheObservationsOfTheComponentThatMissesTheBound) {
   const InitializerOptions options = Options(norm(), bound);
   Estimate estimate;
   const InitializerSummary summary =
-      FindStart(glued.problem, options, &estimate);
+      FindStart(glued.problem, options, {}, &estimate);
   ExpectProvedInfeasible(glued.problem, options, summary);
   EXPECT_GE(summary.certificate->observations.front().observation,
             static_cast<int64_t>(good.problem.observations.size()));
@@ -142,7 +140,7 @@ TEST_P(FindStartTest, SolvesSyntheticRigsAndSingleCameras) {
       const InitializerOptions options = Options(norm(), 20);
       Estimate estimate;
       const InitializerSummary summary =
-          FindStart(built.problem, options, &estimate);
+          FindStart(built.problem, options, {}, &estimate);
       ExpectFeasible(built.problem, options, estimate, summary);
     }
   }
@@ -162,9 +160,9 @@ TEST(FindStart, DoesNotLookAtWhatTheEstimateHolds) {
   for (Eigen::Vector3d& s : scene.estimate.points) s.setConstant(nan);
   Estimate from_nothing;
   const InitializerOptions options = Options(Norm::L2(), 100);
-  FindStart(scene.problem, options, &from_nothing);
+  FindStart(scene.problem, options, {}, &from_nothing);
   const InitializerSummary summary =
-      FindStart(scene.problem, options, &scene.estimate);
+      FindStart(scene.problem, options, {}, &scene.estimate);
   ExpectFeasible(scene.problem, options, scene.estimate, summary);
   EXPECT_EQ(scene.estimate.points, from_nothing.points);
   EXPECT_EQ(scene.estimate.translations, from_nothing.translations);
@@ -173,7 +171,7 @@ TEST(FindStart, DoesNotLookAtWhatTheEstimateHolds) {
 TEST(FindStart, LeavesWhatNothingSeesAndScalesTheMedianDepthToOne) {
   RandomScene scene = MakeSmallScene(32);
   AddUnseen(&scene);
-  FindStart(scene.problem, Options(Norm::L2(), 100), &scene.estimate);
+  FindStart(scene.problem, Options(Norm::L2(), 100), {}, &scene.estimate);
   EXPECT_EQ(scene.estimate.translations.back(), Eigen::Vector3d(7, 8, 9));
   EXPECT_EQ(scene.estimate.points.back(), Eigen::Vector3d(-1, -2, -3));
   std::vector<double> depths;
@@ -190,9 +188,8 @@ TEST(FindStart, ChangesNothingWhenInterrupted) {
   const CancelFlag is_cancelled = true;
   for (const double max_error : {100.0, 1e-3}) {
     InitializerOptions options = Options(Norm::L2(), max_error);
-    options.cancel = &is_cancelled;
     const InitializerSummary summary =
-        FindStart(scene.problem, options, &scene.estimate);
+        FindStart(scene.problem, options, {1, &is_cancelled}, &scene.estimate);
     EXPECT_EQ(summary.termination, InitializerTermination::kInterrupted);
     EXPECT_FALSE(summary.certificate);
     EXPECT_EQ(scene.estimate.points, before.points);
@@ -213,11 +210,30 @@ TEST(FindStart, ReportsEveryIterationWithTheBoundThatItSeeks) {
   };
   Estimate estimate;
   const InitializerSummary summary =
-      FindStart(scene.problem, options, &estimate);
+      FindStart(scene.problem, options, {}, &estimate);
   EXPECT_GT(calls, 2);
   ASSERT_EQ(static_cast<int>(summary.iterations.size()), calls);
   EXPECT_EQ(summary.iterations.front().target, 100);
   EXPECT_LT(summary.iterations.back().target, 100);  // lowered
+}
+
+// Set behind the last iteration, when the proof is all that is left to do.
+TEST(FindStart, IsInterruptedWhileInfeasibilityIsBeingProved) {
+  const RandomScene scene = MakeSmallScene(33);
+  Estimate estimate;
+  const InitializerSummary proved =
+      FindStart(scene.problem, Options(Norm::L2(), 1e-3), {}, &estimate);
+  ASSERT_EQ(proved.termination, InitializerTermination::kInfeasible);
+  CancelFlag is_cancelled = false;
+  InitializerOptions options = Options(Norm::L2(), 1e-3);
+  const Context context{1, &is_cancelled};
+  options.callback = [&](int iteration, const JointIteration&) {
+    is_cancelled = iteration == static_cast<int>(proved.iterations.size());
+  };
+  const InitializerSummary summary =
+      FindStart(scene.problem, options, context, &estimate);
+  EXPECT_EQ(summary.termination, InitializerTermination::kInterrupted);
+  EXPECT_FALSE(summary.certificate);
 }
 
 TEST(FindStart, IsInterruptedAtAnyIteration) {
@@ -225,19 +241,18 @@ TEST(FindStart, IsInterruptedAtAnyIteration) {
   for (const double max_error : {100.0, 1e-3}) {
     Estimate estimate;
     const size_t num_iterations =
-        FindStart(scene.problem, Options(Norm::L2(), max_error), &estimate)
+        FindStart(scene.problem, Options(Norm::L2(), max_error), {}, &estimate)
             .iterations.size();
     ASSERT_GT(num_iterations, 4u);
     for (size_t last = 1; last < num_iterations; ++last) {
       CancelFlag is_cancelled = false;
       InitializerOptions options = Options(Norm::L2(), max_error);
-      options.cancel = &is_cancelled;
       options.callback = [&](int iteration, const JointIteration&) {
         if (iteration == static_cast<int>(last)) is_cancelled = true;
       };
       Estimate unwritten;
       const InitializerSummary summary =
-          FindStart(scene.problem, options, &unwritten);
+          FindStart(scene.problem, options, {1, &is_cancelled}, &unwritten);
       EXPECT_EQ(summary.iterations.size(), last);
       if (summary.certificate) {  // proved just before
         ExpectProvedInfeasible(scene.problem, options, summary);
@@ -252,7 +267,7 @@ TEST(FindStart, IsInterruptedAtAnyIteration) {
 TEST(FindStart, RefusesBadOptions) {
   RandomScene scene = MakeSmallScene(34);
   const auto run = [&](const InitializerOptions& options) {
-    FindStart(scene.problem, options, &scene.estimate);
+    FindStart(scene.problem, options, {}, &scene.estimate);
   };
   EXPECT_THROW(run(Options(Norm::L2(), 0)), std::invalid_argument);
   EXPECT_THROW(run(Options({3}, 100)), std::invalid_argument);

@@ -43,7 +43,8 @@ class RealModelTest : public testing::TestWithParam<RealModel> {
   void ExpectOptimumFrom(Estimate estimate) const {
     JointOptions options;
     options.relative_gap = kGap;
-    const JointSummary summary = SolveJoint(built_.problem, options, &estimate);
+    const JointSummary summary =
+        SolveJoint(built_.problem, options, {}, &estimate);
     EXPECT_EQ(summary.termination, JointTermination::kGapReached);
     const double optimum = GetParam().optimum;
     // Five digits are known.
@@ -85,7 +86,7 @@ using FindStartOfRealModel = RealModelTest;
 
 TEST_P(FindStartOfRealModel, LeadsToTheReferenceOptimum) {
   Estimate estimate;
-  const InitializerSummary start = FindStart(built_.problem, {}, &estimate);
+  const InitializerSummary start = FindStart(built_.problem, {}, {}, &estimate);
   ASSERT_EQ(start.termination, InitializerTermination::kFeasible);
   EXPECT_LT(start.cost, InitializerOptions().max_error);
   ExpectOptimumFrom(estimate);

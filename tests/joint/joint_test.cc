@@ -3,14 +3,15 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string>
 
 #include <gtest/gtest.h>
 
-#include "krot/problem/cost.h"
 #include "krot/joint/initializer.h"
+#include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
-#include "tests/oracle/lp_oracle.h"
 #include "tests/joint/small_scenes.h"
+#include "tests/oracle/lp_oracle.h"
 
 namespace krot {
 namespace {
@@ -21,7 +22,6 @@ JointOptions Options(Norm norm) {
   JointOptions options;
   options.norm = norm;
   options.relative_gap = kGap;
-  options.num_threads = 1;
   return options;
 }
 
@@ -42,7 +42,7 @@ void ExpectCertified(const KnownRotationProblem& problem, Norm norm,
 
 double OptimalCost(const RandomScene& scene, Norm norm) {
   Estimate estimate = scene.estimate;
-  return SolveJoint(scene.problem, Options(norm), &estimate).cost_final;
+  return SolveJoint(scene.problem, Options(norm), {}, &estimate).cost_final;
 }
 
 // Every unknown moved by up to `size` along each axis; depths stay positive.
@@ -69,7 +69,7 @@ Estimate HugTheBoundary(const RandomScene& scene, Norm norm) {
   sweeps.norm = norm;
   sweeps.max_sweeps = 5;
   sweeps.sweep_tolerance = 1e-9;
-  SolveResInt(scene.problem, sweeps, &estimate);
+  SolveResInt(scene.problem, sweeps, {}, &estimate);
   return estimate;
 }
 
@@ -84,15 +84,16 @@ TEST_P(SolveJointTest, ProvesItsOptimumToAMillionth) {
       SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
       RandomScene scene = MakeSmallScene(seed, baseline);
       const JointSummary summary =
-          SolveJoint(scene.problem, Options(norm()), &scene.estimate);
+          SolveJoint(scene.problem, Options(norm()), {}, &scene.estimate);
       ExpectCertified(scene.problem, norm(), scene.estimate, summary);
       EXPECT_EQ(summary.num_components, 1);
     }
   }
 }
 
-TEST_P(SolveJointTest, AgreesWithLinearProgrammes) {
-  if (norm().p == 2) GTEST_SKIP() << "no linear programme for p = 2";
+using SolvePolyhedralJointTest = SolveJointTest;
+
+TEST_P(SolvePolyhedralJointTest, AgreesWithLinearProgrammes) {
   for (const double baseline : {0.0, 0.3}) {
     for (unsigned seed = 11; seed <= 13; ++seed) {
       SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
@@ -116,7 +117,8 @@ TEST_P(SolveJointTest, EndsAtTheSameOptimumFromAnyStart) {
       const double optimum = OptimalCost(scene, norm());
 
       Estimate far = Shake(scene, 2);
-      JointSummary summary = SolveJoint(scene.problem, Options(norm()), &far);
+      JointSummary summary =
+          SolveJoint(scene.problem, Options(norm()), {}, &far);
       EXPECT_GT(summary.cost_initial, 20 * optimum);
       ExpectCertified(scene.problem, norm(), far, summary);
       EXPECT_NEAR(summary.cost_final, optimum, 1e-6 * optimum);
@@ -124,8 +126,8 @@ TEST_P(SolveJointTest, EndsAtTheSameOptimumFromAnyStart) {
       Estimate from_nothing;
       InitializerOptions initializer;
       initializer.norm = norm();
-      FindStart(scene.problem, initializer, &from_nothing);
-      summary = SolveJoint(scene.problem, Options(norm()), &from_nothing);
+      FindStart(scene.problem, initializer, {}, &from_nothing);
+      summary = SolveJoint(scene.problem, Options(norm()), {}, &from_nothing);
       ExpectCertified(scene.problem, norm(), from_nothing, summary);
       EXPECT_NEAR(summary.cost_final, optimum, 1e-6 * optimum);
     }
@@ -138,7 +140,7 @@ TEST_P(SolveJointTest, LeavesStartsThatHugTheBoundary) {
     const RandomScene scene = MakeSmallScene(seed);
     Estimate estimate = HugTheBoundary(scene, norm());
     const JointSummary summary =
-        SolveJoint(scene.problem, Options(norm()), &estimate);
+        SolveJoint(scene.problem, Options(norm()), {}, &estimate);
     ExpectCertified(scene.problem, norm(), estimate, summary);
     const double optimum = OptimalCost(scene, norm());
     EXPECT_NEAR(summary.cost_final, optimum, 1e-6 * optimum);
@@ -152,7 +154,7 @@ TEST_P(SolveJointTest, SolvesEveryComponentToItsOwnOptimum) {
     RandomScene glued =
         is_first_first ? Glue(first, second) : Glue(second, first);
     const JointSummary summary =
-        SolveJoint(glued.problem, Options(norm()), &glued.estimate);
+        SolveJoint(glued.problem, Options(norm()), {}, &glued.estimate);
     ExpectCertified(glued.problem, norm(), glued.estimate, summary);
     EXPECT_EQ(summary.num_components, 2);
 
@@ -179,7 +181,7 @@ TEST_P(SolveJointTest, LeavesWhatNothingSeesWhereItIs) {
   const double optimum = OptimalCost(scene, norm());
   AddUnseen(&scene);
   const JointSummary summary =
-      SolveJoint(scene.problem, Options(norm()), &scene.estimate);
+      SolveJoint(scene.problem, Options(norm()), {}, &scene.estimate);
   ExpectCertified(scene.problem, norm(), scene.estimate, summary);
   EXPECT_EQ(summary.cost_final, optimum);
   EXPECT_EQ(scene.estimate.translations.back(), Eigen::Vector3d(7, 8, 9));
@@ -195,9 +197,9 @@ TEST_P(SolveJointTest, HasTheSameBitsAtAnyNumberOfThreads) {
   for (const int num_threads : {1, 2, 3}) {
     JointOptions options = Options(norm());
     options.relative_gap = 1e-4;
-    options.num_threads = num_threads;
     Estimate estimate = scene.estimate;
-    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    const JointSummary summary =
+        SolveJoint(scene.problem, options, {num_threads}, &estimate);
     EXPECT_EQ(summary.termination, JointTermination::kGapReached);
     if (!expected) {
       expected = estimate;
@@ -209,12 +211,16 @@ TEST_P(SolveJointTest, HasTheSameBitsAtAnyNumberOfThreads) {
   }
 }
 
+std::string NameOf(const testing::TestParamInfo<double>& test) {
+  return test.param == 1 ? "L1" : test.param == 2 ? "L2" : "LInf";
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Norms, SolveJointTest,
-    testing::Values(1, 2, std::numeric_limits<double>::infinity()),
-    [](const auto& test) {
-      return test.param == 1 ? "L1" : test.param == 2 ? "L2" : "LInf";
-    });
+    testing::Values(1, 2, std::numeric_limits<double>::infinity()), NameOf);
+INSTANTIATE_TEST_SUITE_P(
+    Norms, SolvePolyhedralJointTest,
+    testing::Values(1, std::numeric_limits<double>::infinity()), NameOf);
 
 TEST(SolveJoint, ReportsEveryIterationAndNeverALossOfWhatItHad) {
   RandomScene scene = Glue(MakeSmallScene(51), MakeSmallScene(52));
@@ -224,7 +230,7 @@ TEST(SolveJoint, ReportsEveryIterationAndNeverALossOfWhatItHad) {
     EXPECT_EQ(iteration, ++calls);
   };
   const JointSummary summary =
-      SolveJoint(scene.problem, options, &scene.estimate);
+      SolveJoint(scene.problem, options, {}, &scene.estimate);
   ASSERT_EQ(static_cast<int>(summary.iterations.size()), calls);
   double seconds = 0;
   double bound = 0;
@@ -244,7 +250,7 @@ TEST(SolveJoint, StopsAtMaxIterations) {
   JointOptions options = Options(Norm::L2());
   options.max_iterations = 1;
   const JointSummary summary =
-      SolveJoint(scene.problem, options, &scene.estimate);
+      SolveJoint(scene.problem, options, {}, &scene.estimate);
   EXPECT_EQ(summary.termination, JointTermination::kMaxIterations);
   EXPECT_EQ(summary.iterations.size(), 1u);
   EXPECT_LE(summary.cost_final, summary.cost_initial);
@@ -257,12 +263,13 @@ TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
   for (const int last : {0, 1, 4}) {
     CancelFlag is_cancelled = last == 0;
     JointOptions options = Options(Norm::L2());
-    options.cancel = &is_cancelled;
+    const Context context{1, &is_cancelled};
     options.callback = [&](int iteration, const JointIteration&) {
       if (iteration == last) is_cancelled = true;
     };
     Estimate estimate = scene.estimate;
-    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    const JointSummary summary =
+        SolveJoint(scene.problem, options, context, &estimate);
     EXPECT_EQ(summary.termination, JointTermination::kInterrupted);
     EXPECT_EQ(static_cast<int>(summary.iterations.size()), last);
     EXPECT_LE(summary.cost_final, summary.cost_initial);
@@ -279,7 +286,7 @@ TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
     Estimate estimate = HugTheBoundary(scene, Norm::L2());
     CancelFlag is_cancelled = false;
     JointOptions options = Options(Norm::L2());
-    options.cancel = &is_cancelled;
+    const Context context{1, &is_cancelled};
     options.callback = [&](int, const JointIteration& state) {
       if (!state.target) return;
       EXPECT_LT(*state.target, *state.cost);
@@ -287,7 +294,8 @@ TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
       is_cancelled = true;
       ++num_interrupted;
     };
-    const JointSummary summary = SolveJoint(scene.problem, options, &estimate);
+    const JointSummary summary =
+        SolveJoint(scene.problem, options, context, &estimate);
     EXPECT_EQ(summary.termination == JointTermination::kInterrupted,
               is_cancelled);
     EXPECT_EQ(summary.iterations.back().target.has_value(), is_cancelled);
@@ -302,7 +310,7 @@ TEST(SolveJoint, OfNothingIsDone) {
   IndexObservations(&problem);
   Estimate estimate;
   const JointSummary summary =
-      SolveJoint(problem, Options(Norm::L2()), &estimate);
+      SolveJoint(problem, Options(Norm::L2()), {}, &estimate);
   EXPECT_EQ(summary.termination, JointTermination::kGapReached);
   EXPECT_EQ(summary.num_components, 0);
   EXPECT_EQ(summary.cost_final, 0);
@@ -311,7 +319,7 @@ TEST(SolveJoint, OfNothingIsDone) {
 TEST(SolveJoint, RefusesStartsBehindACameraAndBadOptions) {
   RandomScene scene = MakeSmallScene(55);
   const auto run = [&](const JointOptions& options) {
-    SolveJoint(scene.problem, options, &scene.estimate);
+    SolveJoint(scene.problem, options, {}, &scene.estimate);
   };
   EXPECT_THROW(run(Options({1.5})), std::invalid_argument);
   JointOptions options = Options(Norm::L2());

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "krot/bridge/bridge.h"
-#include "krot/problem/cost.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot {
@@ -28,7 +28,7 @@ TEST(SolveJoint, ProvesTheOptimumOfModelsWithGrossOutliers) {
       options.relative_gap = 1e-4;
       Estimate estimate = built.start;
       const JointSummary summary =
-          SolveJoint(built.problem, options, &estimate);
+          SolveJoint(built.problem, options, {}, &estimate);
       EXPECT_GT(summary.cost_final, 10);
       ASSERT_TRUE(summary.certificate);
       const CertificateCheck check =

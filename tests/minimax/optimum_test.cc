@@ -65,8 +65,10 @@ TEST_P(OptimumTest, AgreesWithTheOracleFromGoodAndBadStarts) {
   }
 }
 
-// The text's tolerances leave a distance to the optimum, never a negative one.
-TEST_P(OptimumTest, IsNeverUndercutByThePapersSettings) {
+// Where no direction lowers all residuals that are active, within 1 % of the
+// largest, one of these is at least as large wherever one goes: the optimum is
+// above 0.99 of the cost. So it is where the step's tolerance ends the descent.
+TEST_P(OptimumTest, IsMissedByLessThanTheTolerancesOfThePapersSettings) {
   const auto [p, kind] = GetParam();
   const Norm norm{p};
   FastDescentOptions options;
@@ -87,10 +89,15 @@ TEST_P(OptimumTest, IsNeverUndercutByThePapersSettings) {
       EXPECT_LE(summary.cost, summary.cost_initial);
       EXPECT_GE(summary.cost, oracle.lower_bound - kAgreement);
       EXPECT_LE(summary.iterations, options.max_iterations);
+      if (summary.termination == DescentTermination::kMaxIterations) {
+        EXPECT_EQ(summary.iterations, options.max_iterations);
+        EXPECT_LE(summary.cost, 1.1 * oracle.cost);
+        continue;
+      }
       EXPECT_TRUE(summary.termination == DescentTermination::kStationary ||
-                  summary.termination == DescentTermination::kNoDecrease ||
-                  (summary.termination == DescentTermination::kMaxIterations &&
-                   summary.iterations == options.max_iterations));
+                  summary.termination == DescentTermination::kNoDecrease);
+      EXPECT_LE((1 - options.active_tolerance) * summary.cost,
+                oracle.cost + kAgreement);
     }
   }
 }

@@ -177,16 +177,16 @@ TEST(TextIo, RefusesToWriteWhatItCouldNotReadBack) {
   for (const char* name : {" a.jpg", "a.jpg ", "a\nb.jpg", "a\rb.jpg"}) {
     Model model = TinyModel();
     model.images[2].name = name;
-    EXPECT_THAT(ModelErrorOf([&] { FormatImagesText(model); }),
+    EXPECT_THAT(WriteErrorOf([&] { FormatImagesText(model); }),
                 HasSubstr("image 9: found the name"))
         << name;
   }
   Model model = TinyRigModel();
   model.rigs[0].sensors[1].sensor_id.type = 5;
-  EXPECT_THAT(ModelErrorOf([&] { FormatRigsText(model); }),
+  EXPECT_THAT(WriteErrorOf([&] { FormatRigsText(model); }),
               HasSubstr("found sensor type 5"));
   model.cameras[0].model_id = 99;
-  EXPECT_THAT(ModelErrorOf([&] { FormatCamerasText(model); }),
+  EXPECT_THAT(WriteErrorOf([&] { FormatCamerasText(model); }),
               HasSubstr("camera 7: found camera model id 99"));
 }
 

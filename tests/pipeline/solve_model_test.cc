@@ -84,7 +84,7 @@ TEST(SolveModel, CountsIterationsAndSecondsOverAllStages) {
     EXPECT_EQ(iteration, ++calls);
   };
   const SolveSummary summary =
-      SolveModel(SynthesizeScene({}).model, options).summary;
+      SolveModel(SynthesizeScene(NoisyScene()).model, options).summary;
   EXPECT_EQ(static_cast<int>(summary.iterations.size()), calls);
   const auto is_joint = [](const JointIteration& state) {
     return !state.target;
@@ -114,6 +114,34 @@ TEST(SolveModel, ListsTheSupportWorstFirstWithMultipliersOfSumOne) {
   EXPECT_NEAR(sum, 1, 1e-12);
   // All of it lies at the maximum, but for the gap.
   EXPECT_GT(last_px, 0.98 * summary.cost_final);
+}
+
+TEST(SolveModel, IsDoneAtOnceWhereEveryErrorIsZero) {
+  SceneOptions scene;
+  scene.num_frames = 8;
+  scene.num_points = 100;
+  const Model model = SynthesizeScene(scene).model;
+  ASSERT_LT(CostOf(model), 1e-9);
+  for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kJoint}) {
+    SolveModelOptions options;
+    options.method = method;
+    const SolveModelResult result = SolveModel(model, options);
+    EXPECT_EQ(result.summary.termination, SolveTermination::kZeroCost);
+    EXPECT_TRUE(result.summary.sweeps.empty());
+    EXPECT_TRUE(result.summary.iterations.empty());
+    EXPECT_LT(CostOf(result.model), 1e-9);
+  }
+}
+
+TEST(SolveModel, EndsWhereEveryErrorHasBecomeZero) {
+  SceneOptions scene = NoisyScene();
+  scene.pixel_noise = 0;
+  const Model model = SynthesizeScene(scene).model;
+  ASSERT_GT(CostOf(model), 1);
+  const SolveModelResult result = SolveModel(model, {});
+  EXPECT_EQ(result.summary.termination, SolveTermination::kZeroCost);
+  EXPECT_LT(result.summary.iterations.size(), 60u);
+  EXPECT_LT(CostOf(result.model), 1e-9);
 }
 
 TEST(SolveModel, BoundsNothingBySweepsAlone) {
@@ -156,7 +184,7 @@ std::vector<double> FrameMaxima(const BuiltProblem& built,
 double LargestFrameGain(const Model& model) {
   const BuiltProblem built = BuildProblem(model, {});
   Estimate swept = built.start;
-  BlockSweep(built.problem, {}, Norm::L2(), 1, nullptr).ResectFrames(&swept);
+  BlockSweep(built.problem, {}, Norm::L2(), Context{1}).ResectFrames(&swept);
   const std::vector<double> before = FrameMaxima(built, built.start);
   const std::vector<double> after = FrameMaxima(built, swept);
   double gain = 0;
@@ -232,11 +260,10 @@ TEST(SolveModel, GivesTheSameBitsAtAnyNumberOfThreads) {
   for (const SolveInit init : {SolveInit::kModel, SolveInit::kFeasible}) {
     SolveModelOptions options;
     options.init = init;
-    options.num_threads = 1;
-    const Model expected = SolveModel(model, options).model;
+    const Model expected = SolveModel(model, options, {1}).model;
     for (const int num_threads : {2, 3}) {
-      options.num_threads = num_threads;
-      EXPECT_THAT(SolveModel(model, options).model, IsModel(expected));
+      EXPECT_THAT(SolveModel(model, options, {num_threads}).model,
+                  IsModel(expected));
     }
   }
 }
@@ -279,11 +306,10 @@ TEST(SolveModel, GivesTheBestSoFarWhenInterrupted) {
   SolveModelOptions options;
   options.method = SolveMethod::kResInt;
   options.res_int.sweep_tolerance = 0;
-  options.cancel = &cancel;
   options.res_int.callback = [&](int sweep, const Sweep&) {
     if (sweep == 2) cancel = true;
   };
-  const SolveModelResult result = SolveModel(model, options);
+  const SolveModelResult result = SolveModel(model, options, {-1, &cancel});
   EXPECT_EQ(result.summary.termination, SolveTermination::kInterrupted);
   EXPECT_EQ(result.summary.sweeps.size(), 2u);
   EXPECT_NEAR(CostOf(result.model), result.summary.sweeps.back().cost, 1e-9);
@@ -293,11 +319,10 @@ TEST(SolveModel, GivesTheBestSoFarWhenInterruptedInAJointIteration) {
   const Model model = SynthesizeScene(NoisyScene()).model;
   CancelFlag cancel{false};
   SolveModelOptions options;
-  options.cancel = &cancel;
   options.joint.callback = [&](int iteration, const JointIteration&) {
     if (iteration == 3) cancel = true;
   };
-  const SolveModelResult result = SolveModel(model, options);
+  const SolveModelResult result = SolveModel(model, options, {-1, &cancel});
   EXPECT_EQ(result.summary.termination, SolveTermination::kInterrupted);
   EXPECT_NEAR(CostOf(result.model), result.summary.cost_final, 1e-9);
 }
@@ -326,12 +351,12 @@ TEST(SolveModel, IsInterruptedOnItsWayToAStart) {
   SolveModelOptions options;
   options.init = SolveInit::kFeasible;
   CancelFlag is_cancelled = false;
-  options.cancel = &is_cancelled;
   options.joint.callback = [&](int iteration, const JointIteration& state) {
     EXPECT_TRUE(state.target);
     if (iteration == 2) is_cancelled = true;
   };
-  const SolveModelResult result = SolveModel(model, options);
+  const SolveModelResult result =
+      SolveModel(model, options, {-1, &is_cancelled});
   EXPECT_EQ(result.summary.termination, SolveTermination::kInterrupted);
   EXPECT_EQ(result.summary.iterations.size(), 2u);
   EXPECT_FALSE(result.summary.num_working_observations);
@@ -342,8 +367,9 @@ TEST(SolveModel, StartsFromNothingWhereTheModelLeavesObservationsOut) {
   const PoselessScene scene;
   SolveModelOptions options;
   std::vector<std::string> notes;
-  options.on_note = [&](const std::string& note) { notes.push_back(note); };
-  const SolveModelResult result = SolveModel(scene.model, options);
+  Context context;
+  context.on_note = [&](const std::string& note) { notes.push_back(note); };
+  const SolveModelResult result = SolveModel(scene.model, options, context);
   EXPECT_EQ(result.summary.init, SolveInit::kFeasible);
   EXPECT_THAT(result.summary.left_out, ::testing::Each(0));
   EXPECT_NEAR(result.summary.cost_final, scene.cost, 2e-4 * scene.cost);
@@ -368,8 +394,9 @@ TEST(SolveModel, KeepsAnImageWithoutPoseInSweepsAloneAndSaysWhatHelps) {
   SolveModelOptions options;
   options.method = SolveMethod::kResInt;
   std::vector<std::string> notes;
-  options.on_note = [&](const std::string& note) { notes.push_back(note); };
-  const SolveModelResult result = SolveModel(scene.model, options);
+  Context context;
+  context.on_note = [&](const std::string& note) { notes.push_back(note); };
+  const SolveModelResult result = SolveModel(scene.model, options, context);
   EXPECT_EQ(result.summary.left_out[static_cast<int>(LeftOut::kNoPose)],
             scene.num_observations);
   EXPECT_EQ(result.summary.pixel_error_after.not_finite,

@@ -10,6 +10,7 @@ namespace {
 
 using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 TEST(FindComponents, NumbersThemByTheirFirstFrame) {
   const Components components =
@@ -47,6 +48,16 @@ TEST(FindComponents, JoinsTheViewsOfOneFrame) {
   problem.views[1].frame = 0;
   IndexObservations(&problem);
   EXPECT_EQ(FindComponents(problem).count, 1);
+}
+
+TEST(SplitIntoComponents, GivesEachConnectedPartItsObservations) {
+  const KnownRotationProblem problem =
+      MakeGraph(4, 3, {{3, 0}, {1, 0}, {2, 1}, {0, 1}, {3, 2}});
+  EXPECT_THAT(SplitIntoComponents(problem),
+              ElementsAre(ElementsAre(2, 3), ElementsAre(0, 1, 4)));
+  EXPECT_THAT(SplitIntoComponents(problem, {0, 2}),
+              ElementsAre(ElementsAre(1 + 1), ElementsAre(0)));
+  EXPECT_THAT(SplitIntoComponents(problem, {}), IsEmpty());
 }
 
 }  // namespace

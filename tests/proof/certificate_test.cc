@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/problem/cost.h"
 #include "krot/joint/feasible_start.h"
+#include "krot/problem/cost.h"
 #include "krot/proof/support.h"
 #include "tests/problem/random_problem.h"
 #include "tests/proof/joint_iterate.h"
@@ -98,12 +98,12 @@ TEST_P(CertificateOfNorm, ProvesThatNothingIsJustBelowTheOptimum) {
       options.unit_depth = 0.5;
       Estimate unused;
       std::vector<Multiplier> multipliers;
-      ASSERT_NE(FindEstimateBelow(scene.problem, share * cost, options, &unused,
-                                  &multipliers),
+      ASSERT_NE(FindEstimateBelow(scene.problem, share * cost, options, {},
+                                  &unused, &multipliers),
                 InteriorPointTermination::kFeasible);
       const std::optional<Certificate> certificate =
           MakeInfeasibilityCertificate(scene.problem, norm(), share * cost,
-                                       multipliers, CertificateOptions());
+                                       multipliers, CertificateOptions(), {});
       ASSERT_TRUE(certificate);
       const CertificateCheck check =
           CheckCertificate(scene.problem, norm(), *certificate);

@@ -21,14 +21,14 @@ inline JointIterate SolveToGap(const KnownRotationProblem& problem, Norm norm,
   InteriorPointOptions options;
   options.norm = norm;
   options.smallest_gap = gap;
-  options.num_threads = 2;
   options.stop = [&](const ConicIterate& current) {
     iterate.estimate = *current.estimate;
     return false;
   };
   Estimate estimate = start;
   iterate.gamma =
-      MinimizeJointly(problem, options, &estimate, &iterate.multipliers).gamma;
+      MinimizeJointly(problem, options, {}, &estimate, &iterate.multipliers)
+          .gamma;
   return iterate;
 }
 
@@ -36,7 +36,7 @@ inline std::optional<Certificate> Certify(
     const KnownRotationProblem& problem, Norm norm, const JointIterate& iterate,
     const CertificateOptions& options = {}) {
   return MakeCertificate(problem, norm, iterate.estimate, iterate.gamma,
-                         iterate.multipliers, options);
+                         iterate.multipliers, options, {});
 }
 
 }  // namespace krot

@@ -14,17 +14,17 @@ using ::testing::Not;
 
 SolveReport SomeReport() {
   SolveReport report;
-  report.version = "1.2.3";
+  report.run.version = "1.2.3";
   report.command = "solver";
   report.method = "res_int";
-  report.threads = 2;
-  report.seed = 18446744073709551615u;
+  report.run.threads = 2;
+  report.run.seed = 18446744073709551615u;
   SolveSummary& summary = report.summary;
   summary.termination = SolveTermination::kStalled;
   summary.method = SolveMethod::kResInt;
   summary.num_frames = 1;
   summary.num_observations = 8;
-  summary.left_out = {2, 0, 0, 3, 0, 0};
+  summary.left_out = {2, 0, 0, 3, 0};
   summary.cost_initial = 4;
   summary.cost_final = 0.1;
   summary.sweeps = {{0.2, 0.5}, {0.1, 0.75}};
@@ -42,6 +42,7 @@ TEST(SolveJson, KeepsEveryBitOfItsNumbers) {
   EXPECT_EQ(json["left_out"]["behind"], 2);
   EXPECT_EQ(json["left_out"]["short_track"], 3);
   EXPECT_EQ(json["left_out"]["no_pose"], 0);
+  EXPECT_EQ(json["left_out"]["single_ray"], 0);  // never, but keys stay
 }
 
 TEST(SolveJson, SaysNullForErrorsThatNoObservationHas) {
@@ -166,7 +167,7 @@ TEST(NothingToSolve, SaysWhy) {
   SolveSummary summary;
   EXPECT_EQ(NothingToSolveSentence(summary),
             "nothing to solve: the model has no observations");
-  summary.left_out = {0, 1, 0, 1000, 0, 0};
+  summary.left_out = {0, 1, 0, 1000, 0};
   EXPECT_EQ(NothingToSolveSentence(summary),
             "nothing to solve: 1001 observations left out (undistortion 1, "
             "short_track 1000)");

@@ -43,7 +43,7 @@ TEST(Alternation, IsStuckAtTwoPixelsWhereNoneAreAttainable) {
   EXPECT_LT(Cost(problem, kTrue, norm, 1), 1e-12);
 
   Estimate estimate = kStart;
-  BlockSweep blocks(problem, FastDescentOptions{}, norm, 1, nullptr);
+  BlockSweep blocks(problem, FastDescentOptions{}, norm, Context{1});
   const auto sweep = [&](int times) {
     for (int n = 0; n < times; ++n) {
       blocks.IntersectPoints(&estimate);

@@ -65,7 +65,6 @@ class ResIntTest : public testing::TestWithParam<FastDescentSettings> {
   ResIntOptions Options() const {
     ResIntOptions options;
     options.fast_descent.settings = GetParam();
-    options.num_threads = 1;
     options.max_sweeps = 30;
     options.sweep_tolerance = 1e-4;
     return options;
@@ -81,7 +80,7 @@ TEST_P(ResIntTest, NeverRaisesTheCostAndReportsWhatItReached) {
     EXPECT_EQ(sweep, ++callbacks);
   };
   const ResIntSummary summary =
-      SolveResInt(scene.problem, options, &scene.estimate);
+      SolveResInt(scene.problem, options, {}, &scene.estimate);
   EXPECT_EQ(summary.cost_initial, start);
   EXPECT_LT(summary.cost_final, summary.cost_initial);
   EXPECT_EQ(summary.cost_final,
@@ -99,11 +98,12 @@ TEST_P(ResIntTest, GivesTheSameBitsAtAnyNumberOfThreads) {
   const RandomScene scene = MakeScene(2);
   ResIntOptions options = Options();
   Estimate one = scene.estimate;
-  const double cost = SolveResInt(scene.problem, options, &one).cost_final;
+  const double cost = SolveResInt(scene.problem, options, {1}, &one).cost_final;
   for (const int threads : {2, 3}) {
-    options.num_threads = threads;
     Estimate estimate = scene.estimate;
-    EXPECT_EQ(SolveResInt(scene.problem, options, &estimate).cost_final, cost);
+    EXPECT_EQ(
+        SolveResInt(scene.problem, options, {threads}, &estimate).cost_final,
+        cost);
     ExpectSameBits(estimate, one);
   }
 }
@@ -113,7 +113,7 @@ TEST_P(ResIntTest, SaysStalledOnlyAfterIdleSweeps) {
   ResIntOptions options = Options();
   options.max_sweeps = 1000;
   const ResIntSummary summary =
-      SolveResInt(scene.problem, options, &scene.estimate);
+      SolveResInt(scene.problem, options, {}, &scene.estimate);
   EXPECT_EQ(summary.termination, ResIntTermination::kStalled);
   const size_t patience = GetParam() == FastDescentSettings::kPaper ? 1 : 3;
   const size_t n = summary.sweeps.size();
@@ -129,7 +129,7 @@ TEST_P(ResIntTest, SaysMaxSweepsAfterSoMany) {
   ResIntOptions options = Options();
   options.max_sweeps = 2;
   const ResIntSummary summary =
-      SolveResInt(scene.problem, options, &scene.estimate);
+      SolveResInt(scene.problem, options, {}, &scene.estimate);
   EXPECT_EQ(summary.termination, ResIntTermination::kMaxSweeps);
   EXPECT_EQ(summary.sweeps.size(), 2u);
 }
@@ -139,7 +139,8 @@ TEST_P(ResIntTest, NoSweepsChangeNothing) {
   ResIntOptions options = Options();
   options.max_sweeps = 0;
   Estimate estimate = scene.estimate;
-  const ResIntSummary summary = SolveResInt(scene.problem, options, &estimate);
+  const ResIntSummary summary =
+      SolveResInt(scene.problem, options, {}, &estimate);
   EXPECT_EQ(summary.termination, ResIntTermination::kMaxSweeps);
   EXPECT_EQ(summary.cost_final, summary.cost_initial);
   EXPECT_TRUE(summary.sweeps.empty());
@@ -150,10 +151,9 @@ TEST_P(ResIntTest, InterruptionKeepsTheBestSoFar) {
   RandomScene scene = MakeScene(1);
   CancelFlag cancel{false};
   ResIntOptions options = Options();
-  options.cancel = &cancel;
   options.callback = [&](int sweep, const Sweep&) { cancel = sweep == 2; };
   const ResIntSummary summary =
-      SolveResInt(scene.problem, options, &scene.estimate);
+      SolveResInt(scene.problem, options, {1, &cancel}, &scene.estimate);
   EXPECT_EQ(summary.termination, ResIntTermination::kInterrupted);
   ASSERT_EQ(summary.sweeps.size(), 2u);
   EXPECT_NEAR(summary.cost_final, summary.sweeps.back().cost, kCostRounding);
@@ -166,7 +166,8 @@ TEST_P(ResIntTest, TriangulationLeavesFramesAlone) {
   ResIntOptions options = Options();
   options.update_frames = false;
   Estimate estimate = scene.estimate;
-  const ResIntSummary summary = SolveResInt(scene.problem, options, &estimate);
+  const ResIntSummary summary =
+      SolveResInt(scene.problem, options, {}, &estimate);
   EXPECT_EQ(estimate.translations, scene.estimate.translations);
   EXPECT_LT(summary.cost_final, summary.cost_initial);
 }
@@ -174,7 +175,7 @@ TEST_P(ResIntTest, TriangulationLeavesFramesAlone) {
 TEST_P(ResIntTest, RefusesAStartBehindACamera) {
   RandomScene scene = MakeScene(1);
   scene.estimate.points[5].z() = -100;
-  EXPECT_THROW(SolveResInt(scene.problem, Options(), &scene.estimate),
+  EXPECT_THROW(SolveResInt(scene.problem, Options(), {}, &scene.estimate),
                std::invalid_argument);
 }
 
@@ -182,11 +183,11 @@ TEST_P(ResIntTest, RefusesOptionsOutOfRange) {
   RandomScene scene = MakeScene(1);
   ResIntOptions options = Options();
   options.max_sweeps = -1;
-  EXPECT_THROW(SolveResInt(scene.problem, options, &scene.estimate),
+  EXPECT_THROW(SolveResInt(scene.problem, options, {}, &scene.estimate),
                std::invalid_argument);
   options = Options();
   options.norm.p = 0.5;
-  EXPECT_THROW(SolveResInt(scene.problem, options, &scene.estimate),
+  EXPECT_THROW(SolveResInt(scene.problem, options, {}, &scene.estimate),
                std::invalid_argument);
 }
 
@@ -202,10 +203,9 @@ INSTANTIATE_TEST_SUITE_P(, ResIntTest,
 TEST(ResInt, NoiseFreeScenesComeOutNearlyExact) {
   RandomScene scene = MakeExactScene();
   ResIntOptions options;
-  options.num_threads = 1;
   options.max_sweeps = 300;
   const ResIntSummary summary =
-      SolveResInt(scene.problem, options, &scene.estimate);
+      SolveResInt(scene.problem, options, {}, &scene.estimate);
   EXPECT_LT(summary.cost_final, 1e-2 * summary.cost_initial);
 }
 
@@ -213,11 +213,10 @@ TEST(ResInt, NoiseFreeScenesComeOutNearlyExact) {
 TEST(ResInt, TheLastOfSoManySweepsLeavesFramesAtTheirOptima) {
   RandomScene scene = MakeScene(6);
   ResIntOptions options;
-  options.num_threads = 1;
   options.max_sweeps = 3;
-  SolveResInt(scene.problem, options, &scene.estimate);
+  SolveResInt(scene.problem, options, {}, &scene.estimate);
   Estimate again = scene.estimate;
-  BlockSweep(scene.problem, FastDescentOptions{}, Norm::L2(), 1, nullptr)
+  BlockSweep(scene.problem, FastDescentOptions{}, Norm::L2(), Context{1})
       .ResectFrames(&again);
   for (int32_t f = 0; f < scene.problem.num_frames; ++f) {
     EXPECT_NEAR(FrameCost(scene.problem, again, f),
@@ -229,10 +228,9 @@ TEST(ResInt, TheLastOfSoManySweepsLeavesFramesAtTheirOptima) {
 TEST(ResInt, SweepsThatStallLeaveFramesAtTheirOptima) {
   RandomScene scene = MakeScene(6);
   ResIntOptions options;
-  options.num_threads = 1;
-  SolveResInt(scene.problem, options, &scene.estimate);
-  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
-                    nullptr);
+  SolveResInt(scene.problem, options, {}, &scene.estimate);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                    Context{1});
   Estimate again = scene.estimate;
   blocks.ResectFrames(&again);
   for (int32_t f = 0; f < scene.problem.num_frames; ++f) {
@@ -243,8 +241,8 @@ TEST(ResInt, SweepsThatStallLeaveFramesAtTheirOptima) {
 
 TEST(BlockSweep, LeavesBlocksAtTheLevelOfTheGoalWhereTheyAre) {
   const RandomScene scene = MakeScene(7);
-  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
-                    nullptr);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                    Context{1});
   const double level = (1 + 1e-9) * FrameCost(scene.problem, scene.estimate, 0);
   blocks.SetGoal({1e-11, level});
   Estimate estimate = scene.estimate;
@@ -258,8 +256,8 @@ TEST(BlockSweep, LeavesBlocksAtTheLevelOfTheGoalWhereTheyAre) {
 
 TEST(BlockSweep, LeavesPointsAtTheLevelOfTheGoalWhereTheyAre) {
   const RandomScene scene = MakeScene(7);
-  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
-                    nullptr);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                    Context{1});
   const double level =
       (1 + 1e-9) * PointCost(scene.problem, scene.estimate, Norm::L2(), 0);
   blocks.SetGoal({1e-11, level});
@@ -278,8 +276,8 @@ TEST(BlockSweep, LeavesPointsAtTheLevelOfTheGoalWhereTheyAre) {
 
 TEST(BlockSweep, ReturnsTheCostThatItReaches) {
   RandomScene scene = MakeScene(8);
-  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 2,
-                    nullptr);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                    Context{2});
   for (const double level : {0.0, 3.0}) {
     blocks.SetGoal({1e-11, level});
     const double after_points = blocks.IntersectPoints(&scene.estimate);
@@ -298,8 +296,8 @@ TEST(BlockSweep, OfAPointBehindACameraReturnsInfinity) {
   RandomScene scene = MakeScene(8);
   scene.estimate.points.front().z() = -100;
   for (const double level : {0.0, 3.0}) {
-    BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
-                      nullptr);
+    BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                      Context{1});
     blocks.SetGoal({1e-11, level});
     Estimate estimate = scene.estimate;
     EXPECT_EQ(blocks.IntersectPoints(&estimate),
@@ -313,8 +311,8 @@ TEST(BlockSweep, OfAPointBehindACameraReturnsInfinity) {
 // Every point is then at its own optimum for the frames as they are.
 TEST(BlockSweep, ASecondIntersectionGainsNothing) {
   RandomScene scene = MakeScene(5);
-  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(), 1,
-                    nullptr);
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                    Context{1});
   blocks.IntersectPoints(&scene.estimate);
   const Estimate once = scene.estimate;
   blocks.IntersectPoints(&scene.estimate);

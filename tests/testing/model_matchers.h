@@ -1,23 +1,18 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <sstream>
-#include <stdexcept>
 #include <string>
-#include <string_view>
-#include <system_error>
-#include <vector>
 
 #include <gmock/gmock.h>
 
+#include "krot/base/write_file.h"
 #include "krot/model/model.h"
 #include "krot/model/model_error.h"
+#include "tests/testing/temp_folder.h"
 
 namespace krot {
 
@@ -174,66 +169,23 @@ inline auto IsModel(const Model& expected) {
   return IsModel(expected, Ignoring());
 }
 
-// The message of the ModelError that `action` throws; "" if it throws none.
-template <typename Action>
-std::string ModelErrorOf(const Action& action) {
+// The message of the Error that `action` throws; "" if it throws none.
+template <typename Error, typename Action>
+std::string MessageOf(const Action& action) {
   try {
     action();
-  } catch (const ModelError& error) {
+  } catch (const Error& error) {
     return error.what();
   }
   return "";
 }
-
-// A folder that lives as long as this object.
-class TempFolder {
- public:
-  TempFolder() {
-    std::string name =
-        (std::filesystem::temp_directory_path() / "krot-test-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw std::runtime_error(name + ": cannot be created");
-    }
-    path_ = name;
-  }
-  ~TempFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path operator/(const std::string& name) const {
-    return path_ / name;
-  }
-
- private:
-  std::filesystem::path path_;
-};
-
-inline std::string ReadBytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path.string() + ": cannot be opened");
-  return {std::istreambuf_iterator<char>(file), {}};
+template <typename Action>
+std::string ModelErrorOf(const Action& action) {
+  return MessageOf<ModelError>(action);
 }
-
-inline void WriteBytes(const std::filesystem::path& path,
-                       std::string_view bytes) {
-  std::filesystem::create_directories(path.parent_path());
-  std::ofstream file(path, std::ios::binary);
-  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (!file.flush()) throw std::runtime_error(path.string() + ": not written");
-}
-
-// The names of the entries of a folder, sorted.
-inline std::vector<std::string> FileNames(const std::filesystem::path& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    names.push_back(entry.path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
+template <typename Action>
+std::string WriteErrorOf(const Action& action) {
+  return MessageOf<WriteError>(action);
 }
 
 // The folder of real models that the environment names in KROT_REAL_MODELS,

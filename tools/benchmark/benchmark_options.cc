@@ -15,10 +15,11 @@ void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser) {
                      "printed");
   parser->AddChoice("format", &options->format, {"text", "markdown"},
                     "How to print the tables");
-  parser->AddPath("report_path", &options->report_path, false, "a file",
-                  "Where the same goes as JSON");
-  parser->AddPath("plot_path", &options->plot_path, false, "a file",
-                  "Where the plot goes as SVG");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the same goes as JSON");
+  parser->AddOutputFile("plot_path", &options->plot_path,
+                        "Where the plot goes, as a script with which gnuplot "
+                        "prints an SVG");
   parser->Add({"random_seed", "What random instances are made from",
                "an integer >= 0", std::to_string(options->random_seed), false,
                [options](const std::string& text) {

@@ -15,7 +15,7 @@ struct BenchmarkOptions {
   int repeats = 5;
   std::string format = "text";  // or "markdown"
   std::string report_path;      // JSON; empty: none
-  std::string plot_path;        // SVG; empty: none
+  std::string plot_path;        // for gnuplot; empty: none
   uint64_t random_seed = 0;
   LogOptions log;
   std::string project_path;

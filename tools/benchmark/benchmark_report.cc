@@ -1,6 +1,6 @@
 #include "tools/benchmark/benchmark_report.h"
 
-#include "krot/report/write_file.h"
+#include "krot/base/write_file.h"
 
 namespace krot {
 namespace {
@@ -53,7 +53,7 @@ void PublishReport(const BenchmarkReport& report,
     WriteFileAtomically(options.report_path, json.dump(2) + "\n");
   }
   if (!options.plot_path.empty() && report.plot) {
-    WriteFileAtomically(options.plot_path, ToSvg(*report.plot));
+    WriteFileAtomically(options.plot_path, ToGnuplot(*report.plot));
   }
 }
 

@@ -185,7 +185,7 @@ class Contest {
     return cell;
   }
 
-  const KnownRotationOptions& options_;
+  const KnownRotationOptions options_;
   Solvers solvers_;
   size_t num_unlimited_ = 0;  // the first so many have all the time
   ResultTable seconds_;

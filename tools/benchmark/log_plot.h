@@ -19,8 +19,8 @@ struct LogPlot {
   std::vector<PlotSeries> series;
 };
 
-// A self-contained SVG image; decades are ruled, each line bears its name at
-// its end. Points that are not positive and finite are left out.
-std::string ToSvg(const LogPlot& plot);
+// A script for gnuplot that holds the data and prints an SVG image. Points
+// that are not positive and finite are left out, and lines without any.
+std::string ToGnuplot(const LogPlot& plot);
 
 }  // namespace krot

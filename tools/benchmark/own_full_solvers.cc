@@ -1,8 +1,8 @@
 #include <utility>
 
 #include "krot/base/timer.h"
-#include "krot/pipeline/schedule.h"
 #include "krot/joint/joint.h"
+#include "krot/pipeline/schedule.h"
 #include "krot/sweeps/res_int.h"
 #include "tools/benchmark/known_rotation_solver.h"
 
@@ -19,11 +19,9 @@ class Schedule : public KnownRotationSolver {
 
   bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
-    SolveModelOptions options;
-    options.num_threads = num_threads_;
-    options.cancel = cancel;
     SolveSummary summary;
-    RunSchedule(problem, options, method_, Timer(), estimate, &summary);
+    RunSchedule(problem, {}, method_, {num_threads_, cancel}, Timer(), estimate,
+                &summary);
     return !IsCancelled(cancel);
   }
 
@@ -48,9 +46,8 @@ class Sweeps : public KnownRotationSolver {
     ResIntOptions options;
     options.fast_descent.settings = settings_;
     options.sweep_tolerance = 1e-3;  // the paper's
-    options.num_threads = num_threads_;
-    options.cancel = cancel;
-    const ResIntSummary summary = SolveResInt(problem, options, estimate);
+    const ResIntSummary summary =
+        SolveResInt(problem, options, {num_threads_, cancel}, estimate);
     return summary.termination != ResIntTermination::kInterrupted;
   }
 

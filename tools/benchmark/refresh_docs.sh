@@ -4,7 +4,8 @@
 #
 #   <!-- begin NAME --> and <!-- end NAME -->
 #
-# and is replaced by OUTPUT/NAME.md where that exists. Needs awk.
+# and is replaced by OUTPUT/NAME.md where that exists, but for its <details>,
+# which the JSON beside it holds. Needs awk and, for the plots, gnuplot.
 #
 # Usage: tools/benchmark/run_all.sh MODELS OUTPUT
 #        tools/benchmark/refresh_docs.sh OUTPUT
@@ -22,7 +23,11 @@ awk -v output="$output" '
     is_replaced = (getline line < file) > 0
     if (is_replaced) {
       print ""
-      do { print line } while ((getline line < file) > 0)
+      do {
+        if (line ~ /^<details>/) is_detail = 1
+        if (!is_detail) print line
+        else if (line ~ /^<\/details>/) { is_detail = 0; getline line < file }
+      } while ((getline line < file) > 0)
       print ""
     }
     next
@@ -32,7 +37,7 @@ awk -v output="$output" '
 ' "$document" >"$refreshed"
 cat "$refreshed" >"$document"
 for name in triangulation triangulation_inf known_rotation scaling; do
-  if [[ -s $output/$name.svg ]]; then
-    cp "$output/$name.svg" "$root/docs/images/benchmark_$name.svg"
+  if [[ -s $output/$name.gp ]]; then
+    gnuplot "$output/$name.gp" >"$root/docs/images/benchmark_$name.svg"
   fi
 done

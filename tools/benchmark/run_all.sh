@@ -8,10 +8,10 @@
 #
 # MODELS is a folder of COLMAP models, by default KROT_REAL_MODELS; without it
 # synthetic models alone are measured. OUTPUT is a folder for the tables (*.md),
-# reports (*.json) and plots (*.svg); by default they are thrown away. Needs
-# 3 GB of memory and 1 GB in TMPDIR. QUICK=1 measures little of everything, in a
-# minute or two, to see that it goes through. What fails is named on stderr and
-# left out.
+# reports (*.json) and plots (*.gp, for gnuplot); by default they are thrown
+# away. Needs 3 GB of memory and 1 GB in TMPDIR. QUICK=1 measures little of
+# everything, in a minute or two, to see that it goes through. What fails is
+# named on stderr and left out.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 models=${1:-${KROT_REAL_MODELS:-}}
@@ -85,9 +85,9 @@ printf '| part | seconds |\n|---|---:|\n' >"$output/elapsed.new"
 run() {
   local name=$1 start=$SECONDS code=0
   shift
-  rm -f "$output/$name".{md,json,svg}
+  rm -f "$output/$name".{md,json,gp}
   "$BUILD/krot_benchmark" "$@" --format markdown \
-    --report_path "$output/$name.json" --plot_path "$output/$name.svg" \
+    --report_path "$output/$name.json" --plot_path "$output/$name.gp" \
     >"$output/$name.new" || code=$?
   if ((code == 0)); then
     mv "$output/$name.new" "$output/$name.md"

@@ -48,10 +48,9 @@ double MicrosecondsPerSweep(const BenchmarkModel& model,
   options.max_sweeps = kSweeps;
   options.sweep_tolerance = 0;
   options.patience = kSweeps;
-  options.num_threads = num_threads;
   Estimate estimate = model.built.start;
   const ResIntSummary summary =
-      SolveResInt(model.built.problem, options, &estimate);
+      SolveResInt(model.built.problem, options, {num_threads}, &estimate);
   *cost = summary.cost_final;
   return 1e6 * summary.sweeps.back().seconds /
          static_cast<double>(summary.sweeps.size() *

@@ -130,6 +130,7 @@ ResultTable RatioTable(const std::string& name,
                        const std::string& first_column) {
   ResultTable table;
   table.name = name + "_ratio";
+  table.is_detail = true;
   table.caption = "The same times by that of " + solvers.front() +
                   ", where the optimum is reached on every instance";
   table.columns = {first_column};
@@ -199,7 +200,6 @@ void RunTable1(const TriangulationOptions& options, Norm norm,
   table.columns.insert(table.columns.end(), names.begin(), names.end());
   table.notes = {kMissNote};
   ResultTable ratios = RatioTable(table.name, names, "model");
-  ratios.is_detail = true;
   ResultTable excess = ExcessTable(table.name, names, "model");
   const auto measure = [&](const std::string& path) {
     Random random(options.common.random_seed);

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes docs/images/sample_result.svg: how many observations of the bundled
 # sample have an error above x pixels, before and after `krot solver`. Solves
-# the sample with build/krot, or with the executable in KROT. Needs awk.
+# the sample with build/krot, or with the executable in KROT. Needs awk and
+# gnuplot.
 #
 # Usage: tools/docs/sample_result.sh
 set -euo pipefail
@@ -11,17 +12,22 @@ krot=${KROT:-$root/build/krot}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# errors MODEL: its pixel errors, one per line, largest first.
+# errors MODEL: "rank error" of its pixel errors, largest first; of ranks that
+# lie close on a logarithmic axis one is enough.
 errors() {
   "$krot" model_analyzer --path "$1" --num_worst 1000000 \
     --report_path "$work/report.json" --log_level 0 >/dev/null
-  awk -F': ' '/"error_px":/ { sub(/,$/, "", $2); print $2 }' \
-    "$work/report.json"
+  awk -F': ' '/"error_px":/ {
+    if (++rank < next_rank) next
+    next_rank = rank * 1.03
+    sub(/,$/, "", $2)
+    print rank, $2
+  }' "$work/report.json"
 }
 
 "$krot" solver --input_path "$root/tools/sample/model" \
   --output_path "$work/solved" --log_level 0 >/dev/null
 errors "$root/tools/sample/model" >"$work/before"
 errors "$work/solved" >"$work/after"
-awk -f "$here/error_tails.awk" "$work/before" "$work/after" \
+gnuplot -e "folder='$work'" "$here/error_tails.gp" \
   >"$root/docs/images/sample_result.svg"

@@ -134,10 +134,10 @@ void AdjustmentOptions::AddCeres(OptionParser* parser) {
                "Threads, -1 being all; with more than one the last digits "
                "differ from run to run",
                "-1 or an integer in [1, 1024]", "-1", false,
-               [options](const std::string& text) {
+               [this](const std::string& text) {
                  int threads = 0;
                  if (!ParseInteger(text, &threads)) return false;
-                 options->num_threads = threads;
+                 num_threads_ = threads;
                  return threads == -1 || (threads >= 1 && threads <= 1024);
                }});
 }

@@ -13,6 +13,7 @@ class AdjustmentOptions {
   // What they say. Throws OptionError for pairs that contradict each other. To
   // be called after Parse.
   AdjustModelOptions Resolve(const OptionParser& parser) const;
+  int num_threads() const { return num_threads_; }
 
  private:
   void AddRefined(OptionParser* parser);
@@ -20,6 +21,7 @@ class AdjustmentOptions {
   void AddCap(OptionParser* parser);
 
   BundleAdjustmentOptions adjustment_;
+  int num_threads_ = -1;
   bool refine_extrinsics_ = true;
   double max_error_ = 0;
   double max_error_factor_ = 0;

@@ -4,17 +4,18 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
+#include "krot/base/write_file.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/adjustment_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/adjustment_options.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/solve_progress.h"
 
 namespace krot {
 namespace {
@@ -36,15 +37,15 @@ std::string IterationLine(const BundleAdjustmentIteration& iteration) {
 // The adjustment with its progress on stderr. Throws CommandError where there
 // is nothing to write afterwards.
 AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
-                         const LogOptions& log) {
+                         Context context, const LogOptions& log) {
   options.adjustment.callback =
       [&log](const BundleAdjustmentIteration& iteration) {
         LogLine(log, 1, IterationLine(iteration));
       };
-  options.on_note = [&log](const std::string& sentence) {
-    LogLine(log, 1, sentence);
-  };
-  AdjustModelResult result = AdjustModel(model, options);
+  SolveProgress progress(log, SolveProgress::GoalsOf(options.start));
+  progress.Follow(&options.start, &context);
+  AdjustModelResult result = AdjustModel(model, options, context);
+  progress.Finish();
   ThrowIfInterrupted();
   const AdjustModelSummary& summary = result.summary;
   switch (summary.adjustment.termination) {
@@ -59,37 +60,37 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
 }
 
 int Run(const ModelPaths& paths, const CommonOptions& common,
-        AdjustModelOptions options) {
+        AdjustModelOptions options, int num_threads) {
   const Timer total_timer;
-  const CancelFlag& cancel = CatchInterrupts();
+  const Context context{num_threads, &CatchInterrupts()};
   const WriteModelOptions write_options = CheckModelPaths(paths);
   AdjustmentReport report;
-  report.version = KROT_VERSION;
-  report.threads = ResolveNumThreads(options.adjustment.num_threads);
-  report.seed = common.random_seed;
+  report.run.version = KROT_VERSION;
+  report.run.threads = ResolveNumThreads(num_threads);
+  report.run.seed = common.random_seed;
 
   const Timer read_timer;
   const Model model = ReadValidModel(paths.input_path);
-  report.seconds_read = read_timer.Seconds();
+  report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 
-  options.adjustment.cancel = &cancel;
-  AdjustModelResult result = Adjust(model, std::move(options), common.log);
+  AdjustModelResult result =
+      Adjust(model, std::move(options), context, common.log);
   report.summary = std::move(result.summary);
 
   LogLine(common.log, 2, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModelTo(result.model, paths.output_path, write_options);
-  report.seconds_write = write_timer.Seconds();
-  report.seconds_total = total_timer.Seconds();
-  report.peak_memory_bytes = PeakMemoryBytes();
+  WriteModel(result.model, paths.output_path, write_options);
+  report.run.seconds_write = write_timer.Seconds();
+  report.run.seconds_total = total_timer.Seconds();
+  report.run.peak_memory_bytes = PeakMemoryBytes();
   const std::string report_json = AdjustmentJson(report);
   if (!paths.report_path.empty()) {
     LogLine(common.log, 2, "writing " + paths.report_path);
     WriteFileAtomically(paths.report_path, report_json);
   }
   WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                report.threads, common.log);
+                report.run.threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
   return kExitDone;
 }
@@ -113,7 +114,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
     PrintTable(common.log, parser.Help());
     return kExitDone;
   }
-  return Run(paths, common, options.Resolve(parser));
+  return Run(paths, common, options.Resolve(parser), options.num_threads());
 }
 
 }  // namespace krot

@@ -1,24 +1,16 @@
 #include "tools/krot/html_path.h"
 
+#include "krot/base/write_file.h"
 #include "krot/report/html_page.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/model_files.h"
 
 namespace krot {
 
 void AddHtmlPath(std::string* html_path, OptionParser* parser) {
-  parser->AddPath("html_path", html_path, false, "a file",
-                  "Where the report goes as a page to look at: figures, charts "
-                  "and both models in 3D, in one HTML file");
-}
-
-void CheckHtmlPath(const std::string& html_path, const std::string& report_path,
-                   const std::string& folder_to_come) {
-  CheckSidePath("html_path", html_path, folder_to_come);
-  if (!html_path.empty() && html_path == report_path) {
-    throw OptionError("--html_path = " + html_path +
-                      ", must not be --report_path");
-  }
+  parser->AddOutputFile(
+      "html_path", html_path,
+      "Where the report goes as a page to look at: figures, charts "
+      "and both models in 3D, in one HTML file");
 }
 
 void WriteHtmlPage(const std::string& html_path, const std::string& report_json,

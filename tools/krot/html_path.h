@@ -11,11 +11,6 @@ namespace krot {
 // --html_path, which commands with a report have.
 void AddHtmlPath(std::string* html_path, OptionParser* parser);
 
-// As CheckSidePath; throws OptionError, too, if the page would take the place
-// of the report.
-void CheckHtmlPath(const std::string& html_path, const std::string& report_path,
-                   const std::string& folder_to_come = "");
-
 // Writes the page (HtmlPage), or nothing if html_path is "". Throws WriteError.
 void WriteHtmlPage(const std::string& html_path, const std::string& report_json,
                    const Model& before, const Model& after, int num_threads,

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "krot/adjust/ceres_log.h"
+#include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/command.h"
 #include "tools/krot/command_error.h"
 #include "tools/krot/option_value.h"

@@ -1,17 +1,16 @@
-#include <filesystem>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "krot/analysis/error_colors.h"
 #include "krot/analysis/pixel_errors.h"
+#include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -35,8 +34,8 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "Another name for --path");
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many of the worst images and observations to list");
-  parser->AddPath("report_path", &options->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the report goes, as JSON");
   parser->AddPath("certificate_path", &options->certificate_path, false,
                   "a file",
                   "A certificate of this model: show what it proves, and the "
@@ -76,18 +75,16 @@ WriteModelOptions CopyOptions(const AnalyzerOptions& options,
 }
 
 // What can be known before the model is read.
-void CheckPaths(const AnalyzerOptions& options, const std::string& input_path,
-                const OptionParser& parser) {
+void CheckAnalyzerPaths(const AnalyzerOptions& options,
+                        const std::string& input_path,
+                        const OptionParser& parser) {
   CheckSidePath("report_path", options.report_path, options.error_colors_path);
   if (!options.error_colors_path.empty()) {
-    std::error_code error;
-    if (std::filesystem::equivalent(input_path, options.error_colors_path,
-                                    error)) {
+    if (IsSamePath(input_path, options.error_colors_path)) {
       throw OptionError("--error_colors_path = " + options.error_colors_path +
                         ", must not be the model itself");
     }
-    CheckModelWritable(options.error_colors_path,
-                       CopyOptions(options, input_path));
+    CheckWritable(options.error_colors_path, CopyOptions(options, input_path));
     return;
   }
   for (const char* name : {"error_colors_top", "overwrite"}) {
@@ -102,8 +99,8 @@ void WriteColoredCopy(const AnalyzerOptions& options,
   const std::vector<double> errors_px = PixelErrors(model);
   UpdatePointErrors(errors_px, &model);
   ColorPointsByError(errors_px, options.error_colors_top, &model);
-  WriteModelTo(model, options.error_colors_path,
-               CopyOptions(options, input_path));
+  WriteModel(model, options.error_colors_path,
+             CopyOptions(options, input_path));
 }
 
 // What the certificate says of the model; "" if none is given.
@@ -131,7 +128,7 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   const std::string path = ModelPath(options, parser);
-  CheckPaths(options, path, parser);
+  CheckAnalyzerPaths(options, path, parser);
   const Model model = ReadValidModel(path);
   const std::string certificate = CertificateText(options, model);
   const ModelReport report = AnalyzeModel(model, options.num_worst);

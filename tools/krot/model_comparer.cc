@@ -2,17 +2,19 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/analysis/overlay.h"
+#include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/report/comparison_report.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/html_path.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -55,8 +57,8 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
   parser->AddPath("output_path", &options->output_path, false, "a folder",
                   "Where errors.csv (per image, as COLMAP's) and "
                   "errors_summary.txt (the tables) go; created if need be");
-  parser->AddPath("report_path", &options->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the report goes, as JSON");
   AddHtmlPath(&options->html_path, parser);
   parser->AddPath("certificate_path1", &options->certificate_path1, false,
                   "a file",
@@ -88,13 +90,9 @@ WriteModelOptions OverlayWriteOptions(const ComparerOptions& options) {
   return write;
 }
 
-bool IsSameFolder(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::equivalent(a, b, error) && !error;
-}
-
 // What can be known before the models are read.
-void CheckPaths(const ComparerOptions& options, const OptionParser& parser) {
+void CheckComparerPaths(const ComparerOptions& options,
+                        const OptionParser& parser) {
   if (options.overlay_path.empty()) {
     for (const char* name : {"output_type", "overwrite"}) {
       if (parser.IsGiven(name)) {
@@ -105,22 +103,29 @@ void CheckPaths(const ComparerOptions& options, const OptionParser& parser) {
   } else {
     for (const std::string& input :
          {options.input_path1, options.input_path2}) {
-      if (IsSameFolder(input, options.overlay_path)) {
+      if (IsSamePath(input, options.overlay_path)) {
         throw OptionError("--overlay_path = " + options.overlay_path +
                           ", must not be a model that is compared");
       }
     }
-    CheckModelWritable(options.overlay_path, OverlayWriteOptions(options));
+    CheckWritable(options.overlay_path, OverlayWriteOptions(options));
   }
   if (!options.output_path.empty()) {
     const fs::path folder = options.output_path;
     const fs::path folder_to_come = fs::exists(folder) ? fs::path() : folder;
     for (const char* name : {kErrorsName, kTableName}) {
       CheckFileWritable(folder / name, folder_to_come);
+      for (const auto& [option, path] :
+           {std::pair("report_path", options.report_path),
+            std::pair("html_path", options.html_path)}) {
+        if (!IsSamePath(folder / name, path)) continue;
+        throw OptionError("--" + std::string(option) + " = " + path +
+                          ", must not be " + name + " of --output_path");
+      }
     }
   }
   CheckSidePath("report_path", options.report_path, options.overlay_path);
-  CheckHtmlPath(options.html_path, options.report_path, options.overlay_path);
+  CheckSidePath("html_path", options.html_path, options.overlay_path);
 }
 
 std::optional<CertificateVerdict> Verify(const Model& model,
@@ -194,7 +199,7 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
     PrintTable(options.common.log, parser.Help());
     return kExitDone;
   }
-  CheckPaths(options, parser);
+  CheckComparerPaths(options, parser);
   const Model model1 = ReadValidModel(options.input_path1);
   const Model model2 = ReadValidModel(options.input_path2);
 
@@ -208,8 +213,8 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   const Model aligned =
       TransformModel(model2, report.summary.world1_from_world2);
   if (!options.overlay_path.empty()) {
-    WriteModelTo(OverlayModels(model1, aligned), options.overlay_path,
-                 OverlayWriteOptions(options));
+    WriteModel(OverlayModels(model1, aligned), options.overlay_path,
+               OverlayWriteOptions(options));
   }
   if (!options.output_path.empty()) {
     WriteErrorFiles(options.output_path, report.summary, table);

@@ -2,22 +2,16 @@
 
 #include <array>
 #include <filesystem>
-#include <system_error>
 
-#include "krot/model/model_error.h"
+#include "krot/base/write_file.h"
 #include "krot/model/validate.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/html_path.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool IsSameFolder(const std::string& a, const std::string& b) {
-  std::error_code error;
-  return fs::equivalent(a, b, error) && !error;
-}
 
 ModelFormat OutputFormat(const ModelPaths& paths) {
   const ModelFormat input_format = DetectModelFormat(paths.input_path);
@@ -31,13 +25,14 @@ void CheckSideName(const std::string& option, const std::string& path) {
   constexpr std::array<const char*, 5> kStems = {"cameras", "rigs", "frames",
                                                  "images", "points3D"};
   const fs::path name = fs::path(path).filename();
+  bool is_taken = name == "project.ini";
   for (const char* stem : kStems) {
-    if (name.stem() == stem &&
-        (name.extension() == ".bin" || name.extension() == ".txt")) {
-      throw OptionError("--" + option + " = " + path +
-                        ", must not bear the name of a model's file");
-    }
+    is_taken |= name.stem() == stem &&
+                (name.extension() == ".bin" || name.extension() == ".txt");
   }
+  if (!is_taken) return;
+  throw OptionError("--" + option + " = " + path +
+                    ", must not bear the name of a model's file");
 }
 
 }  // namespace
@@ -50,8 +45,8 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);
-  parser->AddPath("report_path", &paths->report_path, false, "a file",
-                  "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &paths->report_path,
+                        "Where the report goes, as JSON");
   AddHtmlPath(&paths->html_path, parser);
 }
 
@@ -63,7 +58,7 @@ void AddOverwrite(bool* overwrite, OptionParser* parser) {
 
 WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   CheckSideName("report_path", paths.report_path);
-  if (IsSameFolder(paths.input_path, paths.output_path) && !paths.overwrite) {
+  if (IsSamePath(paths.input_path, paths.output_path) && !paths.overwrite) {
     throw OptionError(
         "--output_path is --input_path; add --overwrite 1 to replace the "
         "model");
@@ -72,9 +67,9 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   options.format = OutputFormat(paths);
   options.overwrite = paths.overwrite;
   options.copy_project_from = paths.input_path;
-  CheckModelWritable(paths.output_path, options);
+  CheckWritable(paths.output_path, options);
   CheckSidePath("report_path", paths.report_path, paths.output_path);
-  CheckHtmlPath(paths.html_path, paths.report_path, paths.output_path);
+  CheckSidePath("html_path", paths.html_path, paths.output_path);
   return options;
 }
 
@@ -89,24 +84,6 @@ Model ReadValidModel(const std::string& path) {
   Model model = ReadModel(path, DetectModelFormat(path));
   ValidateModel(model);
   return model;
-}
-
-void CheckModelWritable(const std::string& path,
-                        const WriteModelOptions& options) {
-  try {
-    CheckWritable(path, options);
-  } catch (const ModelError& error) {
-    throw CommandError(kExitNotWritten, error.what());
-  }
-}
-
-void WriteModelTo(const Model& model, const std::string& path,
-                  const WriteModelOptions& options) {
-  try {
-    WriteModel(model, path, options);
-  } catch (const ModelError& error) {
-    throw CommandError(kExitNotWritten, error.what());
-  }
 }
 
 }  // namespace krot

@@ -22,8 +22,8 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
 
 // Throws OptionError where the paths contradict each other, ModelError where
-// no model lies at input_path, CommandError (kExitNotWritten) where the output
-// or a report could not be written. Changes nothing and reads no model.
+// no model lies at input_path, WriteError where the output or a report could
+// not be written. Changes nothing and reads no model.
 // Returns how to write.
 WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 
@@ -36,11 +36,5 @@ void CheckSidePath(const std::string& option, const std::string& path,
 
 // Reads and validates. Throws ModelError.
 Model ReadValidModel(const std::string& path);
-
-// As in model_io.h, but what they throw is a CommandError (kExitNotWritten).
-void CheckModelWritable(const std::string& path,
-                        const WriteModelOptions& options);
-void WriteModelTo(const Model& model, const std::string& path,
-                  const WriteModelOptions& options);
 
 }  // namespace krot

@@ -1,5 +1,4 @@
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "krot/camera/camera_model.h"
@@ -8,6 +7,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/same_path.h"
 
 namespace krot {
 namespace {
@@ -103,24 +103,13 @@ void AddSynthesizerOptions(SynthesizerOptions* options, OptionParser* parser) {
                    &options->common, parser);
 }
 
-bool IsSamePath(const std::string& a, const std::string& b) {
-  const auto normal = [](const std::string& path) {
-    std::error_code ignored;
-    return (std::filesystem::weakly_canonical(path, ignored) / "")
-        .lexically_normal();
-  };
-  return normal(a) == normal(b);
-}
-
 SceneOptions ToSceneOptions(const SynthesizerOptions& options) {
   SceneOptions scene = options.scene;
   scene.layout =
       options.layout == "orbit" ? SceneLayout::kOrbit : SceneLayout::kStreet;
   scene.camera_model_id = FindCameraModel(options.camera_model)->id;
   scene.random_seed = options.common.random_seed;
-  if (options.ground_truth_path == options.output_path ||
-      (!options.ground_truth_path.empty() &&
-       IsSamePath(options.ground_truth_path, options.output_path))) {
+  if (IsSamePath(options.ground_truth_path, options.output_path)) {
     throw OptionError("--ground_truth_path is --output_path");
   }
   if (!scene.has_rigs && scene.sensors_per_rig > 1) {
@@ -175,16 +164,16 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   write_options.format =
       options.output_type == "TXT" ? ModelFormat::kText : ModelFormat::kBinary;
   write_options.overwrite = options.overwrite;
-  CheckModelWritable(options.output_path, write_options);
+  CheckWritable(options.output_path, write_options);
   const bool wants_ground_truth = !options.ground_truth_path.empty();
   if (wants_ground_truth) {
-    CheckModelWritable(options.ground_truth_path, write_options);
+    CheckWritable(options.ground_truth_path, write_options);
   }
 
   const SyntheticScene scene = Synthesize(scene_options);
-  WriteModelTo(scene.model, options.output_path, write_options);
+  WriteModel(scene.model, options.output_path, write_options);
   if (wants_ground_truth) {
-    WriteModelTo(scene.ground_truth, options.ground_truth_path, write_options);
+    WriteModel(scene.ground_truth, options.ground_truth_path, write_options);
   }
   PrintTable(options.common.log, SceneTable(scene));
   return kExitDone;

@@ -8,6 +8,8 @@
 
 #include <boost/program_options.hpp>
 
+#include "tools/krot/same_path.h"
+
 namespace krot {
 namespace {
 
@@ -67,6 +69,13 @@ void OptionParser::AddPath(const std::string& name, std::string* value,
          *value = text;
          return !text.empty();
        }});
+  paths_.push_back({name, value});
+}
+
+void OptionParser::AddOutputFile(const std::string& name, std::string* value,
+                                 const std::string& description) {
+  AddPath(name, value, false, "a file", description);
+  paths_.back().is_output_file = true;
 }
 
 void OptionParser::AddBool(const std::string& name, bool* value,
@@ -121,7 +130,21 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
                         " -h lists the options)");
     }
   }
+  CheckOutputFiles();
   return true;
+}
+
+void OptionParser::CheckOutputFiles() const {
+  for (const PathOption& output : paths_) {
+    if (!output.is_output_file) continue;
+    for (const PathOption& other : paths_) {
+      if (&other == &output || !IsSamePath(*output.value, *other.value)) {
+        continue;
+      }
+      throw OptionError("--" + output.name + " = " + *output.value +
+                        ", must not be --" + other.name);
+    }
+  }
 }
 
 std::vector<OptionAssignment> OptionParser::ReadArguments(

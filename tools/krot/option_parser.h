@@ -41,6 +41,10 @@ class OptionParser {
   void Add(Option option);
   void AddPath(const std::string& name, std::string* value, bool required,
                const std::string& range, const std::string& description);
+  // A file that the command writes: Parse refuses one that another path, of an
+  // output or an input, names already.
+  void AddOutputFile(const std::string& name, std::string* value,
+                     const std::string& description);
   void AddBool(const std::string& name, bool* value,
                const std::string& description);
   void AddInteger(const std::string& name, int* value, const Range<int>& range,
@@ -63,16 +67,24 @@ class OptionParser {
   std::string Help() const;
 
  private:
+  struct PathOption {
+    std::string name;
+    const std::string* value;
+    bool is_output_file = false;
+  };
+
   std::vector<OptionAssignment> ReadArguments(
       const std::vector<std::string>& arguments) const;
   std::vector<OptionAssignment> ReadProjectFile(const std::string& path) const;
   void Assign(const std::vector<OptionAssignment>& assignments);
+  void CheckOutputFiles() const;
   // Throws OptionError, naming the nearest option, if there is none.
   const Option& Find(const OptionAssignment& assignment) const;
 
   std::string command_;
   std::string summary_;
   std::vector<Option> options_;
+  std::vector<PathOption> paths_;
   std::set<std::string> given_;
 };
 

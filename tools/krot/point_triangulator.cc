@@ -27,13 +27,12 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   SolveCommand command;
   command.name = "point_triangulator";
   command.method_name = "intersection";
-  command.solve = &TriangulateModel;
   OptionParser parser(command.name,
                       "re-estimates every point of a COLMAP model for the "
                       "lowest largest reprojection error of its track; the "
                       "frames stay");
   AddModelPaths(&command.paths, &parser);
-  AddSolveOptions(&command.options, &parser);
+  AddSolveOptions(&command.options, &command.context, &parser);
   RefuseDatabase(&parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "
@@ -44,6 +43,7 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   CheckSolveOptions(command.options, parser);
+  command.options = PointsOnly(command.options);
   return RunSolveCommand(command);
 }
 

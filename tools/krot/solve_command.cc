@@ -5,10 +5,10 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
+#include "krot/base/write_file.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
-#include "krot/report/write_file.h"
 #include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/solve_progress.h"
@@ -18,23 +18,12 @@ namespace {
 
 SolveReport DescribeRun(const SolveCommand& command) {
   SolveReport report;
-  report.version = KROT_VERSION;
+  report.run.version = KROT_VERSION;
   report.command = command.name;
   report.method = command.method_name;
-  report.threads = ResolveNumThreads(command.options.num_threads);
-  report.seed = command.common.random_seed;
+  report.run.threads = ResolveNumThreads(command.context.num_threads);
+  report.run.seed = command.common.random_seed;
   return report;
-}
-
-SolveProgress::Goals ProgressGoals(const SolveModelOptions& options) {
-  SolveProgress::Goals goals;
-  goals.relative_gap = options.joint.relative_gap;
-  const bool is_auto = EffectiveMethod(options) == SolveMethod::kAuto;
-  goals.sweep_tolerance = is_auto ? options.leading_sweep_tolerance
-                                  : options.res_int.sweep_tolerance;
-  goals.max_sweeps =
-      is_auto ? options.max_leading_sweeps : options.res_int.max_sweeps;
-  return goals;
 }
 
 std::string ProblemWords(const SolveSummary& summary) {
@@ -60,19 +49,11 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
                        const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   SolveModelOptions options = command.options;
-  SolveProgress progress(log, ProgressGoals(options));
-  options.cancel = &cancel;
+  Context context = command.context;
+  context.cancel = &cancel;
+  SolveProgress progress(log, SolveProgress::GoalsOf(options));
+  progress.Follow(&options, &context);
   options.describe_certificate = !command.certificate_path.empty();
-  options.res_int.callback = [&progress](int sweep, const Sweep& state) {
-    progress.Update(sweep, state);
-  };
-  options.joint.callback = [&progress](int iteration,
-                                       const JointIteration& state) {
-    progress.Update(iteration, state);
-  };
-  options.on_note = [&log](const std::string& sentence) {
-    LogLine(log, 1, sentence);
-  };
   options.on_built = [&](const SolveSummary& summary) {
     ThrowIfInterrupted();
     if (summary.num_observations == 0) {
@@ -80,7 +61,7 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
     }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
-  SolveModelResult result = command.solve(model, options);
+  SolveModelResult result = SolveModel(model, options, context);
   progress.Finish();
   ThrowIfInterrupted();
   return result;
@@ -124,7 +105,7 @@ void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   const LogOptions& log = command.common.log;
   if (summary.method == SolveMethod::kResInt) return;
   if (summary.termination != SolveTermination::kGapReached &&
-      !IsZeroUpToRounding(summary)) {
+      summary.termination != SolveTermination::kZeroCost) {
     LogLine(log, 0, "warning: " + MissedGapSentence(summary));
   }
   if (!command.certificate_path.empty() && !summary.certificate) {
@@ -159,7 +140,7 @@ int RunSolveCommand(const SolveCommand& command) {
 
   const Timer read_timer;
   const Model model = ReadValidModel(paths.input_path);
-  report.seconds_read = read_timer.Seconds();
+  report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 
   SolveModelResult result = Solve(command, model, cancel);
@@ -174,18 +155,18 @@ int RunSolveCommand(const SolveCommand& command) {
   }
   LogLine(log, 2, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModelTo(result.model, paths.output_path, write_options);
-  report.seconds_write = write_timer.Seconds();
-  report.seconds_total = total_timer.Seconds();
-  report.peak_memory_bytes = PeakMemoryBytes();
+  WriteModel(result.model, paths.output_path, write_options);
+  report.run.seconds_write = write_timer.Seconds();
+  report.run.seconds_total = total_timer.Seconds();
+  report.run.peak_memory_bytes = PeakMemoryBytes();
+  WriteCertificate(command, report.summary);
   const std::string report_json = SolveJson(report);
   if (!paths.report_path.empty()) {
     LogLine(log, 2, "writing " + paths.report_path);
     WriteFileAtomically(paths.report_path, report_json);
   }
   WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                command.options.num_threads, log);
-  WriteCertificate(command, report.summary);
+                command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);
   return kExitDone;

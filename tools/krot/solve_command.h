@@ -17,11 +17,14 @@ struct SolveCommand {
   ModelPaths paths;
   std::string certificate_path;  // "": not wanted
   CommonOptions common;
-  SolveModelOptions options;  // its callbacks and flag are set by the run
-  SolveModelResult (*solve)(const Model&, const SolveModelOptions&) = nullptr;
+  SolveModelOptions options;  // its callbacks are set by the run
+  Context context;            // likewise, and the flag
 };
 
-// Returns an exit code or throws; nothing is written unless all went well.
+// Returns an exit code or throws. Nothing is written before the solve is done:
+// then the model, the certificate, the report and the page, each whole or not
+// at all. Where one cannot be written those before it stay. Without a start
+// there is the certificate alone, if it is proved that there is none.
 int RunSolveCommand(const SolveCommand& command);
 
 }  // namespace krot

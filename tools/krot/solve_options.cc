@@ -7,12 +7,9 @@ namespace {
 
 // Those that FastDescentSettings::kFast does not look at.
 const std::vector<std::string> kPaperOnlyNames = {
-    "FastDescent.stationarity_tolerance",
-    "FastDescent.step_tolerance",
-    "FastDescent.slope_probe",
-    "FastDescent.active_tolerance",
-    "FastDescent.max_step",
-    "FastDescent.max_iterations"};
+    "FastDescent.stationarity_tolerance", "FastDescent.step_tolerance",
+    "FastDescent.slope_probe", "FastDescent.active_tolerance",
+    "FastDescent.max_step"};
 
 bool ParseNorm(const std::string& text, Norm* norm) {
   if (text == "inf") {
@@ -58,7 +55,8 @@ void AddFastDescentOptions(FastDescentOptions* options, OptionParser* parser) {
 
 }  // namespace
 
-void AddSolveOptions(SolveModelOptions* options, OptionParser* parser) {
+void AddSolveOptions(SolveModelOptions* options, Context* context,
+                     OptionParser* parser) {
   ResIntOptions* res_int = &options->res_int;
   parser->Add({"Solver.norm", "The p of the residuals' norm",
                "1, 2, inf or a number >= 1", "2", false,
@@ -68,10 +66,10 @@ void AddSolveOptions(SolveModelOptions* options, OptionParser* parser) {
   parser->Add({"Solver.num_threads",
                "Threads, -1 being all; the result is the same, bit by bit",
                "-1 or an integer in [1, 1024]", "-1", false,
-               [options](const std::string& text) {
+               [context](const std::string& text) {
                  int threads = 0;
                  if (!ParseInteger(text, &threads)) return false;
-                 options->num_threads = threads;
+                 context->num_threads = threads;
                  return threads == -1 || (threads >= 1 && threads <= 1024);
                }});
   parser->Add({"Solver.settings",

@@ -9,7 +9,8 @@ namespace krot {
 
 // The options that `solver` and `point_triangulator` share, in their groups
 // Solver, FastDescent and Problem.
-void AddSolveOptions(SolveModelOptions* options, OptionParser* parser);
+void AddSolveOptions(SolveModelOptions* options, Context* context,
+                     OptionParser* parser);
 
 // Solver.polish, of `solver` alone.
 void AddPolishOption(SolveModelOptions* options, OptionParser* parser);

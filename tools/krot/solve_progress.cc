@@ -29,6 +29,32 @@ SolveProgress::SolveProgress(const LogOptions& log, const Goals& goals,
                              Style style)
     : log_(log), goals_(goals), style_(style) {}
 
+SolveProgress::Goals SolveProgress::GoalsOf(const SolveModelOptions& options) {
+  Goals goals;
+  goals.relative_gap = options.joint.relative_gap;
+  const bool is_auto = EffectiveMethod(options) == SolveMethod::kAuto;
+  goals.sweep_tolerance = is_auto ? options.leading_sweep_tolerance
+                                  : options.res_int.sweep_tolerance;
+  goals.max_sweeps =
+      is_auto ? options.max_leading_sweeps : options.res_int.max_sweeps;
+  return goals;
+}
+
+void SolveProgress::Follow(SolveModelOptions* options, Context* context) {
+  options->res_int.callback = [this](int sweep, const Sweep& state) {
+    Update(sweep, state);
+  };
+  options->joint.callback = [this](int iteration, const JointIteration& state) {
+    Update(iteration, state);
+  };
+  context->on_note = [this](const std::string& sentence) { Note(sentence); };
+}
+
+void SolveProgress::Note(const std::string& sentence) {
+  Finish();
+  LogLine(log_, 1, sentence);
+}
+
 void SolveProgress::Update(int sweep, const Sweep& state) {
   Enter(Stage::kSweeps);
   Show(SweepFraction(sweep, state.cost),

@@ -3,8 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "krot/joint/joint.h"
-#include "krot/sweeps/res_int.h"
+#include "krot/pipeline/solve_model.h"
 #include "tools/krot/log.h"
 
 namespace krot {
@@ -29,6 +28,7 @@ class SolveProgress {
     int max_sweeps = 0;
     double relative_gap = 0;
   };
+  static Goals GoalsOf(const SolveModelOptions& options);
 
   SolveProgress(const LogOptions& log, const Goals& goals,
                 Style style = StyleOfStderr());
@@ -36,8 +36,15 @@ class SolveProgress {
   SolveProgress(const SolveProgress&) = delete;
   SolveProgress& operator=(const SolveProgress&) = delete;
 
+  // Sets the callbacks that tell of sweeps, iterations and choices; they keep a
+  // reference to this.
+  void Follow(SolveModelOptions* options, Context* context);
+
   void Update(int sweep, const Sweep& state);
   void Update(int iteration, const JointIteration& state);  // or to a start
+
+  // A sentence on a line of its own.
+  void Note(const std::string& sentence);
 
   // Ends the line of the bar.
   void Finish();

@@ -143,18 +143,17 @@ void ExplainMethod(const SolveCommand& command) {
 int RunSolver(const std::vector<std::string>& arguments) {
   SolveCommand command;
   command.name = "solver";
-  command.solve = &SolveModel;
   OptionParser parser(command.name,
                       "finds the lowest largest reprojection error of a COLMAP "
                       "model, and proves it; rotations, intrinsics and the "
                       "coordinate frame stay");
   AddModelPaths(&command.paths, &parser);
-  parser.AddPath("certificate_path", &command.certificate_path, false, "a file",
-                 "Where the proof of the lower bound goes, as JSON; see "
-                 "certificate_checker");
+  parser.AddOutputFile("certificate_path", &command.certificate_path,
+                       "Where the proof of the lower bound goes, as JSON; see "
+                       "certificate_checker");
   AddScheduleOptions(&command.options, &parser);
   AddPolishOption(&command.options, &parser);
-  AddSolveOptions(&command.options, &parser);
+  AddSolveOptions(&command.options, &command.context, &parser);
   AddResIntOptions(SolveModelOptions(), &command.options.res_int, &parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "

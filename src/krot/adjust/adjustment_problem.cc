@@ -121,8 +121,8 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
 }
 
 ceres::Solver::Options AdjustmentSolverOptions(
-    const BundleAdjustmentOptions& options, AdjustmentBlocks* blocks,
-    const ceres::Problem& problem) {
+    const BundleAdjustmentOptions& options, const Context& context,
+    AdjustmentBlocks* blocks, const ceres::Problem& problem) {
   ceres::Solver::Options solver;
   solver.logging_type = ceres::SILENT;
   solver.max_num_iterations = options.max_num_iterations;
@@ -132,7 +132,7 @@ ceres::Solver::Options AdjustmentSolverOptions(
   solver.parameter_tolerance = options.parameter_tolerance;
   solver.max_num_consecutive_invalid_steps = 10;
   solver.max_trust_region_radius = kLargestTrustRegion;
-  solver.num_threads = ResolveNumThreads(options.num_threads);
+  solver.num_threads = ResolveNumThreads(context.num_threads);
   if (!options.refine_points3D) {
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     return solver;

@@ -30,7 +30,7 @@ ceres::Problem::Options AdjustmentProblemOptions();
 
 // Points are eliminated first; the rest is chosen by the number of images.
 ceres::Solver::Options AdjustmentSolverOptions(
-    const BundleAdjustmentOptions& options, AdjustmentBlocks* blocks,
-    const ceres::Problem& problem);
+    const BundleAdjustmentOptions& options, const Context& context,
+    AdjustmentBlocks* blocks, const ceres::Problem& problem);
 
 }  // namespace krot

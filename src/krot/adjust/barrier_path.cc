@@ -261,6 +261,7 @@ int64_t BarrierPath::NumActive() const {
 }  // namespace
 
 void FollowBarrierPath(const BundleAdjustmentOptions& options,
+                       const Context& context,
                        const ceres::Solver::Options& solver_options,
                        const BarrierProblem& bounded,
                        BundleAdjustmentSummary* summary) {
@@ -268,7 +269,7 @@ void FollowBarrierPath(const BundleAdjustmentOptions& options,
   BarrierPath path(solver_options, bounded);
   summary->termination = BundleAdjustmentTermination::kMaxIterations;
   for (int& n = summary->num_iterations; n < options.max_num_iterations;) {
-    if (IsCancelled(options.cancel)) {
+    if (context.IsCancelled()) {
       summary->termination = BundleAdjustmentTermination::kInterrupted;
       break;
     }

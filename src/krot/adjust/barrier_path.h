@@ -59,6 +59,7 @@ struct BarrierProblem {
 // iterate is feasible, as the start must be. Fills in what the summary says of
 // the end: termination, num_iterations, stationarity, duality_gap, num_active.
 void FollowBarrierPath(const BundleAdjustmentOptions& options,
+                       const Context& context,
                        const ceres::Solver::Options& solver_options,
                        const BarrierProblem& bounded,
                        BundleAdjustmentSummary* summary);

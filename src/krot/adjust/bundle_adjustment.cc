@@ -26,12 +26,22 @@ namespace krot {
 namespace {
 
 void CheckOptions(const BundleAdjustmentOptions& options) {
-  CheckArgument(options.min_track_length >= 1, "min_track_length",
-                options.min_track_length, ">= 1");
+  const auto at_least = [](auto least, const char* name, auto value) {
+    CheckArgument(value >= least, name, value, ">= " + std::to_string(least));
+  };
+  at_least(1, "min_track_length", options.min_track_length);
   CheckArgument(options.loss_scale > 0, "loss_scale", options.loss_scale,
                 "> 0");
-  CheckArgument(options.max_num_iterations >= 0, "max_num_iterations",
-                options.max_num_iterations, ">= 0");
+  at_least(0, "max_num_iterations", options.max_num_iterations);
+  at_least(1, "max_linear_solver_iterations",
+           options.max_linear_solver_iterations);
+  at_least(0, "function_tolerance", options.function_tolerance);
+  at_least(0, "gradient_tolerance", options.gradient_tolerance);
+  at_least(0, "parameter_tolerance", options.parameter_tolerance);
+  at_least(0, "max_num_images_direct_dense",
+           options.max_num_images_direct_dense);
+  at_least(0, "max_num_images_direct_sparse",
+           options.max_num_images_direct_sparse);
   if (!options.max_error) return;
   CheckArgument(*options.max_error > 0, "max_error", *options.max_error, "> 0");
   CheckArgument(options.loss == RobustLoss::kTrivial, "loss",
@@ -109,12 +119,13 @@ void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
 // Half the sum of the squared errors under the loss, if there is one; none
 // where an error is not finite or reaches the cap.
 std::optional<double> RobustCost(const BundleAdjustmentOptions& options,
+                                 const Context& context,
                                  const ceres::LossFunction* loss,
                                  const AdjustmentBlocks& blocks) {
   const auto errors = ProjectErrors(
       blocks,
       options.max_error.value_or(std::numeric_limits<double>::infinity()),
-      options.num_threads);
+      context.num_threads);
   if (!errors) return std::nullopt;
   if (loss == nullptr) return HalfSquaredNorm(*errors);
   double sum = 0;
@@ -139,10 +150,10 @@ BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
 }
 
 // Solves a problem without a cap.
-void Minimize(const BundleAdjustmentOptions& options,
+void Minimize(const BundleAdjustmentOptions& options, const Context& context,
               ceres::Solver::Options solver_options, ceres::Problem* problem,
               BundleAdjustmentSummary* summary) {
-  IterationObserver observer(options);
+  IterationObserver observer(options.callback, context);
   solver_options.callbacks.push_back(&observer);
   ceres::Solver::Summary solve;
   ceres::Solve(solver_options, problem, &solve);
@@ -153,7 +164,8 @@ void Minimize(const BundleAdjustmentOptions& options,
 }  // namespace
 
 BundleAdjustmentResult AdjustBundle(const Model& model,
-                                    const BundleAdjustmentOptions& options) {
+                                    const BundleAdjustmentOptions& options,
+                                    const Context& context) {
   CheckOptions(options);
   const Timer timer;
   const AdjustmentBlocks before =
@@ -182,9 +194,10 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   BundleAdjustmentSummary& summary = result.summary;
   Count(blocks, problem, &summary);
   const ceres::Solver::Options solver_options =
-      AdjustmentSolverOptions(options, &blocks, problem);
+      AdjustmentSolverOptions(options, context, &blocks, problem);
   summary.linear_solver = SolverName(solver_options);
-  const std::optional<double> cost = RobustCost(options, loss.get(), blocks);
+  const std::optional<double> cost =
+      RobustCost(options, context, loss.get(), blocks);
   if (summary.num_parameters == 0) {
     summary.termination = BundleAdjustmentTermination::kNothingToAdjust;
   } else if (!cost) {
@@ -194,13 +207,13 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
     const BundleAdjustmentOptions recorded =
         RecordIterations(options, &summary);
     if (options.max_error) {
-      FollowBarrierPath(recorded, solver_options,
+      FollowBarrierPath(recorded, context, solver_options,
                         {&problem, &blocks, &barrier, &multipliers, &recorder},
                         &summary);
     } else {
-      Minimize(recorded, solver_options, &problem, &summary);
+      Minimize(recorded, context, solver_options, &problem, &summary);
     }
-    summary.cost_final = *RobustCost(options, loss.get(), blocks);
+    summary.cost_final = *RobustCost(options, context, loss.get(), blocks);
     if (!options.max_error) {
       summary.stationarity = Stationarity(solver_options.num_threads,
                                           summary.cost_final, &problem);

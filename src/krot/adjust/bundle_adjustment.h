@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -60,10 +60,7 @@ struct BundleAdjustmentOptions {
   // strictly below it.
   std::optional<double> max_error;
 
-  // With more than one thread Ceres adds up in no fixed order: the last digits
-  // differ from run to run then.
-  int num_threads = -1;
-  const CancelFlag* cancel = nullptr;  // may be null
+  // After every iteration; may be empty.
   std::function<void(const BundleAdjustmentIteration&)> callback;
 };
 
@@ -127,11 +124,13 @@ struct BundleAdjustmentResult {
 // updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a
-// max_error, so is one that takes an error to it.
+// max_error, so is one that takes an error to it. With more than one thread
+// Ceres adds up in no fixed order: the last digits differ from run to run then.
 //
 // Requires a valid model (ValidateModel). Throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range.
 BundleAdjustmentResult AdjustBundle(const Model& model,
-                                    const BundleAdjustmentOptions& options);
+                                    const BundleAdjustmentOptions& options,
+                                    const Context& context = {});
 
 }  // namespace krot

@@ -12,8 +12,10 @@ namespace krot {
 // Tells the caller of every iteration, and ends a solve that is cancelled.
 class IterationObserver final : public ceres::IterationCallback {
  public:
-  explicit IterationObserver(const BundleAdjustmentOptions& options)
-      : callback_(options.callback), cancel_(options.cancel) {}
+  using Callback = std::function<void(const BundleAdjustmentIteration&)>;
+
+  IterationObserver(const Callback& callback, const Context& context)
+      : callback_(callback), context_(context) {}
 
   // Without the start.
   int num_iterations() const { return num_iterations_; }
@@ -33,13 +35,13 @@ class IterationObserver final : public ceres::IterationCallback {
       iteration.seconds = timer_.Seconds();
       callback_(iteration);
     }
-    return IsCancelled(cancel_) ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-                                : ceres::SOLVER_CONTINUE;
+    return context_.IsCancelled() ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                  : ceres::SOLVER_CONTINUE;
   }
 
  private:
-  std::function<void(const BundleAdjustmentIteration&)> callback_;
-  const CancelFlag* cancel_;
+  const Callback callback_;
+  const Context context_;
   const Timer timer_;
   int num_iterations_ = 0;
   double cost_ = 0;  // where the solve is

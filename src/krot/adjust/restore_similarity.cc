@@ -2,32 +2,17 @@
 
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <vector>
 
 #include <Eigen/SVD>
+
+#include "krot/base/disjoint_sets.h"
 
 namespace krot {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-// Disjoint sets of [0, count).
-class UnionFind {
- public:
-  explicit UnionFind(size_t count) : parents_(count) {
-    std::iota(parents_.begin(), parents_.end(), size_t{0});
-  }
-  size_t Find(size_t i) {
-    while (parents_[i] != i) i = parents_[i] = parents_[parents_[i]];
-    return i;
-  }
-  void Unite(size_t i, size_t j) { parents_[Find(i)] = Find(j); }
-
- private:
-  std::vector<size_t> parents_;
-};
 
 // What moves together: indices of AdjustmentBlocks. Sensors only where they are
 // refined; else `has_fixed_scale` says whether they have a translation.
@@ -43,7 +28,7 @@ std::vector<Component> FindComponents(const AdjustmentBlocks& blocks,
   const size_t num_frames = blocks.frames.size();
   const size_t num_sensors = blocks.sensors.size();
   const size_t num_nodes = num_frames + num_sensors + blocks.points.size();
-  UnionFind nodes(num_nodes);
+  DisjointSets nodes(static_cast<int64_t>(num_nodes));
   std::vector<bool> is_used(num_nodes, false);
   std::vector<bool> is_scaled(num_frames, false);
   for (const AdjustmentObservation& observation : blocks.observations) {

@@ -5,9 +5,9 @@
 #include <exception>
 #include <mutex>
 #include <thread>
-#include <vector>
 
 #include "krot/base/check.h"
+#include "krot/base/thread_pool.h"
 
 namespace krot {
 
@@ -29,7 +29,7 @@ void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
   std::mutex mutex;
   int64_t failed_chunk = num_chunks;
   std::exception_ptr failure;
-  auto work = [&](int worker) {
+  const auto work = [&](int worker) {
     for (;;) {
       const int64_t chunk = next_chunk.fetch_add(1);
       if (chunk >= num_chunks) return;
@@ -46,17 +46,7 @@ void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
     }
   };
 
-  std::vector<std::thread> threads;
-  threads.reserve(num_workers - 1);
-  for (int worker = 1; worker < num_workers; ++worker) {
-    try {
-      threads.emplace_back(work, worker);
-    } catch (const std::exception&) {
-      break;  // the system has no more threads; those there are do the work
-    }
-  }
-  work(0);
-  for (std::thread& thread : threads) thread.join();
+  ThreadPool::Get().Run(num_workers, work);
   if (failure) std::rethrow_exception(failure);
 }
 

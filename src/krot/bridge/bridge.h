@@ -18,13 +18,9 @@ enum class LeftOut {
   kOffAxis,       // 90 degrees or more off the optical axis
   kShortTrack,    // fewer than min_track_length usable observations
   kNoPose,        // the image has no frame or no finite translation
-  // Never used: a point seen along a single ray is solved like any other, as
-  // its residuals bound the cost from below wherever it lies on that ray.
-  kSingleRay,
 };
-inline constexpr int kNumLeftOutReasons = 6;
-// "behind", "undistortion", "off_axis", "short_track", "no_pose",
-// "single_ray".
+inline constexpr int kNumLeftOutReasons = 5;
+// "behind", "undistortion", "off_axis", "short_track", "no_pose".
 const char* LeftOutName(LeftOut reason);
 
 struct BuildProblemOptions {

@@ -266,8 +266,6 @@ const char* LeftOutName(LeftOut reason) {
       return "short_track";
     case LeftOut::kNoPose:
       return "no_pose";
-    case LeftOut::kSingleRay:
-      return "single_ray";
   }
   return "unknown";
 }

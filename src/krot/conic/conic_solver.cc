@@ -7,21 +7,29 @@
 namespace krot {
 namespace {
 
-// Every pair keeps its smallest eigenvalue above this share of their mean.
+// Every pair keeps its smallest eigenvalue above this share of their mean. A
+// larger one shortens steps, a smaller one lets the next ones become short.
 constexpr double kNeighbourhood = 1e-3;
-// No depth that is not small grows by more than this factor in a step.
+// No depth that is not small grows by more than this factor in a step: far
+// beyond, neither the gauge nor the linearised top = g w holds.
 constexpr double kMaxDepthGrowth = 3;
-// After a step shorter than this, the next one only centres.
+// After a step shorter than this, the next one only centres, so far. Scaling
+// or leaving out the corrector instead took more iterations (docs/method.md,
+// "What did not help").
 constexpr double kShortStep = 0.1;
 constexpr double kCentring = 0.8;
+// Mehrotra's sigma is no less, whatever the predictor leaves of the gap.
 constexpr double kSmallestSigma = 1e-6;
-// Of the way to the boundary, and of a step that left the neighbourhood.
+// A step goes so far of the way to the boundary, and so far of a step that
+// left the neighbourhood; one shorter than the last is none.
 constexpr double kDamping = 0.98;
 constexpr double kBacktracking = 0.7;
 constexpr double kSmallestStep = 1e-8;
 // Centrality correctors aim at a step that is longer by kLonger, where they
 // bring the pairs' products within these shares of the target mu. One that
 // does not gain kWorthwhile of kLonger is the last [Colombo, Gondzio 2008].
+// Each is a solve without a factor; two took a fifth of the iterations away
+// (docs/benchmarks.md, "The joint iteration").
 constexpr int kCentralityCorrectors = 2;
 constexpr double kLonger = 0.3;
 constexpr double kLeastProduct = 0.1;
@@ -44,12 +52,14 @@ void Move(const BlockVector& direction, double step, Estimate* x) {
 template <typename Cone>
 ConicSolver<Cone>::ConicSolver(const KnownRotationProblem& problem,
                                const InteriorPointOptions& options,
+                               const Context& context,
                                const ConeProgram& program,
                                const Estimate& start, double scalar)
     : problem_(problem),
       options_(options),
+      context_(context),
       program_(program),
-      system_(problem, program, options.norm, options.num_threads),
+      system_(problem, program, options.norm, context.num_threads),
       dz_(problem.observations.size()),
       best_(start),
       multipliers_(problem.observations.size()) {
@@ -221,51 +231,46 @@ void ConicSolver<Cone>::ExportMultipliers() {
   });
 }
 
+// Why the run ends with this iteration, if it does.
+template <typename Cone>
+std::optional<InteriorPointTermination> ConicSolver<Cone>::Iterate(
+    InteriorPointSummary* summary) {
+  using Termination = InteriorPointTermination;
+  if (context_.IsCancelled()) return Termination::kInterrupted;
+  if (!system_.Factorize(now_.viewed, now_.scalar, now_.z)) {
+    return Termination::kSingular;
+  }
+  FindDirection(/*only_centre=*/step_ < kShortStep);
+  step_ = TakeStep();
+  ++summary->iterations;
+  if (!(step_ > 0)) return Termination::kNoProgress;
+  ExportMultipliers();
+  summary->gamma = now_.scalar;
+  summary->gap = now_.gap / now_.scalar;
+  if (now_.cost < best_cost_) {
+    best_cost_ = now_.cost;
+    best_ = now_.x;
+  }
+  const ConicIterate iterate{summary->iterations, now_.scalar, now_.cost,
+                             summary->gap,        step_,       &now_.x,
+                             &multipliers_};
+  if (options_.stop && options_.stop(iterate)) return Termination::kStopped;
+  if (!program_.IsCost() && now_.cost < program_.bound) {
+    best_ = now_.x;
+    return Termination::kFeasible;
+  }
+  if (summary->gap <= options_.smallest_gap) return Termination::kSmallestGap;
+  return std::nullopt;
+}
+
 template <typename Cone>
 InteriorPointSummary ConicSolver<Cone>::Run() {
   InteriorPointSummary summary;
-  summary.termination = InteriorPointTermination::kMaxIterations;
-  double step = 1;
-  while (summary.iterations < options_.max_iterations) {
-    if (IsCancelled(options_.cancel)) {
-      summary.termination = InteriorPointTermination::kInterrupted;
-      break;
-    }
-    if (!system_.Factorize(now_.viewed, now_.scalar, now_.z)) {
-      summary.termination = InteriorPointTermination::kSingular;
-      break;
-    }
-    FindDirection(/*only_centre=*/step < kShortStep);
-    step = TakeStep();
-    ++summary.iterations;
-    if (!(step > 0)) {
-      summary.termination = InteriorPointTermination::kNoProgress;
-      break;
-    }
-    ExportMultipliers();
-    summary.gamma = now_.scalar;
-    summary.gap = now_.gap / now_.scalar;
-    if (now_.cost < best_cost_) {
-      best_cost_ = now_.cost;
-      best_ = now_.x;
-    }
-    const ConicIterate iterate{summary.iterations, now_.scalar, now_.cost,
-                               summary.gap,        step,        &now_.x,
-                               &multipliers_};
-    if (options_.stop && options_.stop(iterate)) {
-      summary.termination = InteriorPointTermination::kStopped;
-      break;
-    }
-    if (!program_.IsCost() && now_.cost < program_.bound) {
-      best_ = now_.x;
-      summary.termination = InteriorPointTermination::kFeasible;
-      break;
-    }
-    if (summary.gap <= options_.smallest_gap) {
-      summary.termination = InteriorPointTermination::kSmallestGap;
-      break;
-    }
+  std::optional<InteriorPointTermination> end;
+  while (!end && summary.iterations < options_.max_iterations) {
+    end = Iterate(&summary);
   }
+  summary.termination = end.value_or(InteriorPointTermination::kMaxIterations);
   return summary;
 }
 

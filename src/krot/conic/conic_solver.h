@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -9,17 +10,26 @@
 
 namespace krot {
 
-// One run of the interior point: per factorisation of the Newton system a
-// predictor, a corrector [Mehrotra 1992] and up to two centrality correctors
-// [Gondzio 1996], in a wide neighbourhood of the central path. Slacks are
-// recomputed at every trial: top = g w is bilinear. Where it is linear, in the
-// feasibility programme, slacks and multipliers have step lengths of their own.
+// One run of the interior point, in a wide neighbourhood of the central path:
+//
+//   Factorize       the Newton system at now_
+//   FindDirection   one Solve each for
+//                     a predictor, f = 0              } not after a short step
+//                     a corrector [Mehrotra 1992]       only centres then
+//                     up to two centrality correctors [Gondzio 1996]
+//   TakeStep        the longest, then shorter ones until one IsInside the
+//                   neighbourhood: trial_ becomes now_
+//   what was reached: multipliers, gap, the best estimate; enough?
+//
+// Slacks are recomputed at every trial: top = g w is bilinear. Where it is
+// linear, in the feasibility programme, slacks and multipliers have step
+// lengths of their own.
 template <typename Cone>
 class ConicSolver {
  public:
   ConicSolver(const KnownRotationProblem& problem,
-              const InteriorPointOptions& options, const ConeProgram& program,
-              const Estimate& start, double scalar);
+              const InteriorPointOptions& options, const Context& context,
+              const ConeProgram& program, const Estimate& start, double scalar);
 
   InteriorPointSummary Run();
 
@@ -56,13 +66,17 @@ class ConicSolver {
   bool IsInside(const State& trial) const;
   double TakeStep();
   void ExportMultipliers();
+  std::optional<InteriorPointTermination> Iterate(
+      InteriorPointSummary* summary);
 
   const KnownRotationProblem& problem_;
-  const InteriorPointOptions& options_;
+  const InteriorPointOptions options_;
+  const Context context_;
   const ConeProgram program_;
   NewtonSystem<Cone> system_;
   State now_;
   State trial_;
+  double step_ = 1;         // that led to now_
   std::vector<Vector> dz_;  // not scaled
   Estimate best_;
   double best_cost_ = 0;

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "krot/base/parallel_for.h"
+#include "krot/conic/blas_threads.h"
 
 namespace krot {
 namespace {
@@ -56,6 +57,7 @@ void DenseCholesky::UpdateTile(int64_t k, int64_t i, int64_t j) {
 }
 
 bool DenseCholesky::Factorize(const Eigen::MatrixXd& matrix, int num_threads) {
+  UseOneBlasThread();
   L_ = matrix;
   const int64_t num_tiles = NumChunks(L_.rows(), kTile);
   for (int64_t k = 0; k < num_tiles; ++k) {

@@ -17,7 +17,8 @@ constexpr double kLargestRegularization = 1e-7;
 constexpr int64_t kAlwaysDenseFrames = 500;
 constexpr int64_t kMaxDenseFrames = 4000;
 constexpr double kSparseShare = 0.2;
-// Parts of the sum; fewer where each is large.
+// Parts of the sum, and so the threads that can eliminate points; fewer where
+// each is large: a dense part of 1500 frames takes 162 MB.
 constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;

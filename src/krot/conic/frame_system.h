@@ -18,7 +18,8 @@ namespace krot {
 // fill-reducing order.
 //
 // The sum over points is taken in `num_parts` parts, whose number and order
-// depend on the structure alone: the same bits at any number of threads.
+// depend on the structure alone: the same bits at any number of threads. More
+// threads than parts, four or, for many frames, two, do not make it faster.
 class FrameSystem {
  public:
   explicit FrameSystem(const BlockStructure& structure);

@@ -14,10 +14,11 @@ namespace {
 template <typename Cone>
 InteriorPointSummary Run(const KnownRotationProblem& problem,
                          const InteriorPointOptions& options,
-                         const ConeProgram& program, const Estimate& start,
-                         double scalar, Estimate* estimate,
+                         const Context& context, const ConeProgram& program,
+                         const Estimate& start, double scalar,
+                         Estimate* estimate,
                          std::vector<Multiplier>* multipliers) {
-  ConicSolver<Cone> solver(problem, options, program, start, scalar);
+  ConicSolver<Cone> solver(problem, options, context, program, start, scalar);
   const InteriorPointSummary summary = solver.Run();
   if (program.IsCost() ||
       summary.termination == InteriorPointTermination::kFeasible) {
@@ -27,12 +28,10 @@ InteriorPointSummary Run(const KnownRotationProblem& problem,
   return summary;
 }
 
-InteriorPointSummary RunForNorm(const KnownRotationProblem& problem,
-                                const InteriorPointOptions& options,
-                                const ConeProgram& program,
-                                const Estimate& start, double scalar,
-                                Estimate* estimate,
-                                std::vector<Multiplier>* multipliers) {
+InteriorPointSummary RunForNorm(
+    const KnownRotationProblem& problem, const InteriorPointOptions& options,
+    const Context& context, const ConeProgram& program, const Estimate& start,
+    double scalar, Estimate* estimate, std::vector<Multiplier>* multipliers) {
   CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
                 options.norm.p, "1, 2 or infinity");
   CheckArgument(options.max_iterations >= 1, "max_iterations",
@@ -40,22 +39,22 @@ InteriorPointSummary RunForNorm(const KnownRotationProblem& problem,
   CheckArgument(options.smallest_gap > 0, "smallest_gap", options.smallest_gap,
                 "> 0");
   return options.norm.p == 2
-             ? Run<SecondOrderCone>(problem, options, program, start, scalar,
-                                    estimate, multipliers)
-             : Run<FourHalfLines>(problem, options, program, start, scalar,
-                                  estimate, multipliers);
+             ? Run<SecondOrderCone>(problem, options, context, program, start,
+                                    scalar, estimate, multipliers)
+             : Run<FourHalfLines>(problem, options, context, program, start,
+                                  scalar, estimate, multipliers);
 }
 
 }  // namespace
 
 InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
                                      const InteriorPointOptions& options,
-                                     Estimate* estimate,
+                                     const Context& context, Estimate* estimate,
                                      std::vector<Multiplier>* multipliers) {
   CheckArgument(options.start_margin > 0, "start_margin", options.start_margin,
                 "> 0");
   const double cost =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(std::isfinite(cost), "cost of the start", cost,
                 "finite: all depths positive");
   if (!(cost > 0)) {  // already at the lowest possible
@@ -64,14 +63,14 @@ InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
     summary.termination = InteriorPointTermination::kSmallestGap;
     return summary;
   }
-  return RunForNorm(problem, options, ConeProgram{}, *estimate,
+  return RunForNorm(problem, options, context, ConeProgram{}, *estimate,
                     (1 + options.start_margin) * cost, estimate, multipliers);
 }
 
 InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   const InteriorPointOptions& options,
-                                  double bound, double unit_depth,
-                                  Estimate* estimate,
+                                  const Context& context, double bound,
+                                  double unit_depth, Estimate* estimate,
                                   std::vector<Multiplier>* multipliers) {
   CheckArgument(bound > 0, "bound", bound, "> 0");
   CheckArgument(unit_depth > 0, "unit_depth", unit_depth, "> 0");
@@ -91,8 +90,8 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
         scalar, 1 + (NormOf(viewed.v, options.norm) / bound - viewed.depth) /
                         unit_depth);
   }
-  return RunForNorm(problem, options, program, origin, scalar + 1, estimate,
-                    multipliers);
+  return RunForNorm(problem, options, context, program, origin, scalar + 1,
+                    estimate, multipliers);
 }
 
 int64_t EstimateInteriorPointMemory(const KnownRotationProblem& problem,

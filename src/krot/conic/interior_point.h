@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
@@ -33,8 +33,6 @@ struct InteriorPointOptions {
   double start_margin = 0.1;   // gamma starts at (1 + margin) cost; > 0
   double smallest_gap = 1e-9;  // stop there, relative; > 0
   int max_iterations = 200;    // >= 1
-  int num_threads = -1;
-  const CancelFlag* cancel = nullptr;
   // Called after every iteration; true ends the solve.
   std::function<bool(const ConicIterate&)> stop;
 };
@@ -68,7 +66,7 @@ struct InteriorPointSummary {
 // worse than the start. `multipliers` are those of the last iterate.
 InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
                                      const InteriorPointOptions& options,
-                                     Estimate* estimate,
+                                     const Context& context, Estimate* estimate,
                                      std::vector<Multiplier>* multipliers);
 
 // Looks for an estimate whose residuals are all below `bound` > 0, pixels, by
@@ -82,8 +80,8 @@ InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
 // scene.
 InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   const InteriorPointOptions& options,
-                                  double bound, double unit_depth,
-                                  Estimate* estimate,
+                                  const Context& context, double bound,
+                                  double unit_depth, Estimate* estimate,
                                   std::vector<Multiplier>* multipliers);
 
 // What MinimizeJointly will allocate beyond the problem, bytes. O(problem).

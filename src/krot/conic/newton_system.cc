@@ -147,12 +147,11 @@ void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
   }
 }
 
-// The direction for the targets f, and the multipliers'. With H = A'A and
-// dx = Xf - Xb dg - Xe nu, the rows of g and of the gauge are
-//   (b - A Xb)'b dg - b'A Xe nu = b'(f - A Xf) - 1,
-//   e'dx = 0                  where the scale is free,
-//   nu = mu (e'dx + sigma)    where baselines set it: depths are only kept
-//                             from growing without bound, less and less.
+// The direction for the targets f, and the multipliers'. The first row of the
+// system is dx = Xf - Xb dg - Xe nu; put into the other two, it leaves
+//
+//   [ (b - A Xb)'b   -b'A Xe         ] [ dg ]   [ b'(f - A Xf) - 1 ]
+//   [ -e'Xb          -e'Xe  (- 1/mu) ] [ nu ] = [ -e'Xf  (- sigma) ]
 template <typename Cone>
 void NewtonSystem<Cone>::SolveForTarget(double sigma) {
   BlockVector zero;

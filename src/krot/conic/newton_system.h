@@ -20,11 +20,24 @@ namespace krot {
 //
 // a linear least squares problem, along the gauge e'dx = 0. The multipliers
 // follow: W dz = f - lambda - W^-1 ds. All that is kept per observation is
-// scaled by W.
+// scaled by W, and so are A and b here. With H = A'A of PointElimination, g and
+// the gauge are a border of two rows and columns:
+//
+//   [ H     A'b    e    ] [ dx ]   [ A'f     ]
+//   [ b'A   b'b    0    ] [ dg ] = [ b'f - 1 ]
+//   [ e'    0    -1/mu  ] [ nu ]   [ -sigma  ]
+//
+// where baselines set the scale: depths are only kept from growing without
+// bound, less and less. Where the scale is free, 0 stands for -1/mu and for
+// sigma. In the feasibility programme there is no e.
 //
 // For the cost programme, top = g w is bilinear. Its second-order term is left
 // out, so that the system is that of a Dinkelbach step based at the iterate,
 // and convex.
+//
+// Factorize at an iterate; then Solve for one f after another, each of which
+// may be made of lambda() and the last target() and direction(). Restore puts
+// an earlier direction back, but not its target.
 template <typename Cone>
 class NewtonSystem {
  public:

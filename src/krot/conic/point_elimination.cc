@@ -17,11 +17,15 @@ using ConstBlock = Eigen::Map<const Block<kRows>>;
 template <int kRows>
 using Rows = Eigen::Matrix<double, kRows, 1>;
 
-// An observation all but determines its point beyond this |Q_a|^2.
+// A frame all but determines a point beyond this |Q_a|^2: the more frames do,
+// the more (I - Q Q') A_t are formed; the fewer, the more their blocks cancel.
 constexpr double kHighLeverage = 0.5;
+// |Q|^2 = 3 allows fewer, but for rounding.
 constexpr int kMaxHighLeverage = 6;
+// One takes the effect of the frames' regularisation away; each is a solve.
 constexpr int kRefinements = 1;
-// Starting a thread takes longer than its share of so few observations.
+// Waking a thread takes longer than its share of so few observations: with
+// threads, certificates of small models took twice the time.
 constexpr int64_t kFewObservations = 4000;
 
 }  // namespace
@@ -127,9 +131,9 @@ void PointElimination<kRows>::FindSightings(int64_t k,
   }
 }
 
-// Adds A_t' (I - Q Q') A_t, a 3x3 block for each pair of frames that see the
-// point. A frame may see it several times, and its rows must be summed before
-// they are squared: moving frame and point together, they may all but cancel.
+// Adds A_t'A_t - G'G, but for pairs of frames of high leverage. A frame may see
+// it several times, and its rows must be summed before they are squared: moving
+// frame and point together, they may all but cancel.
 template <int kRows>
 void PointElimination<kRows>::AddPointToFrameSystem(int64_t k, int part) {
   thread_local Sightings s;
@@ -213,7 +217,8 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
   const int num_parts = frame_system_.num_parts();
   std::vector<VectorXd> rhs(num_parts,
                             VectorXd::Zero(frame_system_.num_columns()));
-  // top = Q'r + R^-T g; the frames see A_t'(r - Q top).
+  // What is left is [R G; 0 S] (s; t) = (top; g_t + A_t'(r - Q top)), where
+  // top = Q'r + R^-T g_s.
   x->points.resize(structure_.num_points());
   x->frames.assign(structure_.num_frames(), Vector3d::Zero());
   ForPoints([&](int64_t k, int part) {
@@ -246,6 +251,7 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
     const int32_t column = frame_system_.column(static_cast<int32_t>(f));
     if (column >= 0) x->frames[f] = t.segment<3>(column);
   }
+  // R s = top - G t.
   ForPoints([&](int64_t k, int) {
     Vector3d top = x->points[k];
     for (int64_t i = structure_.point_begin[k];

@@ -45,24 +45,24 @@ constexpr double kShareOfGapBelow = 0.5;
 // What is lost of a bound when it is proved, at most, relative.
 constexpr double kProofLoss = 1e-3;
 
+CertificateOptions Sufficient(double bound) {
+  CertificateOptions options;
+  options.sufficient_bound = bound;
+  return options;
+}
+
 }  // namespace
 
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
-                               const Estimate& start, double known_bound)
+                               const Context& context, const Estimate& start,
+                               double known_bound)
     : problem_(problem),
       options_(options),
+      context_(context),
       estimate_(start),
-      cost_(Cost(problem, start, options.norm, options.num_threads)),
+      cost_(Cost(problem, start, options.norm, context.num_threads)),
       lower_bound_(known_bound) {}
-
-CertificateOptions CertifiedSolve::OptionsFor(double sufficient_bound) const {
-  CertificateOptions options;
-  options.sufficient_bound = sufficient_bound;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
-  return options;
-}
 
 void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
   if (!certificate) return;
@@ -75,15 +75,13 @@ void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
 }
 
 InteriorPointTermination CertifiedSolve::RunFrom(
-    Estimate start, double start_margin, const IsWorthProving& is_worth_proving,
+    Estimate start, double start_margin, const TakeEstimate& take,
     const IterationReport& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
   options.start_margin = start_margin;
   options.max_iterations = std::max(1, max_iterations_ - iterations_);
   options.smallest_gap = kFarBelow * options_.relative_gap;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
   double next_gap = options_.relative_gap;
   double gap_to_ask = kFirstGapToAsk;
   double milestone = std::numeric_limits<double>::infinity();
@@ -95,13 +93,14 @@ InteriorPointTermination CertifiedSolve::RunFrom(
       estimate_ = *iterate.estimate;
     }
     if (iterate.gap <= std::max(next_gap, gap_to_ask)) {
-      is_given_up_ = !is_worth_proving(estimate_);
+      is_given_up_ = !take(estimate_);
       while (gap_to_ask >= iterate.gap) gap_to_ask *= kGapBetweenQuestions;
     }
     if (iterate.gap <= next_gap && !is_given_up_) {
       Adopt(MakeCertificate(problem_, options_.norm, *iterate.estimate,
                             iterate.gamma, *iterate.multipliers,
-                            OptionsFor((1 - options_.relative_gap) * cost_)));
+                            Sufficient((1 - options_.relative_gap) * cost_),
+                            context_));
       next_gap = kGapBetweenCertificates * iterate.gap;
     }
     gap_ = iterate.gap;
@@ -118,7 +117,8 @@ InteriorPointTermination CertifiedSolve::RunFrom(
             iterate.gap > kLargeGap);
   };
   std::vector<Multiplier> multipliers;
-  return MinimizeJointly(problem_, options, &start, &multipliers).termination;
+  return MinimizeJointly(problem_, options, context_, &start, &multipliers)
+      .termination;
 }
 
 FeasibleStartOptions CertifiedSolve::OptionsForStart(
@@ -128,8 +128,6 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
   options.unit_depth = kShareOfDepth * MedianDepth(problem_, estimate_);
   options.known_bound = lower_bound_;
   options.hopeless_gap = kHopelessGap;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
   options.callback = [this, &report](double target) {
     ++iterations_;
     JointIteration iteration;
@@ -153,7 +151,7 @@ void CertifiedSolve::LeaveCameras(const IterationReport& report,
   if (smallest >= kDepthInCamera * MedianDepth(problem_, *start)) return;
   std::vector<Multiplier> multipliers;
   FindEstimateBelow(problem_, (1 + kStartMargin) * cost_,
-                    OptionsForStart(report), start, &multipliers);
+                    OptionsForStart(report), context_, start, &multipliers);
 }
 
 // Either an estimate below `bound`, pixels, far from the boundary of the cones,
@@ -161,16 +159,17 @@ void CertifiedSolve::LeaveCameras(const IterationReport& report,
 bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
   const FeasibleStartOptions options = OptionsForStart(report);
   std::vector<Multiplier> multipliers;
-  if (FindEstimateBelow(problem_, bound, options, &estimate_, &multipliers) ==
-      InteriorPointTermination::kFeasible) {
-    LowerByFeasibility(problem_, options, &estimate_);
-    cost_ = Cost(problem_, estimate_, options_.norm, options_.num_threads);
+  if (FindEstimateBelow(problem_, bound, options, context_, &estimate_,
+                        &multipliers) == InteriorPointTermination::kFeasible) {
+    LowerByFeasibility(problem_, options, context_, &estimate_);
+    cost_ = Cost(problem_, estimate_, options_.norm, context_.num_threads);
     return true;
   }
   const double sufficient =
       std::min((1 - kProofLoss) * bound, (1 - options_.relative_gap) * cost_);
   Adopt(MakeInfeasibilityCertificate(problem_, options_.norm, bound,
-                                     multipliers, OptionsFor(sufficient)));
+                                     multipliers, Sufficient(sufficient),
+                                     context_));
   return false;
 }
 
@@ -180,7 +179,7 @@ bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
   bool is_fresh = false;
   double infeasible = lower_bound_;
   while (cost_ - infeasible > width * cost_ && !IsGapReached() &&
-         iterations_ < max_iterations_ && !IsCancelled(options_.cancel)) {
+         iterations_ < max_iterations_ && !context_.IsCancelled()) {
     const double bound = (infeasible + cost_) / 2;
     if (TryBelow(bound, report)) {
       is_fresh = true;
@@ -206,17 +205,17 @@ bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
 }
 
 JointTermination CertifiedSolve::Run(int max_iterations,
-                                     const IsWorthProving& is_worth_proving,
+                                     const TakeEstimate& take,
                                      const IterationReport& report) {
   max_iterations_ = max_iterations;
   width_ = kFirstWidth;
-  if (!(cost_ > 0)) return JointTermination::kGapReached;
+  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
   double start_margin = kStartMargin;
   Estimate start = estimate_;
   LeaveCameras(report, &start);
   for (;;) {
     const InteriorPointTermination termination =
-        RunFrom(start, start_margin, is_worth_proving, report);
+        RunFrom(start, start_margin, take, report);
     start_margin = kFreshStartMargin;
     if (IsGapReached()) return JointTermination::kGapReached;
     if (is_given_up_) return JointTermination::kStalled;
@@ -228,7 +227,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
     }
     const bool is_fresh = FindFreshStart(report);
     if (IsGapReached()) return JointTermination::kGapReached;
-    if (IsCancelled(options_.cancel)) return JointTermination::kInterrupted;
+    if (context_.IsCancelled()) return JointTermination::kInterrupted;
     if (iterations_ >= max_iterations_) {
       return JointTermination::kMaxIterations;
     }

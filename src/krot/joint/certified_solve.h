@@ -5,6 +5,7 @@
 
 #include "krot/joint/feasible_start.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 
@@ -18,20 +19,21 @@ using IterationReport = std::function<void(const JointIteration&)>;
 // Internal to SolveJoint.
 class CertifiedSolve {
  public:
-  // Whether it is worth while to go on from this estimate towards a proof.
-  using IsWorthProving = std::function<bool(const Estimate&)>;
+  // Takes an estimate on the way; whether it is worth while to go on from there
+  // towards a proof.
+  using TakeEstimate = std::function<bool(const Estimate&)>;
 
-  // Keeps references. All depths of `start` are positive. A cost that is as low
-  // as `known_bound`, pixels, allows is low enough.
+  // Keeps a reference to `problem`. All depths of `start` are positive. A cost
+  // that is as low as `known_bound`, pixels, allows is low enough.
   CertifiedSolve(const KnownRotationProblem& problem,
-                 const JointOptions& options, const Estimate& start,
-                 double known_bound);
+                 const JointOptions& options, const Context& context,
+                 const Estimate& start, double known_bound);
 
   // Takes at most `max_iterations`, except for those towards a fresh start,
-  // which it ends once begun. Asks now and then on the way, and before every
-  // certificate that it tries, and ends as kStalled if it is not worth while.
-  JointTermination Run(int max_iterations,
-                       const IsWorthProving& is_worth_proving,
+  // which it ends once begun. Hands an estimate to `take` now and then, and
+  // before every certificate that it tries, and ends as kStalled if it is not
+  // worth while to go on.
+  JointTermination Run(int max_iterations, const TakeEstimate& take,
                        const IterationReport& report);
 
   // The best so far, never worse than the start, and its cost in pixels.
@@ -45,21 +47,22 @@ class CertifiedSolve {
 
  private:
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
+           IsZeroUpToRounding(cost_);
   }
   InteriorPointTermination RunFrom(Estimate start, double start_margin,
-                                   const IsWorthProving& is_worth_proving,
+                                   const TakeEstimate& take,
                                    const IterationReport& report);
   FeasibleStartOptions OptionsForStart(const IterationReport& report);
   void LeaveCameras(const IterationReport& report, Estimate* start);
   bool FindFreshStart(const IterationReport& report);
   bool Bisect(double width, const IterationReport& report);
   bool TryBelow(double bound, const IterationReport& report);
-  CertificateOptions OptionsFor(double sufficient_bound) const;
   void Adopt(std::optional<Certificate> certificate);
 
   const KnownRotationProblem& problem_;
-  const JointOptions& options_;
+  const JointOptions options_;
+  const Context context_;
   Estimate estimate_;
   double cost_ = 0;
   double lower_bound_ = 0;

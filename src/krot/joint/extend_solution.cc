@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
 
 namespace krot {
@@ -21,13 +21,13 @@ constexpr int kMaxSweeps = 10;
 
 // Places the points outside the set; whether none is behind a camera.
 bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
-                 const JointOptions& options, double level,
+                 Norm norm, const Context& context, double level,
                  Estimate* estimate) {
   std::vector<int64_t> observations;
   bool is_behind = false;
   for (int32_t k = 0; k < problem.num_points; ++k) {
     if (set.Contains(k)) continue;
-    const double cost = PointCost(problem, *estimate, options.norm, k);
+    const double cost = PointCost(problem, *estimate, norm, k);
     is_behind |= !std::isfinite(cost);
     if (cost <= level || !std::isfinite(cost)) continue;
     for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
@@ -36,29 +36,26 @@ bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
     }
   }
   if (observations.empty()) return !is_behind;
-  const RestrictedProblem part = RestrictProblem(problem, observations);
-  Estimate placed = RestrictEstimate(part, *estimate);
-  BlockSweep(part.problem, FastDescentOptions(), options.norm,
-             options.num_threads, options.cancel)
+  const ProblemSubset part(problem, std::move(observations));
+  Estimate placed = part.Restrict(*estimate);
+  BlockSweep(part.problem(), FastDescentOptions(), norm, context)
       .IntersectPoints(&placed);
-  ReplaceEstimate(part, placed, estimate);
+  part.Replace(placed, estimate);
   return !is_behind;
 }
 
 }  // namespace
 
 bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
-                    const JointOptions& options, double level, double highest,
-                    Estimate* estimate) {
-  if (!PlaceOthers(problem, set, options, level, estimate)) return false;
+                    Norm norm, const Context& context, double level,
+                    double highest, Estimate* estimate) {
+  if (!PlaceOthers(problem, set, norm, context, level, estimate)) return false;
   const auto excess = [&] {
-    return Cost(problem, *estimate, options.norm, options.num_threads) -
-           highest;
+    return Cost(problem, *estimate, norm, context.num_threads) - highest;
   };
   double left = excess();
   if (left <= 0) return true;
-  BlockSweep blocks(problem, FastDescentOptions(), options.norm,
-                    options.num_threads, options.cancel);
+  BlockSweep blocks(problem, FastDescentOptions(), norm, context);
   blocks.SetGoal({kSweepTolerance, kShareOfHighest * highest});
   for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
     blocks.ResectFrames(estimate);

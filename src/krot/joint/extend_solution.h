@@ -1,8 +1,9 @@
 #pragma once
 
-#include "krot/problem/known_rotation_problem.h"
-#include "krot/joint/joint.h"
+#include "krot/base/context.h"
 #include "krot/joint/working_set.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 
@@ -16,7 +17,7 @@ namespace krot {
 // Whether it succeeded; `estimate` is as far as it came either way. Points
 // behind a camera stay there, and it fails. O(observations) per sweep.
 bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
-                    const JointOptions& options, double level, double highest,
-                    Estimate* estimate);
+                    Norm norm, const Context& context, double level,
+                    double highest, Estimate* estimate);
 
 }  // namespace krot

@@ -25,18 +25,16 @@ double UnitDepth(const KnownRotationProblem& problem) {
 
 InteriorPointTermination FindEstimateBelow(
     const KnownRotationProblem& problem, double bound,
-    const FeasibleStartOptions& options, Estimate* estimate,
-    std::vector<Multiplier>* multipliers) {
+    const FeasibleStartOptions& options, const Context& context,
+    Estimate* estimate, std::vector<Multiplier>* multipliers) {
   InteriorPointOptions conic;
   conic.norm = options.norm;
   conic.max_iterations = options.max_iterations;
-  conic.num_threads = options.num_threads;
-  conic.cancel = options.cancel;
   conic.stop = [&](const ConicIterate& iterate) {
     if (options.callback) options.callback(bound);
     return iterate.gamma > 1 && iterate.gap < options.hopeless_gap;
   };
-  return FindFeasible(problem, conic, bound,
+  return FindFeasible(problem, conic, context, bound,
                       options.unit_depth.value_or(UnitDepth(problem)), estimate,
                       multipliers)
       .termination;
@@ -44,14 +42,14 @@ InteriorPointTermination FindEstimateBelow(
 
 bool LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
-                        Estimate* estimate) {
+                        const Context& context, Estimate* estimate) {
   bool is_lower = false;
   std::vector<Multiplier> multipliers;
   for (;;) {
     const double cost =
-        Cost(problem, *estimate, options.norm, options.num_threads);
+        Cost(problem, *estimate, options.norm, context.num_threads);
     if (!(kShare * cost > options.known_bound) ||
-        FindEstimateBelow(problem, kShare * cost, options, estimate,
+        FindEstimateBelow(problem, kShare * cost, options, context, estimate,
                           &multipliers) !=
             InteriorPointTermination::kFeasible) {
       return is_lower;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -21,8 +22,6 @@ struct FeasibleStartOptions {
   // Gives up once the programme's gap is this small and the
   // bound not met; 0: never.
   double hopeless_gap = 0;
-  int num_threads = -1;
-  const CancelFlag* cancel = nullptr;  // may be null
   // Called after every iteration with the bound that it is to meet, pixels; may
   // be empty.
   std::function<void(double bound)> callback;
@@ -36,14 +35,14 @@ struct FeasibleStartOptions {
 // none (MakeInfeasibilityCertificate).
 InteriorPointTermination FindEstimateBelow(
     const KnownRotationProblem& problem, double bound,
-    const FeasibleStartOptions& options, Estimate* estimate,
-    std::vector<Multiplier>* multipliers);
+    const FeasibleStartOptions& options, const Context& context,
+    Estimate* estimate, std::vector<Multiplier>* multipliers);
 
 // Lowers an estimate by FindEstimateBelow at a quarter of its cost, again and
 // again as long as there is one; returns whether there was. Takes some five
 // iterations each.
 bool LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
-                        Estimate* estimate);
+                        const Context& context, Estimate* estimate);
 
 }  // namespace krot

@@ -1,15 +1,15 @@
 #include "krot/joint/initializer.h"
 
-#include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
 #include "krot/joint/feasible_start.h"
 #include "krot/joint/joint.h"
+#include "krot/problem/components.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/gauge.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -21,20 +21,19 @@ constexpr double kLargestBound = 1e7;  // pixels
 // When lowering a start that already meets the bound is given up.
 constexpr double kHopelessStartGap = 1e-2;
 
-// Scales the estimate to a median depth of one.
-void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
-  const double median = MedianDepth(problem, *estimate);
-  for (Eigen::Vector3d& t : estimate->translations) t /= median;
-  for (Eigen::Vector3d& s : estimate->points) s /= median;
-}
-
 // A component's way to a start.
 class StartSearch {
  public:
-  // Keeps references. Adds iterations to `summary`, and what was proved.
-  StartSearch(const RestrictedProblem& part, const InitializerOptions& options,
-              const Timer& timer, InitializerSummary* summary)
-      : part_(part), options_(options), timer_(timer), summary_(*summary) {}
+  // Keeps references to the part, the timer and the summary. Adds iterations to
+  // `summary`, and what was proved.
+  StartSearch(const ProblemSubset& part, const InitializerOptions& options,
+              const Context& context, const Timer& timer,
+              InitializerSummary* summary)
+      : part_(part),
+        options_(options),
+        context_(context),
+        timer_(timer),
+        summary_(*summary) {}
 
   // `*start` is meaningful if feasible.
   InitializerTermination Run(Estimate* start);
@@ -45,8 +44,9 @@ class StartSearch {
   bool Proves(Certificate certificate);
   void Record(JointIteration iteration);
 
-  const RestrictedProblem& part_;
-  const InitializerOptions& options_;
+  const ProblemSubset& part_;
+  const InitializerOptions options_;
+  const Context context_;
   const Timer& timer_;
   InitializerSummary& summary_;
 };
@@ -63,8 +63,6 @@ FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
   start.norm = options_.norm;
   start.max_iterations = options_.max_iterations;
   start.hopeless_gap = hopeless_gap;
-  start.num_threads = options_.num_threads;
-  start.cancel = options_.cancel;
   start.callback = [this](double bound) {
     JointIteration iteration;
     iteration.target = bound;
@@ -80,8 +78,9 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
   std::vector<Multiplier> multipliers;
   for (double bound = kBoundGrowth * options_.max_error; bound <= kLargestBound;
        bound *= kBoundGrowth) {
-    const InteriorPointTermination found = FindEstimateBelow(
-        part_.problem, bound, StartOptions(0), estimate, &multipliers);
+    const InteriorPointTermination found =
+        FindEstimateBelow(part_.problem(), bound, StartOptions(0), context_,
+                          estimate, &multipliers);
     if (found == InteriorPointTermination::kInterrupted) {
       return InitializerTermination::kInterrupted;
     }
@@ -89,12 +88,11 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
     JointOptions joint;
     joint.norm = options_.norm;
     joint.max_iterations = options_.max_iterations;
-    joint.num_threads = options_.num_threads;
-    joint.cancel = options_.cancel;
     joint.callback = [this](int, const JointIteration& iteration) {
       Record(iteration);
     };
-    const JointSummary optimum = SolveJoint(part_.problem, joint, estimate);
+    const JointSummary optimum =
+        SolveJoint(part_.problem(), joint, context_, estimate);
     if (optimum.certificate && Proves(*optimum.certificate)) {
       return InitializerTermination::kInfeasible;
     }
@@ -112,65 +110,61 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
 // then.
 bool StartSearch::Proves(Certificate certificate) {
   const CertificateCheck check =
-      CheckCertificate(part_.problem, options_.norm, certificate);
+      CheckCertificate(part_.problem(), options_.norm, certificate);
   if (!(check.proved_bound > options_.max_error)) return false;
-  for (CertifiedObservation& o : certificate.observations) {
-    o.observation = part_.observation_of[o.observation];
-  }
   summary_.lower_bound = check.proved_bound;
-  summary_.certificate = std::move(certificate);
+  summary_.certificate = InWhole(part_, std::move(certificate));
   return true;
 }
 
 InitializerTermination StartSearch::Run(Estimate* start) {
   std::vector<Multiplier> multipliers;
-  const InteriorPointTermination found = FindEstimateBelow(
-      part_.problem, options_.max_error, StartOptions(0), start, &multipliers);
+  const InteriorPointTermination found =
+      FindEstimateBelow(part_.problem(), options_.max_error, StartOptions(0),
+                        context_, start, &multipliers);
   if (found == InteriorPointTermination::kInterrupted) {
     return InitializerTermination::kInterrupted;
   }
   if (found != InteriorPointTermination::kFeasible) {
     const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
-        part_.problem, options_.norm, options_.max_error, multipliers,
-        CertificateOptions());
+        part_.problem(), options_.norm, options_.max_error, multipliers,
+        CertificateOptions(), context_);
     if (certificate && Proves(*certificate)) {
       return InitializerTermination::kInfeasible;
     }
     const InitializerTermination decision = DecideByOptimum(start);
     if (decision != InitializerTermination::kFeasible) return decision;
   }
-  LowerByFeasibility(part_.problem, StartOptions(kHopelessStartGap), start);
-  return IsCancelled(options_.cancel) ? InitializerTermination::kInterrupted
-                                      : InitializerTermination::kFeasible;
+  LowerByFeasibility(part_.problem(), StartOptions(kHopelessStartGap), context_,
+                     start);
+  return context_.IsCancelled() ? InitializerTermination::kInterrupted
+                                : InitializerTermination::kFeasible;
 }
 
 }  // namespace
 
 InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
-                             Estimate* estimate) {
+                             const Context& context, Estimate* estimate) {
   CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
   const Timer timer;
   InitializerSummary summary;
   Estimate found = *estimate;
   found.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
   found.points.resize(problem.num_points, Eigen::Vector3d::Zero());
-  std::vector<int64_t> all(problem.observations.size());
-  std::iota(all.begin(), all.end(), 0);
-  for (const std::vector<int64_t>& observations :
-       SplitIntoComponents(problem, all)) {
-    const RestrictedProblem part = RestrictProblem(problem, observations);
+  for (std::vector<int64_t>& observations : SplitIntoComponents(problem)) {
+    const ProblemSubset part(problem, std::move(observations));
     Estimate start;
     summary.termination =
-        StartSearch(part, options, timer, &summary).Run(&start);
+        StartSearch(part, options, context, timer, &summary).Run(&start);
     if (summary.termination != InitializerTermination::kFeasible) {
       return summary;
     }
-    if (!HasBaseline(part.problem)) NormalizeScale(part.problem, &start);
-    ReplaceEstimate(part, start, &found);
+    if (!HasBaseline(part.problem())) NormalizeScale(part.problem(), &start);
+    part.Replace(start, &found);
   }
   summary.termination = InitializerTermination::kFeasible;
-  summary.cost = Cost(problem, found, options.norm, options.num_threads);
+  summary.cost = Cost(problem, found, options.norm, context.num_threads);
   *estimate = std::move(found);
   return summary;
 }

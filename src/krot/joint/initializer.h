@@ -3,11 +3,11 @@
 #include <optional>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
+#include "krot/joint/joint.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
-#include "krot/joint/joint.h"
 
 namespace krot {
 
@@ -18,9 +18,7 @@ struct InitializerOptions {
   Norm norm;                 // p = 1, 2 or infinity
   double max_error = 100;    // the bound that the start must meet, pixels; > 0
   int max_iterations = 200;  // per component; >= 1
-  int num_threads = -1;
-  const CancelFlag* cancel = nullptr;  // may be null
-  JointCallback callback;  // counts over all components; may be empty
+  JointCallback callback;    // counts over all components; may be empty
 };
 
 enum class InitializerTermination {
@@ -47,6 +45,6 @@ struct InitializerSummary {
 // depth of one. Throws std::invalid_argument for options out of range.
 InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
-                             Estimate* estimate);
+                             const Context& context, Estimate* estimate);
 
 }  // namespace krot

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "krot/base/check.h"
@@ -11,9 +10,10 @@
 #include "krot/joint/certified_solve.h"
 #include "krot/joint/extend_solution.h"
 #include "krot/joint/working_set.h"
+#include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -37,22 +37,16 @@ void CheckOptions(const JointOptions& options) {
                 options.max_iterations, ">= 1");
 }
 
-// A part's certificate as one of the whole.
-Certificate InWhole(const RestrictedProblem& part, Certificate certificate) {
-  for (CertifiedObservation& o : certificate.observations) {
-    o.observation = part.observation_of[o.observation];
-  }
-  return certificate;
-}
-
 // A connected component on its way to its certified optimum, by way of the
 // optima of growing working sets.
 class ComponentSolve {
  public:
   ComponentSolve(const KnownRotationProblem& problem,
-                 const JointOptions& options, const Estimate& start)
+                 const JointOptions& options, const Context& context,
+                 const Estimate& start)
       : problem_(problem),
         options_(options),
+        context_(context),
         estimate_(start),
         cost_(CostOf(start)),
         set_(FirstWorkingSet(problem, start, options.norm, cost_)) {}
@@ -68,21 +62,23 @@ class ComponentSolve {
 
  private:
   double CostOf(const Estimate& estimate) const {
-    return Cost(problem_, estimate, options_.norm, options_.num_threads);
+    return Cost(problem_, estimate, options_.norm, context_.num_threads);
   }
   bool IsGapReached() const {
-    return cost_ - lower_bound_ <= options_.relative_gap * cost_;
+    return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
+           IsZeroUpToRounding(cost_);
   }
   JointTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
-  JointTermination SolvePart(const RestrictedProblem& part,
+  JointTermination SolvePart(const ProblemSubset& part,
                              const IterationReport& report,
                              Estimate* candidate);
   bool FitOthers(Estimate* candidate);
   void Keep(const Estimate& candidate);
 
   const KnownRotationProblem& problem_;
-  const JointOptions& options_;
+  const JointOptions options_;
+  const Context context_;
   Estimate estimate_;  // the best so far
   double cost_ = 0;
   WorkingSet set_;
@@ -98,21 +94,21 @@ class ComponentSolve {
 
 // A working set whose solution leaves other points above it is not worth a
 // proof, but more points.
-JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
+JointTermination ComponentSolve::SolvePart(const ProblemSubset& part,
                                            const IterationReport& report,
                                            Estimate* candidate) {
   JointOptions options = options_;
   if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
-  const Estimate start = RestrictEstimate(part, estimate_);
-  CertifiedSolve solve(part.problem, options, start, lower_bound_);
+  const Estimate start = part.Restrict(estimate_);
+  CertifiedSolve solve(part.problem(), options, context_, start, lower_bound_);
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
     return JointTermination::kMaxIterations;
   }
   const auto replace = [&](Estimate optimum) {
-    RestoreGauge(part.problem, start, &optimum);
-    ReplaceEstimate(part, optimum, candidate);
+    RestoreGauge(part.problem(), start, &optimum);
+    part.Replace(optimum, candidate);
   };
   const JointTermination termination = solve.Run(
       options_.max_iterations - iterations_,
@@ -136,14 +132,14 @@ JointTermination ComponentSolve::SolvePart(const RestrictedProblem& part,
 
 JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
                                                  Estimate* candidate) {
-  const std::vector<int64_t> observations = set_.Observations();
+  std::vector<int64_t> observations = set_.Observations();
   num_working_observations_ = static_cast<int64_t>(observations.size());
   do_others_fit_ = true;
   JointTermination worst = JointTermination::kGapReached;
-  for (const std::vector<int64_t>& part :
-       SplitIntoComponents(problem_, observations)) {
+  for (std::vector<int64_t>& part :
+       SplitIntoComponents(problem_, std::move(observations))) {
     const JointTermination termination =
-        SolvePart(RestrictProblem(problem_, part), report, candidate);
+        SolvePart(ProblemSubset(problem_, std::move(part)), report, candidate);
     if (termination == JointTermination::kGapReached) continue;
     worst = termination;
     if (termination != JointTermination::kStalled || !do_others_fit_) break;
@@ -157,8 +153,8 @@ bool ComponentSolve::FitOthers(Estimate* candidate) {
   level_ = set_.Cost(*candidate, options_.norm);
   const double highest =
       level_ / (1 - (1 - kShareOfGapForProof) * options_.relative_gap);
-  const bool do_fit =
-      ExtendSolution(problem_, set_, options_, level_, highest, candidate);
+  const bool do_fit = ExtendSolution(problem_, set_, options_.norm, context_,
+                                     level_, highest, candidate);
   Keep(*candidate);
   return do_fit;
 }
@@ -171,7 +167,7 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
-  if (!(cost_ > 0)) return JointTermination::kGapReached;
+  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
@@ -191,26 +187,24 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
 }  // namespace
 
 JointSummary SolveJoint(const KnownRotationProblem& problem,
-                        const JointOptions& options, Estimate* estimate) {
+                        const JointOptions& options, const Context& context,
+                        Estimate* estimate) {
   CheckOptions(options);
   const Timer timer;
   JointSummary summary;
   summary.cost_initial =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
                 summary.cost_initial, "finite: all depths positive");
 
-  std::vector<int64_t> all(problem.observations.size());
-  std::iota(all.begin(), all.end(), 0);
-  const std::vector<std::vector<int64_t>> components =
-      SplitIntoComponents(problem, all);
+  std::vector<std::vector<int64_t>> components = SplitIntoComponents(problem);
   summary.num_components = static_cast<int32_t>(components.size());
   summary.termination = JointTermination::kGapReached;
   double cost_of_solved = 0;
-  for (const std::vector<int64_t>& observations : components) {
-    const RestrictedProblem part = RestrictProblem(problem, observations);
-    ComponentSolve solve(part.problem, options,
-                         RestrictEstimate(part, *estimate));
+  for (std::vector<int64_t>& observations : components) {
+    const ProblemSubset part(problem, std::move(observations));
+    ComponentSolve solve(part.problem(), options, context,
+                         part.Restrict(*estimate));
     const JointTermination termination =
         solve.Run([&](JointIteration iteration) {
           iteration.cost = std::max(cost_of_solved, solve.cost());
@@ -224,7 +218,7 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
                              iteration);
           }
         });
-    ReplaceEstimate(part, solve.estimate(), estimate);
+    part.Replace(solve.estimate(), estimate);
     cost_of_solved = std::max(cost_of_solved, solve.cost());
     summary.num_working_observations += solve.num_working_observations();
     if (solve.certificate() && solve.lower_bound() > summary.lower_bound) {
@@ -237,7 +231,7 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
     if (termination == JointTermination::kInterrupted) break;
   }
   summary.cost_final =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   // A component that fell short matters only if it sets the maximum.
   if (summary.termination != JointTermination::kInterrupted &&
       summary.RelativeGap() <= options.relative_gap) {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
@@ -36,14 +36,12 @@ struct JointOptions {
   Norm norm;                   // p = 1, 2 or infinity
   double relative_gap = 1e-4;  // (cost - lower_bound) / cost; > 0
   int max_iterations = 2000;   // per component; >= 1
-  int num_threads = -1;
-  const CancelFlag* cancel = nullptr;  // may be null
-  JointCallback callback;  // counts over all components; may be empty
+  JointCallback callback;      // counts over all components; may be empty
 };
 
 enum class JointTermination {
   kNotRun,
-  kGapReached,  // certified
+  kGapReached,  // certified, or a cost that is zero up to rounding
   kMaxIterations,
   kStalled,  // rounding ended the progress before the gap was reached
   kInterrupted,
@@ -71,6 +69,7 @@ struct JointSummary {
 // than the start. Frames and points without observations stay. Memory: see
 // EstimateInteriorPointMemory.
 JointSummary SolveJoint(const KnownRotationProblem& problem,
-                        const JointOptions& options, Estimate* estimate);
+                        const JointOptions& options, const Context& context,
+                        Estimate* estimate);
 
 }  // namespace krot

@@ -13,14 +13,19 @@ constexpr int kZeroPiece = 0;
 constexpr int kNoMember = -1;
 // Weights that the residuals bear together below this are rounding.
 constexpr double kSmallestWeight = 1e-9;
-// See DepthShare.
+// Falls of depths below the first, relative, count as none: steps that are cut
+// short cost iterations. No depth falls below the second of what it is.
+constexpr double kSmallFall = 0.1;
 constexpr double kSmallestDepthShare = 0.1;
+constexpr double kLargestFall = 1 - kSmallestDepthShare;
 // Keeps H invertible where rounding would not: relative to its trace.
 constexpr double kPivotRounding = 1e-14;
-// G serves as long as (what has changed since, relative)^2 is below this.
+// G serves as long as (what has changed since, relative)^2 is below this. Kept
+// wherever kappa is small, it missed optima at infinity; cold points take 2 %
+// longer for this (docs/benchmarks.md, "Res-Int, the first ten sweeps").
 constexpr double kMetricReach = 1e-2;
 
-// See DepthGrowth.
+// Up to this growth of depths DepthGrowth may be a bound, which costs nothing.
 constexpr double kNearby = 1e3;
 
 // How far x is from where v and w vanish: from the camera or, if that is what
@@ -259,9 +264,15 @@ bool LocalModel::AddTangents(const Vector3d& x_trial,
   return added;
 }
 
-double LocalModel::DepthShare(const Vector3d& d) const {
-  return krot::DepthShare(rows_.blocks(), rows_.num_blocks(), x_.data(),
-                          d.data(), kSmallestDepthShare);
+// Where all depths fall by the same share f of themselves, a residual changes
+// with d / (1 + f) as much as its linearisation does with d.
+double LocalModel::ShareOf(const Vector3d& d) const {
+  const Vector3d longer = (kLargestFall / kSmallFall) * d;
+  const double share = DepthShare(rows_.blocks(), rows_.num_blocks(), x_.data(),
+                                  longer.data(), kSmallestDepthShare);
+  if (share == 1) return 1;
+  const double fall = kSmallFall / share;
+  return std::min(1 / (1 + fall), kLargestFall / fall);
 }
 
 double LocalModel::DepthGrowth() const {

@@ -35,6 +35,20 @@ struct ActiveResiduals {
 // of the members' own changes, which makes the method invariant to affine
 // changes of x. With H = I, equal f_k and unit g_k, d is the MEB centre of
 // [Zhang18, Alg. 3].
+//
+//   pieces: [ zero | member 0 | member 1 | ... | tangents of members      ]
+//                    one each, or four           by trials that failed,
+//                    for p = 1, infinity         until the next Linearize
+//
+// A descent calls Start, AddMember, Linearize and, for the first multipliers,
+// StartFrom or Minimize and AdoptMultipliers; then, for every step, Minimize,
+// AddMember for what a trial shows, and
+//
+//   if x moves:  AdoptMultipliers, Linearize
+//   if not:      Linearize, if there are new members,
+//                else RaiseMultipliers and AddTangents;
+//
+// and Active at the end.
 class LocalModel {
  public:
   // What the minimiser of the model does.
@@ -78,9 +92,9 @@ class LocalModel {
   bool AddTangents(const Eigen::Vector3d& x_trial, const double* trial_values,
                    double level);
 
-  // The share of the step d, at most 1, on which no depth of a member falls
-  // below a tenth of what it is at x.
-  double DepthShare(const Eigen::Vector3d& d) const;
+  // How much of the step d, at most 1, does what the model says: less where
+  // depths of members fall, whose residuals go with 1 / depth.
+  double ShareOf(const Eigen::Vector3d& d) const;
 
   // The largest depth at x of the members that bear the last step, by the
   // distance of the start from the camera of any member at most: as far as a

@@ -12,30 +12,39 @@ using Eigen::Vector3d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// So many residuals become members at a time, the largest first.
+// Residuals become members so many at a time, the largest first. More make
+// every step dearer, fewer take more trials to find those that matter.
 constexpr int kMaxAdded = 8;
 // Residuals this small are zero, in pixels.
 constexpr double kZeroPixels = 1e-10;
-// kappa falls by kShrink after a good step and rises by kGrow after a failure.
-// Below kSmallest rounding in the model, about 1e-16 / kappa, would show.
-constexpr double kInitialKappa = 1e-2;
+
+// kappa. A small one makes steps Newton's, a large one safe; the first and the
+// smallest are those with the fewest steps on random triangulations, of 1e-3,
+// 1e-2, 3e-2 and of 1e-6, 1e-5 (docs/benchmarks.md, "One triangulation").
+// Rounding in the model is about 1e-16 / kappa.
+constexpr double kFirstKappa = 1e-2;
 constexpr double kSmallestKappa = 1e-5;
 constexpr double kLargestKappa = 1e9;
-constexpr double kShrink = 0.01;
-constexpr double kGrow = 10;
-// A trial is taken if it keeps this share of its promise, and good from:
+// What it is multiplied by after a good trial and after a failed one.
+constexpr double kKappaFall = 0.01;
+constexpr double kKappaRise = 10;
+
+// Shares of its promise that a trial keeps: it is taken beyond the first, good
+// beyond the second. Taking less would move on by next to nothing.
 constexpr double kSufficientShare = 0.1;
 constexpr double kGoodShare = 0.5;
-// Promises below this, relative, are rounding if the trial does not keep them.
+// Promises below this, relative, are rounding if the trial does not keep them:
+// at two cameras they were tried again and again (docs/benchmarks.md, "One
+// triangulation", step 4).
 constexpr double kPromiseRounding = 1e-10;
 constexpr double kFinestTolerance = DescentGoal{}.tolerance;
-// So often a failed trial may teach the model before kappa rises.
+
+// So often a failed trial may teach the model before kappa rises, and a lesson
+// after which the next trial costs no less than this share of the one before
+// was none. Without an end to lessons, frames whose residuals all point the
+// same way stay where they are (tests/minimax/degenerate_test.cc).
 constexpr int kMaxLessons = 5;
-// A lesson after which the next trial costs no less than this share of the one
-// before was none.
 constexpr double kLessonWorth = 0.99;
-// Depths that fall by less than this, relative, count as constant.
-constexpr double kSmallFall = 0.1;
 
 // Whether the minimiser lies so far away that going on has no point: where
 // depths have grown a millionfold nothing changes by more than 1e-6 of it any
@@ -44,61 +53,79 @@ bool IsFarAway(double depth_growth, double relative_promise) {
   return depth_growth > 1e6 || (depth_growth > 1e3 && relative_promise < 1e-8);
 }
 
-// What a Newton step leaves for the next one, to first order: what the trial
-// misses of the level, and what the quadratic term held back.
-double LeftAfter(const LocalModel::Step& step, double cost_trial) {
-  return std::max(cost_trial - step.level, step.held_back);
-}
+// One descent from a feasible x.
+class Descent {
+ public:
+  Descent(ResidualSet* residuals, Norm norm, const DescentGoal& goal,
+          LocalModel* model, std::vector<char>* is_member)
+      : residuals_(*residuals),
+        norm_(norm),
+        goal_(goal),
+        model_(*model),
+        is_member_(*is_member) {}
 
-// How much of a step is taken. Where all depths fall by the same share f of
-// themselves, a residual changes with d / (1 + f) as much as its linearisation
-// does with d. Small falls do not matter, and no depth falls below a tenth.
-double ShareOf(const LocalModel& model, const Vector3d& d) {
-  const double share = model.DepthShare((0.9 / kSmallFall) * d);
-  if (share == 1) return 1;
-  const double fall = kSmallFall / share;
-  return std::min(1 / (1 + fall), 0.9 / fall);
-}
+  // The residuals have been evaluated at x, where their maximum is `cost`.
+  void Start(const Vector3d& x, double cost, const ActiveResiduals& active);
+  DescentTermination Run(int max_iterations);
 
-}  // namespace
+  const Vector3d& x() const { return x_; }
+  double cost() const { return cost_; }
+  int iterations() const { return iterations_; }
 
-// Makes the largest residuals above `level` members, if they are not yet.
-// Returns the largest of them, if there were any.
-std::optional<double> NewtonDescent::AddMembers(const ResidualSet& residuals,
-                                                double level) {
-  const double* values = residuals.values();
-  int largest[kMaxAdded];  // indices, by falling value
-  int count = 0;
-  for (int i = 0; i < residuals.size(); ++i) {
-    if (!(values[i] > level) || is_member_[i]) continue;
-    int place = count < kMaxAdded ? count++ : kMaxAdded - 1;
-    for (; place > 0 && values[largest[place - 1]] < values[i]; --place) {
-      largest[place] = largest[place - 1];
-    }
-    largest[place] = i;
-    if (count == kMaxAdded) level = values[largest[kMaxAdded - 1]];
-  }
-  for (int k = 0; k < count; ++k) AddMember(residuals, largest[k]);
-  if (count == 0) return std::nullopt;
-  return values[largest[0]];
-}
+ private:
+  // What the model would do.
+  struct Proposal {
+    LocalModel::Step step;
+    double promise;         // by how much the step is to lower the cost
+    double share;           // of the step that is taken
+    bool promises_nothing;  // up to the tolerance
+  };
+  // What comes of it.
+  struct Trial {
+    Vector3d x;
+    double cost;
+    double kept;  // of the promise; 1 where the model is right
+  };
 
-void NewtonDescent::AddMember(const ResidualSet& residuals, int index) {
-  is_member_[index] = true;
-  model_.AddMember(residuals, index);
-}
+  Proposal Propose();
+  bool LowerKappaAtOnce();
+  Trial Try(const Proposal& proposal);
+  bool EndsWith(const Proposal& proposal, const Trial& trial) const;
+  void MoveTo(const Trial& trial);
+  void Accept(const Trial& trial);
+  bool Learn(const Proposal& proposal, const Trial& trial,
+             const std::optional<double>& overlooked);
+  std::optional<double> AddMembers(double level);
+  void AddMember(int index);
+
+  ResidualSet& residuals_;
+  const Norm norm_;
+  const DescentGoal& goal_;
+  LocalModel& model_;
+  std::vector<char>& is_member_;
+
+  Vector3d x_;
+  double cost_ = 0;
+  double kappa_ = kFirstKappa;
+  int iterations_ = 0;
+  // Since x has moved:
+  int lessons_ = 0;
+  double cost_failed_ = kInfinity;  // of the last trial that failed
+};
 
 // The first multipliers are those given or, without any, of a gradient step.
-void NewtonDescent::StartModel(const ResidualSet& residuals, double cost,
-                               Norm norm, const ActiveResiduals& active,
-                               const Vector3d& x) {
+void Descent::Start(const Vector3d& x, double cost,
+                    const ActiveResiduals& active) {
+  x_ = x;
+  cost_ = cost;
+  if (!(cost > kZeroPixels)) return;
   model_.Start(x);
-  is_member_.assign(residuals.size(), false);
-  AddMembers(residuals, /*level=*/-1);
+  is_member_.assign(residuals_.size(), false);
+  AddMembers(/*level=*/-1);
   for (int k = 0; k < active.size; ++k) {
-    if (!is_member_[active.index[k]]) AddMember(residuals, active.index[k]);
+    if (!is_member_[active.index[k]]) AddMember(active.index[k]);
   }
-  model_.Linearize(x, cost, norm);
+  model_.Linearize(x, cost, norm_);
   if (active.size > 0) {
     model_.StartFrom(active);
   } else {
@@ -107,12 +134,147 @@ void NewtonDescent::StartModel(const ResidualSet& residuals, double cost,
   }
 }
 
+DescentTermination Descent::Run(int max_iterations) {
+  while (iterations_ < max_iterations) {
+    if (!(cost_ > kZeroPixels)) return DescentTermination::kZeroCost;
+    const Proposal proposal = Propose();
+    if (proposal.promises_nothing && LowerKappaAtOnce()) continue;
+    if (IsFarAway(model_.DepthGrowth(), proposal.promise / cost_)) {
+      return DescentTermination::kFarAway;
+    }
+    const Trial trial = Try(proposal);
+    if (EndsWith(proposal, trial)) {
+      if (trial.cost < cost_) MoveTo(trial);
+      return DescentTermination::kStationary;
+    }
+    std::optional<double> overlooked;
+    if (trial.cost > proposal.step.level) {
+      overlooked = AddMembers(proposal.step.level);
+    }
+    if (trial.kept > kSufficientShare) {
+      Accept(trial);
+    } else if (!Learn(proposal, trial, overlooked)) {
+      kappa_ *= kKappaRise;
+      if (kappa_ > kLargestKappa) return DescentTermination::kNoDecrease;
+    }
+  }
+  return DescentTermination::kMaxIterations;
+}
+
+// A promise that takes depths near zero says little: residuals go with
+// 1 / depth.
+Descent::Proposal Descent::Propose() {
+  const LocalModel::Step step = model_.Minimize(kappa_);
+  const double promise = cost_ - step.level;
+  const double share = model_.ShareOf(step.d);
+  const double tolerance = share < 1 ? kFinestTolerance : goal_.tolerance;
+  return {step, promise, share, !(promise > tolerance * cost_)};
+}
+
+// A promise may be small for the sake of a kappa that nothing has raised here.
+// Counts as an iteration if so.
+bool Descent::LowerKappaAtOnce() {
+  if (!(kappa_ > kSmallestKappa && lessons_ == 0)) return false;
+  model_.RaiseMultipliers();
+  kappa_ = kSmallestKappa;
+  ++iterations_;
+  return true;
+}
+
+Descent::Trial Descent::Try(const Proposal& proposal) {
+  ++iterations_;
+  Trial trial;
+  trial.x = x_ + proposal.share * proposal.step.d;
+  trial.cost = residuals_.Evaluate(trial.x, norm_);
+  trial.kept = (cost_ - trial.cost) / (proposal.share * proposal.promise);
+  return trial;
+}
+
+// Whether nothing is to be gained after this trial.
+bool Descent::EndsWith(const Proposal& proposal, const Trial& trial) const {
+  if (proposal.promises_nothing) return true;
+  // The pieces of polyhedral norms lack the curvature of Newton's step.
+  const bool is_newton =
+      !norm_.IsPolyhedral() && kappa_ <= kSmallestKappa && proposal.share == 1;
+  if (!is_newton) return false;
+  // What a Newton step leaves for the next one, to first order: what the trial
+  // misses of the level, and what the quadratic term held back.
+  const double left =
+      std::max(trial.cost - proposal.step.level, proposal.step.held_back);
+  const bool is_rounding = !(trial.kept > kSufficientShare) &&
+                           proposal.promise <= kPromiseRounding * cost_;
+  return left <= goal_.tolerance * cost_ || is_rounding;
+}
+
+void Descent::MoveTo(const Trial& trial) {
+  x_ = trial.x;
+  cost_ = trial.cost;
+}
+
+void Descent::Accept(const Trial& trial) {
+  MoveTo(trial);
+  model_.AdoptMultipliers();
+  model_.Linearize(x_, cost_, norm_);
+  if (trial.kept > kGoodShare) {
+    kappa_ = std::max(kappa_ * kKappaFall, kSmallestKappa);
+  }
+  lessons_ = 0;
+  cost_failed_ = kInfinity;
+}
+
+// Teaches the model by a trial that failed; `overlooked` is the largest of the
+// residuals above the level that were no members. Whether that is worth
+// another trial with the same kappa.
+bool Descent::Learn(const Proposal& proposal, const Trial& trial,
+                    const std::optional<double>& overlooked) {
+  if (overlooked) {
+    model_.Linearize(x_, cost_, norm_);
+    // It has not misjudged a residual that it did not know.
+    if (!(*overlooked < trial.cost)) return true;
+  } else {
+    bool learned = model_.RaiseMultipliers();
+    learned |=
+        model_.AddTangents(trial.x, residuals_.values(), proposal.step.level);
+    learned &= trial.cost < kLessonWorth * cost_failed_;
+    cost_failed_ = trial.cost;
+    if (!learned) return false;
+  }
+  return ++lessons_ <= kMaxLessons;
+}
+
+// Makes the largest residuals above `level` members, if they are not yet.
+// Returns the largest of them, if there were any.
+std::optional<double> Descent::AddMembers(double level) {
+  const double* values = residuals_.values();
+  int largest[kMaxAdded];  // indices, by falling value
+  int count = 0;
+  for (int i = 0; i < residuals_.size(); ++i) {
+    if (!(values[i] > level) || is_member_[i]) continue;
+    int place = count < kMaxAdded ? count++ : kMaxAdded - 1;
+    for (; place > 0 && values[largest[place - 1]] < values[i]; --place) {
+      largest[place] = largest[place - 1];
+    }
+    largest[place] = i;
+    if (count == kMaxAdded) level = values[largest[kMaxAdded - 1]];
+  }
+  for (int k = 0; k < count; ++k) AddMember(largest[k]);
+  if (count == 0) return std::nullopt;
+  return values[largest[0]];
+}
+
+void Descent::AddMember(int index) {
+  is_member_[index] = true;
+  model_.AddMember(residuals_, index);
+}
+
+}  // namespace
+
 DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
                                        int max_iterations,
                                        const DescentGoal& goal,
                                        ActiveResiduals* active, Vector3d* x) {
   DescentSummary summary;
-  double cost = residuals->Evaluate(*x, norm);
+  const double cost = residuals->Evaluate(*x, norm);
   summary.cost_initial = cost;
   summary.cost = cost;
   if (!std::isfinite(cost)) {
@@ -123,86 +285,12 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
     summary.termination = DescentTermination::kLowEnough;
     return summary;
   }
-  double kappa = kInitialKappa;
-  if (cost > kZeroPixels) StartModel(*residuals, cost, norm, *active, *x);
-  int lessons = 0;                 // since the last step taken
-  double cost_failed = kInfinity;  // of the last trial since then
-  summary.termination = DescentTermination::kMaxIterations;
-  while (summary.iterations < max_iterations) {
-    if (!(cost > kZeroPixels)) {
-      summary.termination = DescentTermination::kZeroCost;
-      break;
-    }
-    LocalModel::Step step = model_.Minimize(kappa);
-    const double promise = cost - step.level;
-    const double share = ShareOf(model_, step.d);
-    // A promise that takes depths near zero says little: residuals go with
-    // 1 / depth.
-    const double tolerance = share < 1 ? kFinestTolerance : goal.tolerance;
-    const bool is_last = !(promise > tolerance * cost);
-    // Is it small for the sake of a kappa that nothing has raised here?
-    if (is_last && kappa > kSmallestKappa && lessons == 0) {
-      model_.RaiseMultipliers();
-      kappa = kSmallestKappa;
-      ++summary.iterations;
-      continue;
-    }
-    if (IsFarAway(model_.DepthGrowth(), promise / cost)) {
-      summary.termination = DescentTermination::kFarAway;
-      break;
-    }
-    ++summary.iterations;
-    const Vector3d x_trial = *x + share * step.d;
-    const double cost_trial = residuals->Evaluate(x_trial, norm);
-    const double kept = (cost - cost_trial) / (share * promise);
-    // The pieces of polyhedral norms lack the curvature of Newton's step.
-    const bool is_newton =
-        !norm.IsPolyhedral() && kappa <= kSmallestKappa && share == 1;
-    const bool arrives =
-        is_newton && LeftAfter(step, cost_trial) <= goal.tolerance * cost;
-    const bool is_rounding = is_newton && !(kept > kSufficientShare) &&
-                             promise <= kPromiseRounding * cost;
-    if (is_last || arrives || is_rounding) {
-      if (cost_trial < cost) {
-        *x = x_trial;
-        cost = cost_trial;
-      }
-      summary.termination = DescentTermination::kStationary;
-      break;
-    }
-    std::optional<double> overlooked;
-    if (cost_trial > step.level) {
-      overlooked = AddMembers(*residuals, step.level);
-    }
-    if (kept > kSufficientShare) {
-      *x = x_trial;
-      cost = cost_trial;
-      model_.AdoptMultipliers();
-      model_.Linearize(*x, cost, norm);
-      if (kept > kGoodShare) kappa = std::max(kappa * kShrink, kSmallestKappa);
-      lessons = 0;
-      cost_failed = kInfinity;
-      continue;
-    }
-    if (overlooked) {
-      model_.Linearize(*x, cost, norm);
-      // Whether the model knew the largest residual, and misjudged it.
-      const bool misjudged = *overlooked < cost_trial;
-      if (!misjudged || ++lessons <= kMaxLessons) continue;
-    } else {
-      bool learned = model_.RaiseMultipliers();
-      learned |= model_.AddTangents(x_trial, residuals->values(), step.level);
-      learned &= cost_trial < kLessonWorth * cost_failed;
-      cost_failed = cost_trial;
-      if (learned && ++lessons <= kMaxLessons) continue;
-    }
-    kappa *= kGrow;
-    if (kappa > kLargestKappa) {
-      summary.termination = DescentTermination::kNoDecrease;
-      break;
-    }
-  }
-  summary.cost = cost;
+  Descent descent(residuals, norm, goal, &model_, &is_member_);
+  descent.Start(*x, cost, *active);
+  summary.termination = descent.Run(max_iterations);
+  summary.cost = descent.cost();
+  summary.iterations = descent.iterations();
+  *x = descent.x();
   if (summary.iterations > 0) *active = model_.Active();
   return summary;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -43,6 +42,14 @@ struct DescentGoal {
 // residuals that it overlooked, multipliers, tangents; where that does not
 // help, kappa shortens the step, so that one which lowers the maximum exists
 // wherever it is not minimal. Every trial costs one pass over all residuals.
+//
+//   step of the model:   promises nothing, though kappa alone may be why?
+//     |                    kappa falls to its least; again
+//     v
+//   trial, one pass:     leaves nothing to the next?  kStationary
+//     |-- keeps enough of the promise:  x moves, kappa may fall; again
+//     |-- or teaches the model:         again
+//     `-- neither:                      kappa rises; again
 class NewtonDescent {
  public:
   // See FastDescent::Minimize.
@@ -51,11 +58,7 @@ class NewtonDescent {
                           Eigen::Vector3d* x);
 
  private:
-  void StartModel(const ResidualSet& residuals, double cost, Norm norm,
-                  const ActiveResiduals& active, const Eigen::Vector3d& x);
-  std::optional<double> AddMembers(const ResidualSet& residuals, double level);
-  void AddMember(const ResidualSet& residuals, int index);
-
+  // Of a descent; kept for their memory.
   LocalModel model_;
   std::vector<char> is_member_;
 };

@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <string_view>
 #include <system_error>
 
+#include "krot/base/file_descriptor.h"
 #include "krot/model/model_error.h"
 
 namespace krot {
@@ -16,29 +18,6 @@ namespace {
   const std::string reason = std::generic_category().message(errno);
   throw ModelError(path + ": cannot be " + action + ": " + reason);
 }
-
-// An open file that closes itself when an exception passes by.
-class Descriptor {
- public:
-  explicit Descriptor(int value) : value_(value) {}
-  ~Descriptor() {
-    if (is_open()) ::close(value_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  bool is_open() const { return value_ >= 0; }
-  int get() const { return value_; }
-  // False, with errno, if what was written before did not arrive.
-  bool Close() {
-    const int value = value_;
-    value_ = -1;
-    return ::close(value) == 0;
-  }
-
- private:
-  int value_;
-};
 
 bool IsLfsPointer(std::string_view bytes) {
   constexpr std::string_view kSignature =
@@ -51,7 +30,7 @@ bool IsLfsPointer(std::string_view bytes) {
 FileBytes ReadFileBytes(const std::filesystem::path& path) {
   FileBytes file;
   file.path = path.string();
-  const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!descriptor.is_open()) FailWithErrno(file.path, "opened");
 
   struct stat status;
@@ -81,26 +60,6 @@ FileBytes ReadFileBytes(const std::filesystem::path& path) {
                      "where it was cloned");
   }
   return file;
-}
-
-void WriteFileBytes(const std::filesystem::path& path, std::string_view bytes) {
-  const std::string name = path.string();
-  Descriptor descriptor(::open(
-      path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode_t{0666}));
-  if (!descriptor.is_open()) FailWithErrno(name, "created");
-  while (!bytes.empty()) {
-    const ssize_t result =
-        ::write(descriptor.get(), bytes.data(), bytes.size());
-    if (result < 0 && errno == EINTR) continue;
-    if (result < 0) FailWithErrno(name, "written");
-    bytes.remove_prefix(static_cast<size_t>(result));
-  }
-  // Some file systems know only now that there is no space. Those without
-  // fsync answer EINVAL.
-  if (::fsync(descriptor.get()) != 0 && errno != EINVAL) {
-    FailWithErrno(name, "written");
-  }
-  if (!descriptor.Close()) FailWithErrno(name, "written");
 }
 
 }  // namespace krot

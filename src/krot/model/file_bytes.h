@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <string>
-#include <string_view>
 
 namespace krot {
 
@@ -16,9 +15,5 @@ struct FileBytes {
 // regular file or not readable, or if it is a Git LFS pointer instead of the
 // file that it stands for.
 FileBytes ReadFileBytes(const std::filesystem::path& path);
-
-// Creates `path` or replaces its content, and forces it to the disk. Throws
-// ModelError if it cannot be written in full (no space left, for one).
-void WriteFileBytes(const std::filesystem::path& path, std::string_view bytes);
 
 }  // namespace krot

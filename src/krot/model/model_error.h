@@ -5,7 +5,7 @@
 
 namespace krot {
 
-// A model that cannot be read, used or written. what() is one sentence:
+// A model that cannot be read or used. what() is one sentence:
 // the file, the place in it (byte offset or line), what was found and what
 // was expected.
 class ModelError : public std::runtime_error {

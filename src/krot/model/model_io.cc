@@ -3,9 +3,10 @@
 #include <string>
 #include <vector>
 
+#include "krot/base/folder_swap.h"
+#include "krot/base/write_file.h"
 #include "krot/model/binary_io.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/folder_swap.h"
 #include "krot/model/model_error.h"
 #include "krot/model/text_io.h"
 
@@ -46,15 +47,15 @@ constexpr const char* kProjectFile = "project.ini";
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
-// Runs `action`; what the file system refuses becomes a ModelError.
-template <typename Action>
-auto WithModelErrors(const fs::path& folder, const char* verb,
-                     const Action& action) {
+// Runs `action`; what the file system refuses becomes an Error.
+template <typename Error, typename Action>
+auto Translating(const fs::path& folder, const char* verb,
+                 const Action& action) {
   try {
     return action();
   } catch (const fs::filesystem_error& error) {
-    throw ModelError(folder.string() + ": cannot be " + verb + ": " +
-                     error.code().message());
+    throw Error(folder.string() + ": cannot be " + verb + ": " +
+                error.code().message());
   }
 }
 
@@ -135,14 +136,14 @@ void WriteModelFiles(const Model& model, ModelFormat format,
     if (part.is_optional && !model.has_rigs) continue;
     const auto format_part =
         format == ModelFormat::kBinary ? part.format_binary : part.format_text;
-    WriteFileBytes(folder / part.FileName(format), format_part(model));
+    WriteFile(folder / part.FileName(format), format_part(model));
   }
 }
 
 }  // namespace
 
 ModelFormat DetectModelFormat(const fs::path& folder) {
-  return WithModelErrors(folder, "read", [&] {
+  return Translating<ModelError>(folder, "read", [&] {
     if (!fs::exists(folder)) {
       throw ModelError(folder.string() + ": no such folder");
     }
@@ -158,8 +159,8 @@ ModelFormat DetectModelFormat(const fs::path& folder) {
 }
 
 Model ReadModel(const fs::path& folder, ModelFormat format) {
-  const bool has_rigs =
-      WithModelErrors(folder, "read", [&] { return HasRigs(folder, format); });
+  const bool has_rigs = Translating<ModelError>(
+      folder, "read", [&] { return HasRigs(folder, format); });
   Model model;
   for (const ModelPart& part : kParts) {
     if (part.is_optional && !has_rigs) continue;
@@ -174,14 +175,14 @@ Model ReadModel(const fs::path& folder, ModelFormat format) {
 }
 
 void CheckWritable(const fs::path& folder, const WriteModelOptions& options) {
-  WithModelErrors(folder, "written", [&] {
+  Translating<WriteError>(folder, "written", [&] {
     CheckSwappable(folder);
     if (options.overwrite) return;
     for (const ModelPart& part : kParts) {
       for (const ModelFormat format : kFormats) {
         const std::string name = part.FileName(format);
         if (!fs::exists(folder / name)) continue;
-        throw ModelError(folder.string() + ": already holds a model (" + name +
+        throw WriteError(folder.string() + ": already holds a model (" + name +
                          "); set overwrite to replace it");
       }
     }
@@ -191,7 +192,7 @@ void CheckWritable(const fs::path& folder, const WriteModelOptions& options) {
 void WriteModel(const Model& model, const fs::path& folder,
                 const WriteModelOptions& options) {
   CheckWritable(folder, options);
-  WithModelErrors(folder, "written", [&] {
+  Translating<WriteError>(folder, "written", [&] {
     FolderSwap swap(folder);
     WriteModelFiles(model, options.format, swap.staging());
     const fs::path project = options.copy_project_from / kProjectFile;

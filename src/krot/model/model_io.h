@@ -32,7 +32,7 @@ struct WriteModelOptions {
   std::filesystem::path copy_project_from;  // empty: nothing is copied
 };
 
-// Throws ModelError if WriteModel would refuse this folder: it holds a model
+// Throws WriteError if WriteModel would refuse this folder: it holds a model
 // and options.overwrite is false, it is a file, a mount point or the working
 // directory, or it cannot be created or is not writable. Changes nothing.
 void CheckWritable(const std::filesystem::path& folder,
@@ -41,7 +41,7 @@ void CheckWritable(const std::filesystem::path& folder,
 // Writes the model into a new sibling folder and swaps that in, so that an
 // interruption leaves the old model or the new one and never a mix; foreign
 // files already in `folder` are carried over, model files of the other format
-// are not. Throws ModelError; nothing has changed then. Requires a valid model
+// are not. Throws WriteError; nothing has changed then. Requires a valid model
 // (ValidateModel).
 void WriteModel(const Model& model, const std::filesystem::path& folder,
                 const WriteModelOptions& options);

@@ -3,8 +3,8 @@
 #include <string_view>
 #include <utility>
 
+#include "krot/base/write_file.h"
 #include "krot/camera/camera_model.h"
-#include "krot/model/model_error.h"
 #include "krot/model/sensor_type.h"
 #include "krot/model/text_io.h"
 
@@ -34,7 +34,7 @@ void AppendPoseWords(const Pose& pose, std::string* text) {
 void AppendSensorId(const SensorId& sensor_id, std::string* text) {
   const std::optional<std::string_view> name = SensorTypeName(sensor_id.type);
   if (!name) {
-    throw ModelError("found sensor type " + std::to_string(sensor_id.type) +
+    throw WriteError("found sensor type " + std::to_string(sensor_id.type) +
                      " (sensor " + std::to_string(sensor_id.id) +
                      "), expected -1, 0 or 1: text has names for these only");
   }
@@ -51,7 +51,7 @@ void CheckNameFitsText(const Image& image) {
       (name.empty() || (kBlanks.find(name.front()) == std::string_view::npos &&
                         kBlanks.find(name.back()) == std::string_view::npos));
   if (fits) return;
-  throw ModelError("image " + std::to_string(image.id) + ": found the name \"" +
+  throw WriteError("image " + std::to_string(image.id) + ": found the name \"" +
                    name +
                    "\", expected no line break and no blank at either end: "
                    "text files cannot hold them");
@@ -68,7 +68,7 @@ std::string FormatCamerasText(const Model& model) {
   for (const Camera& camera : model.cameras) {
     const CameraModelInfo* info = FindCameraModel(camera.model_id);
     if (info == nullptr) {
-      throw ModelError("camera " + std::to_string(camera.id) +
+      throw WriteError("camera " + std::to_string(camera.id) +
                        ": found camera model id " +
                        std::to_string(camera.model_id) + ", expected 0 to " +
                        std::to_string(CameraModels().back().id));

@@ -15,7 +15,7 @@ namespace krot {
 // Parse... replaces its part of the model; throws ModelError with the line,
 // the word found and what was expected. Text holds no counts of records:
 // duplicates and gaps are for ValidateModel. Format... returns the file's
-// content; throws ModelError for what text cannot hold (an unknown camera
+// content; throws WriteError for what text cannot hold (an unknown camera
 // model or sensor type, a name with line breaks or blanks at its ends).
 // O(bytes), some 100 MB/s.
 

@@ -9,10 +9,6 @@
 namespace krot {
 namespace {
 
-bool IsInterrupted(const AdjustModelOptions& options) {
-  return IsCancelled(options.adjustment.cancel);
-}
-
 // Every error, so that what COLMAP recomputes is below the cap, too.
 bool IsBelow(const PixelErrorStatistics& errors, double max_error) {
   return errors.not_finite == 0 && errors.max < max_error;
@@ -25,60 +21,52 @@ std::string PixelText(double error_px) {
   return text.str();
 }
 
-SolveModelResult FindStart(const Model& model,
-                           const AdjustModelOptions& options) {
-  SolveModelOptions solve = options.start;
-  solve.num_threads = options.adjustment.num_threads;
-  solve.cancel = options.adjustment.cancel;
-  return SolveModel(model, solve);
-}
-
 // Where a bounded adjustment starts, and its cap; none if there is no estimate
 // below it.
 std::optional<Model> BoundedStart(const Model& model,
                                   const AdjustModelOptions& options,
+                                  const Context& context,
                                   AdjustModelSummary* summary) {
-  const auto note = [&](const std::string& sentence) {
-    if (options.on_note) options.on_note(sentence);
-  };
   summary->max_error = options.adjustment.max_error;
   if (!options.max_error_factor &&
       IsBelow(summary->pixel_error_before, *summary->max_error)) {
     return model;
   }
-  note(options.max_error_factor
-           ? "the cap refers to the lowest maximum with these rotations: "
-             "solving for it"
-           : "the model's largest error is not below the cap: solving for the "
-             "lowest with these rotations");
-  SolveModelResult start = FindStart(model, options);
+  context.Note(
+      options.max_error_factor
+          ? "the cap refers to the lowest maximum with these rotations: "
+            "solving for it"
+          : "the model's largest error is not below the cap: solving for the "
+            "lowest with these rotations");
+  SolveModelResult start = SolveModel(model, options.start, context);
   summary->pixel_error_start = start.summary.pixel_error_after;
   summary->start = std::move(start.summary);
   if (options.max_error_factor) {
     summary->max_error =
         *options.max_error_factor * summary->pixel_error_start.max;
   }
-  if (IsInterrupted(options) ||
+  if (context.IsCancelled() ||
       !IsBelow(summary->pixel_error_start, *summary->max_error)) {
     return std::nullopt;
   }
-  note("largest error " + PixelText(summary->pixel_error_start.max) + ", cap " +
-       PixelText(*summary->max_error));
+  context.Note("largest error " + PixelText(summary->pixel_error_start.max) +
+               ", cap " + PixelText(*summary->max_error));
   return std::move(start.model);
 }
 
 }  // namespace
 
 AdjustModelResult AdjustModel(const Model& model,
-                              const AdjustModelOptions& options) {
+                              const AdjustModelOptions& options,
+                              const Context& context) {
   if (options.max_error_factor) {
     CheckArgument(*options.max_error_factor > 1, "max_error_factor",
                   *options.max_error_factor, "> 1");
   }
-  const int num_threads = options.adjustment.num_threads;
   AdjustModelResult result;
   AdjustModelSummary& summary = result.summary;
-  summary.pixel_error_before = Summarize(PixelErrors(model, num_threads));
+  summary.pixel_error_before =
+      Summarize(PixelErrors(model, context.num_threads));
   summary.pixel_error_start = summary.pixel_error_before;
   summary.pixel_error_after = summary.pixel_error_before;
 
@@ -86,22 +74,22 @@ AdjustModelResult AdjustModel(const Model& model,
   const bool is_bounded = adjustment.max_error || options.max_error_factor;
   std::optional<Model> start;
   if (is_bounded) {
-    start = BoundedStart(model, options, &summary);
+    start = BoundedStart(model, options, context, &summary);
     if (!start) {
       summary.adjustment.termination =
-          IsInterrupted(options)
-              ? BundleAdjustmentTermination::kInterrupted
-              : BundleAdjustmentTermination::kInfeasibleStart;
+          context.IsCancelled() ? BundleAdjustmentTermination::kInterrupted
+                                : BundleAdjustmentTermination::kInfeasibleStart;
       result.model = model;
       return result;
     }
     adjustment.max_error = summary.max_error;
   }
   BundleAdjustmentResult adjusted =
-      AdjustBundle(start ? *start : model, adjustment);
+      AdjustBundle(start ? *start : model, adjustment, context);
   summary.adjustment = std::move(adjusted.summary);
   result.model = std::move(adjusted.model);
-  const std::vector<double> errors_px = PixelErrors(result.model, num_threads);
+  const std::vector<double> errors_px =
+      PixelErrors(result.model, context.num_threads);
   UpdatePointErrors(errors_px, &result.model);
   summary.pixel_error_after = Summarize(errors_px);
   return result;

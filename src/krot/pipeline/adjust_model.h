@@ -1,11 +1,10 @@
 #pragma once
 
-#include <functional>
 #include <optional>
-#include <string>
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/pixel_errors.h"
+#include "krot/base/context.h"
 #include "krot/model/model.h"
 #include "krot/pipeline/solve_model.h"
 
@@ -22,11 +21,7 @@ struct AdjustModelOptions {
   // Takes the place of adjustment.max_error: the cap is so many times the
   // largest error of the known rotation problem's solution; > 1.
   std::optional<double> max_error_factor;
-  // For the known rotation problem; threads and cancellation are those of
-  // `adjustment`.
-  SolveModelOptions start;
-  // A sentence on what is done, and why; may be empty.
-  std::function<void(const std::string&)> on_note;
+  SolveModelOptions start;  // for the known rotation problem
 };
 
 struct AdjustModelSummary {
@@ -49,6 +44,7 @@ struct AdjustModelResult {
 // Stored point errors are updated. Requires and throws as AdjustBundle and
 // SolveModel.
 AdjustModelResult AdjustModel(const Model& model,
-                              const AdjustModelOptions& options);
+                              const AdjustModelOptions& options,
+                              const Context& context = {});
 
 }  // namespace krot

@@ -2,14 +2,14 @@
 
 namespace krot {
 
-JointCallback LogIterations(const SolveModelOptions& options,
-                            const Timer& timer, SolveSummary* summary) {
-  return [&options, &timer, summary](int, const JointIteration& state) {
+JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
+                            SolveSummary* summary) {
+  return [callback, &timer, summary](int, const JointIteration& state) {
     summary->iterations.push_back(state);
     summary->iterations.back().seconds = timer.Seconds();
-    if (!options.joint.callback) return;
-    options.joint.callback(static_cast<int>(summary->iterations.size()),
-                           summary->iterations.back());
+    if (!callback) return;
+    callback(static_cast<int>(summary->iterations.size()),
+             summary->iterations.back());
   };
 }
 

@@ -7,8 +7,8 @@ namespace krot {
 
 // For the stages of a solve that iterate: appends every iteration to
 // `summary->iterations`, with the seconds of the solve's `timer`, and hands it
-// on to options.joint.callback, counted over all stages. Keeps references.
-JointCallback LogIterations(const SolveModelOptions& options,
-                            const Timer& timer, SolveSummary* summary);
+// on to `callback`, counted over all stages. Keeps references to the other two.
+JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
+                            SolveSummary* summary);
 
 }  // namespace krot

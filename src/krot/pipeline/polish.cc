@@ -18,14 +18,11 @@ BundleAdjustmentOptions PolishOptions(Polish polish) {
 
 }  // namespace
 
-PolishSummary PolishModel(Polish polish, int num_threads,
-                          const CancelFlag* cancel, Model* model) {
-  BundleAdjustmentOptions options = PolishOptions(polish);
-  options.num_threads = num_threads;
-  options.cancel = cancel;
-  BundleAdjustmentResult adjusted = AdjustBundle(*model, options);
+PolishSummary PolishModel(Polish polish, const Context& context, Model* model) {
+  BundleAdjustmentResult adjusted =
+      AdjustBundle(*model, PolishOptions(polish), context);
   const std::vector<double> errors_px =
-      PixelErrors(adjusted.model, num_threads);
+      PixelErrors(adjusted.model, context.num_threads);
   UpdatePointErrors(errors_px, &adjusted.model);
   *model = std::move(adjusted.model);
   return {polish, std::move(adjusted.summary), Summarize(errors_px)};

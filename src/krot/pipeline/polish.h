@@ -2,7 +2,7 @@
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/pixel_errors.h"
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -22,9 +22,8 @@ struct PolishSummary {
 };
 
 // Adjusts the model in place and updates its stored point errors. `polish` must
-// not be kNone; `cancel` may be null.
-PolishSummary PolishModel(Polish polish, int num_threads,
-                          const CancelFlag* cancel, Model* model);
+// not be kNone.
+PolishSummary PolishModel(Polish polish, const Context& context, Model* model);
 
 // As --Solver.polish takes it: "none", "rotations_fixed", "full".
 const char* PolishName(Polish polish);

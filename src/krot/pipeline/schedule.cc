@@ -51,10 +51,11 @@ SolveTermination FromJoint(JointTermination termination) {
 class Schedule {
  public:
   Schedule(const KnownRotationProblem& problem,
-           const SolveModelOptions& options, const Timer& timer,
-           Estimate* estimate, SolveSummary* summary)
+           const SolveModelOptions& options, const Context& context,
+           const Timer& timer, Estimate* estimate, SolveSummary* summary)
       : problem_(problem),
         options_(options),
+        context_(context),
         timer_(timer),
         estimate_(*estimate),
         summary_(*summary) {}
@@ -79,7 +80,8 @@ class Schedule {
   }
 
   const KnownRotationProblem& problem_;
-  const SolveModelOptions& options_;
+  const SolveModelOptions options_;
+  const Context context_;
   const Timer& timer_;
   Estimate& estimate_;
   SolveSummary& summary_;
@@ -87,10 +89,9 @@ class Schedule {
 
 void Schedule::Sweeps(ResIntOptions res_int) {
   res_int.norm = options_.norm;
-  res_int.num_threads = options_.num_threads;
-  res_int.cancel = options_.cancel;
   res_int.callback = [this](int, const Sweep& sweep) { AddSweep(sweep.cost); };
-  const ResIntSummary result = SolveResInt(problem_, res_int, &estimate_);
+  const ResIntSummary result =
+      SolveResInt(problem_, res_int, context_, &estimate_);
   summary_.termination = FromResInt(result.termination);
   summary_.cost_final = result.cost_final;
 }
@@ -106,11 +107,9 @@ void Schedule::LeadingSweeps() {
 std::optional<Certificate> Schedule::Joint() {
   JointOptions joint = options_.joint;
   joint.norm = options_.norm;
-  joint.num_threads = options_.num_threads;
-  joint.cancel = options_.cancel;
   joint.relative_gap *= kShareOfGap;
-  joint.callback = LogIterations(options_, timer_, &summary_);
-  const JointSummary result = SolveJoint(problem_, joint, &estimate_);
+  joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
+  const JointSummary result = SolveJoint(problem_, joint, context_, &estimate_);
   summary_.termination = FromJoint(result.termination);
   summary_.cost_final = result.cost_final;
   summary_.num_working_observations = result.num_working_observations;
@@ -119,17 +118,17 @@ std::optional<Certificate> Schedule::Joint() {
 
 void Schedule::FinishingSweeps() {
   BlockSweep blocks(problem_, options_.res_int.fast_descent, options_.norm,
-                    options_.num_threads, options_.cancel);
+                    context_);
   for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
     Estimate swept = estimate_;
     blocks.IntersectPoints(&swept);
     blocks.ResectFrames(&swept);
-    if (IsCancelled(options_.cancel)) {
+    if (context_.IsCancelled()) {
       summary_.termination = SolveTermination::kInterrupted;
       return;
     }
     const double cost =
-        Cost(problem_, swept, options_.norm, options_.num_threads);
+        Cost(problem_, swept, options_.norm, context_.num_threads);
     if (!(cost <= (1 + kCostRounding) * summary_.cost_final)) return;
     estimate_ = std::move(swept);
     summary_.cost_final = cost;
@@ -139,19 +138,18 @@ void Schedule::FinishingSweeps() {
 
 void Schedule::StartAfresh() {
   if (!(summary_.cost_final > options_.init_max_error)) return;
-  if (options_.on_note) {
-    options_.on_note("the start is a rough one; looking for a better");
-  }
+  context_.Note("the start is a rough one; looking for a better");
   FoundStart found = FindFeasibleStart(
-      problem_, options_, LogIterations(options_, timer_, &summary_));
+      problem_, options_, context_,
+      LogIterations(options_.joint.callback, timer_, &summary_));
   if (found.termination == SolveTermination::kInterrupted) {
     summary_.termination = SolveTermination::kInterrupted;
   }
-  if (found.termination != SolveTermination::kNotRun) return;
+  if (!found.estimate) return;
   const double cost =
-      Cost(problem_, found.estimate, options_.norm, options_.num_threads);
+      Cost(problem_, *found.estimate, options_.norm, context_.num_threads);
   if (!(cost < summary_.cost_final)) return;
-  estimate_ = std::move(found.estimate);
+  estimate_ = *std::move(found.estimate);
   summary_.cost_final = cost;
 }
 
@@ -159,13 +157,19 @@ void Schedule::StartAfresh() {
 
 std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
                                        const SolveModelOptions& options,
-                                       SolveMethod method, const Timer& timer,
-                                       Estimate* estimate,
+                                       SolveMethod method,
+                                       const Context& context,
+                                       const Timer& timer, Estimate* estimate,
                                        SolveSummary* summary) {
   summary->cost_initial =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   summary->cost_final = summary->cost_initial;
-  Schedule schedule(problem, options, timer, estimate, summary);
+  if (method != SolveMethod::kResInt &&
+      IsZeroUpToRounding(summary->cost_initial)) {
+    summary->termination = SolveTermination::kZeroCost;
+    return std::nullopt;
+  }
+  Schedule schedule(problem, options, context, timer, estimate, summary);
   switch (method) {
     case SolveMethod::kResInt:
       schedule.Sweeps(options.res_int);

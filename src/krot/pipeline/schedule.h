@@ -13,8 +13,9 @@ namespace krot {
 // it has one. The cost rises by rounding at most.
 std::optional<Certificate> RunSchedule(const KnownRotationProblem& problem,
                                        const SolveModelOptions& options,
-                                       SolveMethod method, const Timer& timer,
-                                       Estimate* estimate,
+                                       SolveMethod method,
+                                       const Context& context,
+                                       const Timer& timer, Estimate* estimate,
                                        SolveSummary* summary);
 
 }  // namespace krot

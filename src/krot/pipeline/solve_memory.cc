@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "krot/conic/interior_point.h"
-#include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
 #include "krot/joint/working_set.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -40,12 +40,12 @@ int64_t PartBytes(const KnownRotationProblem& problem) {
   return ProblemBytes(problem) + Size(problem.observations.size(), 8);
 }
 
-// The points that the joint solver looks at first, as a problem.
-KnownRotationProblem FirstWorkingProblem(const BuiltProblem& built, Norm norm) {
+// The points that the joint solver looks at first.
+ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm) {
   const KnownRotationProblem& problem = built.problem;
   const double cost = Cost(problem, built.start, norm, /*num_threads=*/1);
   const WorkingSet set = FirstWorkingSet(problem, built.start, norm, cost);
-  return RestrictProblem(problem, set.Observations()).problem;
+  return ProblemSubset(problem, set.Observations());
 }
 
 }  // namespace
@@ -71,20 +71,22 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
       summary.init == SolveInit::kModel) {
     return memory;
   }
-  // The largest component, the lists of which observation is in which, and all
-  // or some of it as a problem for the interior point.
+  // The lists of which observation is in which component and working set, and
+  // the largest component, which is a copy unless there is but one.
   const int64_t component =
-      held + PartBytes(problem) + Size(problem.observations.size(), 16);
-  memory.at_most = std::max(
-      memory.at_most, component + PartBytes(problem) +
-                          EstimateInteriorPointMemory(problem, summary.norm));
+      held + Size(problem.observations.size(), 16) +
+      (summary.num_components > 1 ? PartBytes(problem) : 0);
+  memory.at_most =
+      std::max(memory.at_most,
+               component + EstimateInteriorPointMemory(problem, summary.norm));
   if (summary.init == SolveInit::kFeasible) {
     memory.likely = memory.at_most;
     return memory;
   }
   // The allocator keeps what the interior point has freed when the points that
   // it did not look at become a problem in turn.
-  const KnownRotationProblem working = FirstWorkingProblem(built, summary.norm);
+  const ProblemSubset subset = FirstWorkingProblem(built, summary.norm);
+  const KnownRotationProblem& working = subset.problem();
   memory.likely = std::max(
       memory.likely, component + PartBytes(working) +
                          EstimateInteriorPointMemory(working, summary.norm) +

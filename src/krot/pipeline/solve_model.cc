@@ -78,8 +78,10 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
                   summary->cost_final
             : 0;
   }
-  if (summary->termination == SolveTermination::kGapReached &&
-      !(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
+  if (summary->termination != SolveTermination::kGapReached) return;
+  if (IsZeroUpToRounding(summary->cost_final)) {
+    summary->termination = SolveTermination::kZeroCost;
+  } else if (!(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
     summary->termination = SolveTermination::kStalled;
   }
 }
@@ -87,87 +89,33 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
 // Finds the estimate to start from; false, and the termination why, if there
 // is none.
 bool FindEstimate(const Model& model, const SolveModelOptions& options,
-                  const Timer& timer, Start* start, Estimate* estimate,
-                  SolveSummary* summary) {
+                  const Context& context, const Timer& timer, Start* start,
+                  Estimate* estimate, SolveSummary* summary) {
   if (start->init == SolveInit::kModel) {
     *estimate = start->built.start;
     return true;
   }
-  FoundStart found = FindFeasibleStart(start->built.problem, options,
-                                       LogIterations(options, timer, summary));
-  summary->termination = found.termination;
-  if (found.termination == SolveTermination::kNotRun) {
-    *estimate = std::move(found.estimate);
+  FoundStart found =
+      FindFeasibleStart(start->built.problem, options, context,
+                        LogIterations(options.joint.callback, timer, summary));
+  if (found.estimate) {
+    *estimate = *std::move(found.estimate);
     return true;
   }
+  summary->termination = found.termination;
   const bool was_asked = options.init == SolveInit::kFeasible;
   if (found.termination == SolveTermination::kInterrupted || was_asked) {
     Certify(model, *start, start->built.start, options, found.certificate,
             summary);
     return false;
   }
-  if (options.on_note) {
-    options.on_note("there is none; going on without those observations");
-  }
-  *start = OwnStart(model, options);
+  context.Note("there is none; going on without those observations");
+  *start = OwnStart(model, options, context);
   summary->init = start->init;
   CountProblem(model, start->built, summary);
   *estimate = start->built.start;
   summary->termination = SolveTermination::kNothingToSolve;
   return !start->built.problem.observations.empty();
-}
-
-SolveModelResult Solve(const Model& model, const SolveModelOptions& options) {
-  CheckOptions(options);
-  SolveModelResult result;
-  SolveSummary& summary = result.summary;
-  summary.method = EffectiveMethod(options);
-  summary.norm = options.norm;
-
-  const Timer build_timer;
-  Start start = ChooseStart(model, options, summary.method);
-  summary.init = start.init;
-  CountProblem(model, start.built, &summary);
-  summary.pixel_error_before =
-      Summarize(PixelErrors(model, options.num_threads));
-  summary.pixel_error_after = summary.pixel_error_before;
-  summary.seconds_build = build_timer.Seconds();
-  if (options.on_built) options.on_built(summary);
-  if (start.built.problem.observations.empty()) {
-    summary.termination = SolveTermination::kNothingToSolve;
-    result.model = model;
-    return result;
-  }
-
-  const Timer solve_timer;
-  Estimate estimate;
-  if (!FindEstimate(model, options, solve_timer, &start, &estimate, &summary)) {
-    summary.seconds_solve = solve_timer.Seconds();
-    result.model = model;
-    return result;
-  }
-  const KnownRotationProblem& problem = start.built.problem;
-  const std::optional<Certificate> certificate = RunSchedule(
-      problem, options, summary.method, solve_timer, &estimate, &summary);
-  if (options.res_int.update_frames) {
-    RestoreGauge(problem, start.built.start, &estimate);
-    summary.cost_final =
-        Cost(problem, estimate, options.norm, options.num_threads);
-  }
-  result.model = ApplyEstimate(model, start.built, estimate);
-  const std::vector<double> errors_px =
-      PixelErrors(result.model, options.num_threads);
-  UpdatePointErrors(errors_px, &result.model);
-  summary.pixel_error_after = Summarize(errors_px);
-  summary.seconds_solve = solve_timer.Seconds();
-
-  Certify(model, start, estimate, options, certificate, &summary);
-  MeasureGap(options.joint.relative_gap, &summary);
-  if (options.polish != Polish::kNone && !IsCancelled(options.cancel)) {
-    summary.polish = PolishModel(options.polish, options.num_threads,
-                                 options.cancel, &result.model);
-  }
-  return result;
 }
 
 }  // namespace
@@ -181,19 +129,74 @@ SolveMethod EffectiveMethod(const SolveModelOptions& options) {
 }
 
 SolveModelResult SolveModel(const Model& model,
-                            const SolveModelOptions& options) {
-  return Solve(model, options);
+                            const SolveModelOptions& options,
+                            const Context& context) {
+  CheckOptions(options);
+  SolveModelResult result;
+  SolveSummary& summary = result.summary;
+  summary.method = EffectiveMethod(options);
+  summary.norm = options.norm;
+
+  const Timer build_timer;
+  Start start = ChooseStart(model, options, summary.method, context);
+  summary.init = start.init;
+  CountProblem(model, start.built, &summary);
+  summary.pixel_error_before =
+      Summarize(PixelErrors(model, context.num_threads));
+  summary.pixel_error_after = summary.pixel_error_before;
+  summary.seconds_build = build_timer.Seconds();
+  if (options.on_built) options.on_built(summary);
+  if (start.built.problem.observations.empty()) {
+    summary.termination = SolveTermination::kNothingToSolve;
+    result.model = model;
+    return result;
+  }
+
+  const Timer solve_timer;
+  Estimate estimate;
+  if (!FindEstimate(model, options, context, solve_timer, &start, &estimate,
+                    &summary)) {
+    summary.seconds_solve = solve_timer.Seconds();
+    result.model = model;
+    return result;
+  }
+  const KnownRotationProblem& problem = start.built.problem;
+  const std::optional<Certificate> certificate =
+      RunSchedule(problem, options, summary.method, context, solve_timer,
+                  &estimate, &summary);
+  if (options.res_int.update_frames) {
+    RestoreGauge(problem, start.built.start, &estimate);
+    summary.cost_final =
+        Cost(problem, estimate, options.norm, context.num_threads);
+  }
+  result.model = ApplyEstimate(model, start.built, estimate);
+  const std::vector<double> errors_px =
+      PixelErrors(result.model, context.num_threads);
+  UpdatePointErrors(errors_px, &result.model);
+  summary.pixel_error_after = Summarize(errors_px);
+  summary.seconds_solve = solve_timer.Seconds();
+
+  Certify(model, start, estimate, options, certificate, &summary);
+  MeasureGap(options.joint.relative_gap, &summary);
+  if (options.polish != Polish::kNone && !context.IsCancelled()) {
+    summary.polish = PolishModel(options.polish, context, &result.model);
+  }
+  return result;
 }
 
 SolveModelResult TriangulateModel(const Model& model,
-                                  const SolveModelOptions& options) {
-  SolveModelOptions points_only = options;
-  points_only.method = SolveMethod::kResInt;
-  points_only.init = SolveInit::kModel;
-  points_only.polish = Polish::kNone;
-  points_only.res_int.update_frames = false;
-  points_only.res_int.max_sweeps = 1;
-  return Solve(model, points_only);
+                                  const SolveModelOptions& options,
+                                  const Context& context) {
+  return SolveModel(model, PointsOnly(options), context);
+}
+
+SolveModelOptions PointsOnly(SolveModelOptions options) {
+  options.method = SolveMethod::kResInt;
+  options.init = SolveInit::kModel;
+  options.polish = Polish::kNone;
+  options.res_int.update_frames = false;
+  options.res_int.max_sweeps = 1;
+  return options;
 }
 
 }  // namespace krot

@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
 #include "krot/bridge/certificate_support.h"
+#include "krot/joint/joint.h"
 #include "krot/model/model.h"
 #include "krot/pipeline/polish.h"
-#include "krot/joint/joint.h"
 #include "krot/sweeps/res_int.h"
 
 namespace krot {
@@ -37,6 +38,7 @@ enum class SolveTermination {
   kNotRun,
   kNothingToSolve,  // every observation was left out
   kGapReached,      // a certificate shows the relative gap asked for
+  kZeroCost,        // every residual is zero up to rounding: no gap is needed
   kStalled,         // no further progress, and no proof that there is none
   kMaxSweeps,
   kMaxIterations,
@@ -105,10 +107,8 @@ struct SolveModelOptions {
   BuildProblemOptions problem;
   Polish polish = Polish::kNone;  // of SolveModel
 
-  // Take the place of those in the stages' own options.
+  // Takes the place of that in the stages' own options.
   Norm norm;
-  int num_threads = -1;
-  const CancelFlag* cancel = nullptr;  // may be null
 
   // kResInt. Its fast_descent and callback serve all sweeps, of which those of
   // kAuto are counted on.
@@ -121,8 +121,6 @@ struct SolveModelOptions {
   // kAuto, kJoint. Its callback is also told of iterations towards a start.
   JointOptions joint;
 
-  // A sentence on what was chosen, and why; may be empty.
-  std::function<void(const std::string&)> on_note;
   // Called once, with the counts filled in, before the solve; may be empty.
   std::function<void(const SolveSummary&)> on_built;
 };
@@ -148,12 +146,17 @@ struct SolveModelResult {
 // an image plane and std::invalid_argument for options out of range. Memory:
 // see solve_memory.h.
 SolveModelResult SolveModel(const Model& model,
-                            const SolveModelOptions& options);
+                            const SolveModelOptions& options,
+                            const Context& context = {});
 
-// The same with all frames fixed. Points do not depend on each other then, so
-// one sweep is all there is: method, init and the number of sweeps are ignored.
+// The same with all frames fixed: SolveModel with PointsOnly(options).
 SolveModelResult TriangulateModel(const Model& model,
-                                  const SolveModelOptions& options);
+                                  const SolveModelOptions& options,
+                                  const Context& context = {});
+
+// Points do not depend on each other with the frames fixed, so one sweep is all
+// there is: method, init, polish and the number of sweeps are replaced.
+SolveModelOptions PointsOnly(SolveModelOptions options);
 
 // The method that SolveModel uses for these options.
 SolveMethod EffectiveMethod(const SolveModelOptions& options);

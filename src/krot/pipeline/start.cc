@@ -8,10 +8,6 @@
 namespace krot {
 namespace {
 
-void Note(const SolveModelOptions& options, const std::string& sentence) {
-  if (options.on_note) options.on_note(sentence);
-}
-
 bool IsLarger(const BuiltProblem& a, const BuiltProblem& b) {
   return a.problem.observations.size() > b.problem.observations.size();
 }
@@ -39,23 +35,24 @@ std::string NumberOfMissing(const BuiltProblem& all, const BuiltProblem& own) {
 }
 
 BuiltProblem Build(const Model& model, const SolveModelOptions& options,
-                   bool ignore_translations) {
+                   const Context& context, bool ignore_translations) {
   BuildProblemOptions build_options = options.problem;
-  build_options.num_threads = options.num_threads;
+  build_options.num_threads = context.num_threads;
   build_options.ignore_translations = ignore_translations;
   return BuildProblem(model, build_options);
 }
 
 }  // namespace
 
-Start OwnStart(const Model& model, const SolveModelOptions& options) {
-  return {Build(model, options, /*ignore_translations=*/false),
+Start OwnStart(const Model& model, const SolveModelOptions& options,
+               const Context& context) {
+  return {Build(model, options, context, /*ignore_translations=*/false),
           SolveInit::kModel};
 }
 
 Start ChooseStart(const Model& model, const SolveModelOptions& options,
-                  SolveMethod method) {
-  Start own = OwnStart(model, options);
+                  SolveMethod method, const Context& context) {
+  Start own = OwnStart(model, options, context);
   const auto count = [&own](LeftOut reason) {
     return own.built.left_out[static_cast<size_t>(reason)];
   };
@@ -66,43 +63,43 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
     return own;
   }
 
-  Start all{Build(model, options, /*ignore_translations=*/true),
+  Start all{Build(model, options, context, /*ignore_translations=*/true),
             SolveInit::kFeasible};
   if (asked) return all;
   const bool is_larger = IsLarger(all.built, own.built);
   if (!is_larger && !coincide) return own;
   if (method != SolveMethod::kAuto) {
     if (is_larger) {
-      Note(options,
-           NumberOfMissing(all.built, own.built) +
-               " observations are left out because they have no pose or are "
-               "behind their cameras; --Solver.init feasible takes them in");
+      context.Note(
+          NumberOfMissing(all.built, own.built) +
+          " observations are left out because they have no pose or are "
+          "behind their cameras; --Solver.init feasible takes them in");
     }
     return own;
   }
-  Note(options, is_larger ? "the model's translations and points leave out " +
-                                NumberOfMissing(all.built, own.built) +
-                                " observations; looking for a start that has "
-                                "all of them"
-                          : std::string("all cameras of the model stand in one "
-                                        "place; looking for a start"));
+  context.Note(is_larger ? "the model's translations and points leave out " +
+                               NumberOfMissing(all.built, own.built) +
+                               " observations; looking for a start that has "
+                               "all of them"
+                         : std::string("all cameras of the model stand in one "
+                                       "place; looking for a start"));
   return all;
 }
 
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
                              const SolveModelOptions& options,
-                             const JointCallback& log) {
+                             const Context& context, const JointCallback& log) {
   InitializerOptions initializer;
   initializer.norm = options.norm;
   initializer.max_error = options.init_max_error;
-  initializer.num_threads = options.num_threads;
-  initializer.cancel = options.cancel;
   initializer.callback = log;
   FoundStart start;
-  InitializerSummary summary = FindStart(problem, initializer, &start.estimate);
+  Estimate estimate;
+  InitializerSummary summary =
+      FindStart(problem, initializer, context, &estimate);
   switch (summary.termination) {
     case InitializerTermination::kFeasible:
-      start.termination = SolveTermination::kNotRun;
+      start.estimate = std::move(estimate);
       break;
     case InitializerTermination::kInfeasible:
       start.termination = SolveTermination::kInfeasible;

@@ -18,15 +18,16 @@ struct Start {
 // The model's own start or, if asked for or if `method` is kAuto and the
 // model's own is not fit for all observations, one to be found. Says so.
 Start ChooseStart(const Model& model, const SolveModelOptions& options,
-                  SolveMethod method);
+                  SolveMethod method, const Context& context);
 
 // The model's own start; observations that it cannot serve are left out.
-Start OwnStart(const Model& model, const SolveModelOptions& options);
+Start OwnStart(const Model& model, const SolveModelOptions& options,
+               const Context& context);
 
 struct FoundStart {
-  // kNotRun: there is a start.
+  std::optional<Estimate> estimate;  // all depths are positive
+  // Without one: why.
   SolveTermination termination = SolveTermination::kNotRun;
-  Estimate estimate;                       // all depths are positive
   std::optional<Certificate> certificate;  // kInfeasible
 };
 
@@ -34,6 +35,6 @@ struct FoundStart {
 // `log`.
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
                              const SolveModelOptions& options,
-                             const JointCallback& log);
+                             const Context& context, const JointCallback& log);
 
 }  // namespace krot

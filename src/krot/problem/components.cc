@@ -1,48 +1,31 @@
 #include "krot/problem/components.h"
 
-#include <algorithm>
 #include <numeric>
+#include <utility>
+
+#include "krot/base/disjoint_sets.h"
 
 namespace krot {
 namespace {
 
-// Union-find with path halving. The root of a set is its smallest member.
-class DisjointSets {
- public:
-  explicit DisjointSets(int32_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
-
-  int32_t Find(int32_t member) {
-    while (parent_[member] != member) {
-      parent_[member] = parent_[parent_[member]];
-      member = parent_[member];
-    }
-    return member;
-  }
-
-  void Unite(int32_t a, int32_t b) {
-    const auto [low, high] = std::minmax({Find(a), Find(b)});
-    parent_[high] = low;
-  }
-
- private:
-  std::vector<int32_t> parent_;
-};
-
-}  // namespace
-
-Components FindComponents(const KnownRotationProblem& problem) {
-  const auto frame_of = [&](int64_t observation) {
-    return problem.views[problem.observations[observation].view].frame;
+// Of the graph that these observations span.
+Components FindComponentsOf(const KnownRotationProblem& problem,
+                            const std::vector<int64_t>& observations) {
+  const auto point_of = [&](int64_t n) {
+    return problem.observations[observations[n]].point;
   };
+  const auto frame_of = [&](int64_t n) {
+    return problem.views[problem.observations[observations[n]].view].frame;
+  };
+  const int64_t count = static_cast<int64_t>(observations.size());
 
   // Two frames are connected if they see one point.
   DisjointSets frames(problem.num_frames);
-  for (int32_t point = 0; point < problem.num_points; ++point) {
-    const int64_t begin = problem.point_begin[point];
-    for (int64_t i = begin + 1; i < problem.point_begin[point + 1]; ++i) {
-      frames.Unite(frame_of(begin), frame_of(i));
+  std::vector<char> is_seen(problem.num_frames, 0);
+  for (int64_t n = 0; n < count; ++n) {
+    is_seen[frame_of(n)] = 1;
+    if (n > 0 && point_of(n) == point_of(n - 1)) {
+      frames.Unite(frame_of(n), frame_of(n - 1));
     }
   }
 
@@ -50,17 +33,46 @@ Components FindComponents(const KnownRotationProblem& problem) {
   components.of_frame.assign(problem.num_frames, -1);
   components.of_point.assign(problem.num_points, -1);
   for (int32_t frame = 0; frame < problem.num_frames; ++frame) {
-    if (problem.frame_begin[frame] == problem.frame_begin[frame + 1]) continue;
-    const int32_t root = frames.Find(frame);
+    if (!is_seen[frame]) continue;
+    const int64_t root = frames.Find(frame);
     components.of_frame[frame] =
         root == frame ? components.count++ : components.of_frame[root];
   }
-  for (int32_t point = 0; point < problem.num_points; ++point) {
-    const int64_t begin = problem.point_begin[point];
-    if (begin == problem.point_begin[point + 1]) continue;
-    components.of_point[point] = components.of_frame[frame_of(begin)];
+  for (int64_t n = 0; n < count; ++n) {
+    components.of_point[point_of(n)] = components.of_frame[frame_of(n)];
   }
   return components;
+}
+
+std::vector<int64_t> All(const KnownRotationProblem& problem) {
+  std::vector<int64_t> all(problem.observations.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+}  // namespace
+
+Components FindComponents(const KnownRotationProblem& problem) {
+  return FindComponentsOf(problem, All(problem));
+}
+
+std::vector<std::vector<int64_t>> SplitIntoComponents(
+    const KnownRotationProblem& problem) {
+  return SplitIntoComponents(problem, All(problem));
+}
+
+std::vector<std::vector<int64_t>> SplitIntoComponents(
+    const KnownRotationProblem& problem, std::vector<int64_t> observations) {
+  const Components components = FindComponentsOf(problem, observations);
+  std::vector<std::vector<int64_t>> split(components.count);
+  if (components.count == 1) {
+    split[0] = std::move(observations);
+    return split;
+  }
+  for (const int64_t i : observations) {
+    split[components.of_point[problem.observations[i].point]].push_back(i);
+  }
+  return split;
 }
 
 }  // namespace krot

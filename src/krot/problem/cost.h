@@ -59,4 +59,8 @@ double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
 double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
             Norm norm, int num_threads);
 
+// Whether a cost, pixels, is as good as zero: rounding alone makes as much of
+// residuals that are.
+inline bool IsZeroUpToRounding(double cost) { return cost < 1e-9; }
+
 }  // namespace krot

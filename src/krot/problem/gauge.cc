@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "krot/problem/components.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {
@@ -202,6 +203,12 @@ void RestoreGauge(const KnownRotationProblem& problem,
     if (component < 0) continue;
     estimate->points[k] += moves[component].Shift(estimate->points[k]);
   }
+}
+
+void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
+  const double median = MedianDepth(problem, *estimate);
+  for (Vector3d& t : estimate->translations) t /= median;
+  for (Vector3d& s : estimate->points) s /= median;
 }
 
 }  // namespace krot

@@ -24,4 +24,8 @@ namespace krot {
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate);
 
+// Scales an estimate to a median depth of one: that of a problem without
+// baselines (HasBaseline), whose scale is free. O(observations).
+void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate);
+
 }  // namespace krot

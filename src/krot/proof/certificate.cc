@@ -4,63 +4,44 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/dual_repair.h"
 #include "krot/proof/support.h"
 
 namespace krot {
 namespace {
 
-// Of SelectBalanced.
+// Of SelectBalanced. A strict one drops observations that a proof may need, a
+// lax one keeps what does not balance. Tried on models with outliers together,
+// never one by one.
 constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
-// How often misfits are dropped and the rest is tried again.
+// How often misfits are dropped and the rest is tried again, each time at the
+// cost of a repair.
 constexpr int kMaxDrops = 20;
-// Smaller multipliers, by the largest, are left out at first.
+// Smaller multipliers, by the largest, are left out at first: a smaller
+// support is easier to balance, but may lack what decides.
 constexpr double kSharesOfLargest[] = {1e-3, 1e-5, 0};
+// The same beside the supports by scores.
 constexpr double kSharesBesideScores[] = {1e-3, 1e-5};
+// Of SelectSupport, the cheapest first: a strict one gives a small support,
+// which may lack what decides. Multipliers that matter span eight decades.
 constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
-// Of the sub-problems.
+// Of the sub-problems: far below any gap that is asked for, as what is left of
+// it is missing from the bound.
 constexpr double kSmallestGap = 1e-9;
 constexpr int kMaxIterations = 100;
-// Larger ones are given up as soon as they cannot prove enough.
+// Larger ones are only worth their time if they prove enough: they are given
+// up as soon as they cannot.
 constexpr int64_t kLargeUnknowns = 1500;
-constexpr double kEqualBounds = 1e-7;  // relative
+// What a smaller support may cost of the bound, relative: far below any gap.
+constexpr double kEqualBounds = 1e-7;
+// How often a sub-problem is cut down to what sets its maximum.
 constexpr int kMaxReductions = 4;
 // The defect that a certificate states allows for another machine's
 // arithmetic, which may find a little more than was found here.
 constexpr double kDefectFactor = 2;
 constexpr double kSmallestDefect = 1e-12;
-
-// The bound that multipliers would prove, pixels, if (1) held: the estimate
-// times (1).
-double SuggestedBound(const KnownRotationProblem& problem,
-                      const Estimate& estimate,
-                      const std::vector<Multiplier>& multipliers) {
-  double weighted_residual = 0;
-  double weighted_depth = 0;
-  for (size_t i = 0; i < multipliers.size(); ++i) {
-    const ViewedPoint viewed =
-        ViewPoint(problem, problem.observations[i], estimate);
-    weighted_residual -= multipliers[i].y.dot(viewed.v);
-    weighted_depth += multipliers[i].lambda * viewed.depth;
-  }
-  return weighted_residual / weighted_depth;
-}
-
-// The observations whose multipliers exceed a share of the largest.
-std::vector<int64_t> LargeOnes(const std::vector<Multiplier>& multipliers,
-                               double share) {
-  double largest = 0;
-  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
-  std::vector<int64_t> large;
-  for (size_t i = 0; i < multipliers.size(); ++i) {
-    if (multipliers[i].lambda > share * largest) {
-      large.push_back(static_cast<int64_t>(i));
-    }
-  }
-  return large;
-}
 
 std::vector<Multiplier> Pick(const std::vector<Multiplier>& multipliers,
                              const std::vector<int64_t>& observations) {
@@ -91,11 +72,21 @@ void CheckInput(const KnownRotationProblem& problem,
                 options.max_unknowns, ">= 1");
 }
 
-class Maker {
+// Looks for certificates among given observations in three ways, the cheapest
+// first, and keeps the best that the check accepts:
+//
+//   as they are   repairs the multipliers in hand               Offer
+//   balanced      of those, what balances, without misfits      TryBalanced
+//   solved        those of the sub-problem's own optimum, then  SolveAndReduce
+//                 of what sets the maximum of that, and so on
+//
+// Every way ends in Offer, which alone writes the best, and none goes on once
+// IsEnough().
+class CertificateSearch {
  public:
-  Maker(const KnownRotationProblem& problem, Norm norm,
-        const CertificateOptions& options)
-      : problem_(problem), norm_(norm), options_(options) {}
+  CertificateSearch(const KnownRotationProblem& problem, Norm norm,
+                    const CertificateOptions& options, const Context& context)
+      : problem_(problem), norm_(norm), options_(options), context_(context) {}
 
   // Tries the multipliers of these observations, connected, as they are; then
   // those of their sub-problem, solved from `estimate` of the whole; then that
@@ -108,7 +99,7 @@ class Maker {
                    const std::vector<int64_t>& candidates);
 
   bool IsEnough() const {
-    return IsCancelled(options_.cancel) ||
+    return context_.IsCancelled() ||
            best_.lower_bound >= options_.sufficient_bound;
   }
 
@@ -121,37 +112,41 @@ class Maker {
   static int64_t NumUnknowns(const KnownRotationProblem& part) {
     return 3 * (int64_t{part.num_points} + part.num_frames - 1);
   }
-  void SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
+  void SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
                       double threshold, int num_reductions);
   std::vector<int64_t> OfferBalanced(double delta,
                                      const std::vector<Multiplier>& multipliers,
                                      const std::vector<int64_t>& candidates,
                                      double tolerance);
-  // Returns the misfits of the part.
-  std::vector<int64_t> Offer(const RestrictedProblem& part, double delta,
+  // Repairs the part's multipliers, and keeps what comes of them if it is
+  // better than the best so far. Returns the misfits of the part.
+  std::vector<int64_t> Offer(const ProblemSubset& part, double delta,
                              const std::vector<Multiplier>& multipliers);
 
   const KnownRotationProblem& problem_;
   const Norm norm_;
-  const CertificateOptions& options_;
+  const CertificateOptions options_;
+  const Context context_;
   Certificate best_;
 };
 
-void Maker::Try(const std::vector<int64_t>& observations, const Estimate& whole,
-                const std::vector<Multiplier>& multipliers, double threshold) {
-  const RestrictedProblem part = RestrictProblem(problem_, observations);
-  if (NumUnknowns(part.problem) > options_.max_unknowns) return;
+void CertificateSearch::Try(const std::vector<int64_t>& observations,
+                            const Estimate& whole,
+                            const std::vector<Multiplier>& multipliers,
+                            double threshold) {
+  const ProblemSubset part(problem_, observations);
+  if (NumUnknowns(part.problem()) > options_.max_unknowns) return;
   const std::vector<Multiplier> known = Pick(multipliers, observations);
   const double delta =
-      SuggestedBound(part.problem, RestrictEstimate(part, whole), known);
+      SuggestedBound(part.problem(), part.Restrict(whole), known);
   Offer(part, delta, known);
   if (!IsEnough()) TryBalanced(delta, multipliers, observations);
   if (!IsEnough()) SolveAndReduce(part, whole, threshold, kMaxReductions);
 }
 
-void Maker::TryBalanced(double delta,
-                        const std::vector<Multiplier>& multipliers,
-                        const std::vector<int64_t>& candidates) {
+void CertificateSearch::TryBalanced(double delta,
+                                    const std::vector<Multiplier>& multipliers,
+                                    const std::vector<int64_t>& candidates) {
   for (const double tolerance : kBalanceTolerances) {
     std::vector<int64_t> left = candidates;
     for (int drop = 0; drop < kMaxDrops && !left.empty() && !IsEnough();
@@ -164,7 +159,7 @@ void Maker::TryBalanced(double delta,
 
 // The balanced ones of the candidates; returns those of them that are worth
 // another try, without their misfits.
-std::vector<int64_t> Maker::OfferBalanced(
+std::vector<int64_t> CertificateSearch::OfferBalanced(
     double delta, const std::vector<Multiplier>& multipliers,
     const std::vector<int64_t>& candidates, double tolerance) {
   std::vector<int64_t> left;
@@ -173,7 +168,7 @@ std::vector<int64_t> Maker::OfferBalanced(
   for (const std::vector<int64_t>& component :
        SplitIntoComponents(problem_, balanced)) {
     const std::vector<int64_t> misfits =
-        Offer(RestrictProblem(problem_, component), delta,
+        Offer(ProblemSubset(problem_, component), delta,
               Pick(multipliers, component));
     if (misfits.empty()) continue;
     auto misfit = misfits.begin();
@@ -189,64 +184,62 @@ std::vector<int64_t> Maker::OfferBalanced(
   return left;
 }
 
-void Maker::SolveAndReduce(const RestrictedProblem& part, const Estimate& whole,
-                           double threshold, int num_reductions) {
+void CertificateSearch::SolveAndReduce(const ProblemSubset& part,
+                                       const Estimate& whole, double threshold,
+                                       int num_reductions) {
   InteriorPointOptions options;
   options.norm = norm_;
   options.smallest_gap = kSmallestGap;
   options.max_iterations = kMaxIterations;
-  options.num_threads = options_.num_threads;
-  options.cancel = options_.cancel;
-  if (NumUnknowns(part.problem) > kLargeUnknowns) {
+  if (NumUnknowns(part.problem()) > kLargeUnknowns) {
     // Its optimum is below every cost it reaches.
     options.stop = [this](const ConicIterate& iterate) {
       return iterate.cost < options_.sufficient_bound;
     };
   }
-  Estimate estimate = RestrictEstimate(part, whole);
+  Estimate estimate = part.Restrict(whole);
   std::vector<Multiplier> multipliers;
-  const InteriorPointSummary summary =
-      MinimizeJointly(part.problem, options, &estimate, &multipliers);
+  const InteriorPointSummary summary = MinimizeJointly(
+      part.problem(), options, context_, &estimate, &multipliers);
   if (summary.termination == InteriorPointTermination::kStopped) return;
-  Offer(part, SuggestedBound(part.problem, estimate, multipliers), multipliers);
+  Offer(part, SuggestedBound(part.problem(), estimate, multipliers),
+        multipliers);
 
-  const std::vector<int64_t> support = SelectSupport(
-      part.problem,
-      SupportScores(part.problem, norm_, estimate, summary.gamma, multipliers),
-      threshold);
+  const std::vector<int64_t> support =
+      SelectSupport(part.problem(),
+                    SupportScores(part.problem(), norm_, estimate,
+                                  summary.gamma, multipliers),
+                    threshold);
   if (num_reductions == 0 ||
-      support.size() == part.problem.observations.size()) {
+      support.size() == part.problem().observations.size()) {
     return;
   }
   for (const std::vector<int64_t>& component :
-       SplitIntoComponents(part.problem, support)) {
+       SplitIntoComponents(part.problem(), support)) {
     if (IsEnough()) return;
-    std::vector<int64_t> rest;
-    for (const int64_t i : component) rest.push_back(part.observation_of[i]);
-    SolveAndReduce(RestrictProblem(problem_, rest), whole, threshold,
-                   num_reductions - 1);
+    SolveAndReduce(ProblemSubset(problem_, part.InWhole(component)), whole,
+                   threshold, num_reductions - 1);
   }
 }
 
-std::vector<int64_t> Maker::Offer(const RestrictedProblem& part, double delta,
-                                  const std::vector<Multiplier>& multipliers) {
-  if (!(delta > 0) || NumUnknowns(part.problem) > options_.max_unknowns) {
+std::vector<int64_t> CertificateSearch::Offer(
+    const ProblemSubset& part, double delta,
+    const std::vector<Multiplier>& multipliers) {
+  if (!(delta > 0) || NumUnknowns(part.problem()) > options_.max_unknowns) {
     return {};
   }
   RepairedMultipliers repaired =
-      RepairMultipliers(part.problem, norm_, delta, multipliers);
-  std::optional<Certificate>& certificate = repaired.certificate;
-  if (!certificate || !IsBetter(*certificate, best_)) return repaired.misfits;
-  for (CertifiedObservation& o : certificate->observations) {
-    o.observation = part.observation_of[o.observation];
+      RepairMultipliers(part.problem(), norm_, delta, multipliers);
+  if (!repaired.certificate || !IsBetter(*repaired.certificate, best_)) {
+    return repaired.misfits;
   }
-  certificate->defect = kMaxDefect;
-  const CertificateCheck check =
-      CheckCertificate(problem_, norm_, *certificate);
+  Certificate certificate = InWhole(part, std::move(*repaired.certificate));
+  certificate.defect = kMaxDefect;
+  const CertificateCheck check = CheckCertificate(problem_, norm_, certificate);
   if (!check.is_accepted) return {};
-  certificate->defect =
+  certificate.defect =
       std::clamp(kDefectFactor * check.defect, kSmallestDefect, kMaxDefect);
-  best_ = std::move(*certificate);
+  best_ = std::move(certificate);
   return {};
 }
 
@@ -255,11 +248,11 @@ std::vector<int64_t> Maker::Offer(const RestrictedProblem& part, double delta,
 std::optional<Certificate> MakeCertificate(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
     double gamma, const std::vector<Multiplier>& multipliers,
-    const CertificateOptions& options) {
+    const CertificateOptions& options, const Context& context) {
   CheckInput(problem, multipliers, options);
   const std::vector<double> scores =
       SupportScores(problem, norm, estimate, gamma, multipliers);
-  Maker maker(problem, norm, options);
+  CertificateSearch search(problem, norm, options, context);
   std::vector<int64_t> previous;
   for (const double threshold : kThresholds) {
     const std::vector<int64_t> support =
@@ -268,30 +261,37 @@ std::optional<Certificate> MakeCertificate(
     previous = support;
     for (const std::vector<int64_t>& component :
          SplitIntoComponents(problem, support)) {
-      maker.Try(component, estimate, multipliers, threshold);
-      if (maker.IsEnough()) return maker.best();
+      search.Try(component, estimate, multipliers, threshold);
+      if (search.IsEnough()) return search.best();
     }
   }
   // Scores do not tell an observation whose depth vanishes at the optimum.
   const double delta = SuggestedBound(problem, estimate, multipliers);
   for (const double share : kSharesBesideScores) {
-    maker.TryBalanced(delta, multipliers, LargeOnes(multipliers, share));
-    if (maker.IsEnough()) break;
+    search.TryBalanced(delta, multipliers, SelectLarge(multipliers, share));
+    if (search.IsEnough()) break;
   }
-  return maker.best();
+  return search.best();
 }
 
 std::optional<Certificate> MakeInfeasibilityCertificate(
     const KnownRotationProblem& problem, Norm norm, double bound,
     const std::vector<Multiplier>& multipliers,
-    const CertificateOptions& options) {
+    const CertificateOptions& options, const Context& context) {
   CheckInput(problem, multipliers, options);
-  Maker maker(problem, norm, options);
+  CertificateSearch search(problem, norm, options, context);
   for (const double share : kSharesOfLargest) {
-    maker.TryBalanced(bound, multipliers, LargeOnes(multipliers, share));
-    if (maker.IsEnough()) break;
+    search.TryBalanced(bound, multipliers, SelectLarge(multipliers, share));
+    if (search.IsEnough()) break;
   }
-  return maker.best();
+  return search.best();
+}
+
+Certificate InWhole(const ProblemSubset& part, Certificate certificate) {
+  for (CertifiedObservation& o : certificate.observations) {
+    o.observation = part.InWhole(o.observation);
+  }
+  return certificate;
 }
 
 }  // namespace krot

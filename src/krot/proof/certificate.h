@@ -4,10 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/certificate_check.h"
 
 namespace krot {
@@ -17,8 +18,6 @@ struct CertificateOptions {
   double sufficient_bound = std::numeric_limits<double>::infinity();
   // Supports with more unknowns are not tried; >= 1.
   int max_unknowns = 15000;
-  int num_threads = -1;                // -1: all
-  const CancelFlag* cancel = nullptr;  // may be null
 };
 
 // A lower bound on every estimate's cost with its proof, from an interior
@@ -35,7 +34,7 @@ struct CertificateOptions {
 std::optional<Certificate> MakeCertificate(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
     double gamma, const std::vector<Multiplier>& multipliers,
-    const CertificateOptions& options);
+    const CertificateOptions& options, const Context& context);
 
 // The same from the multipliers with which FindFeasible ends where no estimate
 // has all its residuals below `bound`, pixels: a certificate near that bound
@@ -43,6 +42,9 @@ std::optional<Certificate> MakeCertificate(
 std::optional<Certificate> MakeInfeasibilityCertificate(
     const KnownRotationProblem& problem, Norm norm, double bound,
     const std::vector<Multiplier>& multipliers,
-    const CertificateOptions& options);
+    const CertificateOptions& options, const Context& context);
+
+// A part's certificate as one of the whole.
+Certificate InWhole(const ProblemSubset& part, Certificate certificate);
 
 }  // namespace krot

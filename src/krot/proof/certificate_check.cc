@@ -8,7 +8,7 @@
 
 #include <Eigen/LU>
 
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/certificate_input.h"
 #include "krot/proof/force_balance.h"
 
@@ -82,11 +82,23 @@ struct Balance {
   Real rotation_error = 0;
 };
 
+std::vector<int64_t> ObservationsOf(const Certificate& certificate) {
+  std::vector<int64_t> observations;
+  for (const CertifiedObservation& o : certificate.observations) {
+    observations.push_back(o.observation);
+  }
+  return observations;
+}
+
+// Of what RefuseNumbers lets pass.
 class Checker {
  public:
   Checker(const KnownRotationProblem& problem, Norm norm,
           const Certificate& certificate)
-      : whole_(problem), norm_(norm), certificate_(certificate) {}
+      : whole_(problem),
+        norm_(norm),
+        certificate_(certificate),
+        part_(problem, ObservationsOf(certificate)) {}
 
   // The first thing that is wrong, or none.
   std::optional<std::string> Run();
@@ -94,7 +106,7 @@ class Checker {
   double rho() const { return rho_; }
 
  private:
-  std::optional<std::string> Restrict();
+  std::optional<std::string> ScaleMultipliers();
   Imbalance BoundImbalance() const;
   void FindCorrections();
   // Of sums over the support, relative to the sum of absolute values: every
@@ -109,7 +121,7 @@ class Checker {
   const Norm norm_;
   const Certificate& certificate_;
 
-  RestrictedProblem part_;
+  const ProblemSubset part_;  // the support
   std::vector<Real> lambda_;  // of part_, scaled to a maximum in [1/2, 1)
   std::vector<Vector2> y_;
   std::vector<Force> forces_;
@@ -118,14 +130,11 @@ class Checker {
   double rho_ = 0;
 };
 
-std::optional<std::string> Checker::Restrict() {
-  std::vector<int64_t> observations;
+std::optional<std::string> Checker::ScaleMultipliers() {
   double largest = 0;
   for (const CertifiedObservation& o : certificate_.observations) {
-    observations.push_back(o.observation);
     largest = std::max(largest, o.lambda);
   }
-  part_ = RestrictProblem(whole_, observations);
   int exponent = 0;
   std::frexp(largest, &exponent);
   for (const CertifiedObservation& o : certificate_.observations) {
@@ -145,12 +154,12 @@ std::optional<std::string> Checker::Restrict() {
       return "a ray of its observations is no finite number";
     }
   }
-  return RefuseRotations(part_.problem);
+  return RefuseRotations(part_.problem());
 }
 
 // Of forces turned into the world by rotations known to kRotationError.
 Imbalance Checker::BoundImbalance() const {
-  const KnownRotationProblem& problem = part_.problem;
+  const KnownRotationProblem& problem = part_.problem();
   std::vector<Balance> of_point(problem.num_points);
   std::vector<Balance> of_frame(problem.num_frames);
   for (size_t i = 0; i < forces_.size(); ++i) {
@@ -186,7 +195,7 @@ void Checker::FindCorrections() {
                        std::max(compliance.y, compliance.delta_lambda /
                                                   certificate_.lower_bound));
   }
-  corrections_ = BoundCorrections(part_.problem, strength, BoundImbalance());
+  corrections_ = BoundCorrections(part_.problem(), strength, BoundImbalance());
 }
 
 // (2), once every frame's origin has moved to the projection centre of the
@@ -194,7 +203,7 @@ void Checker::FindCorrections() {
 // the unknown as well as t_f is. If each frame has one centre, the constants
 // are gone; the others are force times offset of the centre.
 std::optional<std::string> Checker::CheckConstants() const {
-  const KnownRotationProblem& problem = part_.problem;
+  const KnownRotationProblem& problem = part_.problem();
   std::vector<int32_t> first_view(problem.num_frames, -1);
   Real kappa = 0;
   Real kappa_error = 0;
@@ -244,8 +253,7 @@ std::optional<std::string> Checker::BoundRho() {
 }
 
 std::optional<std::string> Checker::Run() {
-  if (auto refusal = RefuseNumbers(whole_, norm_, certificate_)) return refusal;
-  if (auto refusal = Restrict()) return refusal;
+  if (auto refusal = ScaleMultipliers()) return refusal;
   FindCorrections();
   if (auto refusal = CheckConstants()) return refusal;
   if (auto refusal = BoundRho()) return refusal;
@@ -262,8 +270,12 @@ std::optional<std::string> Checker::Run() {
 
 CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
                                   Norm norm, const Certificate& certificate) {
-  Checker checker(problem, norm, certificate);
   CertificateCheck check;
+  if (auto refusal = RefuseNumbers(problem, norm, certificate)) {
+    check.refusal = *refusal;
+    return check;
+  }
+  Checker checker(problem, norm, certificate);
   if (auto refusal = checker.Run()) {
     check.refusal = *refusal;
     check.defect = std::max(0.0, checker.rho() - 1);

@@ -13,15 +13,19 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-// By how much (2) stays below zero, relative to what it sums up.
+// By how much (2) stays below zero, relative to what it sums up: well above
+// roundings, well below any gap.
 constexpr double kConstantMargin = 1e-8;
 // The bound that is claimed leaves this for the last roundings, relative.
 constexpr double kBoundMargin = 4e-13;
 // Lengthening y costs the bound in first order, turning it in second: lengths
 // count this much at least, or as much as there is left up to lambda.
 constexpr double kLengthWeight = 1e-3;
-constexpr double kMaxGrowth = 0.5;  // of a lambda in a step, relative
+// Of a lambda, relative: a misfit would have to change by more.
+constexpr double kMaxLambdaChange = 0.5;
+// The first solve leaves its own rounding, the second that of Miss().
 constexpr int kNumRefinements = 2;
+// Each costs two solves with the one factor.
 constexpr int kMaxSteps = 20;
 // Steps end where the next promises less than this, of the bound.
 constexpr double kSmallestGain = 1e-9;
@@ -55,6 +59,16 @@ DualFrame MakeDualFrame(const Vector2d& eta, Norm norm) {
   return frame;
 }
 
+// Alternating projections, in the one metric that Factorize fixes:
+//
+//   Factorize --> Balance --> Misfits --none--> Divided, kept if the best
+//                    ^           |                 |
+//                    |          any --> end      gains? --no--> end
+//                    |                             |
+//                    +---------- Shorten <--------yes
+//
+// After Balance (1) and (2) hold, but maybe not |y_i|_dual <= lambda_i; after
+// Shorten it is the other way about; what is Divided has both.
 class Repair {
  public:
   Repair(const KnownRotationProblem& problem, Norm norm, double delta,
@@ -112,7 +126,8 @@ void Repair::Balance() {
 std::vector<int64_t> Repair::Misfits() const {
   std::vector<int64_t> misfits;
   for (size_t i = 0; i < now_.size(); ++i) {
-    if (!(std::abs(now_[i].lambda / original_[i].lambda - 1) < kMaxGrowth)) {
+    if (!(std::abs(now_[i].lambda / original_[i].lambda - 1) <
+          kMaxLambdaChange)) {
       misfits.push_back(static_cast<int64_t>(i));
     }
   }

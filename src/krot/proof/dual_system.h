@@ -18,7 +18,16 @@ namespace krot {
 // The rows are those of the points and of all frames but the first (the
 // problem must be connected). Where a frame sees points through several
 // projection centres, one more row holds the constants (b; d), counted from the
-// centre of the frame's first view.
+// centre of the frame's first view. Observation i fills, in the equations of
+//
+//   its point            P_i' (y_i; lambda_i) + ...  = 0     P_i = E_i R_sr
+//   R_rw its frame, if not 0  F_i' (y_i; lambda_i) + ...  = 0     F_i = E_i
+//   R_sr the constants        k_i' (y_i; lambda_i) + ... <= 0     k_i = (b;
+//   delta d)
+//
+// with E_i = (J_i (I2 | -u_i); delta e3'). To be used so: Changes once, to be
+// factorised; Miss of the multipliers in hand, to be solved for a change of
+// them, as often as they are refined.
 class DualSystem {
  public:
   // (2) is asked to stay as far below zero as it is for these multipliers, at

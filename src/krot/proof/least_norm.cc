@@ -64,7 +64,7 @@ bool LeastNormSolver::FactorizeDense() {
          std::numeric_limits<double>::epsilon() * diagonal.maxCoeff();
 }
 
-// With A = M': the solution of least norm is A (A'A)^-1 rhs.
+// With A = M', its points' columns orthogonalised: A (A'A)^-1 rhs.
 bool LeastNormSolver::FactorizeByPoints() {
   structure_ = {};
   structure_.point_begin.assign(1, 0);

@@ -36,11 +36,26 @@ struct LeastNormProblem {
   }
 };
 
-// Their solutions of least norm: dense, by Householder's reflections, where
-// that is affordable, as their multipliers span many decades; beyond
-// `max_dense_rows` by eliminating points.
+// Their solutions of least norm, x = M' (M M')^-1 rhs. What is factorised is
+// M', an observation's three unknowns per row of blocks:
+//
+//              points          frames but 0    last
+//            0    1    2       1    2    3
+//   obs 0  [ P              |                | l ]   of frame 0
+//   obs 1  [ P              |  F             | l ]   P: point_rows, 3 x 3
+//   obs 2  [      P         |       F        | l ]   F: frame_rows, 3 x 3
+//   obs 3  [      P         |            F   | l ]   l: last_row, 3 x 1
+//   obs 4  [           P    |  F             | l ]
+//
+// Dense, by Householder's reflections, where that is affordable, as their
+// multipliers span many decades; beyond `max_dense_rows` by eliminating points,
+// which leaves the columns of the frames, and of the last one its part outside
+// of the span of all others.
+//
+// Factorize once and then, if it succeeded, Solve as often as needed.
 class LeastNormSolver {
  public:
+  // The cost of the dense way grows with the cube of the rows.
   explicit LeastNormSolver(int64_t max_dense_rows = 1500)
       : max_dense_rows_(max_dense_rows) {}
 

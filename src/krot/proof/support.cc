@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -79,6 +79,19 @@ std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
   return PruneUnconstrained(problem, support);
 }
 
+std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
+                                 double share) {
+  double largest = 0;
+  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
+  std::vector<int64_t> large;
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    if (multipliers[i].lambda > share * largest) {
+      large.push_back(static_cast<int64_t>(i));
+    }
+  }
+  return large;
+}
+
 std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     double delta,
                                     const std::vector<Multiplier>& multipliers,
@@ -100,6 +113,20 @@ std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
     if (balanced.size() == candidates.size()) return balanced;
     candidates = std::move(balanced);
   }
+}
+
+double SuggestedBound(const KnownRotationProblem& problem,
+                      const Estimate& estimate,
+                      const std::vector<Multiplier>& multipliers) {
+  double weighted_residual = 0;
+  double weighted_depth = 0;
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], estimate);
+    weighted_residual -= multipliers[i].y.dot(viewed.v);
+    weighted_depth += multipliers[i].lambda * viewed.depth;
+  }
+  return weighted_residual / weighted_depth;
 }
 
 }  // namespace krot

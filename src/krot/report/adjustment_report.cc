@@ -5,30 +5,16 @@
 #include <sstream>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
+#include "krot/report/error_rows.h"
+#include "krot/report/problem_words.h"
+#include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json NumberOrNull(const std::optional<double>& value) {
-  return value ? Json(*value) : Json();
-}
-
-Json ErrorJson(const PixelErrorStatistics& statistics) {
-  const auto number = [&](double value) {
-    return statistics.count > 0 ? Json(value) : Json();
-  };
-  return {{"max", number(statistics.max)},
-          {"p99", number(statistics.p99)},
-          {"mean", number(statistics.mean)},
-          {"rms", number(statistics.rms)}};
-}
-
-Json IterationsJson(const std::vector<BundleAdjustmentIteration>& iterations) {
+Json AdjustmentIterationsJson(
+    const std::vector<BundleAdjustmentIteration>& iterations) {
   Json array = Json::array();
   for (const BundleAdjustmentIteration& iteration : iterations) {
     array.push_back({{"cost", iteration.cost},
@@ -39,58 +25,34 @@ Json IterationsJson(const std::vector<BundleAdjustmentIteration>& iterations) {
   return array;
 }
 
-std::string ErrorTable(const AdjustModelSummary& summary) {
-  TextTable table;
-  const bool has_start = summary.start.has_value();
-  const auto add = [&](const char* name, double PixelErrorStatistics::*error) {
-    std::vector<std::string> row = {
-        name, FormatNumber(summary.pixel_error_before.*error, 4)};
-    if (has_start) {
-      row.push_back(FormatNumber(summary.pixel_error_start.*error, 4));
-    }
-    row.push_back(FormatNumber(summary.pixel_error_after.*error, 4));
-    table.AddRow(row);
-  };
-  if (has_start) {
-    table.AddRow({"pixels", "before", "start", "after"});
-  } else {
-    table.AddRow({"pixels", "before", "after"});
+std::string AdjustmentErrorTable(const AdjustModelSummary& summary) {
+  std::vector<std::string> head = {"pixels", "before"};
+  std::vector<PixelErrorStatistics> estimates = {summary.pixel_error_before};
+  if (summary.start) {
+    head.push_back("start");
+    estimates.push_back(summary.pixel_error_start);
   }
-  add("max error", &PixelErrorStatistics::max);
-  add("P99 error", &PixelErrorStatistics::p99);
-  add("mean error", &PixelErrorStatistics::mean);
-  add("RMS error", &PixelErrorStatistics::rms);
+  head.push_back("after");
+  estimates.push_back(summary.pixel_error_after);
+  TextTable table;
+  table.AddRow(head);
+  AddErrorColumns(estimates, &table);
   return table.ToString();
 }
 
-std::string LeftOutList(const BundleAdjustmentSummary& summary) {
-  std::string list;
-  const auto add = [&](const char* reason, int64_t count) {
-    if (count == 0) return;
-    list += (list.empty() ? " (" : ", ") + std::string(reason) + " " +
-            std::to_string(count);
-  };
-  add("no_pose", summary.num_no_pose);
-  add("behind", summary.num_behind);
-  add("short_track", summary.num_short_track);
-  return list.empty() ? list : list + ")";
+LeftOutCounts LeftOutBy(const BundleAdjustmentSummary& summary) {
+  return {{"no_pose", summary.num_no_pose},
+          {"behind", summary.num_behind},
+          {"short_track", summary.num_short_track}};
 }
 
-int64_t NumLeftOut(const BundleAdjustmentSummary& summary) {
-  return summary.num_no_pose + summary.num_behind + summary.num_short_track;
-}
-
-std::string CountsSentence(const BundleAdjustmentSummary& summary) {
-  return Counted(summary.num_frames, "frame") + ", " +
-         Counted(summary.num_images, "image") + ", " +
-         Counted(summary.num_points, "point") + ", " +
-         Counted(summary.num_observations, "observation") + " and " +
+std::string AdjustmentCountsSentence(const BundleAdjustmentSummary& summary) {
+  return CountsWords(summary) + " and " +
          Counted(summary.num_parameters, "parameter") + " in the adjustment; " +
-         Counted(NumLeftOut(summary), "observation") + " left out" +
-         LeftOutList(summary) + ".";
+         LeftOutWords(LeftOutBy(summary)) + ".";
 }
 
-std::string TerminationSentence(const BundleAdjustmentSummary& summary) {
+std::string AdjustmentEndSentence(const BundleAdjustmentSummary& summary) {
   const std::string after =
       " after " + Counted(summary.num_iterations, "iteration");
   switch (summary.termination) {
@@ -111,6 +73,11 @@ std::string TerminationSentence(const BundleAdjustmentSummary& summary) {
       break;
   }
   return "Not run.";
+}
+
+// Of the solve for a model below the cap.
+double StartSeconds(const SolveSummary& start) {
+  return start.seconds_build + start.seconds_solve;
 }
 
 // What the cap did, and how good the end is.
@@ -155,11 +122,7 @@ std::string NothingToAdjustSentence(const BundleAdjustmentSummary& summary) {
   if (summary.num_observations > 0) {
     return "nothing to adjust: everything is held still";
   }
-  if (NumLeftOut(summary) == 0) {
-    return "nothing to adjust: the model has no observations";
-  }
-  return "nothing to adjust: " + Counted(NumLeftOut(summary), "observation") +
-         " left out" + LeftOutList(summary);
+  return NothingToDoSentence("adjust", LeftOutBy(summary));
 }
 
 std::string NoModelBelowCapSentence(const AdjustModelSummary& summary) {
@@ -187,14 +150,10 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   const AdjustModelSummary& summary = report.summary;
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
   std::ostringstream text;
-  text << "\nReprojection errors\n" << ErrorTable(summary);
-  if (summary.pixel_error_after.not_finite > 0) {
-    text << Counted(summary.pixel_error_after.not_finite, "observation")
-         << " without a finite error (behind the camera, no pose, or not "
-            "projectable), in no row above.\n";
-  }
-  text << CountsSentence(adjustment) << '\n'
-       << TerminationSentence(adjustment) << " Cost "
+  text << "\nReprojection errors\n" << AdjustmentErrorTable(summary);
+  text << NotFiniteSentence(summary.pixel_error_after)
+       << AdjustmentCountsSentence(adjustment) << '\n'
+       << AdjustmentEndSentence(adjustment) << " Cost "
        << FormatNumber(adjustment.cost_initial, 3) << " -> "
        << FormatNumber(adjustment.cost_final, 3)
        << " px^2 (half the sum of the squared errors, robust if a loss is)";
@@ -203,18 +162,13 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   }
   text << ".\n";
   if (summary.max_error) text << CapSentence(summary) << '\n';
-  text << "Read " << FormatNumber(report.seconds_read, 2) << " s, ";
+  std::string adjusted;
   if (summary.start) {
-    text << "found a start in "
-         << FormatNumber(
-                summary.start->seconds_build + summary.start->seconds_solve, 2)
-         << " s, ";
+    adjusted = "found a start in " +
+               FormatNumber(StartSeconds(*summary.start), 2) + " s, ";
   }
-  text << "adjusted " << FormatNumber(adjustment.seconds, 2) << " s, wrote "
-       << FormatNumber(report.seconds_write, 2) << " s; "
-       << FormatNumber(report.seconds_total, 2) << " s in all on "
-       << Counted(report.threads, "thread") << ", "
-       << FormatBytes(report.peak_memory_bytes) << " at most.\n";
+  adjusted += "adjusted " + FormatNumber(adjustment.seconds, 2) + " s";
+  text << RunSentence(report.run, adjusted);
   return text.str();
 }
 
@@ -224,10 +178,10 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
   Json start_bound, start_seconds;  // null unless there was such a solve
   if (summary.start) {
     start_bound = NumberOrNull(summary.start->lower_bound);
-    start_seconds = summary.start->seconds_build + summary.start->seconds_solve;
+    start_seconds = StartSeconds(*summary.start);
   }
   const Json json = {
-      {"version", report.version},
+      {"version", report.run.version},
       {"command", "bundle_adjuster"},
       {"termination", AdjustmentTerminationName(adjustment.termination)},
       {"num_frames", adjustment.num_frames},
@@ -235,14 +189,11 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
       {"num_points", adjustment.num_points},
       {"num_observations", adjustment.num_observations},
       {"num_parameters", adjustment.num_parameters},
-      {"left_out",
-       {{"no_pose", adjustment.num_no_pose},
-        {"behind", adjustment.num_behind},
-        {"short_track", adjustment.num_short_track}}},
+      {"left_out", LeftOutJson(LeftOutBy(adjustment))},
       {"cost_initial", adjustment.cost_initial},
       {"cost_final", adjustment.cost_final},
       {"num_iterations", adjustment.num_iterations},
-      {"iterations", IterationsJson(adjustment.iterations)},
+      {"iterations", AdjustmentIterationsJson(adjustment.iterations)},
       {"linear_solver", adjustment.linear_solver},
       {"stationarity", NumberOrNull(adjustment.stationarity)},
       {"max_error", NumberOrNull(summary.max_error)},
@@ -254,16 +205,16 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
         {"start", ErrorJson(summary.pixel_error_start)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
       {"seconds",
-       {{"read", report.seconds_read},
+       {{"read", report.run.seconds_read},
         {"start", start_seconds},
         {"adjust", adjustment.seconds},
-        {"write", report.seconds_write},
-        {"total", report.seconds_total}}},
-      {"peak_memory_bytes", report.peak_memory_bytes},
-      {"threads", report.threads},
-      {"seed", report.seed},
+        {"write", report.run.seconds_write},
+        {"total", report.run.seconds_total}}},
+      {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"threads", report.run.threads},
+      {"seed", report.run.seed},
   };
-  return json.dump(2) + "\n";
+  return ReportText(json);
 }
 
 }  // namespace krot

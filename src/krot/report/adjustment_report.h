@@ -1,22 +1,16 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 
 #include "krot/pipeline/adjust_model.h"
+#include "krot/report/run_record.h"
 
 namespace krot {
 
 // What one run of `krot bundle_adjuster` did.
 struct AdjustmentReport {
-  std::string version;  // KROT's
+  RunRecord run;
   AdjustModelSummary summary;
-  double seconds_read = 0;  // wall clock
-  double seconds_write = 0;
-  double seconds_total = 0;
-  int64_t peak_memory_bytes = 0;
-  int threads = 0;
-  uint64_t seed = 0;
 };
 
 // For the terminal: errors before and after, what took part, why it ended.

@@ -1,22 +1,17 @@
 #include <iomanip>
 #include <sstream>
 
-#include <nlohmann/json.hpp>
-
 #include "krot/report/comparison_report.h"
+#include "krot/report/report_json.h"
 
 namespace krot {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 Json CountJson(const ComparisonSummary& summary, int64_t ModelCounts::*count) {
   return {{"model1", summary.model1.*count},
           {"model2", summary.model2.*count},
           {"shared", summary.shared.*count}};
 }
-
-Json VectorJson(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
 Json AlignmentJson(const ComparisonSummary& summary) {
   const Similarity& similarity = summary.world1_from_world2;
@@ -39,16 +34,7 @@ Json DifferenceJson(const DifferenceStatistics& differences) {
           {"rms", known(differences.rms)}};
 }
 
-Json ErrorJson(const PixelErrorStatistics& errors) {
-  const auto known = [&errors](double value) {
-    return errors.count > 0 ? Json(value) : Json();
-  };
-  return {{"count", errors.count},      {"not_finite", errors.not_finite},
-          {"max", known(errors.max)},   {"p99", known(errors.p99)},
-          {"mean", known(errors.mean)}, {"rms", known(errors.rms)}};
-}
-
-Json ImagesJson(const std::vector<ImageDifference>& images) {
+Json SharedImagesJson(const std::vector<ImageDifference>& images) {
   Json json = Json::array();
   for (const ImageDifference& image : images) {
     json.push_back(
@@ -58,8 +44,8 @@ Json ImagesJson(const std::vector<ImageDifference>& images) {
          {"rotation_deg", image.pose ? Json(image.pose->rotation_deg) : Json()},
          {"center", image.pose ? Json(image.pose->center) : Json()},
          {"pixel_error",
-          {{"model1", ErrorJson(image.errors1)},
-           {"model2", ErrorJson(image.errors2)}}}});
+          {{"model1", CountedErrorJson(image.errors1)},
+           {"model2", CountedErrorJson(image.errors2)}}}});
   }
   return json;
 }
@@ -72,10 +58,6 @@ Json WorstPointsJson(const std::vector<PointDifference>& points) {
                     {"distance", point.distance}});
   }
   return json;
-}
-
-Json NumberOrNull(const std::optional<double>& value) {
-  return value ? Json(*value) : Json();
 }
 
 Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
@@ -116,18 +98,17 @@ std::string ComparisonJson(const ComparisonReport& report) {
       {"center", DifferenceJson(summary.center)},
       {"point", DifferenceJson(summary.point)},
       {"pixel_error",
-       {{"model1", ErrorJson(summary.errors1)},
-        {"model2", ErrorJson(summary.errors2)},
-        {"shared1", ErrorJson(summary.shared_errors1)},
-        {"shared2", ErrorJson(summary.shared_errors2)}}},
-      {"images", ImagesJson(summary.images)},
+       {{"model1", CountedErrorJson(summary.errors1)},
+        {"model2", CountedErrorJson(summary.errors2)},
+        {"shared1", CountedErrorJson(summary.shared_errors1)},
+        {"shared2", CountedErrorJson(summary.shared_errors2)}}},
+      {"images", SharedImagesJson(summary.images)},
       {"worst_points", WorstPointsJson(summary.worst_points)},
       {"certificate",
        {{"model1", VerdictJson(report.certificate1)},
         {"model2", VerdictJson(report.certificate2)}}},
   };
-  // Image names are bytes, not always UTF-8.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return ReportText(json);
 }
 
 std::string PoseErrorsCsv(const ComparisonSummary& summary) {

@@ -8,6 +8,7 @@
 
 #include "krot/report/certificate_table.h"
 #include "krot/report/comparison_report.h"
+#include "krot/report/error_rows.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -98,24 +99,13 @@ std::string DifferenceTable(const ComparisonSummary& summary) {
          FormatLength(summary.scene_radius) + " scene units.\n";
 }
 
-void AddErrors(const std::string& name, const PixelErrorStatistics& errors,
-               TextTable* table) {
-  if (errors.count == 0) {
-    table->AddRow({name, "0", "-", "-", "-", "-"});
-    return;
-  }
-  table->AddRow({name, std::to_string(errors.count),
-                 FormatNumber(errors.max, 4), FormatNumber(errors.p99, 4),
-                 FormatNumber(errors.mean, 4), FormatNumber(errors.rms, 4)});
-}
-
-std::string ErrorTable(const ComparisonSummary& summary) {
+std::string ComparedErrorTable(const ComparisonSummary& summary) {
   TextTable table;
-  table.AddRow({"", "observations", "max", "P99", "mean", "RMS"});
-  AddErrors("model 1", summary.errors1, &table);
-  AddErrors("model 2", summary.errors2, &table);
-  AddErrors("model 1, those in both", summary.shared_errors1, &table);
-  AddErrors("model 2, those in both", summary.shared_errors2, &table);
+  AddErrorHead("", &table);
+  AddErrorRow("model 1", summary.errors1, &table);
+  AddErrorRow("model 2", summary.errors2, &table);
+  AddErrorRow("model 1, those in both", summary.shared_errors1, &table);
+  AddErrorRow("model 2, those in both", summary.shared_errors2, &table);
   std::string text = "\nTrue reprojection errors, pixels\n" + table.ToString();
   const int64_t not_finite1 = summary.errors1.not_finite;
   const int64_t not_finite2 = summary.errors2.not_finite;
@@ -197,7 +187,8 @@ std::string CertificateText(const std::string& name,
 std::string ComparisonTable(const ComparisonReport& report, int max_rows) {
   const ComparisonSummary& summary = report.summary;
   const size_t num_rows = static_cast<size_t>(max_rows);
-  return CountTable(summary) + DifferenceTable(summary) + ErrorTable(summary) +
+  return CountTable(summary) + DifferenceTable(summary) +
+         ComparedErrorTable(summary) +
          ImageTable("The cameras farthest apart", summary, num_rows,
                     &DistanceMoved) +
          ImageTable("The images whose largest error changed most", summary,

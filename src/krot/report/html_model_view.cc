@@ -6,8 +6,6 @@
 #include <numeric>
 #include <unordered_map>
 
-#include <nlohmann/json.hpp>
-
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/check.h"
@@ -15,11 +13,10 @@
 #include "krot/model/image_geometry.h"
 #include "krot/report/html_base64.h"
 #include "krot/report/html_error_curves.h"
+#include "krot/report/report_json.h"
 
 namespace krot {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 // Of all points, in the order of Model::points3D; NaN if none is finite.
 struct PointErrors {
@@ -95,18 +92,9 @@ Eigen::Vector2d HalfExtent(const Camera& camera) {
 }
 
 Json ErrorsJson(const PixelErrorStatistics& errors) {
-  const auto known = [&errors](double value) {
-    return errors.count > 0 ? Json(value) : Json();
-  };
-  return {{"count", errors.count},
-          {"max", known(errors.max)},
-          {"p99", known(errors.p99)},
-          {"mean", known(errors.mean)},
-          {"rms", known(errors.rms)}};
-}
-
-Json VectorJson(const Eigen::Vector3d& vector) {
-  return {vector.x(), vector.y(), vector.z()};
+  Json json = {{"count", errors.count}};
+  json.update(ErrorJson(errors));
+  return json;
 }
 
 Json ImageJson(const ImageErrors& image, const Camera& camera,
@@ -134,7 +122,8 @@ Json ImageJson(const ImageErrors& image, const Camera& camera,
           {"pixel_error", ErrorsJson(image.errors)}};
 }
 
-Json ImagesJson(const Model& model, const std::vector<double>& errors_px) {
+Json ViewedImagesJson(const Model& model,
+                      const std::vector<double>& errors_px) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const std::vector<ImageErrors> errors = ErrorsByImage(model, errors_px);
   std::unordered_map<CameraId, const Camera*> cameras;
@@ -197,7 +186,7 @@ std::string ModelViewJson(const Model& model, const Eigen::Vector3d& origin,
       {"num_points", model.points3D.size()},
       {"num_observations", model.track_elements.size()},
       {"origin", VectorJson(origin)},
-      {"images", ImagesJson(model, errors_px)},
+      {"images", ViewedImagesJson(model, errors_px)},
       {"points", PointsJson(model, selection, point_errors, origin)},
       {"histogram",
        {{"min_exponent", ErrorHistogram::kMinExponent},

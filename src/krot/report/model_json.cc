@@ -1,20 +1,8 @@
-#include <nlohmann/json.hpp>
-
 #include "krot/report/model_report.h"
+#include "krot/report/report_json.h"
 
 namespace krot {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-Json ErrorJson(const PixelErrorStatistics& errors) {
-  const auto known = [&errors](double value) {
-    return errors.count > 0 ? Json(value) : Json();
-  };
-  return {{"count", errors.count},      {"not_finite", errors.not_finite},
-          {"max", known(errors.max)},   {"p99", known(errors.p99)},
-          {"mean", known(errors.mean)}, {"rms", known(errors.rms)}};
-}
 
 Json ColmapJson(const ColmapStatistics& colmap) {
   return {{"num_rigs", colmap.num_rigs},
@@ -29,12 +17,12 @@ Json ColmapJson(const ColmapStatistics& colmap) {
           {"mean_reprojection_error", colmap.mean_reprojection_error}};
 }
 
-Json ImagesJson(const std::vector<ImageErrors>& images) {
+Json ImageErrorsJson(const std::vector<ImageErrors>& images) {
   Json json = Json::array();
   for (const ImageErrors& image : images) {
     json.push_back({{"image_id", image.image_id},
                     {"image_name", image.image_name},
-                    {"pixel_error", ErrorJson(image.errors)}});
+                    {"pixel_error", CountedErrorJson(image.errors)}});
   }
   return json;
 }
@@ -44,7 +32,7 @@ Json CamerasJson(const std::vector<CameraErrors>& cameras) {
   for (const CameraErrors& camera : cameras) {
     json.push_back({{"camera_id", camera.camera_id},
                     {"num_images", camera.num_images},
-                    {"pixel_error", ErrorJson(camera.errors)}});
+                    {"pixel_error", CountedErrorJson(camera.errors)}});
   }
   return json;
 }
@@ -78,9 +66,9 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
       {"version", version},
       {"command", "model_analyzer"},
       {"colmap", ColmapJson(report.colmap)},
-      {"pixel_error", ErrorJson(report.pixel_error)},
+      {"pixel_error", CountedErrorJson(report.pixel_error)},
       {"cameras", CamerasJson(report.cameras)},
-      {"images", ImagesJson(report.images)},
+      {"images", ImageErrorsJson(report.images)},
       {"worst", WorstJson(report.worst)},
       {"track_lengths", TrackLengthsJson(report.track_lengths)},
       {"num_tracks_with_repeated_image", report.num_tracks_with_repeated_image},
@@ -96,8 +84,7 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
         {"median", angle.median_deg},
         {"max", angle.max_deg}}},
   };
-  // Image names are bytes, not always UTF-8.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return ReportText(json);
 }
 
 }  // namespace krot

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "krot/report/error_rows.h"
 #include "krot/report/model_report.h"
 #include "krot/report/text_table.h"
 
@@ -25,21 +26,6 @@ std::string ColmapFigures(const ColmapStatistics& colmap) {
        << "Mean reprojection error: "
        << FormatNumber(colmap.mean_reprojection_error, 6) << "px\n";
   return text.str();
-}
-
-void AddErrorHead(const std::string& name, TextTable* table) {
-  table->AddRow({name, "observations", "max", "P99", "mean", "RMS"});
-}
-
-void AddErrorRow(const std::string& name, const PixelErrorStatistics& errors,
-                 TextTable* table) {
-  if (errors.count == 0) {
-    table->AddRow({name, "0", "-", "-", "-", "-"});
-    return;
-  }
-  table->AddRow({name, std::to_string(errors.count),
-                 FormatNumber(errors.max, 4), FormatNumber(errors.p99, 4),
-                 FormatNumber(errors.mean, 4), FormatNumber(errors.rms, 4)});
 }
 
 std::string OverallErrors(const ModelReport& report) {

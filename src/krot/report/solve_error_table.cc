@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "krot/report/error_rows.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -18,24 +19,16 @@ std::string PolishSentence(const SolveSummary& summary) {
 }  // namespace
 
 std::string SolveErrorTable(const SolveSummary& summary) {
-  const PixelErrorStatistics& before = summary.pixel_error_before;
-  const PixelErrorStatistics& after = summary.pixel_error_after;
-  TextTable table;
   std::vector<std::string> head = {"pixels", "before", "after"};
-  if (summary.polish) head.push_back("polished");
+  std::vector<PixelErrorStatistics> estimates = {summary.pixel_error_before,
+                                                 summary.pixel_error_after};
+  if (summary.polish) {
+    head.push_back("polished");
+    estimates.push_back(summary.polish->pixel_error);
+  }
+  TextTable table;
   table.AddRow(head);
-  const auto add = [&](const char* name, double PixelErrorStatistics::*error) {
-    std::vector<std::string> row = {name, FormatNumber(before.*error, 4),
-                                    FormatNumber(after.*error, 4)};
-    if (summary.polish) {
-      row.push_back(FormatNumber(summary.polish->pixel_error.*error, 4));
-    }
-    table.AddRow(row);
-  };
-  add("max error", &PixelErrorStatistics::max);
-  add("P99 error", &PixelErrorStatistics::p99);
-  add("mean error", &PixelErrorStatistics::mean);
-  add("RMS error", &PixelErrorStatistics::rms);
+  AddErrorColumns(estimates, &table);
   table.AddRow({"cost (max, linearised)", FormatNumber(summary.cost_initial, 4),
                 FormatNumber(summary.cost_final, 4)});
   return table.ToString() + PolishSentence(summary);

@@ -1,19 +1,18 @@
 #include <optional>
 
-#include <nlohmann/json.hpp>
-
 #include "krot/report/adjustment_report.h"
+#include "krot/report/report_json.h"
 #include "krot/report/solve_report.h"
 
 namespace krot {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 const char* TerminationName(SolveTermination termination) {
   switch (termination) {
     case SolveTermination::kGapReached:
       return "gap_reached";
+    case SolveTermination::kZeroCost:
+      return "zero_cost";
     case SolveTermination::kStalled:
       return "stalled";
     case SolveTermination::kMaxSweeps:
@@ -34,11 +33,7 @@ const char* TerminationName(SolveTermination termination) {
   return "not_run";
 }
 
-Json NumberOrNull(const std::optional<double>& value) {
-  return value ? Json(*value) : Json();
-}
-
-Json IterationsJson(const std::vector<JointIteration>& iterations) {
+Json JointIterationsJson(const std::vector<JointIteration>& iterations) {
   Json json = Json::array();
   for (const JointIteration& iteration : iterations) {
     json.push_back({{"method", iteration.target ? "feasible_start" : "joint"},
@@ -64,19 +59,6 @@ Json SupportJson(const std::vector<SupportObservation>& support) {
   return json;
 }
 
-Json ErrorJson(const PixelErrorStatistics& statistics) {
-  if (statistics.count == 0) {
-    return {{"max", nullptr},
-            {"p99", nullptr},
-            {"mean", nullptr},
-            {"rms", nullptr}};
-  }
-  return {{"max", statistics.max},
-          {"p99", statistics.p99},
-          {"mean", statistics.mean},
-          {"rms", statistics.rms}};
-}
-
 Json PolishJson(const std::optional<PolishSummary>& polish) {
   if (!polish) return {};
   const BundleAdjustmentSummary& adjustment = polish->adjustment;
@@ -93,17 +75,14 @@ Json PolishJson(const std::optional<PolishSummary>& polish) {
 
 std::string SolveJson(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
-  Json left_out = Json::object();
-  for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
-    left_out[LeftOutName(static_cast<LeftOut>(reason))] =
-        summary.left_out[reason];
-  }
+  Json left_out = LeftOutJson(LeftOutByReason(summary));
+  left_out["single_ray"] = 0;  // a key that once was stays
   Json sweeps = Json::array();
   for (const Sweep& sweep : summary.sweeps) {
     sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
   }
   const Json json = {
-      {"version", report.version},
+      {"version", report.run.version},
       {"command", report.command},
       {"method", report.method},
       {"norm", NormName(summary.norm)},
@@ -126,21 +105,20 @@ std::string SolveJson(const SolveReport& report) {
         {"after", ErrorJson(summary.pixel_error_after)}}},
       {"polish", PolishJson(summary.polish)},
       {"sweeps", sweeps},
-      {"iterations", IterationsJson(summary.iterations)},
+      {"iterations", JointIterationsJson(summary.iterations)},
       {"support", SupportJson(summary.support)},
       {"seconds",
-       {{"read", report.seconds_read},
+       {{"read", report.run.seconds_read},
         {"build", summary.seconds_build},
         {"solve", summary.seconds_solve},
         {"certify", NumberOrNull(summary.seconds_certify)},
-        {"write", report.seconds_write},
-        {"total", report.seconds_total}}},
-      {"peak_memory_bytes", report.peak_memory_bytes},
-      {"threads", report.threads},
-      {"seed", report.seed},
+        {"write", report.run.seconds_write},
+        {"total", report.run.seconds_total}}},
+      {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"threads", report.run.threads},
+      {"seed", report.run.seed},
   };
-  // Image names are bytes, not always UTF-8.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return ReportText(json);
 }
 
 }  // namespace krot

@@ -8,9 +8,17 @@
 
 namespace krot {
 
-bool IsZeroUpToRounding(const SolveSummary& summary) {
-  constexpr double kRoundingPx = 1e-9;
-  return summary.cost_final < kRoundingPx;
+LeftOutCounts LeftOutByReason(const SolveSummary& summary) {
+  LeftOutCounts counts;
+  for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
+    counts.emplace_back(LeftOutName(static_cast<LeftOut>(reason)),
+                        summary.left_out[reason]);
+  }
+  return counts;
+}
+
+std::string NothingToSolveSentence(const SolveSummary& summary) {
+  return NothingToDoSentence("solve", LeftOutByReason(summary));
 }
 
 std::string MissedGapSentence(const SolveSummary& summary) {

@@ -1,9 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <sstream>
 
+#include "krot/problem/cost.h"
 #include "krot/report/certificate_table.h"
+#include "krot/report/error_rows.h"
 #include "krot/report/solve_error_table.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -18,7 +19,7 @@ constexpr int kListedSupport = 10;
 std::string Verdict(const SolveSummary& summary) {
   const std::string maximum =
       "Maximum " + FormatNumber(summary.cost_final, 4) + " px (linearised)";
-  if (IsZeroUpToRounding(summary)) {
+  if (IsZeroUpToRounding(summary.cost_final)) {
     return "Every error is zero up to rounding (" +
            Scientific(summary.cost_final) + " px at most).";
   }
@@ -64,7 +65,7 @@ std::string StepsWords(const SolveSummary& summary) {
          WorkingSetWords(summary) + " and " + sweeps;
 }
 
-std::string TerminationSentence(const SolveSummary& summary) {
+std::string SolveEndSentence(const SolveSummary& summary) {
   const std::string after = StepsWords(summary);
   switch (summary.termination) {
     case SolveTermination::kGapReached:
@@ -77,6 +78,8 @@ std::string TerminationSentence(const SolveSummary& summary) {
                   ? ": the last one gained less than the tolerance; whether a "
                     "lower cost exists is not known."
                   : ": no further progress was made.");
+    case SolveTermination::kZeroCost:
+      return "Ended" + after + " with nothing left to lower.";
     case SolveTermination::kMaxSweeps:
       return "Ended" + after + ", as many as were allowed.";
     case SolveTermination::kInterrupted:
@@ -91,81 +94,38 @@ std::string TerminationSentence(const SolveSummary& summary) {
   return "Not run.";
 }
 
-int64_t NumLeftOut(const SolveSummary& summary) {
-  return std::accumulate(summary.left_out.begin(), summary.left_out.end(),
-                         int64_t{0});
-}
-
-// "short_track 12, behind 3"; empty if nothing was left out.
-std::string LeftOutList(const SolveSummary& summary) {
-  std::string list;
-  for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
-    if (summary.left_out[reason] == 0) continue;
-    if (!list.empty()) list += ", ";
-    list += std::string(LeftOutName(static_cast<LeftOut>(reason))) + " " +
-            std::to_string(summary.left_out[reason]);
-  }
-  return list;
-}
-
-std::string CountsSentence(const SolveSummary& summary) {
-  std::ostringstream text;
-  text << Counted(summary.num_frames, "frame") << ", "
-       << Counted(summary.num_images, "image") << ", "
-       << Counted(summary.num_points, "point") << ", "
-       << Counted(summary.num_observations, "observation")
-       << " in the optimisation; "
-       << Counted(NumLeftOut(summary), "observation") << " left out";
-  const std::string list = LeftOutList(summary);
-  if (!list.empty()) text << " (" << list << ")";
-  if (summary.num_retriangulated_points > 0) {
-    text << "; " << Counted(summary.num_retriangulated_points, "point")
-         << " re-triangulated at the start";
-  }
-  return text.str() + ".";
+std::string SolveCountsSentence(const SolveSummary& summary) {
+  return CountsWords(summary) + " in the optimisation; " +
+         LeftOutWords(LeftOutByReason(summary)) +
+         (summary.num_retriangulated_points > 0
+              ? "; " + Counted(summary.num_retriangulated_points, "point") +
+                    " re-triangulated at the start."
+              : ".");
 }
 
 }  // namespace
 
-std::string NothingToSolveSentence(const SolveSummary& summary) {
-  const int64_t num_left_out = NumLeftOut(summary);
-  if (num_left_out == 0) {
-    return "nothing to solve: the model has no observations";
-  }
-  return "nothing to solve: " + Counted(num_left_out, "observation") +
-         " left out (" + LeftOutList(summary) + ")";
-}
-
 std::string SolveTable(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
-  const PixelErrorStatistics& after = summary.pixel_error_after;
-
   std::ostringstream text;
   text << "\nReprojection errors, p = " << NormName(summary.norm)
        << " for the cost, Euclidean for the rest\n"
-       << SolveErrorTable(summary) << CountsSentence(summary) << '\n';
-  if (after.not_finite > 0) {
-    text << Counted(after.not_finite, "observation")
-         << " without a finite error (behind the camera, no pose, or not "
-            "projectable), in no row above.\n";
-  }
+       << SolveErrorTable(summary) << SolveCountsSentence(summary) << '\n'
+       << NotFiniteSentence(summary.pixel_error_after);
   if (summary.num_components > 1) {
     text << "The problem falls into "
          << Counted(summary.num_components, "component")
          << " without observations in common; each is solved.\n";
   }
-  text << TerminationSentence(summary) << '\n' << Verdict(summary) << '\n';
+  text << SolveEndSentence(summary) << '\n' << Verdict(summary) << '\n';
   if (summary.is_certified) {
     text << SupportTable(summary.support, kListedSupport);
   }
-  text << (summary.is_certified ? "\n" : "") << "Read "
-       << FormatNumber(report.seconds_read, 2) << " s, built "
-       << FormatNumber(summary.seconds_build, 2) << " s, solved "
-       << FormatNumber(summary.seconds_solve, 2) << " s, wrote "
-       << FormatNumber(report.seconds_write, 2) << " s; "
-       << FormatNumber(report.seconds_total, 2) << " s in all on "
-       << Counted(report.threads, "thread") << ", "
-       << FormatBytes(report.peak_memory_bytes) << " at most.\n";
+  text << (summary.is_certified ? "\n" : "")
+       << RunSentence(report.run,
+                      "built " + FormatNumber(summary.seconds_build, 2) +
+                          " s, solved " +
+                          FormatNumber(summary.seconds_solve, 2) + " s");
   return text.str();
 }
 

@@ -18,12 +18,12 @@ constexpr int64_t kPrefetchAhead = 16;
 
 BlockSweep::BlockSweep(const KnownRotationProblem& problem,
                        const FastDescentOptions& options, Norm norm,
-                       int num_threads, const CancelFlag* cancel)
+                       const Context& context)
     : problem_(problem),
       norm_(norm),
-      cancel_(cancel),
-      num_threads_(ResolveNumThreads(num_threads)),
-      descents_(num_threads_, FastDescent(options, norm)),
+      context_(context),
+      descents_(ResolveNumThreads(context.num_threads),
+                FastDescent(options, norm)),
       point_active_(problem.num_points),
       frame_active_(problem.num_frames) {}
 
@@ -47,9 +47,9 @@ template <typename Function>
 double BlockSweep::LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
                                const Function& minimize) {
   std::vector<double> chunk_max(NumChunks(num_blocks, blocks_per_chunk), 0);
-  ParallelFor(num_blocks, blocks_per_chunk, num_threads_,
+  ParallelFor(num_blocks, blocks_per_chunk, static_cast<int>(descents_.size()),
               [&](int64_t begin, int64_t end, int worker) {
-                if (IsCancelled(cancel_)) return;
+                if (context_.IsCancelled()) return;
                 double largest = 0;
                 for (int64_t block = begin; block < end; ++block) {
                   largest =

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/minimax/fast_descent.h"
 #include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -12,17 +12,17 @@ namespace krot {
 // The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
 // other and spread over threads; the result does not depend on how many. Each
 // thread keeps one FastDescent, so that sweeps do not allocate once warm.
-// Once `cancel` is set, the blocks that are left are skipped.
+// Once it is cancelled, the blocks that are left are skipped.
 //
 // Both return the cost that is reached, pixels, to rounding what Cost() gives:
 // infinity where a block starts at a depth that is not positive, and then the
 // estimate is of no use.
 class BlockSweep {
  public:
-  // Keeps a reference to `problem`. `cancel` may be null.
+  // Keeps a reference to `problem`.
   BlockSweep(const KnownRotationProblem& problem,
-             const FastDescentOptions& options, Norm norm, int num_threads,
-             const CancelFlag* cancel);
+             const FastDescentOptions& options, Norm norm,
+             const Context& context);
 
   // How far blocks go from now on; at first, to their optima.
   void SetGoal(const DescentGoal& goal) { goal_ = goal; }
@@ -42,8 +42,7 @@ class BlockSweep {
 
   const KnownRotationProblem& problem_;
   Norm norm_;
-  const CancelFlag* cancel_;
-  int num_threads_;
+  const Context context_;
   DescentGoal goal_;
   std::vector<FastDescent> descents_;  // one per thread
   std::vector<AffineMap> cameras_;     // per view, while points move

@@ -27,7 +27,8 @@ void CheckOptions(const ResIntOptions& options) {
 }  // namespace
 
 ResIntSummary SolveResInt(const KnownRotationProblem& problem,
-                          const ResIntOptions& options, Estimate* estimate) {
+                          const ResIntOptions& options, const Context& context,
+                          Estimate* estimate) {
   CheckOptions(options);
   const Timer timer;
   const bool literal =
@@ -35,14 +36,13 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   const int patience = literal ? 1 : options.patience;
   ResIntSummary summary;
   summary.cost_initial =
-      Cost(problem, *estimate, options.norm, options.num_threads);
+      Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
                 summary.cost_initial, "finite: all depths positive");
 
   summary.termination = ResIntTermination::kMaxSweeps;
-  BlockSweep blocks(problem, options.fast_descent, options.norm,
-                    options.num_threads, options.cancel);
-  Momentum momentum(problem, options.num_threads, *estimate,
+  BlockSweep blocks(problem, options.fast_descent, options.norm, context);
+  Momentum momentum(problem, context.num_threads, *estimate,
                     summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
   int idle_sweeps = 0;  // in a row
@@ -55,7 +55,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
     blocks.SetGoal(is_coarse && !is_last ? coarse_goal : DescentGoal{});
     double reached = blocks.IntersectPoints(&current);
     if (options.update_frames) reached = blocks.ResectFrames(&current);
-    if (IsCancelled(options.cancel)) {
+    if (context.IsCancelled()) {
       summary.termination = ResIntTermination::kInterrupted;
       break;
     }
@@ -78,7 +78,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   }
   // The costs of sweeps differ from Cost() by rounding.
   summary.cost_final =
-      Cost(problem, momentum.best(), options.norm, options.num_threads);
+      Cost(problem, momentum.best(), options.norm, context.num_threads);
   if (summary.cost_final <= summary.cost_initial) {
     *estimate = momentum.best();
   } else {

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/minimax/fast_descent.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -37,9 +37,7 @@ struct ResIntOptions {
   // After so many such sweeps in a row; >= 1. A sweep with momentum may fail
   // where the next one, without, does not. Paper settings: after the first.
   int patience = 3;
-  int num_threads = -1;       // -1: all; the result does not depend on it
   bool update_frames = true;  // false: points only (triangulation)
-  const CancelFlag* cancel = nullptr;  // may be null
   // After every sweep, counted from 1; may be empty.
   std::function<void(int sweep, const Sweep&)> callback;
 };
@@ -62,6 +60,7 @@ struct ResIntSummary {
 // std::invalid_argument otherwise). The cost never rises. Beyond the problem
 // it needs about 200 bytes per point and per frame.
 ResIntSummary SolveResInt(const KnownRotationProblem& problem,
-                          const ResIntOptions& options, Estimate* estimate);
+                          const ResIntOptions& options, const Context& context,
+                          Estimate* estimate);
 
 }  // namespace krot

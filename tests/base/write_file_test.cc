@@ -1,11 +1,11 @@
-#include "krot/report/write_file.h"
+#include "krot/base/write_file.h"
 
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "tests/testing/model_matchers.h"
+#include "tests/testing/temp_folder.h"
 
 namespace krot {
 namespace {
@@ -17,6 +17,16 @@ TEST(WriteFile, ReplacesAFileAndLeavesNothingBesideIt) {
   WriteFileAtomically(folder / "report.json", "new");
   EXPECT_EQ(ReadBytes(folder / "report.json"), "new");
   EXPECT_EQ(FileNames(folder.path()), std::vector<std::string>{"report.json"});
+}
+
+TEST(WriteFile, ReportsAFullDisk) {
+  try {
+    WriteFile("/dev/full", "bytes");
+    ADD_FAILURE() << "nothing was thrown";
+  } catch (const WriteError& error) {
+    EXPECT_STREQ(error.what(),
+                 "/dev/full: cannot be written: No space left on device");
+  }
 }
 
 TEST(WriteFile, FailsWithoutATraceWhereThereIsNoFolder) {

@@ -1,4 +1,4 @@
-#include "krot/model/folder_swap.h"
+#include "krot/base/folder_swap.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -9,7 +9,7 @@
 #include <string>
 #include <system_error>
 
-#include "krot/model/model_error.h"
+#include "krot/base/write_file.h"
 
 namespace krot {
 namespace {
@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 // Without symbolic links, dots and a trailing slash: what rename acts on.
 fs::path Resolve(const fs::path& target) {
-  if (target.empty()) throw ModelError("found no name of an output folder");
+  if (target.empty()) throw WriteError("found no name of an output folder");
   const fs::path resolved = fs::weakly_canonical(fs::absolute(target));
   return resolved.has_filename() ? resolved : resolved.parent_path();
 }
@@ -44,10 +44,10 @@ bool HoldsWorkingDirectory(const fs::path& folder) {
 
 void CheckFolderIsWritable(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
-    throw ModelError(folder.string() + ": is a file, expected a folder");
+    throw WriteError(folder.string() + ": is a file, expected a folder");
   }
   if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
-    throw ModelError(folder.string() +
+    throw WriteError(folder.string() +
                      ": cannot be written to: " + Reason(errno));
   }
 }
@@ -70,7 +70,7 @@ void Carry(const fs::path& from, const fs::path& to) {
   if (fs::is_directory(status)) {
     // Removing the old folder would empty what is mounted there.
     if (IsMountPoint(from)) {
-      throw ModelError(from.string() +
+      throw WriteError(from.string() +
                        ": is a mount point inside the folder to be replaced; "
                        "choose another folder");
     }
@@ -94,7 +94,7 @@ void Exchange(const fs::path& staging, const fs::path& target) {
     return;
   }
   if (errno != EINVAL && errno != ENOSYS) {
-    throw ModelError(target.string() +
+    throw WriteError(target.string() +
                      ": cannot be replaced: " + Reason(errno));
   }
   const fs::path old = staging.string() + "-old";
@@ -103,7 +103,7 @@ void Exchange(const fs::path& staging, const fs::path& target) {
   fs::rename(staging, target, error);
   if (error) {
     fs::rename(old, target);
-    throw ModelError(target.string() +
+    throw WriteError(target.string() +
                      ": cannot be replaced: " + error.message());
   }
   fs::rename(old, staging);
@@ -116,12 +116,12 @@ void CheckSwappable(const fs::path& target) {
   const fs::path existing = ExistingPart(resolved);
   if (existing == resolved) {
     if (IsMountPoint(resolved)) {
-      throw ModelError(resolved.string() +
+      throw WriteError(resolved.string() +
                        ": is a mount point, which cannot be replaced; choose a "
                        "folder inside it");
     }
     if (HoldsWorkingDirectory(resolved)) {
-      throw ModelError(resolved.string() +
+      throw WriteError(resolved.string() +
                        ": is or holds the working directory, which cannot be "
                        "replaced; choose another folder or start elsewhere");
     }

@@ -1,11 +1,13 @@
-#include "krot/report/write_file.h"
+#include "krot/base/write_file.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
-#include <fstream>
+#include <optional>
 #include <system_error>
+
+#include "krot/base/file_descriptor.h"
 
 namespace krot {
 namespace {
@@ -20,6 +22,37 @@ fs::path ParentFolder(const fs::path& file) {
 // As a folder: "out/" and "out" are the same.
 fs::path Normal(const fs::path& folder) {
   return (fs::absolute(folder) / "").lexically_normal();
+}
+
+// What could not be done with a file, and why.
+struct Failure {
+  const char* action;
+  std::string reason;
+};
+
+Failure FailureOf(const char* action) {
+  return {action, std::generic_category().message(errno)};
+}
+
+std::optional<Failure> TryToWrite(const fs::path& file,
+                                  std::string_view contents) {
+  FileDescriptor descriptor(::open(
+      file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode_t{0666}));
+  if (!descriptor.is_open()) return FailureOf("created");
+  while (!contents.empty()) {
+    const ssize_t result =
+        ::write(descriptor.get(), contents.data(), contents.size());
+    if (result < 0 && errno == EINTR) continue;
+    if (result < 0) return FailureOf("written");
+    contents.remove_prefix(static_cast<size_t>(result));
+  }
+  // Some file systems know only now that there is no space. Those without
+  // fsync answer EINVAL.
+  if (::fsync(descriptor.get()) != 0 && errno != EINVAL) {
+    return FailureOf("written");
+  }
+  if (!descriptor.Close()) return FailureOf("written");
+  return std::nullopt;
 }
 
 }  // namespace
@@ -46,7 +79,14 @@ void CheckFileWritable(const fs::path& file, const fs::path& folder_to_come) {
   }
 }
 
-void WriteFileAtomically(const fs::path& file, const std::string& contents) {
+void WriteFile(const fs::path& file, std::string_view contents) {
+  if (const std::optional<Failure> failure = TryToWrite(file, contents)) {
+    throw WriteError(file.string() + ": cannot be " + failure->action + ": " +
+                     failure->reason);
+  }
+}
+
+void WriteFileAtomically(const fs::path& file, std::string_view contents) {
   fs::path temporary = file;
   temporary += ".new-" + std::to_string(getpid());
   const auto fail = [&](const std::string& why) {
@@ -55,10 +95,9 @@ void WriteFileAtomically(const fs::path& file, const std::string& contents) {
     throw WriteError(file.string() + " cannot be written: " + why);
   };
 
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << contents;
-  stream.close();
-  if (!stream) fail(std::strerror(errno));
+  if (const std::optional<Failure> failure = TryToWrite(temporary, contents)) {
+    fail(failure->reason);
+  }
   std::error_code error;
   fs::rename(temporary, file, error);
   if (error) fail(error.message());

@@ -1,12 +1,17 @@
-#include "krot/problem/restrict.h"
+#include "krot/problem/subset.h"
 
+#include <algorithm>
 #include <string>
+#include <utility>
 
 #include "krot/base/check.h"
-#include "krot/problem/components.h"
 
 namespace krot {
 namespace {
+
+bool IsAll(const std::vector<char>& is_kept) {
+  return std::find(is_kept.begin(), is_kept.end(), 0) == is_kept.end();
+}
 
 // Numbers the marked elements in their order; the others get -1.
 std::vector<int32_t> Renumber(const std::vector<char>& is_kept,
@@ -40,80 +45,87 @@ int32_t FrameOf(const KnownRotationProblem& problem, int64_t observation) {
 
 }  // namespace
 
-RestrictedProblem RestrictProblem(const KnownRotationProblem& problem,
-                                  const std::vector<int64_t>& observations) {
-  CheckAscending(problem, observations);
-  std::vector<char> has_point(problem.num_points, 0);
-  std::vector<char> has_view(problem.views.size(), 0);
-  std::vector<char> has_frame(problem.num_frames, 0);
-  for (const int64_t i : observations) {
-    has_point[problem.observations[i].point] = 1;
-    has_view[problem.observations[i].view] = 1;
-    has_frame[FrameOf(problem, i)] = 1;
+ProblemSubset::ProblemSubset(const KnownRotationProblem& whole,
+                             std::vector<int64_t> observations)
+    : whole_(whole), observation_of_(std::move(observations)) {
+  CheckAscending(whole, observation_of_);
+  std::vector<char> has_point(whole.num_points, 0);
+  std::vector<char> has_view(whole.views.size(), 0);
+  std::vector<char> has_frame(whole.num_frames, 0);
+  for (const int64_t i : observation_of_) {
+    has_point[whole.observations[i].point] = 1;
+    has_view[whole.observations[i].view] = 1;
+    has_frame[FrameOf(whole, i)] = 1;
   }
+  const bool is_whole = observation_of_.size() == whole.observations.size() &&
+                        IsAll(has_point) && IsAll(has_view) && IsAll(has_frame);
+  if (is_whole) {
+    observation_of_ = {};
+  } else {
+    Copy(has_point, has_view, has_frame);
+  }
+}
 
-  RestrictedProblem part;
-  part.observation_of = observations;
-  const std::vector<int32_t> new_point = Renumber(has_point, &part.point_of);
-  const std::vector<int32_t> new_view = Renumber(has_view, &part.view_of);
-  const std::vector<int32_t> new_frame = Renumber(has_frame, &part.frame_of);
-  part.problem.num_points = static_cast<int32_t>(part.point_of.size());
-  part.problem.num_frames = static_cast<int32_t>(part.frame_of.size());
-  for (const int32_t v : part.view_of) {
-    part.problem.views.push_back(problem.views[v]);
-    part.problem.views.back().frame = new_frame[problem.views[v].frame];
+void ProblemSubset::Copy(const std::vector<char>& has_point,
+                         const std::vector<char>& has_view,
+                         const std::vector<char>& has_frame) {
+  std::vector<int32_t> view_of;
+  const std::vector<int32_t> new_point = Renumber(has_point, &point_of_);
+  const std::vector<int32_t> new_view = Renumber(has_view, &view_of);
+  const std::vector<int32_t> new_frame = Renumber(has_frame, &frame_of_);
+  copy_ = std::make_unique<KnownRotationProblem>();
+  copy_->num_points = static_cast<int32_t>(point_of_.size());
+  copy_->num_frames = static_cast<int32_t>(frame_of_.size());
+  for (const int32_t v : view_of) {
+    copy_->views.push_back(whole_.views[v]);
+    copy_->views.back().frame = new_frame[whole_.views[v].frame];
   }
-  part.problem.observations.reserve(observations.size());
-  for (const int64_t i : observations) {
-    part.problem.observations.push_back(problem.observations[i]);
-    Observation& observation = part.problem.observations.back();
+  copy_->observations.reserve(observation_of_.size());
+  for (const int64_t i : observation_of_) {
+    copy_->observations.push_back(whole_.observations[i]);
+    Observation& observation = copy_->observations.back();
     observation.view = new_view[observation.view];
     observation.point = new_point[observation.point];
   }
-  IndexObservations(&part.problem);
-  return part;
+  IndexObservations(copy_.get());
 }
 
-Estimate RestrictEstimate(const RestrictedProblem& part,
-                          const Estimate& whole) {
+std::vector<int64_t> ProblemSubset::InWhole(
+    std::vector<int64_t> observations) const {
+  for (int64_t& i : observations) i = InWhole(i);
+  return observations;
+}
+
+Estimate ProblemSubset::Restrict(const Estimate& whole) const {
+  if (IsWhole()) return whole;
   Estimate estimate;
-  for (const int32_t f : part.frame_of) {
+  for (const int32_t f : frame_of_) {
     estimate.translations.push_back(whole.translations.at(f));
   }
-  for (const int32_t k : part.point_of) {
+  for (const int32_t k : point_of_) {
     estimate.points.push_back(whole.points.at(k));
   }
   return estimate;
 }
 
-void ReplaceEstimate(const RestrictedProblem& part, const Estimate& estimate,
-                     Estimate* whole) {
-  for (size_t f = 0; f < part.frame_of.size(); ++f) {
-    whole->translations.at(part.frame_of[f]) = estimate.translations.at(f);
+void ProblemSubset::Replace(const Estimate& estimate, Estimate* whole) const {
+  if (IsWhole()) {
+    *whole = estimate;
+    return;
   }
-  for (size_t k = 0; k < part.point_of.size(); ++k) {
-    whole->points.at(part.point_of[k]) = estimate.points.at(k);
+  for (size_t f = 0; f < frame_of_.size(); ++f) {
+    whole->translations.at(frame_of_[f]) = estimate.translations.at(f);
   }
-}
-
-std::vector<std::vector<int64_t>> SplitIntoComponents(
-    const KnownRotationProblem& problem,
-    const std::vector<int64_t>& observations) {
-  const RestrictedProblem part = RestrictProblem(problem, observations);
-  const Components components = FindComponents(part.problem);
-  std::vector<std::vector<int64_t>> split(components.count);
-  for (size_t i = 0; i < observations.size(); ++i) {
-    const int32_t point = part.problem.observations[i].point;
-    split[components.of_point[point]].push_back(observations[i]);
+  for (size_t k = 0; k < point_of_.size(); ++k) {
+    whole->points.at(point_of_[k]) = estimate.points.at(k);
   }
-  return split;
 }
 
 std::vector<int64_t> PruneUnconstrained(
     const KnownRotationProblem& problem,
     const std::vector<int64_t>& observations) {
-  const RestrictedProblem part = RestrictProblem(problem, observations);
-  const KnownRotationProblem& p = part.problem;
+  const ProblemSubset part(problem, observations);
+  const KnownRotationProblem& p = part.problem();
   const size_t count = observations.size();
   std::vector<int64_t> left_of_point(p.num_points);
   std::vector<int64_t> left_of_frame(p.num_frames);

@@ -5,7 +5,7 @@
 
 namespace krot {
 
-// Throws ModelError if FolderSwap would refuse this target: it is a file, a
+// Throws WriteError if FolderSwap would refuse this target: it is a file, a
 // mount point or the working directory (which cannot be replaced under a
 // running shell), or it or its nearest existing parent is not writable.
 // Changes nothing.
@@ -21,7 +21,7 @@ void CheckSwappable(const std::filesystem::path& target);
 //   ... write into swap.staging() ...
 //   swap.Commit(is_replaced);
 //
-// Throws ModelError or std::filesystem::filesystem_error; nothing has changed
+// Throws WriteError or std::filesystem::filesystem_error; nothing has changed
 // then.
 class FolderSwap {
  public:

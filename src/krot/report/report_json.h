@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <Eigen/Core>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/report/problem_words.h"
+
+namespace krot {
+
+// What the JSON writers of this folder share; for its .cc files alone.
+using Json = nlohmann::ordered_json;
+
+Json NumberOrNull(const std::optional<double>& value);
+
+Json VectorJson(const Eigen::Vector3d& vector);
+
+// {max, p99, mean, rms}, each null where nothing was counted.
+Json ErrorJson(const PixelErrorStatistics& errors);
+
+// The same behind {count, not_finite}.
+Json CountedErrorJson(const PixelErrorStatistics& errors);
+
+// The counts, by reason.
+Json LeftOutJson(const LeftOutCounts& left_out);
+
+// The text of a report. Image names are bytes, not always UTF-8: what is not
+// is replaced.
+std::string ReportText(const Json& json);
+
+}  // namespace krot

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace krot {
+
+// What every run that solves for a model records beside its result.
+struct RunRecord {
+  std::string version;      // KROT's
+  double seconds_read = 0;  // wall clock
+  double seconds_write = 0;
+  double seconds_total = 0;
+  int64_t peak_memory_bytes = 0;
+  int threads = 0;
+  uint64_t seed = 0;
+};
+
+// "Read 0.10 s, MIDDLE, wrote 0.20 s; 1.50 s in all on 2 threads, ...\n".
+std::string RunSentence(const RunRecord& run, const std::string& middle);
+
+}  // namespace krot
