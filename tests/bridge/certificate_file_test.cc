@@ -237,7 +237,9 @@ TEST_P(CertificateOfModel, IsRefusedIfAnyNumberOfItsFileChanges) {
     expect_one([](Observation* o) { ++o->image_id; });
     expect_one([](Observation* o) { ++o->point2D_idx; });
     expect_one([](Observation* o) { ++o->point3D_id; });
-    expect_one([](Observation* o) { o->bearing[1] += 1e-6; });
+    expect_one([&](Observation* o) {
+      o->bearing[1] += std::min(1e-2, millionth / o->lambda);
+    });
     expect_one([](Observation* o) { o->bearing *= -1; });
     expect_one([&](Observation* o) { o->lambda += millionth; });
     expect_one([&](Observation* o) { o->y -= millionth * o->y.normalized(); });

@@ -157,29 +157,25 @@ std::vector<double> StrongParams(int model_id, std::mt19937* random) {
 TEST_P(RemainderBoundOf, InOneDirectionIsNeverExceeded) {
   std::mt19937 random(2);
   int num_bounded = 0;
-  for (int i = 0; i < 100; ++i) {
+  for (int i = 0; i < 50; ++i) {
     const std::vector<double> params = StrongParams(GetParam(), &random);
     const auto trial =
         DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
     if (!trial) continue;
-    const std::vector<Eigen::Vector2d> errors = SampleLinearErrors(
-        GetParam(), params.data(), *trial, NumRays(GetParam()) / 5, &random);
-    for (int direction = 0; direction < 3; ++direction) {
-      const Eigen::Vector2d y = 3 * RandomRay(1, &random);
-      const auto bound =
-          SupportBound(GetParam(), params.data(), trial->pixel, trial->x_hat, y,
-                       trial->level_px, trial->p);
-      if (!bound) break;
-      ++num_bounded;
-      double largest = 0;
-      for (const Eigen::Vector2d& error : errors) {
-        largest = std::max(largest, -y.dot(error));
-      }
-      // Of the rays' own rounding.
-      EXPECT_LE(largest, *bound + 1e-8 * y.norm());
+    const Eigen::Vector2d y = 3 * RandomRay(1, &random);
+    const auto bound = SupportBound(GetParam(), params.data(), trial->pixel,
+                                    trial->x_hat, y, trial->level_px, trial->p);
+    if (!bound) continue;
+    ++num_bounded;
+    double largest = 0;
+    for (const Eigen::Vector2d& error :
+         SampleLinearErrors(GetParam(), params.data(), *trial,
+                            NumRays(GetParam()) / 2, &random)) {
+      largest = std::max(largest, -y.dot(error));
     }
+    EXPECT_LE(largest, *bound + 1e-8 * y.norm());  // of the rays' rounding
   }
-  EXPECT_GT(num_bounded, 60);
+  EXPECT_GT(num_bounded, 10);
 }
 
 // The point of the ball |e|_p = 1 that is farthest in the direction -y.
