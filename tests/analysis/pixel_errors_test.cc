@@ -83,11 +83,18 @@ TEST(PixelErrors, AreNotNumbersWithoutAPose) {
   EXPECT_TRUE(std::isnan(errors[1]));
 }
 
-TEST(PixelErrors, AreNotNumbersWithoutAnImagePlane) {
+TEST(PixelErrors, OfAPanoramaGoTheShorterWayRound) {
   Model model = TwoImages();
   model.cameras[0].model_id = FindCameraModel("EQUIRECTANGULAR")->id;
   model.cameras[0].params = {100, 80};
-  EXPECT_TRUE(std::isnan(PixelErrors(model)[0]));
+  // Behind the camera: azimuth pi, elevation 0, the seam at x = 0 and x = 100.
+  model.points3D[0].xyz = {0, 0, -10};
+  Point2D& point2D = model.images[0].points2D[0];
+  for (const double x : {3.0, 97.0}) {
+    point2D.x = x;
+    point2D.y = 40;
+    EXPECT_NEAR(PixelErrors(model)[0], 3, 1e-12);
+  }
 }
 
 TEST(PixelErrors, HaveTheSameBitsAtAnyNumberOfThreads) {

@@ -1,13 +1,12 @@
 #include <cstdlib>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/model/model_io.h"
-#include "tests/proof/joint_iterate.h"
+#include "tests/bridge/pixel_optimum.h"
 #include "tests/proof/naive_certificate_check.h"
 
 namespace krot {
@@ -15,7 +14,7 @@ namespace {
 
 struct RealModel {
   const char* folder;
-  double optimum;  // linearised pixels, from a reference solver, to 1e-4
+  double optimum;  // pixels, from a reference solver, to 1e-4
 };
 
 class CertificateOfRealModel : public ::testing::TestWithParam<RealModel> {};
@@ -26,19 +25,18 @@ TEST_P(CertificateOfRealModel, ProvesTheReferenceOptimum) {
   const std::filesystem::path folder =
       std::filesystem::path(root) / GetParam().folder;
   const Model model = ReadModel(folder, DetectModelFormat(folder));
-  const BuiltProblem built = BuildProblem(model, {});
-  const JointIterate iterate =
-      SolveToGap(built.problem, Norm::L2(), built.start, 1e-4);
-  const std::optional<Certificate> certificate =
-      Certify(built.problem, Norm::L2(), iterate);
-  ASSERT_TRUE(certificate);
-  const NaiveCheck naive = CheckNaively(built.problem, 2, *certificate);
+  BuiltProblem built = BuildProblem(model, {});
+  const PixelOptimum optimum =
+      SolveInPixels(model, Norm::L2(), &built, /*num_steps=*/2);
+  ASSERT_TRUE(optimum.is_proved);
+  const NaiveCheck naive =
+      CheckNaively(built.problem, 2, optimum.certificate.rows);
   EXPECT_LE(naive.longest, 1 + 1e-12);
   EXPECT_LE(naive.term, 1e-6);
 
   const CertificateFile file =
       ParseCertificate(CertificateJson(DescribeCertificate(
-                           model, built, Norm::L2(), *certificate)),
+                           model, built, Norm::L2(), optimum.certificate)),
                        "c.json");
   const CertificateVerdict verdict = VerifyCertificateFile(model, file);
   EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;

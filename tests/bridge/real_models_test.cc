@@ -16,7 +16,7 @@ namespace {
 struct RealModel {
   const char* folder;
   int64_t num_observations;  // all of them usable
-  double cost;               // linearised pixels, from a reference solver
+  double cost;               // pixels, from a reference solver
 };
 
 class BuildProblemOfRealModel : public ::testing::TestWithParam<RealModel> {};

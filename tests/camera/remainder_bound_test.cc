@@ -4,6 +4,8 @@
 #include <limits>
 #include <random>
 #include <stdexcept>
+#include <string_view>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -50,14 +52,17 @@ std::optional<Trial> DrawTrial(int model_id, const double* params,
   return trial;
 }
 
-// The largest |v / w| / level over rays with |f| <= level, most of them near
-// it, found from the pixels around the trial's; -1 below it are none.
-double SampleKappa(int model_id, const double* params, const Trial& trial,
-                   int num_rays, std::mt19937* random) {
+// v / w at rays with |f| <= level, most of them near it, found from the pixels
+// around the trial's.
+std::vector<Eigen::Vector2d> SampleLinearErrors(int model_id,
+                                                const double* params,
+                                                const Trial& trial,
+                                                int num_rays,
+                                                std::mt19937* random) {
   const Eigen::Matrix3d E =
       *RowAtProjection(model_id, params, trial.pixel, trial.x_hat);
   std::uniform_real_distribution<double> unit(0, 1);
-  double largest = 0;
+  std::vector<Eigen::Vector2d> errors;
   for (int i = 0; i < num_rays; ++i) {
     Eigen::Vector2d offset = RandomRay(1, random);
     const double share = i % 4 ? 1 - 1e-9 : unit(*random);
@@ -69,10 +74,32 @@ double SampleKappa(int model_id, const double* params, const Trial& trial,
     if (!error || NormOf(*error, trial.p) > trial.level_px) continue;
     const Eigen::Vector3d row = E * *ray;
     EXPECT_GT(row[0], 0);
-    const double linear = NormOf(row.tail<2>() / row[0], trial.p);
-    largest = std::max(largest, linear / trial.level_px);
+    errors.push_back(row.tail<2>() / row[0]);
+  }
+  return errors;
+}
+
+// The largest |v / w| / level of the sample; -1 below it are none.
+double SampleKappa(int model_id, const double* params, const Trial& trial,
+                   int num_rays, std::mt19937* random) {
+  double largest = 0;
+  for (const Eigen::Vector2d& error :
+       SampleLinearErrors(model_id, params, trial, num_rays, random)) {
+    largest = std::max(largest, NormOf(error, trial.p) / trial.level_px);
   }
   return largest - 1;
+}
+
+// Panoramas and fisheyes up to where they see, others up to 52 degrees.
+double LargestAngle(int model_id) {
+  if (model_id == 17) return kPi;
+  const bool perspective = model_id <= 4 || model_id == 6;
+  return model_id == 11 || perspective ? 0.9 : 1.9;
+}
+
+// Rays of some are slow to find.
+int NumRays(int model_id) {
+  return model_id == 10 || model_id == 11 ? 200 : 1000;
 }
 
 class RemainderBoundOf : public testing::TestWithParam<int> {};
@@ -84,12 +111,8 @@ INSTANTIATE_TEST_SUITE_P(EveryModel, RemainderBoundOf, testing::Range(0, 18),
 
 TEST_P(RemainderBoundOf, IsNeverExceededAndNearlyReached) {
   std::mt19937 random(1);
-  const bool perspective = GetParam() <= 4 || GetParam() == 6;
-  const double max_angle = GetParam() == 17                  ? kPi
-                           : GetParam() == 11 || perspective ? 0.9
-                                                             : 1.9;
-  // Rays of these are slow to find.
-  const int num_rays = GetParam() == 10 || GetParam() == 11 ? 200 : 1000;
+  const double max_angle = LargestAngle(GetParam());
+  const int num_rays = NumRays(GetParam());
   int num_bounded = 0;
   for (int i = 0; i < 100; ++i) {
     const RandomCamera camera(GetParam(), &random);
@@ -107,6 +130,91 @@ TEST_P(RemainderBoundOf, IsNeverExceededAndNearlyReached) {
         << "trial " << i << ", level " << trial->level_px << ", p " << trial->p;
   }
   EXPECT_GT(num_bounded, 40);
+}
+
+double DualNormOf(const Eigen::Vector2d& y, double p) {
+  return NormOf(y, p == 1 ? kInfinity : p == 2 ? 2 : 1);
+}
+
+// Parameters up to six times as strong as those of RandomCamera: folds are
+// near.
+std::vector<double> StrongParams(int model_id, std::mt19937* random) {
+  std::vector<double> params = RandomCamera(model_id, random).params();
+  const std::string_view names = FindCameraModel(model_id)->param_names;
+  const double factor = 1 + 5 * RandomRay(1, random).norm();
+  size_t index = 0;
+  for (size_t at = 0; at != std::string_view::npos; ++index) {
+    at = at == 0 ? 0 : at + 2;
+    const std::string_view name = names.substr(at, 2);
+    if (name[0] == 'k' && name != "k4" && name != "k5" && name != "k6") {
+      params[index] *= factor;
+    }
+    at = names.find(", ", at);
+  }
+  return params;
+}
+
+TEST_P(RemainderBoundOf, InOneDirectionIsNeverExceeded) {
+  std::mt19937 random(2);
+  int num_bounded = 0;
+  for (int i = 0; i < 50; ++i) {
+    const std::vector<double> params = StrongParams(GetParam(), &random);
+    const auto trial =
+        DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
+    if (!trial) continue;
+    const Eigen::Vector2d y = 3 * RandomRay(1, &random);
+    const auto bound = SupportBound(GetParam(), params.data(), trial->pixel,
+                                    trial->x_hat, y, trial->level_px, trial->p);
+    if (!bound) continue;
+    ++num_bounded;
+    double largest = 0;
+    for (const Eigen::Vector2d& error :
+         SampleLinearErrors(GetParam(), params.data(), *trial,
+                            NumRays(GetParam()) / 2, &random)) {
+      largest = std::max(largest, -y.dot(error));
+    }
+    EXPECT_LE(largest, *bound + 1e-8 * y.norm());  // of the rays' rounding
+  }
+  EXPECT_GT(num_bounded, 10);
+}
+
+// The point of the ball |e|_p = 1 that is farthest in the direction -y.
+Eigen::Vector2d FarthestAgainst(const Eigen::Vector2d& y, double p) {
+  if (p == 2) return -y.normalized();
+  const Eigen::Vector2d sign(std::copysign(1, y[0]), std::copysign(1, y[1]));
+  if (p != 1) return -sign;
+  return std::abs(y[0]) > std::abs(y[1]) ? Eigen::Vector2d(-sign[0], 0)
+                                         : Eigen::Vector2d(0, -sign[1]);
+}
+
+TEST_P(RemainderBoundOf, IsTheBallsOwnInTheDirectionOfThePoint) {
+  std::mt19937 random(3);
+  constexpr double kMild = 0.02;  // of gamma
+  int num_mild = 0;
+  for (int i = 0; i < 60; ++i) {
+    const RandomCamera camera(GetParam(), &random);
+    const double* params = camera.params().data();
+    auto trial =
+        DrawTrial(GetParam(), params, LargestAngle(GetParam()), &random);
+    if (!trial) continue;
+    const Eigen::Vector2d y = 3 * RandomRay(1, &random);
+    const auto x_hat = PixelBearing(
+        GetParam(), params,
+        trial->pixel + trial->level_px * FarthestAgainst(y, trial->p),
+        trial->x_hat);
+    if (!x_hat) continue;
+    const auto kappa = RemainderBound(GetParam(), params, trial->pixel, *x_hat,
+                                      trial->level_px, trial->p);
+    if (!kappa || *kappa > kMild) continue;
+    ++num_mild;
+    const auto bound = SupportBound(GetParam(), params, trial->pixel, *x_hat, y,
+                                    trial->level_px, trial->p);
+    ASSERT_TRUE(bound);
+    const double own = trial->level_px * DualNormOf(y, trial->p);
+    EXPECT_GE(*bound, (1 - 1e-9) * own);
+    EXPECT_LE(*bound, (1 + 1e-5) * own) << "trial " << i << ", p " << trial->p;
+  }
+  EXPECT_GT(num_mild, 20);
 }
 
 TEST(RemainderBound, OfPinholesIsZero) {

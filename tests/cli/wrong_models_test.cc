@@ -176,13 +176,6 @@ std::vector<WrongModel> InconsistentModels() {
          SetFields(f / "images.txt", 1, {"0", "0", "0", "0"});
        },
        2, "quaternion"},
-      {"Equirectangular", kText,
-       [](const fs::path& f) {
-         std::vector<std::string> lines = Lines(ReadBytes(f / "cameras.txt"));
-         lines[FirstRecord(lines)] = "1 EQUIRECTANGULAR 1024 768 1024 768";
-         WriteBytes(f / "cameras.txt", Joined(lines, '\n'));
-       },
-       2, "EQUIRECTANGULAR"},
   };
 }
 

@@ -89,13 +89,12 @@ TEST_P(InteriorPoint, MultipliersAreStationaryAtTheEnd) {
   for (size_t i = 0; i < multipliers.size(); ++i) {
     const Observation& o = scene.problem.observations[i];
     const View& view = scene.problem.views[o.view];
-    Eigen::Vector3d cam;  // E'(gamma lambda; y), in the camera's axes
-    cam << o.J.transpose() * multipliers[i].y,
-        summary.gamma * multipliers[i].lambda -
-            (o.J * o.u).dot(multipliers[i].y);
+    Eigen::Vector3d force;
+    force << summary.gamma * multipliers[i].lambda, multipliers[i].y;
+    const Eigen::Vector3d cam = o.E.transpose() * force;  // the camera's axes
     of_point[o.point] += view.cam_from_world_rotation.transpose() * cam;
     of_frame[view.frame] += view.cam_from_rig_rotation.transpose() * cam;
-    size += (o.J.transpose() * multipliers[i].y).norm();
+    size += (o.E.bottomRows<2>().transpose() * multipliers[i].y).norm();
   }
   for (const Eigen::Vector3d& sum : of_point) {
     EXPECT_LT(sum.norm(), 1e-6 * size);
@@ -221,7 +220,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(MinimizeJointly, HasNothingToDoWhereTheCostIsZero) {
   RandomScene scene = MakeScene(11, 5);
   for (Observation& o : scene.problem.observations) {
-    o.J.setZero();
+    o.E.bottomRows<2>().setZero();
   }
   const Estimate start = scene.estimate;
   std::vector<Multiplier> multipliers;

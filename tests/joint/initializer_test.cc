@@ -111,7 +111,9 @@ TEST_P(FindStartTest, NamesTheObservationsOfTheComponentThatMissesTheBound) {
   RandomScene good = MakeSmallScene(21);
   const RandomScene bad = MakeSmallScene(22);
   const double bound = 0.9 * OptimalCost(bad, norm());
-  for (Observation& o : good.problem.observations) o.J *= 1e-3;
+  for (Observation& o : good.problem.observations) {
+    o.E.bottomRows<2>() *= 1e-3;
+  }
   const RandomScene glued = Glue(good, bad);
   const InitializerOptions options = Options(norm(), bound);
   Estimate estimate;

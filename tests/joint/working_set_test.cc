@@ -27,7 +27,8 @@ double ErrorOf(const RandomScene& scene, const Observation& observation) {
       view.cam_from_world_rotation * scene.estimate.points[observation.point] +
       view.cam_from_rig_rotation * scene.estimate.translations[view.frame] +
       view.cam_from_rig_translation;
-  return (observation.J * (x_cam.hnormalized() - observation.u)).norm();
+  const Eigen::Vector3d wv = observation.E * x_cam;
+  return wv.tail<2>().norm() / wv[0];
 }
 
 // Per frame, its observations of points in the set.

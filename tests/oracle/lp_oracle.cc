@@ -50,10 +50,9 @@ class Feasibility {
         matrix.appendRow(row);
         row_lower.push_back(b - a.dot(view.cam_from_rig_translation));
       };
-      add(Vector3d::UnitZ(), min_depth_, 0);
+      add(o.E.row(0).transpose(), min_depth_, 0);
       for (const Vector2d& h : vertices_) {
-        const Vector2d g = o.J.transpose() * h;
-        add({-g[0], -g[1], gamma + g.dot(o.u)}, 0, 1);
+        add(o.E.transpose() * Vector3d(gamma, -h[0], -h[1]), 0, 1);
       }
     }
     std::vector<double> lower(tau + 1, -COIN_DBL_MAX);

@@ -35,9 +35,9 @@ TEST(ResidualOf, IsThePixelErrorOfAPinholeCameraExactly) {
                                        /*views_per_frame=*/2,
                                        /*baseline=*/0.3, /*seed=*/2});
   for (Observation& observation : scene.problem.observations) {
-    observation.J = Eigen::Vector2d(fx, fy).asDiagonal();
-    const Eigen::Vector2d pixel(fx * observation.u.x() + cx,
-                                fy * observation.u.y() + cy);
+    const Eigen::Vector2d u = RayOf(observation);
+    observation.E = RowAtRay(u, Eigen::Vector2d(fx, fy).asDiagonal());
+    const Eigen::Vector2d pixel(fx * u.x() + cx, fy * u.y() + cy);
     const ViewedPoint viewed =
         ViewPoint(scene.problem, observation, scene.estimate);
     const View& view = scene.problem.views[observation.view];

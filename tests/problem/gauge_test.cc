@@ -262,5 +262,34 @@ TEST(RestoreGauge, LeavesFramesAndPointsWithoutObservationsWhereTheyAre) {
   EXPECT_NEAR((moved.points[0] - scene.estimate.points[0]).norm(), 0, 1e-12);
 }
 
+TEST(RestoreGaugeIfHarmless, DoesTheSameWhereNothingIsLost) {
+  const RandomScene scene = MakeRandomScene({});
+  const Estimate moved =
+      Moved(scene.problem, scene.estimate, 0.5, Vector3d(1, 2, 3));
+  Estimate restored = moved;
+  RestoreGauge(scene.problem, scene.estimate, &restored);
+  Estimate estimate = moved;
+  RestoreGaugeIfHarmless(scene.problem, scene.estimate, Norm::L2(), 1,
+                         &estimate);
+  EXPECT_NE(estimate.points, moved.points);
+  EXPECT_EQ(estimate.points, restored.points);
+  EXPECT_EQ(estimate.translations, restored.translations);
+}
+
+TEST(RestoreGaugeIfHarmless, StaysWhereCoordinatesWouldLoseTheirDigits) {
+  const RandomScene scene = MakeRandomScene({});
+  const double cost = Cost(scene.problem, scene.estimate, Norm::L2(), 1);
+  // 1e8 away, coordinates are multiples of 1.5e-8, some 1e-5 px.
+  const Estimate far =
+      Moved(scene.problem, scene.estimate, 1, Vector3d(1e8, -1e8, 1e8));
+  Estimate restored = scene.estimate;
+  RestoreGauge(scene.problem, far, &restored);
+  ASSERT_GT(Cost(scene.problem, restored, Norm::L2(), 1), (1 + 1e-8) * cost);
+  Estimate estimate = scene.estimate;
+  RestoreGaugeIfHarmless(scene.problem, far, Norm::L2(), 1, &estimate);
+  EXPECT_EQ(estimate.points, scene.estimate.points);
+  EXPECT_EQ(estimate.translations, scene.estimate.translations);
+}
+
 }  // namespace
 }  // namespace krot

@@ -21,7 +21,7 @@ inline KnownRotationProblem MakeGraph(
   for (int32_t f = 0; f < num_frames; ++f) problem.views[f].frame = f;
   for (const auto& [frame, point] : edges) {
     problem.observations.push_back(
-        {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity(), frame, point});
+        {RowAtRay({0, 0}, Eigen::Matrix2d::Identity()), frame, point});
   }
   IndexObservations(&problem);
   return problem;

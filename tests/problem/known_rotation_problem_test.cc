@@ -12,7 +12,7 @@ namespace {
 using ::testing::ElementsAre;
 
 Observation Sees(int32_t view, int32_t point) {
-  return {Eigen::Vector2d::Zero(), Eigen::Matrix2d::Identity(), view, point};
+  return {RowAtRay({0, 0}, Eigen::Matrix2d::Identity()), view, point};
 }
 
 // Two frames, the first with two views; point 1 has no observation.

@@ -74,9 +74,12 @@ inline RandomScene MakeRandomScene(const RandomSceneOptions& options) {
           view.cam_from_rig_rotation * scene.estimate.translations[view.frame] +
           view.cam_from_rig_translation;
       Observation observation;
-      observation.u = x_cam.hnormalized() + 4e-3 * vector3().head<2>();
-      observation.J << 1000 + 50 * uniform(generator), 20 * uniform(generator),
+      const Eigen::Vector2d u =
+          x_cam.hnormalized() + 4e-3 * vector3().head<2>();
+      Eigen::Matrix2d J;
+      J << 1000 + 50 * uniform(generator), 20 * uniform(generator),
           20 * uniform(generator), 1000 + 50 * uniform(generator);
+      observation.E = RowAtRay(u, J);
       observation.view = j;
       observation.point = k;
       problem.observations.push_back(observation);
@@ -84,6 +87,18 @@ inline RandomScene MakeRandomScene(const RandomSceneOptions& options) {
   }
   IndexObservations(&problem);
   return scene;
+}
+
+// Where a row was taken by RowAtRay.
+inline Eigen::Vector2d RayOf(const Observation& observation) {
+  return -observation.E.bottomLeftCorner<2, 2>().inverse() *
+         observation.E.bottomRightCorner<2, 1>();
+}
+
+// Takes such a row elsewhere, with the same Jacobian.
+inline void MoveRay(const Eigen::Vector2d& by, Observation* observation) {
+  observation->E.bottomRightCorner<2, 1>() -=
+      observation->E.bottomLeftCorner<2, 2>() * by;
 }
 
 }  // namespace krot

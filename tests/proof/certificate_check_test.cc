@@ -184,11 +184,11 @@ TEST(CheckCertificate, RefusesWhateverOverflowsOrUnderflows) {
   }
   for (const double huge : {1e200, 1e308}) {
     KnownRotationProblem problem = twice.problem;
-    problem.observations[0].J *= huge;
+    problem.observations[0].E.bottomRows<2>() *= huge;
     EXPECT_FALSE(
         CheckCertificate(problem, Norm::L2(), twice.certificate).is_accepted);
     problem = twice.problem;
-    problem.observations[0].u[0] = huge;
+    problem.observations[0].E(1, 2) = huge;
     EXPECT_FALSE(
         CheckCertificate(problem, Norm::L2(), twice.certificate).is_accepted);
   }
@@ -312,10 +312,10 @@ TEST_P(TamperedCertificate, IsRefusedIfTheProblemChangesByAMillionth) {
     Observation& observation =
         scene_.problem.observations[certified.observation];
     const Observation original = observation;
-    observation.u[0] += 1e-6;
+    MoveRay({1e-6, 0}, &observation);
     EXPECT_FALSE(Check(certificate_).is_accepted);
     observation = original;
-    observation.J *= 1 + 1e-6;
+    observation.E.bottomRows<2>() *= 1 + 1e-6;
     EXPECT_FALSE(Check(certificate_).is_accepted);
     observation = original;
   }

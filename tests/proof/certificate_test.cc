@@ -127,9 +127,9 @@ TEST(MakeCertificate, ReachesAndNeverExceedsAnOptimumThatIsKnownExactly) {
   // One image sees one point twice, 16 px apart; nothing else is as bad.
   RandomScene scene = MakeScene(2, 1, 0);
   Observation twin = scene.problem.observations.back();
-  twin.J = 1024 * Eigen::Matrix2d::Identity();
+  twin.E = RowAtRay(RayOf(twin), 1024 * Eigen::Matrix2d::Identity());
   scene.problem.observations.back() = twin;
-  twin.u[0] += 1.0 / 64;
+  MoveRay({1.0 / 64, 0}, &twin);
   scene.problem.observations.push_back(twin);
   IndexObservations(&scene.problem);
   const std::optional<Certificate> certificate =

@@ -43,18 +43,20 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
     const View& view = problem.views[o.view];
     const long double lambda = certified.lambda;
     const auto add = [&](int row, const Eigen::Matrix3d& R) {
+      const auto entry = [&](int r, int k) {  // of E R
+        long double sum = 0;
+        for (int n = 0; n < 3; ++n) {
+          sum += static_cast<long double>(o.E(r, n)) * R(n, k);
+        }
+        return sum;
+      };
       for (int k = 0; k < 3; ++k) {
         for (int r = 0; r < 2; ++r) {
-          long double a = 0;
-          for (int n = 0; n < 2; ++n) {
-            a += static_cast<long double>(o.J(r, n)) *
-                 (static_cast<long double>(R(n, k)) -
-                  static_cast<long double>(o.u[n]) * R(2, k));
-          }
+          const long double a = entry(1 + r, k);
           M(row + k, 3 * i + r) = lambda * a;
           defect(row + k, 0) += a * certified.y[r];
         }
-        M(row + k, 3 * i + 2) = certificate.lower_bound * lambda * R(2, k);
+        M(row + k, 3 * i + 2) = certificate.lower_bound * lambda * entry(0, k);
         defect(row + k, 0) += M(row + k, 3 * i + 2);
       }
     };

@@ -30,7 +30,8 @@ KnownRotationProblem MakeProblem() {
     for (int f = 0; f < 3; ++f) {
       const Vector3d x_cam = kTrue.points[k] + kTrue.translations[f];
       problem.observations.push_back(
-          {x_cam.hnormalized(), 1000 * Eigen::Matrix2d::Identity(), f, k});
+          {RowAtRay(x_cam.hnormalized(), 1000 * Eigen::Matrix2d::Identity()), f,
+           k});
     }
   }
   IndexObservations(&problem);

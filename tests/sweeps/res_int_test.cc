@@ -28,10 +28,11 @@ RandomScene MakeExactScene() {
   RandomScene scene = MakeScene(3);
   for (Observation& observation : scene.problem.observations) {
     const View& view = scene.problem.views[observation.view];
-    observation.u = (view.cam_from_world_rotation *
-                         scene.estimate.points[observation.point] +
-                     scene.estimate.translations[view.frame])
-                        .hnormalized();
+    const Eigen::Vector3d x_cam = view.cam_from_world_rotation *
+                                      scene.estimate.points[observation.point] +
+                                  scene.estimate.translations[view.frame];
+    observation.E =
+        RowAtRay(x_cam.hnormalized(), observation.E.bottomLeftCorner<2, 2>());
   }
   std::mt19937 generator(4);
   std::uniform_real_distribution<double> uniform(-0.02, 0.02);

@@ -3,6 +3,7 @@
 #include "krot/base/timer.h"
 #include "krot/joint/joint.h"
 #include "krot/pipeline/schedule.h"
+#include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
 #include "tools/benchmark/known_rotation_solver.h"
 
@@ -20,12 +21,25 @@ class Schedule : public KnownRotationSolver {
   bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
     SolveSummary summary;
-    RunSchedule(problem, {}, method_, {num_threads_, cancel}, Timer(), estimate,
-                &summary);
+    const Timer timer;
+    const Context context{num_threads_, cancel};
+    SolveRows(problem, {}, method_, /*is_first_round=*/true, context, timer,
+              estimate, &summary);
+    if (method_ == SolveMethod::kAuto) Finish(problem, context, estimate);
     return !IsCancelled(cancel);
   }
 
  private:
+  static void Finish(const KnownRotationProblem& problem,
+                     const Context& context, Estimate* estimate) {
+    constexpr int kFinishingSweeps = 2;  // as many as `krot solver` takes
+    for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
+      const double cost =
+          Cost(problem, *estimate, Norm::L2(), context.num_threads);
+      SweepToFinish(problem, {}, context, cost, estimate);
+    }
+  }
+
   std::string name_;
   SolveMethod method_;
   int num_threads_;

@@ -75,40 +75,43 @@ std::optional<Eigen::Matrix3d> RowAtPixel(const Sources& sources,
 }
 
 // Fills the slots with the observations that have a pose and a row: where the
-// point projects or, if it does not or must not count, at the pixel's ray.
+// point projects or, if it does not or must not count, at the pixel's ray. All
+// that have a ray are taken there if one does not see the point.
 int CollectRows(const Sources& sources, int32_t point, bool only_rays,
                 Slots slots, LeftOutCounts* left_out) {
   const Point3D& point3D = sources.model.points3D[point];
   int num_kept = 0;
+  bool is_seen_by_all = true;
   for (uint64_t e = point3D.track_begin; e < point3D.track_end; ++e) {
     const TrackElement& element = sources.model.track_elements[e];
     const int32_t image = sources.image_indices.at(element.image_id);
     const ImageGeometry& geometry = sources.geometries[image];
-
-    Observation& observation = slots.observations[num_kept];
-    observation.view = image;
-    observation.point = point;
+    if (!geometry.has_pose) {
+      ++(*left_out)[static_cast<size_t>(LeftOut::kNoPose)];
+      continue;
+    }
     const Point2D& point2D =
         sources.model.images[image].points2D[element.point2D_idx];
     const Eigen::Vector2d pixel(point2D.x, point2D.y);
-    std::optional<LeftOut> reason;
     std::optional<Eigen::Matrix3d> row;
-    if (!geometry.has_pose) {
-      reason = LeftOut::kNoPose;
-    } else if (!only_rays) {
-      row = RowAtPoint(sources, geometry, pixel, point3D.xyz);
-    }
-    if (!reason && !row) {
+    if (!only_rays) row = RowAtPoint(sources, geometry, pixel, point3D.xyz);
+    if (!row) {
+      is_seen_by_all = false;
       row = RowAtPixel(sources, geometry, pixel);
-      if (!row) reason = LeftOut::kUndistortion;
     }
+    if (!row) {
+      ++(*left_out)[static_cast<size_t>(LeftOut::kUndistortion)];
+      continue;
+    }
+    slots.observations[num_kept] = {*row, image, point};
+    slots.point2D[num_kept] = static_cast<int32_t>(element.point2D_idx);
+    slots.pixels[num_kept++] = pixel;
+  }
+  for (int i = 0; i < num_kept && !is_seen_by_all && !only_rays; ++i) {
+    Observation& observation = slots.observations[i];
+    const auto row = RowAtPixel(sources, sources.geometries[observation.view],
+                                slots.pixels[i]);
     if (row) observation.E = *row;
-    if (reason) {
-      ++(*left_out)[static_cast<size_t>(*reason)];
-    } else {
-      slots.point2D[num_kept] = static_cast<int32_t>(element.point2D_idx);
-      slots.pixels[num_kept++] = pixel;
-    }
   }
   return num_kept;
 }

@@ -251,15 +251,15 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
       });
   // -y'm = -y'f + y'r, of which the first is at most |f| <= 1, and the second
   // small of second order around x_hat.
-  return Search(
-      map, p, reach, sampled + kAlongSlack, [&](const Enclosure& enclosure) {
-        const double direct = along(enclosure.m).hi;
-        const double first = along(enclosure.f).hi;
-        const Interval sum =
-            Interval{0, first < 1 ? first : 1.0} - along(enclosure.remainder);
-        if (!(sum.hi < kInfinity)) return direct;
-        return direct < sum.hi ? direct : sum.hi;
-      });
+  return Search(map, p, reach, sampled + kAlongSlack, kMaxCellsAlong,
+                [&](const Enclosure& enclosure) {
+                  const double direct = along(enclosure.m).hi;
+                  const double first = along(enclosure.f).hi;
+                  const Interval sum = Interval{0, first < 1 ? first : 1.0} -
+                                       along(enclosure.remainder);
+                  if (!(sum.hi < kInfinity)) return direct;
+                  return direct < sum.hi ? direct : sum.hi;
+                });
 }
 
 }  // namespace krot

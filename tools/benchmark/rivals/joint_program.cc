@@ -42,7 +42,7 @@ void JointProgram::Set(const Estimate& x, double gamma) {
     const ViewedPoint viewed = ViewPoint(problem_, observation, x);
     const double omega = viewed.depth;
     Matrix3d E;  // (gamma w; v) of x_cam, in the unit of the depth
-    E << 0, 0, gamma, observation.J, -observation.J * observation.u;
+    E << gamma * observation.E.row(0), observation.E.bottomRows<2>();
     E /= omega;
     Block& block = blocks_[i];
     block.by_point = E * view.cam_from_world_rotation;

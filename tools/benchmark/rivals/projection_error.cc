@@ -28,18 +28,16 @@ class ProjectionError : public ceres::SizedCostFunction<2, 3, 3> {
     const Vector3d x_cam = view_.cam_from_world_rotation * s +
                            view_.cam_from_rig_rotation * t +
                            view_.cam_from_rig_translation;
-    const double w = x_cam[2];
+    const auto depth = observation_.E.row(0);
+    const double w = depth * x_cam;
     if (!(w > 0)) return false;
-    RowMajor23 E;  // J (I2 | -u)
-    E << observation_.J, -observation_.J * observation_.u;
+    const RowMajor23 E = observation_.E.bottomRows<2>();
     const Vector2d r = E * x_cam / w;
     Eigen::Map<Vector2d> result(residuals);
     result = r;
     if (target_ != nullptr) result -= *target_;
     if (jacobians == nullptr) return true;
-    RowMajor23 by_x_cam = E;
-    by_x_cam.col(2) -= r;
-    by_x_cam /= w;
+    const RowMajor23 by_x_cam = (E - r * depth) / w;
     if (jacobians[0] != nullptr) {
       Eigen::Map<RowMajor23> J(jacobians[0]);
       J = by_x_cam * view_.cam_from_rig_rotation;
