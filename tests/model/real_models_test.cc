@@ -63,16 +63,11 @@ TEST(RealModels, ComeBackByteForByteDirectlyAndThroughText) {
   }
 }
 
-TEST(RealModels, AreValidButForTheInconsistentOne) {
+TEST(RealModels, AreValid) {
   if (!RealModels()) GTEST_SKIP() << kNoModels;
   for (const fs::path& path : ReadableModels()) {
     const Model model = ReadModel(path, DetectModelFormat(path));
-    const std::string error = ModelErrorOf([&] { ValidateModel(model); });
-    if (path.filename() == "edge_bad_point2d_idx_txt") {
-      EXPECT_THAT(error, HasSubstr("in its track, but that 2D point names"));
-    } else {
-      EXPECT_EQ(error, "") << path;
-    }
+    EXPECT_EQ(ModelErrorOf([&] { ValidateModel(model); }), "") << path;
   }
 }
 

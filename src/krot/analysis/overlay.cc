@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/model/contradictions.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 
@@ -172,6 +173,8 @@ Model Join(Model model1, Model model2) {
 Model OverlayModels(const Model& model1, const Model& model2, int num_threads) {
   Model first = model1;
   Model second = model2;
+  DropUnknownPoints3D(&first);  // ids that the other model may bear
+  DropUnknownPoints3D(&second);
   if (first.has_rigs != second.has_rigs) {
     AddTrivialRigs(first.has_rigs ? &second : &first);
   }

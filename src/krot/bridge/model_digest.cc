@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <openssl/evp.h>
@@ -130,7 +131,27 @@ void AddCamera(const Camera& camera, Digest* digest) {
   for (const double param : camera.params) digest->Number(param);
 }
 
-void AddImage(const Image& image, const Place* place, Digest* digest) {
+// By image id: which 2D points, and of which 3D points, the tracks name.
+using Observations =
+    std::unordered_map<ImageId, std::vector<std::pair<uint32_t, Point3DId>>>;
+
+Observations SortedObservations(const Model& model) {
+  Observations observations;
+  for (const Point3D& point : model.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      observations[element.image_id].emplace_back(element.point2D_idx,
+                                                  point.id);
+    }
+  }
+  for (auto& [image_id, of_image] : observations) {
+    std::sort(of_image.begin(), of_image.end());
+  }
+  return observations;
+}
+
+void AddImage(const Image& image, const Place* place,
+              const Observations& observations, Digest* digest) {
   digest->Integer(image.id);
   digest->Integer(image.camera_id);
   digest->Integer(place != nullptr);
@@ -142,18 +163,18 @@ void AddImage(const Image& image, const Place* place, Digest* digest) {
     }
     for (const double t : place->cam_from_rig.translation) digest->Number(t);
   }
-  const auto is_observation = [](const Point2D& point2D) {
-    return point2D.point3D_id != kInvalidPoint3DId;
-  };
-  digest->Integer(static_cast<uint64_t>(std::count_if(
-      image.points2D.begin(), image.points2D.end(), is_observation)));
-  for (size_t n = 0; n < image.points2D.size(); ++n) {
-    const Point2D& point2D = image.points2D[n];
-    if (!is_observation(point2D)) continue;
-    digest->Integer(n);
+  const auto found = observations.find(image.id);
+  if (found == observations.end()) {
+    digest->Integer(0);
+    return;
+  }
+  digest->Integer(found->second.size());
+  for (const auto& [point2D_idx, point3D_id] : found->second) {
+    const Point2D& point2D = image.points2D[point2D_idx];
+    digest->Integer(point2D_idx);
     digest->Number(point2D.x);
     digest->Number(point2D.y);
-    digest->Integer(point2D.point3D_id);
+    digest->Integer(point3D_id);
   }
 }
 
@@ -166,11 +187,12 @@ std::string ModelSha256(const Model& model) {
     AddCamera(model.cameras[n], &digest);
   }
   const std::unordered_map<ImageId, Place> places = Places(model);
+  const Observations observations = SortedObservations(model);
   digest.Integer(model.images.size());
   for (const size_t n : OrderById(model.images)) {
     const auto place = places.find(model.images[n].id);
     AddImage(model.images[n], place == places.end() ? nullptr : &place->second,
-             &digest);
+             observations, &digest);
   }
   return digest.Hex();
 }
