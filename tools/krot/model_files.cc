@@ -1,5 +1,6 @@
 #include "tools/krot/model_files.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
@@ -20,6 +21,15 @@ ModelFormat OutputFormat(const ModelPaths& paths) {
   if (paths.output_type == "BIN") return ModelFormat::kBinary;
   if (paths.output_type == "TXT") return ModelFormat::kText;
   return input_format;
+}
+
+// Whether a track has two elements. Of a model without there is one thing to
+// say alone: that there is nothing to solve.
+bool SetsAnything(const Model& model) {
+  return std::any_of(model.points3D.begin(), model.points3D.end(),
+                     [](const Point3D& point) {
+                       return point.track_end - point.track_begin >= 2;
+                     });
 }
 
 std::string ContradictionWords(const Contradictions& contradictions) {
@@ -110,6 +120,7 @@ ValidModel ReadValidModel(const std::string& path,
   ValidateModel(read.model);
   if (!read.contradictions.Any()) return read;
   if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
+  if (!SetsAnything(read.model)) return read;
   LogLine(log, 1,
           "warning: " + path + " contradicts itself: " +
               ContradictionWords(read.contradictions) + "; the " +
