@@ -287,7 +287,6 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         WrongRealModel{"edge_tracks_of_one_txt", 3,
                        "1000 observations left out (short_track 1000)"},
-        WrongRealModel{"edge_bad_point2d_idx_txt", 2, "2D point 0"},
         WrongRealModel{"edge_lfs_pointers", 2, "Git LFS"}),
     [](const auto& test) { return std::string(test.param.folder); });
 

@@ -63,18 +63,11 @@ TEST(RealModels, ComeBackByteForByteDirectlyAndThroughText) {
   }
 }
 
-TEST(RealModels, AreValidButForTheInconsistent) {
+TEST(RealModels, AreValid) {
   if (!RealModels()) GTEST_SKIP() << kNoModels;
   for (const fs::path& path : ReadableModels()) {
     const Model model = ReadModel(path, DetectModelFormat(path));
-    const std::string error = ModelErrorOf([&] { ValidateModel(model); });
-    // GLOMAP's has 2D points in several tracks.
-    if (path.filename() == "edge_bad_point2d_idx_txt" ||
-        path.filename() == "glomap100") {
-      EXPECT_THAT(error, HasSubstr("in its track, but that 2D point names"));
-    } else {
-      EXPECT_EQ(error, "") << path;
-    }
+    EXPECT_EQ(ModelErrorOf([&] { ValidateModel(model); }), "") << path;
   }
 }
 

@@ -70,7 +70,9 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   report.run.seed = common.random_seed;
 
   const Timer read_timer;
-  const Model model = ReadValidModel(paths.input_path);
+  const auto [model, contradictions] =
+      ReadValidModel(paths.input_path, paths.on_contradiction, common.log);
+  report.run.contradictions = contradictions;
   report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 

@@ -14,6 +14,7 @@ namespace {
 struct CheckerOptions {
   std::string input_path;
   std::string certificate_path;
+  std::string on_contradiction = "follow_tracks";
   CommonOptions common;
 };
 
@@ -22,6 +23,7 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
                   "The COLMAP model that the certificate speaks of");
   parser->AddPath("certificate_path", &options->certificate_path, true,
                   "a file", "The certificate, as JSON");
+  AddOnContradiction(&options->on_contradiction, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
 }
@@ -40,8 +42,9 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   const CertificateFile file = ReadCertificateFile(options.certificate_path);
-  const CertificateVerdict verdict =
-      VerifyCertificateFile(ReadValidModel(options.input_path), file);
+  const ValidModel read = ReadValidModel(
+      options.input_path, options.on_contradiction, options.common.log);
+  const CertificateVerdict verdict = VerifyCertificateFile(read.model, file);
   if (!verdict.is_accepted) {
     throw CommandError(kExitCertificateRefused, "refused: " + verdict.refusal);
   }

@@ -23,6 +23,7 @@ struct AnalyzerOptions {
   std::string error_colors_path;
   double error_colors_top = 4;
   bool overwrite = false;
+  std::string on_contradiction = "follow_tracks";
   int num_worst = 10;
   CommonOptions common;
 };
@@ -49,6 +50,7 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "The error from which on the copy's points are dark red; "
                   "those without error are blue");
   AddOverwrite(&options->overwrite, parser);
+  AddOnContradiction(&options->on_contradiction, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
 }
@@ -129,9 +131,11 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   }
   const std::string path = ModelPath(options, parser);
   CheckAnalyzerPaths(options, path, parser);
-  const Model model = ReadValidModel(path);
+  const auto [model, contradictions] =
+      ReadValidModel(path, options.on_contradiction, options.common.log);
   const std::string certificate = CertificateText(options, model);
-  const ModelReport report = AnalyzeModel(model, options.num_worst);
+  ModelReport report = AnalyzeModel(model, options.num_worst);
+  report.contradictions = contradictions;
   if (!options.error_colors_path.empty()) {
     WriteColoredCopy(options, path, model);
   }

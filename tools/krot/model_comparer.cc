@@ -38,6 +38,7 @@ struct ComparerOptions {
   std::string overlay_path;
   std::string output_type = "BIN";
   bool overwrite = false;
+  std::string on_contradiction = "follow_tracks";
   CommonOptions common;
 };
 
@@ -72,6 +73,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
   parser->AddChoice("output_type", &options->output_type, {"BIN", "TXT"},
                     "The format of the overlay");
   AddOverwrite(&options->overwrite, parser);
+  AddOnContradiction(&options->on_contradiction, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
 }
@@ -200,10 +202,14 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   CheckComparerPaths(options, parser);
-  const Model model1 = ReadValidModel(options.input_path1);
-  const Model model2 = ReadValidModel(options.input_path2);
+  const auto [model1, contradictions1] = ReadValidModel(
+      options.input_path1, options.on_contradiction, options.common.log);
+  const auto [model2, contradictions2] = ReadValidModel(
+      options.input_path2, options.on_contradiction, options.common.log);
 
   ComparisonReport report;
+  report.contradictions1 = contradictions1;
+  report.contradictions2 = contradictions2;
   report.version = KROT_VERSION;
   report.certificate1 = Verify(model1, options.certificate_path1);
   report.certificate2 = Verify(model2, options.certificate_path2);

@@ -1,10 +1,13 @@
 #include "tools/krot/model_files.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
 #include "krot/base/write_file.h"
+#include "krot/model/model_error.h"
 #include "krot/model/validate.h"
+#include "krot/report/text_table.h"
 #include "tools/krot/html_path.h"
 #include "tools/krot/same_path.h"
 
@@ -18,6 +21,22 @@ ModelFormat OutputFormat(const ModelPaths& paths) {
   if (paths.output_type == "BIN") return ModelFormat::kBinary;
   if (paths.output_type == "TXT") return ModelFormat::kText;
   return input_format;
+}
+
+// Whether a track has two elements. Of a model without there is one thing to
+// say alone: that there is nothing to solve.
+bool SetsAnything(const Model& model) {
+  return std::any_of(model.points3D.begin(), model.points3D.end(),
+                     [](const Point3D& point) {
+                       return point.track_end - point.track_begin >= 2;
+                     });
+}
+
+std::string ContradictionWords(const Contradictions& contradictions) {
+  return Counted(contradictions.num_track_elements, "track element") +
+         " of 2D points that do not name the 3D point, and " +
+         Counted(contradictions.num_points2D, "2D point") +
+         " of 3D points whose track does not name the 2D point";
 }
 
 // COLMAP's files are not for reports.
@@ -48,6 +67,7 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
   parser->AddOutputFile("report_path", &paths->report_path,
                         "Where the report goes, as JSON");
   AddHtmlPath(&paths->html_path, parser);
+  AddOnContradiction(&paths->on_contradiction, parser);
 }
 
 void AddOverwrite(bool* overwrite, OptionParser* parser) {
@@ -80,10 +100,33 @@ void CheckSidePath(const std::string& option, const std::string& path,
   CheckFileWritable(path, folder_to_come);
 }
 
-Model ReadValidModel(const std::string& path) {
-  Model model = ReadModel(path, DetectModelFormat(path));
-  ValidateModel(model);
-  return model;
+void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
+  parser->AddChoice("Model.on_contradiction", on_contradiction,
+                    {"follow_tracks", "follow_images", "refuse"},
+                    "Where tracks and images name different observations: "
+                    "follow_tracks: the tracks count, and both are written as "
+                    "they are; follow_images: tracks are made anew from the "
+                    "images' 2D points; refuse: such a model is not read");
+}
+
+ValidModel ReadValidModel(const std::string& path,
+                          const std::string& on_contradiction,
+                          const LogOptions& log) {
+  ValidModel read;
+  read.model = ReadModel(path, DetectModelFormat(path));
+  read.contradictions = FindContradictions(read.model);
+  const bool follows_images = on_contradiction == "follow_images";
+  if (follows_images) FollowImages(&read.model);
+  ValidateModel(read.model);
+  if (!read.contradictions.Any()) return read;
+  if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
+  if (!SetsAnything(read.model)) return read;
+  LogLine(log, 1,
+          "warning: " + path + " contradicts itself: " +
+              ContradictionWords(read.contradictions) + "; the " +
+              (follows_images ? "images" : "tracks") +
+              " are followed (--Model.on_contradiction)");
+  return read;
 }
 
 }  // namespace krot

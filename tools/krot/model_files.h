@@ -2,8 +2,10 @@
 
 #include <string>
 
+#include "krot/model/contradictions.h"
 #include "krot/model/model.h"
 #include "krot/model/model_io.h"
+#include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
 namespace krot {
@@ -14,6 +16,7 @@ struct ModelPaths {
   std::string output_path;
   std::string output_type = "auto";
   bool overwrite = false;
+  std::string on_contradiction = "follow_tracks";
   std::string report_path;
   std::string html_path;
 };
@@ -34,7 +37,19 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 void CheckSidePath(const std::string& option, const std::string& path,
                    const std::string& folder_to_come = "");
 
-// Reads and validates. Throws ModelError.
-Model ReadValidModel(const std::string& path);
+// What to do where tracks and images contradict each other; every command that
+// reads a model asks.
+void AddOnContradiction(std::string* on_contradiction, OptionParser* parser);
+
+struct ValidModel {
+  Model model;
+  Contradictions contradictions;  // that the files hold
+};
+
+// Reads and validates, and tells of contradictions on stderr. Throws
+// ModelError.
+ValidModel ReadValidModel(const std::string& path,
+                          const std::string& on_contradiction,
+                          const LogOptions& log);
 
 }  // namespace krot

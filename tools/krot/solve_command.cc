@@ -139,7 +139,9 @@ int RunSolveCommand(const SolveCommand& command) {
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
-  const Model model = ReadValidModel(paths.input_path);
+  const auto [model, contradictions] =
+      ReadValidModel(paths.input_path, paths.on_contradiction, log);
+  report.run.contradictions = contradictions;
   report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 

@@ -20,7 +20,9 @@ constexpr double kSamePixel = 0.01;
 class TrackIndex {
  public:
   explicit TrackIndex(const Model& model)
-      : points_(model.track_elements.size()) {
+      : model_(model),
+        points_(model.track_elements.size()),
+        others_(model.track_elements.size()) {
     for (const Image& image : model.images) {
       elements_.emplace_back(image.points2D.size());
     }
@@ -29,24 +31,56 @@ class TrackIndex {
       const Point3D& point = model.points3D[k];
       for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
         const TrackElement& element = model.track_elements[e];
-        elements_[indices.at(element.image_id)][element.point2D_idx] = e;
+        std::optional<uint64_t>& last =
+            elements_[indices.at(element.image_id)][element.point2D_idx];
+        others_[e] = last;
+        last = e;
         points_[e] = static_cast<int32_t>(k);
       }
     }
   }
 
-  // The track element of this 2D point, none if it has no 3D point.
+  // A track element of this 2D point, none if no track holds it.
   std::optional<uint64_t> Element(int32_t image, size_t point2D_idx) const {
     return elements_[image][point2D_idx];
+  }
+
+  // Another track element of the same 2D point; following these shows all.
+  std::optional<uint64_t> Other(uint64_t element) const {
+    return others_[element];
   }
 
   // Index in Model::points3D.
   int32_t Point(uint64_t element) const { return points_[element]; }
 
+  Point3DId PointId(uint64_t element) const {
+    return model_.points3D[points_[element]].id;
+  }
+
  private:
+  const Model& model_;
   std::vector<std::vector<std::optional<uint64_t>>> elements_;
   std::vector<int32_t> points_;
+  std::vector<std::optional<uint64_t>> others_;
 };
+
+// Pairs the track elements of a 2D point, in which e1 and e2 are the last:
+// whatever their points are if there is one on either side, those of points
+// with the same id otherwise.
+void PairElements(const TrackIndex& index1, const TrackIndex& index2,
+                  uint64_t e1, uint64_t e2, std::vector<ElementPair>* pairs) {
+  if (!index1.Other(e1) && !index2.Other(e2)) {
+    pairs->push_back({e1, e2});
+    return;
+  }
+  for (std::optional<uint64_t> a = e1; a; a = index1.Other(*a)) {
+    for (std::optional<uint64_t> b = e2; b; b = index2.Other(*b)) {
+      if (index1.PointId(*a) != index2.PointId(*b)) continue;
+      pairs->push_back({*a, *b});
+      break;
+    }
+  }
+}
 
 std::vector<IndexPair> MatchImages(const Model& model1, const Model& model2) {
   std::unordered_map<std::string_view, int32_t> by_name;
@@ -80,7 +114,7 @@ std::vector<ElementPair> MatchObservations(const Model& model1,
       if (!IsSamePixel(a[i], b[i])) continue;
       const std::optional<uint64_t> e1 = index1.Element(pair.first, i);
       const std::optional<uint64_t> e2 = index2.Element(pair.second, i);
-      if (e1 && e2) pairs.push_back({*e1, *e2});
+      if (e1 && e2) PairElements(index1, index2, *e1, *e2, &pairs);
     }
   }
   return pairs;

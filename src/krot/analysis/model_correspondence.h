@@ -24,7 +24,8 @@ struct ModelCorrespondence {
   // model. Of images that share a name within one model the first counts.
   std::vector<IndexPair> images;
   // 2D points of these images that both models list under the same index, not
-  // more than 0.01 px apart, and that belong to a 3D point in both.
+  // more than 0.01 px apart, and that belong to a 3D point in both; where
+  // several tracks hold a 2D point, those of 3D points with the same id.
   std::vector<ElementPair> observations;
   // 3D points that share more of these observations with each other than
   // with any third point, whatever their ids; among equals the one with the

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/model/contradictions.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 
@@ -150,6 +151,8 @@ Model Join(Model model1, Model model2) {
 Model OverlayModels(const Model& model1, const Model& model2, int num_threads) {
   Model first = model1;
   Model second = model2;
+  DropUnknownPoints3D(&first);  // ids that the other model may bear
+  DropUnknownPoints3D(&second);
   Renumber(Offsets(first, second), &second);
   Mark("1/", kOverlayColor1, &first);
   Mark("2/", kOverlayColor2, &second);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <utility>
+#include <tuple>
 
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/pixel_certificate.h"
@@ -34,6 +34,28 @@ bool IsSameRay(const CertificateFile::SupportObservation& o,
          (o.J - own.J).norm() <= kRayTolerance * own.J.norm();
 }
 
+// Why an entry of the file found no observation of the problem for itself.
+// Several tracks may hold the same 2D point, and a track may hold it twice.
+std::string RefusalOfUnused(const CertificateFile::SupportObservation& o,
+                            const Model& model, const BuiltProblem& built) {
+  bool is_of_another_point = false;
+  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
+    const Observation& own = built.problem.observations[i];
+    if (static_cast<uint32_t>(built.point2D_of[i]) != o.point2D_idx ||
+        model.images[built.image_of[own.view]].id != o.image_id) {
+      continue;
+    }
+    if (model.points3D[built.point_of[own.point]].id == o.point3D_id) {
+      return NameOf(o) + " stands there twice";
+    }
+    is_of_another_point = true;
+  }
+  return is_of_another_point
+             ? NameOf(o) + " is not of point " + std::to_string(o.point3D_id) +
+                   " in the model"
+             : NameOf(o) + " is not among those that can be used";
+}
+
 // The certificate in terms of the problem, into which the rows of a file of
 // version 1 go.
 struct Translation {
@@ -44,15 +66,12 @@ struct Translation {
 
 Translation Translate(const Model& model, const CertificateFile& file,
                       BuiltProblem* built) {
-  using Key = std::pair<ImageId, uint32_t>;
-  std::map<Key, const CertificateFile::SupportObservation*> by_key;
-  Translation translation;
+  using Key = std::tuple<ImageId, uint32_t, Point3DId>;
+  std::multimap<Key, const CertificateFile::SupportObservation*> by_key;
   for (const CertificateFile::SupportObservation& o : file.observations) {
-    if (!by_key.emplace(Key(o.image_id, o.point2D_idx), &o).second) {
-      translation.refusal = NameOf(o) + " stands there twice";
-      return translation;
-    }
+    by_key.emplace(Key(o.image_id, o.point2D_idx, o.point3D_id), &o);
   }
+  Translation translation;
   Certificate& rows = translation.certificate.rows;
   translation.certificate.lower_bound = file.lower_bound;
   rows.lower_bound = file.rows_bound;
@@ -63,27 +82,25 @@ Translation Translate(const Model& model, const CertificateFile& file,
     Observation& own = problem.observations[i];
     const auto found =
         by_key.find({model.images[built->image_of[own.view]].id,
-                     static_cast<uint32_t>(built->point2D_of[i])});
+                     static_cast<uint32_t>(built->point2D_of[i]),
+                     model.points3D[built->point_of[own.point]].id});
     if (found == by_key.end()) continue;
     const CertificateFile::SupportObservation& o = *found->second;
     by_key.erase(found);
-    if (o.point3D_id != model.points3D[built->point_of[own.point]].id) {
-      translation.refusal = NameOf(o) + " is not of point " +
-                            std::to_string(o.point3D_id) + " in the model";
-    } else if (file.version == 1 &&
-               !IsSameRay(o, reprojection.SourceOf(static_cast<int64_t>(i)),
-                          built->pixels[i])) {
+    if (file.version == 1 &&
+        !IsSameRay(o, reprojection.SourceOf(static_cast<int64_t>(i)),
+                   built->pixels[i])) {
       translation.refusal = "u or J of " + NameOf(o) + " is not the model's";
+      return translation;
     }
-    if (!translation.refusal.empty()) return translation;
     if (file.version == 1) own.E = RowAtRay(o.u, o.J);
     translation.certificate.bearings.push_back(o.bearing);
     rows.observations.push_back({static_cast<int64_t>(i), o.lambda, o.y});
   }
   if (!by_key.empty()) {
     translation.is_unseen = true;
-    translation.refusal = NameOf(*by_key.begin()->second) +
-                          " is not among those that can be used";
+    translation.refusal =
+        RefusalOfUnused(*by_key.begin()->second, model, *built);
   }
   return translation;
 }

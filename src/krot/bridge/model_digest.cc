@@ -7,6 +7,8 @@
 #include <memory>
 #include <new>
 #include <numeric>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <openssl/evp.h>
@@ -92,6 +94,25 @@ void AddCamera(const Camera& camera, Digest* digest) {
   for (const double param : camera.params) digest->Number(param);
 }
 
+// By image id: which 2D points, and of which 3D points, the tracks name.
+using Observations =
+    std::unordered_map<ImageId, std::vector<std::pair<uint32_t, Point3DId>>>;
+
+Observations SortedObservations(const Model& model) {
+  Observations observations;
+  for (const Point3D& point : model.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      observations[element.image_id].emplace_back(element.point2D_idx,
+                                                  point.id);
+    }
+  }
+  for (auto& [image_id, of_image] : observations) {
+    std::sort(of_image.begin(), of_image.end());
+  }
+  return observations;
+}
+
 // How the image's camera sits: in which frame, how that is turned, where in it.
 void AddPlace(const Model& model, const ImageGeometry& image, Digest* digest) {
   digest->Integer(image.frame >= 0);
@@ -107,19 +128,20 @@ void AddPlace(const Model& model, const ImageGeometry& image, Digest* digest) {
   for (const double t : cam_from_rig.translation) digest->Number(t);
 }
 
-void AddObservations(const Image& image, Digest* digest) {
-  const auto is_observation = [](const Point2D& point2D) {
-    return point2D.point3D_id != kInvalidPoint3DId;
-  };
-  digest->Integer(static_cast<uint64_t>(std::count_if(
-      image.points2D.begin(), image.points2D.end(), is_observation)));
-  for (size_t n = 0; n < image.points2D.size(); ++n) {
-    const Point2D& point2D = image.points2D[n];
-    if (!is_observation(point2D)) continue;
-    digest->Integer(n);
+void AddObservations(const Image& image, const Observations& observations,
+                     Digest* digest) {
+  const auto found = observations.find(image.id);
+  if (found == observations.end()) {
+    digest->Integer(0);
+    return;
+  }
+  digest->Integer(found->second.size());
+  for (const auto& [point2D_idx, point3D_id] : found->second) {
+    const Point2D& point2D = image.points2D[point2D_idx];
+    digest->Integer(point2D_idx);
     digest->Number(point2D.x);
     digest->Number(point2D.y);
-    digest->Integer(point2D.point3D_id);
+    digest->Integer(point3D_id);
   }
 }
 
@@ -132,13 +154,14 @@ std::string ModelSha256(const Model& model) {
     AddCamera(model.cameras[n], &digest);
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const Observations observations = SortedObservations(model);
   digest.Integer(model.images.size());
   for (const size_t n : OrderById(model.images)) {
     const Image& image = model.images[n];
     digest.Integer(image.id);
     digest.Integer(image.camera_id);
     AddPlace(model, geometries[n], &digest);
-    AddObservations(image, &digest);
+    AddObservations(image, observations, &digest);
   }
   return digest.Hex();
 }

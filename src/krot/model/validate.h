@@ -8,20 +8,19 @@ namespace krot {
 //  1. ids are unique; no 3D point bears kInvalidPoint3DId;
 //  2. camera model ids are known and have as many parameters as they need;
 //  3. references resolve: image -> camera, rig -> camera, frame -> rig,
-//     frame -> image, track -> image and 2D point, 2D point -> 3D point;
-//  4. a track element (image, point2D) and its 2D point name each other, and
-//     no track holds the same 2D point twice. Not asked of a model whose
-//     tracks are all shorter than two: they set nothing;
-//  5. tracks follow one another in Model::track_elements without gaps;
-//  6. with rigs, every image belongs to exactly one frame, as data of its own
+//     frame -> image, track -> image and 2D point;
+//  4. tracks follow one another in Model::track_elements without gaps;
+//  5. with rigs, every image belongs to exactly one frame, as data of its own
 //     camera, and that camera has a pose in the frame's rig;
-//  7. image names hold no zero byte;
-//  8. numbers are finite and quaternions are not zero. Two exceptions:
+//  6. image names hold no zero byte;
+//  7. numbers are finite and quaternions are not zero. Two exceptions:
 //     translations of images and frames may be NaN or infinite and count as
 //     absent (see the bridge); stored point errors are recomputed by KROT and
 //     may be anything.
 // An image's own pose may contradict its frame's: the frame's counts, as in
-// COLMAP 4. A 3D point may have any track length, none included.
+// COLMAP 4. A 3D point may have any track length, none included. What 2D
+// points say of their 3D points may contradict the tracks: those count (see
+// contradictions.h).
 //
 // Throws ModelError naming the first offender. O(size of the model), a few ns
 // per 2D point.

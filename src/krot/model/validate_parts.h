@@ -32,7 +32,7 @@ struct IndexedModel {
 
 // What ValidateModel says of rigs and frames, their own unique ids excepted.
 void ValidateRigsAndFrames(const IndexedModel& model);
-// References between tracks and 2D points. Requires valid track ranges.
+// References of tracks to 2D points. Requires valid track ranges.
 void ValidateObservations(const IndexedModel& model);
 
 // Throws the parts, one after another, as a ModelError.

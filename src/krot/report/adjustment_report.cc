@@ -190,6 +190,7 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
       {"num_observations", adjustment.num_observations},
       {"num_parameters", adjustment.num_parameters},
       {"left_out", LeftOutJson(LeftOutBy(adjustment))},
+      {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"cost_initial", adjustment.cost_initial},
       {"cost_final", adjustment.cost_final},
       {"num_iterations", adjustment.num_iterations},

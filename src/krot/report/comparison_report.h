@@ -5,6 +5,7 @@
 
 #include "krot/analysis/model_comparison.h"
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/model/contradictions.h"
 
 namespace krot {
 
@@ -12,6 +13,8 @@ namespace krot {
 struct ComparisonReport {
   std::string version;
   ComparisonSummary summary;
+  Contradictions contradictions1;  // of the models as their files have them
+  Contradictions contradictions2;
   // Accepted ones, where given.
   std::optional<CertificateVerdict> certificate1;
   std::optional<CertificateVerdict> certificate2;

@@ -66,6 +66,7 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
       {"version", version},
       {"command", "model_analyzer"},
       {"colmap", ColmapJson(report.colmap)},
+      {"contradictions", ContradictionsJson(report.contradictions)},
       {"pixel_error", CountedErrorJson(report.pixel_error)},
       {"cameras", CamerasJson(report.cameras)},
       {"images", ImageErrorsJson(report.images)},

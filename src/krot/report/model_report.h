@@ -8,6 +8,7 @@
 #include "krot/analysis/geometry_statistics.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/pixel_errors.h"
+#include "krot/model/contradictions.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -15,6 +16,7 @@ namespace krot {
 // What a model's errors, tracks and depths look like: `krot model_analyzer`.
 struct ModelReport {
   ColmapStatistics colmap;
+  Contradictions contradictions;     // of the model as its files have it
   PixelErrorStatistics pixel_error;  // true errors of all observations
   std::vector<ImageErrors> images;
   std::vector<CameraErrors> cameras;

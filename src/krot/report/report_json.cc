@@ -32,6 +32,11 @@ Json LeftOutJson(const LeftOutCounts& left_out) {
   return json;
 }
 
+Json ContradictionsJson(const Contradictions& contradictions) {
+  return {{"track_elements", contradictions.num_track_elements},
+          {"points2D", contradictions.num_points2D}};
+}
+
 std::string ReportText(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

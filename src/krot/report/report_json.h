@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/model/contradictions.h"
 #include "krot/report/problem_words.h"
 
 namespace krot {
@@ -26,6 +27,9 @@ Json CountedErrorJson(const PixelErrorStatistics& errors);
 
 // The counts, by reason.
 Json LeftOutJson(const LeftOutCounts& left_out);
+
+// How often tracks and images contradict each other.
+Json ContradictionsJson(const Contradictions& contradictions);
 
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.

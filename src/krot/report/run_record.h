@@ -3,12 +3,15 @@
 #include <cstdint>
 #include <string>
 
+#include "krot/model/contradictions.h"
+
 namespace krot {
 
 // What every run that solves for a model records beside its result.
 struct RunRecord {
-  std::string version;      // KROT's
-  double seconds_read = 0;  // wall clock
+  std::string version;            // KROT's
+  Contradictions contradictions;  // of the input
+  double seconds_read = 0;        // wall clock
   double seconds_write = 0;
   double seconds_total = 0;
   int64_t peak_memory_bytes = 0;

@@ -95,6 +95,7 @@ std::string SolveJson(const SolveReport& report) {
                                    ? Json(*summary.num_working_observations)
                                    : Json()},
       {"left_out", left_out},
+      {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},
