@@ -64,7 +64,8 @@ struct BuiltProblem {
 // project (RowAtProjection).
 //
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for bad
-// options. A problem without observations is no error. O(observations); 72 bytes each.
+// options. A problem without observations is no error. O(observations); 100
+// bytes each.
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 
