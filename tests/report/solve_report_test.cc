@@ -73,6 +73,7 @@ TEST(SolveTable, HasNoRowForACostThatIsTheMaximum) {
   EXPECT_THAT(SolveTable(report), Not(HasSubstr("cost (")));
   report.summary.norm = Norm::LInf();
   EXPECT_THAT(SolveTable(report), HasSubstr("cost (max optimised, p = inf)"));
+  EXPECT_THAT(SolveTable(report), HasSubstr("Maximum 0.1000 px (p = inf), "));
 }
 
 // A certified solve with a support of twelve.

@@ -59,7 +59,8 @@ std::string Verdict(const SolveSummary& summary) {
            Scientific(summary.cost_final) + " px at most).";
   }
   const std::string maximum =
-      "Maximum " + FormatNumber(summary.cost_final, 4) + " px";
+      "Maximum " + FormatNumber(summary.cost_final, 4) + " px" +
+      (summary.norm.p == 2 ? "" : " (p = " + NormName(summary.norm) + ")");
   if (!summary.is_certified) return maximum + ", not proved optimal.";
   return maximum + ", proved optimal to " + GapPercent(*summary.relative_gap) +
          ": " + BoundWords(summary) + "." + LinearGapSentence(summary);
