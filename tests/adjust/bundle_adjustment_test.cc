@@ -91,7 +91,7 @@ double IndependentFixedRotationCost(const Model& model,
   const auto image_indices = ImageIndices(model);
   std::vector<Eigen::Vector3d> translations, points;
   for (const ImageGeometry& geometry : geometries) {
-    translations.push_back(geometry.cam_from_world_translation);
+    translations.push_back(geometry.cam_from_world.translation);
   }
   ceres::Problem::Options problem_options;
   problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -106,7 +106,7 @@ double IndependentFixedRotationCost(const Model& model,
       problem.AddResidualBlock(
           new ceres::AutoDiffCostFunction<FixedRotationResidual, 2, 3, 3>(
               new FixedRotationResidual{
-                  geometries[n].cam_from_world_rotation,
+                  geometries[n].cam_from_world.rotation,
                   model.cameras[geometries[n].camera].params,
                   {pixel.x, pixel.y}}),
           loss, translations[n].data(), points[k].data());

@@ -199,8 +199,8 @@ TEST(TransformModel, MovesCentersAndPointsAsPoints) {
   const std::vector<ImageGeometry> before = ImageGeometries(model);
   const std::vector<ImageGeometry> after = ImageGeometries(moved);
   const auto center = [](const ImageGeometry& image) -> Vector3d {
-    return -image.cam_from_world_rotation.transpose() *
-           image.cam_from_world_translation;
+    return -image.cam_from_world.rotation.transpose() *
+           image.cam_from_world.translation;
   };
   for (size_t n = 0; n < before.size(); ++n) {
     EXPECT_LE((center(after[n]) - similarity * center(before[n])).norm(),

@@ -5,6 +5,8 @@
 
 #include <limits>
 
+#include "krot/model/trivial_rigs.h"
+
 namespace krot {
 namespace {
 
@@ -20,6 +22,7 @@ Model ThreeImages() {
     model.images[n].id = n;
     model.images[n].cam_from_world.translation.x() = -static_cast<double>(n);
   }
+  UseTrivialRigs(&model);
   return model;
 }
 
@@ -36,8 +39,8 @@ void AddPoint(const Eigen::Vector3d& xyz, const std::vector<ImageId>& images,
   model->points3D.push_back(point);
 }
 
-void LosePose(Image* image) {
-  image->cam_from_world.translation.y() =
+void LosePose(Frame* frame) {
+  frame->rig_from_world.translation.y() =
       std::numeric_limits<double>::quiet_NaN();
 }
 
@@ -65,9 +68,9 @@ TEST(ComputeDepthStatistics, CountsWhatIsNotInFront) {
 TEST(ComputeDepthStatistics, IgnoresImagesWithoutPose) {
   Model model = ThreeImages();
   AddPoint({0, 0, 4}, {0, 2}, &model);
-  LosePose(&model.images[2]);
+  LosePose(&model.frames[2]);
   EXPECT_EQ(ComputeDepthStatistics(model).count, 1);
-  LosePose(&model.images[0]);
+  LosePose(&model.frames[0]);
   EXPECT_EQ(ComputeDepthStatistics(model).count, 0);
   EXPECT_EQ(ComputeDepthStatistics(model).max, 0);
 }

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot {
@@ -50,6 +51,7 @@ Model Renamed(const Model& model) {
   for (TrackElement& element : result.track_elements) element.image_id += 1000;
   for (Point3D& point : result.points3D) point.id += 500;
   std::reverse(result.images.begin(), result.images.end());
+  UseTrivialRigs(&result);
   return result;
 }
 
@@ -157,7 +159,7 @@ TEST(CompareModels, ReportsThePointAndTheCameraThatMoved) {
   Model moved = model;
   moved.points3D[5].xyz += Vector3d(0, 0.03, 0.04);
   const Vector3d shift(0.3, 0, 0.4);
-  Pose& pose = moved.images[2].cam_from_world;
+  Pose& pose = moved.frames[2].rig_from_world;
   pose.translation -= pose.Rotation() * shift;
   const ComparisonSummary summary =
       Compare(model, moved, AlignmentKind::kNone).value();
@@ -179,7 +181,7 @@ TEST(CompareModels, LeavesOutWhatOnlyOneModelHas) {
   const Model model = SomeModel();
   Model smaller = model;
   smaller.images[0].name = "another";
-  smaller.images[1].cam_from_world.translation.setConstant(
+  smaller.frames[1].rig_from_world.translation.setConstant(
       std::numeric_limits<double>::quiet_NaN());
   const ComparisonSummary summary =
       Compare(model, smaller, AlignmentKind::kFrame).value();
@@ -199,8 +201,8 @@ TEST(CompareModels, LeavesOutWhatOnlyOneModelHas) {
 TEST(CompareModels, ComparesErrorsOfModelsWithoutPosesAsStoredOnly) {
   const Model model = SomeModel();
   Model without_poses = model;
-  for (Image& image : without_poses.images) {
-    image.cam_from_world.translation.setConstant(
+  for (Frame& frame : without_poses.frames) {
+    frame.rig_from_world.translation.setConstant(
         std::numeric_limits<double>::infinity());
   }
   EXPECT_FALSE(Compare(model, without_poses, AlignmentKind::kFrame));

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "krot/camera/camera_model.h"
+#include "krot/model/trivial_rigs.h"
 
 namespace krot {
 namespace {
@@ -30,6 +31,7 @@ Model ThreeImages() {
     if (n < 2) image.points2D.push_back({0, 0, 22});
   }
   model.images[2].cam_from_world.translation.x() = kNaN;
+  UseTrivialRigs(&model);
   model.track_elements = {{11, 0}, {12, 0}, {13, 0}, {11, 2}, {12, 2}};
   model.points3D.resize(2);
   model.points3D[0].id = 21;

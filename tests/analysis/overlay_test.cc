@@ -10,6 +10,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 #include "krot/model/model_io.h"
+#include "krot/model/trivial_rigs.h"
 #include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
@@ -49,7 +50,7 @@ class Overlay : public ::testing::TestWithParam<std::pair<bool, bool>> {
 
 TEST_P(Overlay, IsAValidModelThatHoldsBoth) {
   ValidateModel(overlay_);
-  EXPECT_EQ(overlay_.has_rigs, model1_.has_rigs || model2_.has_rigs);
+  EXPECT_EQ(overlay_.stores_rigs, model1_.stores_rigs || model2_.stores_rigs);
   const size_t num_images1 = model1_.images.size();
   ASSERT_EQ(overlay_.images.size(), num_images1 + model2_.images.size());
   EXPECT_EQ(overlay_.images[0].name, "1/" + model1_.images[0].name);
@@ -74,10 +75,10 @@ TEST_P(Overlay, SaysTheSamePosesInImagesAndFrames) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(overlay_);
   for (size_t n = 0; n < geometries.size(); ++n) {
     const Pose& pose = overlay_.images[n].cam_from_world;
-    EXPECT_LE((pose.Rotation() - geometries[n].cam_from_world_rotation).norm(),
+    EXPECT_LE((pose.Rotation() - geometries[n].cam_from_world.rotation).norm(),
               1e-14);
     EXPECT_LE(
-        (pose.translation - geometries[n].cam_from_world_translation).norm(),
+        (pose.translation - geometries[n].cam_from_world.translation).norm(),
         1e-14);
   }
 }
@@ -98,6 +99,7 @@ TEST(OverlayModels, RefusesIdsThatLeaveTheirRange) {
   for (TrackElement& element : large.track_elements) {
     if (element.image_id == old_id) element.image_id = 4294967290;
   }
+  UseTrivialRigs(&large);
   ValidateModel(large);
   EXPECT_THAT(ModelErrorOf([&] { OverlayModels(large, large); }),
               ::testing::HasSubstr("image ids"));

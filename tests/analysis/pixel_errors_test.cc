@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "krot/camera/camera_model.h"
+#include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot {
@@ -34,6 +35,7 @@ Model TwoImages() {
     model.images[n].name = n == 0 ? "left" : "right";
   }
   model.images[1].cam_from_world.translation = {-1, 0, 0};
+  UseTrivialRigs(&model);
   model.images[0].points2D = {{53, 44, 7}};  // projected to (50, 40): 5 px
   model.images[1].points2D = {{39, 40, 7}};  // projected to (40, 40): 1 px
   model.track_elements = {{1, 0}, {2, 0}};
@@ -75,7 +77,7 @@ TEST(PixelErrors, AreNotNumbersBehindTheCamera) {
 
 TEST(PixelErrors, AreNotNumbersWithoutAPose) {
   Model model = TwoImages();
-  model.images[1].cam_from_world.translation.y() = kNaN;
+  model.frames[1].rig_from_world.translation.y() = kNaN;
   const std::vector<double> errors = PixelErrors(model);
   EXPECT_FALSE(std::isnan(errors[0]));
   EXPECT_TRUE(std::isnan(errors[1]));

@@ -18,15 +18,16 @@ namespace {
 const std::map<std::string, std::set<std::string>>& DirectDependencies() {
   static const std::map<std::string, std::set<std::string>> kDependencies = {
       {"base", {}},
+      {"geometry", {}},
       {"math", {}},
       {"minimax", {"math"}},
-      {"problem", {"minimax"}},
+      {"problem", {"minimax", "geometry"}},
       {"conic", {"problem"}},
       {"sweeps", {"problem"}},
       {"proof", {"conic"}},
       {"joint", {"proof", "sweeps"}},
       {"camera", {}},
-      {"model", {"camera"}},
+      {"model", {"camera", "geometry"}},
       {"analysis", {"model"}},
       {"synthetic", {"model"}},
       {"adjust", {"model"}},

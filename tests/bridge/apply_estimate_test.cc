@@ -67,10 +67,10 @@ TEST_P(ApplyEstimateToModel, MakesImagesAgreeWithTheirFrames) {
   for (size_t n = 0; n < result.images.size(); ++n) {
     const Pose& pose = result.images[n].cam_from_world;
     EXPECT_NEAR(
-        (pose.translation - geometries[n].cam_from_world_translation).norm(), 0,
+        (pose.translation - geometries[n].cam_from_world.translation).norm(), 0,
         1e-15);
     EXPECT_NEAR(
-        (pose.Rotation() - geometries[n].cam_from_world_rotation).norm(), 0,
+        (pose.Rotation() - geometries[n].cam_from_world.rotation).norm(), 0,
         1e-14);
   }
 }
@@ -94,7 +94,7 @@ TEST(ApplyEstimate, CorrectsImagesThatContradictTheirFrames) {
 
 TEST(ApplyEstimate, LeavesFramesAndPointsOutsideTheProblemAlone) {
   Model model = NoisyModel(1, false);
-  model.images[2].cam_from_world.translation.z() = std::nan("");
+  model.frames[2].rig_from_world.translation.z() = std::nan("");
   const BuiltProblem built = BuildProblem(model, {/*min_track_length=*/6, 1});
   ASSERT_LT(built.point_of.size(), model.points3D.size());
   const Model result = ApplyEstimate(model, built, Moved(built.start));
@@ -104,8 +104,10 @@ TEST(ApplyEstimate, LeavesFramesAndPointsOutsideTheProblemAlone) {
     EXPECT_EQ(result.points3D[k].xyz == model.points3D[k].xyz,
               !is_optimised[k]);
   }
-  EXPECT_EQ(result.images[2].cam_from_world.translation.x(),
-            model.images[2].cam_from_world.translation.x());
+  EXPECT_EQ(result.images[2].cam_from_world.translation,
+            model.images[2].cam_from_world.translation);
+  EXPECT_EQ(result.frames[2].rig_from_world.translation.x(),
+            model.frames[2].rig_from_world.translation.x());
 }
 
 TEST(ApplyEstimate, RefusesAnEstimateOfAnotherSize) {

@@ -73,8 +73,8 @@ TEST(LeftOutName, IsTheKeyOfTheReport) {
 TEST(LeftOut, NothingDependsOnTranslationsThatAreIgnored) {
   Model model = EightImages();
   const BuiltProblem expected = BuildProblem(model, {});
-  model.images[3].cam_from_world.translation.x() = std::nan("");
-  for (Image& image : model.images) image.cam_from_world.translation *= -1;
+  model.frames[3].rig_from_world.translation.x() = std::nan("");
+  for (Frame& frame : model.frames) frame.rig_from_world.translation *= -1;
   model.points3D[5].xyz.setConstant(std::nan(""));
   BuildProblemOptions options;
   options.ignore_translations = true;
@@ -98,7 +98,7 @@ TEST(LeftOut, AnImageWithoutFiniteTranslationHasNoPose) {
     num_observations += element.image_id == model.images[3].id;
   }
   ASSERT_GT(num_observations, 0);
-  model.images[3].cam_from_world.translation.x() = std::nan("");
+  model.frames[3].rig_from_world.translation.x() = std::nan("");
   const BuiltProblem built = BuildProblem(model, {});
   EXPECT_EQ(Count(built, LeftOut::kNoPose), num_observations);
   EXPECT_THAT(built.frame_of, ElementsAre(0, 1, 2, 4, 5, 6, 7));
@@ -144,16 +144,10 @@ TEST(LeftOut, APointBehindItsCamerasIsRetriangulated) {
 TEST(LeftOut, OnlyAnObservationThatStaysBehindIsLeftOut) {
   Model model = EightImages();
   // One camera looks the other way: turned by 180 degrees about its y axis.
-  const Image turned = model.images[2];
-  const Eigen::Quaterniond q(turned.cam_from_world.quaternion_wxyz[0],
-                             turned.cam_from_world.quaternion_wxyz[1],
-                             turned.cam_from_world.quaternion_wxyz[2],
-                             turned.cam_from_world.quaternion_wxyz[3]);
+  Pose& pose = model.frames[2].rig_from_world;
   const Eigen::Quaterniond half_turn(0, 0, 1, 0);
-  const Eigen::Quaterniond r = half_turn * q;
-  model.images[2].cam_from_world.quaternion_wxyz = {r.w(), r.x(), r.y(), r.z()};
-  model.images[2].cam_from_world.translation =
-      half_turn * turned.cam_from_world.translation;
+  pose = {ToWxyz(half_turn * NormalizedQuaternion(pose.quaternion_wxyz)),
+          half_turn * pose.translation};
 
   const BuiltProblem built = BuildProblem(model, {});
   int64_t num_observations = 0;
@@ -179,7 +173,7 @@ TEST(LeftOut, WhatRemainsOfATrackMayBeTooShort) {
   }
   EXPECT_EQ(Count(all, LeftOut::kShortTrack), num_short);
 
-  model.images[3].cam_from_world.translation.x() = std::nan("");
+  model.frames[3].rig_from_world.translation.x() = std::nan("");
   const BuiltProblem none = BuildProblem(model, {/*min_track_length=*/8, 1});
   EXPECT_EQ(none.problem.num_points, 0);
   EXPECT_EQ(none.problem.num_frames, 0);

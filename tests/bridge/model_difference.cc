@@ -39,7 +39,7 @@ class Transcript {
 };
 
 void Transcript::Add(const Model& model) {
-  Add("has_rigs", uint64_t{model.has_rigs});
+  Add("stores_rigs", uint64_t{model.stores_rigs});
   for (const Camera& camera : model.cameras) {
     const std::string name = "camera " + std::to_string(camera.id);
     Add(name + " model", static_cast<uint64_t>(camera.model_id));

@@ -70,15 +70,12 @@ TEST_P(Documentation, SaysWhatHelpSays) {
   EXPECT_EQ(ParseDocument(ReadBytes(KROT_CLI_DOCUMENT), command), help);
 }
 
-INSTANTIATE_TEST_SUITE_P(Commands, Documentation,
-                         ::testing::Values("solver", "point_triangulator",
-                                           "bundle_adjuster", "model_analyzer",
-                                           "model_comparer",
-                                           "certificate_checker",
-                                           "model_synthesizer"),
-                         [](const auto& test) {
-                           return std::string(test.param);
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Commands, Documentation,
+    ::testing::Values("solver", "point_triangulator", "bundle_adjuster",
+                      "model_analyzer", "model_comparer", "certificate_checker",
+                      "model_synthesizer"),
+    [](const auto& test) { return std::string(test.param); });
 
 TEST(DocumentationOfKrot, ListsTheExitCodesOfHelp) {
   const std::string document = ReadBytes(KROT_CLI_DOCUMENT);

@@ -31,8 +31,8 @@ struct CentreStatistics {
 CentreStatistics Centres(const Model& model) {
   std::vector<Vector3d> centres;
   for (const ImageGeometry& geometry : ImageGeometries(model)) {
-    centres.push_back(-geometry.cam_from_world_rotation.transpose() *
-                      geometry.cam_from_world_translation);
+    centres.push_back(-geometry.cam_from_world.rotation.transpose() *
+                      geometry.cam_from_world.translation);
   }
   CentreStatistics statistics;
   for (const Vector3d& centre : centres) statistics.centroid += centre;

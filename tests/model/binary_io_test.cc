@@ -115,7 +115,7 @@ TEST(BinaryIo, LaysAFrameOutAsColmapDoes) {
 TEST(BinaryIo, ReadsBackWhatItWrote) {
   const Model model = TinyRigModel();
   Model read;
-  read.has_rigs = true;
+  read.stores_rigs = true;
   for (const Part& part : kParts) {
     part.parse({part.name, part.format(model)}, &read);
   }

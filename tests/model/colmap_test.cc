@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/model/model_io.h"
+#include "krot/model/trivial_rigs.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
@@ -46,6 +47,7 @@ Model TinyColmapModel() {
   model.images[0].name = "left/ab.jpg";
   model.images[1].cam_from_world.translation = {1, 2, 3};
   model.images[2].cam_from_world.quaternion_wxyz = {0, 0, 1, 0};
+  UseTrivialRigs(&model);
   return model;
 }
 
@@ -59,6 +61,7 @@ void SortById(std::vector<Record>* records) {
 Model Sorted(Model model) {
   SortById(&model.cameras);
   SortById(&model.images);
+  UseTrivialRigs(&model);
   SortById(&model.points3D);
   std::vector<TrackElement> track_elements;
   for (Point3D& point : model.points3D) {

@@ -74,6 +74,32 @@ TEST(ModelIo, WritesRigsAndFramesOnlyIfThereAreAny) {
               ElementsAre("cameras.bin", "images.bin", "points3D.bin"));
 }
 
+TEST(ModelIo, GivesALegacyModelARigPerCameraAndAFramePerImage) {
+  const TempFolder folder;
+  Write(TinyModel(), folder / "model");
+  const Model model = ReadModel(folder / "model", ModelFormat::kBinary);
+  EXPECT_FALSE(model.stores_rigs);
+  ASSERT_EQ(model.rigs.size(), model.cameras.size());
+  for (size_t r = 0; r < model.rigs.size(); ++r) {
+    const SensorId camera{kSensorTypeCamera, model.cameras[r].id};
+    EXPECT_EQ(model.rigs[r].id, camera.id);
+    EXPECT_TRUE(model.rigs[r].ref_sensor_id == camera);
+    EXPECT_THAT(model.rigs[r].sensors, IsEmpty());
+  }
+  ASSERT_EQ(model.frames.size(), model.images.size());
+  for (size_t f = 0; f < model.frames.size(); ++f) {
+    const Frame& frame = model.frames[f];
+    const Image& image = model.images[f];
+    EXPECT_EQ(frame.id, image.id);
+    EXPECT_EQ(frame.rig_id, image.camera_id);
+    EXPECT_EQ(frame.rig_from_world.quaternion_wxyz,
+              image.cam_from_world.quaternion_wxyz);
+    ASSERT_EQ(frame.data.size(), 1u);
+    EXPECT_EQ(frame.data[0].sensor_id.id, image.camera_id);
+    EXPECT_EQ(frame.data[0].data_id, image.id);
+  }
+}
+
 TEST(ModelIo, TakesEmptyRigsAndFramesForALegacyModel) {
   const TempFolder folder;
   Write(TinyModel(), folder / "model");

@@ -24,7 +24,7 @@ std::string ErrorOf(void (*parse)(const FileBytes&, Model*),
 TEST(TextIo, ReadsBackWhatItWrote) {
   const Model model = TinyRigModel();
   Model read;
-  read.has_rigs = true;
+  read.stores_rigs = true;
   ParseCamerasText({"cameras", FormatCamerasText(model)}, &read);
   ParseRigsText({"rigs", FormatRigsText(model)}, &read);
   ParseFramesText({"frames", FormatFramesText(model)}, &read);

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "krot/model/model.h"
+#include "krot/model/trivial_rigs.h"
 
 namespace krot {
 
@@ -45,6 +46,7 @@ inline Model TinyModel() {
   model.points3D[2] = {12, {4, 5, std::sqrt(2)}, {0, 0, 0}, 1e-9, 2, 5};
   model.track_elements = {
       {9, 0}, {4000000000, 2}, {9, 1}, {4000000000, 0}, {4000000000, 3}};
+  UseTrivialRigs(&model);
   return model;
 }
 
@@ -52,7 +54,7 @@ inline Model TinyModel() {
 // a pose and one without; a rig without sensors; a frame without data.
 inline Model TinyRigModel() {
   Model model = TinyModel();
-  model.has_rigs = true;
+  model.stores_rigs = true;
   Rig rig;
   rig.id = 5;
   rig.ref_sensor_id = SensorId{kSensorTypeImu, 1};

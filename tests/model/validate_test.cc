@@ -25,6 +25,13 @@ std::string ErrorAfter(const std::function<void(Model*)>& change) {
   return ModelErrorOf([&] { ValidateModel(model); });
 }
 
+TEST(ValidateModel, WantsFramesInLegacyModelsToo) {
+  Model model = TinyModel();
+  model.frames.pop_back();
+  EXPECT_THAT(ModelErrorOf([&] { ValidateModel(model); }),
+              HasSubstr("found in no frame"));
+}
+
 TEST(ValidateModel, AcceptsTinyModels) {
   EXPECT_NO_THROW(ValidateModel(TinyModel()));
   EXPECT_NO_THROW(ValidateModel(TinyRigModel()));

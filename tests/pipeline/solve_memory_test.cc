@@ -35,8 +35,7 @@ int64_t PeakBytes(int num_points, SolveMethod method, SolveInit init) {
     SolveModelOptions options;
     options.method = method;
     options.init = init;
-    options.num_threads = 1;
-    SolveModel(MakeModel(num_points), options);
+    SolveModel(MakeModel(num_points), options, {1});
     _exit(0);
   }
   int status = -1;

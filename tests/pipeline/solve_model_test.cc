@@ -334,7 +334,7 @@ struct PoselessScene {
     scene.has_rigs = false;
     model = SynthesizeScene(scene).model;
     cost = SolveModel(model, {}).summary.cost_final;
-    model.images[0].cam_from_world.translation.setConstant(
+    model.frames[0].rig_from_world.translation.setConstant(
         std::numeric_limits<double>::quiet_NaN());
     for (const TrackElement& element : model.track_elements) {
       num_observations += element.image_id == model.images[0].id;
@@ -411,8 +411,8 @@ TEST(SolveModel, StartsFromNothingWhereAllCamerasStandInOnePlace) {
   scene.has_rigs = false;
   Model model = SynthesizeScene(scene).model;
   const double cost = SolveModel(model, {}).summary.cost_final;
-  for (Image& image : model.images) {
-    image.cam_from_world.translation.setZero();
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.translation.setZero();
   }
   const SolveSummary summary = SolveModel(model, {}).summary;
   EXPECT_EQ(summary.init, SolveInit::kFeasible);

@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-#include "tests/problem/random_problem.h"
 #include "tests/joint/small_scenes.h"
+#include "tests/problem/random_problem.h"
 
 namespace krot {
 namespace {

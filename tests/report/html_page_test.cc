@@ -149,8 +149,8 @@ TEST(ModelViewJson, HoldsWhereEveryImageStands) {
     const Eigen::Vector3d on_axis(center[0] + axes[2], center[1] + axes[5],
                                   center[2] + axes[8]);
     const Eigen::Vector3d x_cam =
-        geometries[i].cam_from_world_rotation * on_axis +
-        geometries[i].cam_from_world_translation;
+        geometries[i].cam_from_world.rotation * on_axis +
+        geometries[i].cam_from_world.translation;
     EXPECT_LT((x_cam - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
   }
 }
@@ -159,7 +159,7 @@ TEST(ModelViewJson, SaysNullForAnImageWithoutPose) {
   SceneOptions options;
   options.has_rigs = false;
   Model model = SynthesizeScene(options).model;
-  model.images[0].cam_from_world.translation.setConstant(
+  model.frames[0].rig_from_world.translation.setConstant(
       std::numeric_limits<double>::quiet_NaN());
   const json view = json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
   EXPECT_TRUE(view["images"][0]["center"].is_null());

@@ -222,6 +222,8 @@ TEST(SolveTable, SaysHowMuchTheJointSolverLookedAt) {
   EXPECT_THAT(SolveTable(report), HasSubstr("on all observations and"));
   report.summary.num_working_observations.reset();
   EXPECT_THAT(SolveTable(report), HasSubstr("2 joint iterations and"));
+  report.summary.num_working_observations = 0;  // it had nothing to lower
+  EXPECT_THAT(SolveTable(report), HasSubstr("2 joint iterations and"));
 }
 
 TEST(SolveTable, SaysWhereAllErrorsAreZero) {

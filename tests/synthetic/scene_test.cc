@@ -4,11 +4,14 @@
 #include <numeric>
 #include <set>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "krot/camera/camera_model.h"
+#include "krot/model/trivial_rigs.h"
 #include "krot/model/validate.h"
 #include "tests/synthetic/scene_geometry.h"
+#include "tests/testing/model_matchers.h"
 
 namespace krot {
 namespace {
@@ -147,13 +150,14 @@ TEST(Scene, GivesEveryImagePoints) {
   }
 }
 
-TEST(Scene, OfALegacyModelHasNeitherRigsNorFrames) {
+TEST(Scene, OfALegacyModelHasTrivialRigsThatAreNotStored) {
   SceneOptions options;
   options.has_rigs = false;
   const SyntheticScene scene = SynthesizeScene(options);
-  EXPECT_FALSE(scene.model.has_rigs);
-  EXPECT_TRUE(scene.model.rigs.empty());
-  EXPECT_TRUE(scene.model.frames.empty());
+  EXPECT_FALSE(scene.model.stores_rigs);
+  Model trivial = scene.model;
+  UseTrivialRigs(&trivial);
+  EXPECT_THAT(scene.model, IsModel(trivial));
   EXPECT_NO_THROW(ValidateModel(scene.model));
   EXPECT_LT(MaxErrorPx(scene.ground_truth), 1e-9);
 }

@@ -31,7 +31,7 @@ class ModelComparison {
 
   // "images[3].points2D[17].x: 1.5 and 2", or "" if there is none.
   std::string FirstDifference(const Model& a, const Model& b) {
-    Value("has_rigs", a.has_rigs, b.has_rigs);
+    Value("stores_rigs", a.stores_rigs, b.stores_rigs);
     List("cameras", a.cameras, b.cameras);
     List("rigs", a.rigs, b.rigs);
     List("frames", a.frames, b.frames);

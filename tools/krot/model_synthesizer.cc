@@ -140,7 +140,9 @@ std::string SceneTable(const SyntheticScene& scene) {
   const auto count = [](size_t size) { return std::to_string(size); };
   TextTable table;
   table.AddRow({"cameras", count(scene.model.cameras.size())});
-  table.AddRow({"frames", count(scene.model.frames.size())});
+  table.AddRow(
+      {"frames",
+       count(scene.model.stores_rigs ? scene.model.frames.size() : 0)});
   table.AddRow({"images", count(scene.model.images.size())});
   table.AddRow({"points", count(scene.model.points3D.size())});
   table.AddRow({"observations", count(scene.model.track_elements.size())});

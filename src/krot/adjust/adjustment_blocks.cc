@@ -3,8 +3,6 @@
 #include <cmath>
 #include <string>
 
-#include <Eigen/Geometry>
-
 #include "krot/camera/camera_model.h"
 #include "krot/model/model_error.h"
 
@@ -33,39 +31,15 @@ std::vector<int32_t> SensorOffsets(const Model& model) {
   return offsets;
 }
 
-// What an image's observations are tied to.
-struct ImageBlocks {
-  ImageGeometry geometry;
-  int32_t sensor = -1;
-};
-
-std::vector<ImageBlocks> BlocksOfImages(const Model& model) {
-  const std::vector<int32_t> offsets = SensorOffsets(model);
-  std::unordered_map<RigId, int32_t> rig_indices;
-  for (size_t r = 0; r < model.rigs.size(); ++r) {
-    rig_indices.emplace(model.rigs[r].id, static_cast<int32_t>(r));
-  }
-  std::vector<ImageBlocks> blocks;
-  for (const ImageGeometry& geometry : ImageGeometries(model)) {
-    blocks.push_back({geometry, -1});
-    if (!model.has_rigs || geometry.frame < 0) continue;
-    const int32_t r = rig_indices.at(model.frames[geometry.frame].rig_id);
-    const std::vector<RigSensor>& sensors = model.rigs[r].sensors;
-    const CameraId camera_id = model.cameras[geometry.camera].id;
-    for (size_t i = 0; i < sensors.size(); ++i) {
-      const SensorId& sensor_id = sensors[i].sensor_id;
-      if (sensor_id.type == kSensorTypeCamera && sensor_id.id == camera_id) {
-        blocks.back().sensor = offsets[r] + static_cast<int32_t>(i);
-      }
-    }
-  }
-  return blocks;
+// Index in AdjustmentBlocks::sensors; -1 for the reference sensor.
+int32_t SensorBlock(const ImageGeometry& image,
+                    const std::vector<int32_t>& offsets) {
+  return image.sensor < 0 ? -1 : offsets[image.rig] + image.sensor;
 }
 
 bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
               const Vector3d& xyz) {
-  const Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
-                         geometry.cam_from_world_translation;
+  const Vector3d x_cam = geometry.cam_from_world * xyz;
   if (!(x_cam.z() > 0)) return false;
   return ProjectRay(camera.model_id, camera.params.data(), x_cam.hnormalized())
       .allFinite();
@@ -73,7 +47,8 @@ bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
 
 void CollectObservations(const Model& model, int min_track_length,
                          AdjustmentBlocks* blocks) {
-  const std::vector<ImageBlocks> images = BlocksOfImages(model);
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  const std::vector<int32_t> sensor_offsets = SensorOffsets(model);
   const std::unordered_map<ImageId, int32_t> image_indices =
       ImageIndices(model);
   std::vector<bool> has_observation(images.size(), false);
@@ -85,7 +60,7 @@ void CollectObservations(const Model& model, int min_track_length,
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       const TrackElement& element = model.track_elements[e];
       const int32_t n = image_indices.at(element.image_id);
-      const ImageGeometry& geometry = images[n].geometry;
+      const ImageGeometry& geometry = images[n];
       const Camera& camera = model.cameras[geometry.camera];
       CheckImagePlane(camera);
       if (!geometry.has_pose) {
@@ -95,7 +70,7 @@ void CollectObservations(const Model& model, int min_track_length,
       } else {
         const Point2D& pixel = model.images[n].points2D[element.point2D_idx];
         blocks->observations.push_back({geometry.frame,
-                                        images[n].sensor,
+                                        SensorBlock(geometry, sensor_offsets),
                                         geometry.camera,
                                         static_cast<int32_t>(k),
                                         {pixel.x, pixel.y}});
@@ -137,14 +112,8 @@ Eigen::Map<const Vector3d> TranslationOf(const PoseBlock& block) {
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
                                       int min_track_length) {
   AdjustmentBlocks blocks;
-  if (model.has_rigs) {
-    for (const Frame& frame : model.frames) {
-      blocks.frames.push_back(ToBlock(frame.rig_from_world));
-    }
-  } else {
-    for (const Image& image : model.images) {
-      blocks.frames.push_back(ToBlock(image.cam_from_world));
-    }
+  for (const Frame& frame : model.frames) {
+    blocks.frames.push_back(ToBlock(frame.rig_from_world));
   }
   for (const Rig& rig : model.rigs) {
     for (const RigSensor& sensor : rig.sensors) {
@@ -183,30 +152,22 @@ Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
   }
   for (size_t f = 0; f < after.frames.size(); ++f) {
     if (after.frames[f] == before.frames[f]) continue;
-    (model.has_rigs ? result.frames[f].rig_from_world
-                    : result.images[f].cam_from_world) =
-        ToPose(after.frames[f]);
+    result.frames[f].rig_from_world = ToPose(after.frames[f]);
   }
-  if (!model.has_rigs) return result;
 
-  const std::vector<ImageBlocks> images = BlocksOfImages(model);
-  const std::vector<ImageGeometry> placed = ImageGeometries(result);
+  const std::vector<int32_t> sensor_offsets = SensorOffsets(model);
+  const std::vector<ImageGeometry> images = ImageGeometries(result);
   for (size_t n = 0; n < images.size(); ++n) {
-    const int32_t f = images[n].geometry.frame;
-    const int32_t sensor = images[n].sensor;
+    const int32_t f = images[n].frame;
     if (f < 0) continue;
+    const int32_t sensor = SensorBlock(images[n], sensor_offsets);
     const bool stays =
         after.frames[f] == before.frames[f] &&
         (sensor < 0 || after.sensors[sensor] == before.sensors[sensor]);
     if (stays) continue;
     Pose& pose = result.images[n].cam_from_world;
-    if (sensor < 0) {
-      pose = ToPose(after.frames[f]);
-      continue;
-    }
-    const Eigen::Quaterniond q(placed[n].cam_from_world_rotation);
-    pose.quaternion_wxyz = {q.w(), q.x(), q.y(), q.z()};
-    pose.translation = placed[n].cam_from_world_translation;
+    pose =
+        sensor < 0 ? ToPose(after.frames[f]) : ToPose(images[n].cam_from_world);
   }
   return result;
 }

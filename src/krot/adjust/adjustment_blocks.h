@@ -31,7 +31,7 @@ struct AdjustmentObservation {
 // The unknowns of bundle adjustment as flat blocks of doubles, in the order of
 // the model's own records, and the observations that take part.
 struct AdjustmentBlocks {
-  std::vector<PoseBlock> frames;   // rig_from_world; per image if !has_rigs
+  std::vector<PoseBlock> frames;   // rig_from_world
   std::vector<PoseBlock> sensors;  // sensor_from_rig, rig by rig
   std::vector<std::vector<double>> cameras;
   std::vector<int> camera_models;  // their ids

@@ -32,8 +32,8 @@ class DepthGradient {
     by_rig_ = Eigen::RowVector3d::UnitZ();
     depth_ = x_rig.z();
     if (!has_sensor) return;
-    const RigidTransform sensor_from_rig(blocks[2]);
-    by_rig_ = sensor_from_rig.R.row(2);
+    const BlockTransform sensor_from_rig(blocks[2]);
+    by_rig_ = sensor_from_rig.rotation.row(2);
     by_sensor_ = sensor_from_rig.BlockJacobian(x_rig).row(2);
     has_sensor_ = true;
     depth_ = (sensor_from_rig * x_rig).z();
@@ -45,7 +45,7 @@ class DepthGradient {
   void Subtract(double scale, size_t block, double* row) const {
     if (block == 0) {
       Eigen::Map<Eigen::RowVector3d>(row) -=
-          scale * by_rig_ * rig_from_world_.R;
+          scale * by_rig_ * rig_from_world_.rotation;
     } else if (block == 1) {
       Eigen::Map<RowVector7d>(row) -=
           scale * by_rig_ * rig_from_world_.BlockJacobian(x_world_);
@@ -58,7 +58,7 @@ class DepthGradient {
   using RowVector7d = Eigen::Matrix<double, 1, 7>;
 
   Eigen::Map<const Eigen::Vector3d> x_world_;
-  RigidTransform rig_from_world_;
+  BlockTransform rig_from_world_;
   double depth_ = 0;
   Eigen::RowVector3d by_rig_;  // dw / dx_rig
   bool has_sensor_ = false;

@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "krot/geometry/rigid_transform.h"
+
 namespace krot {
 
 // [a]x, so that [a]x b = a x b.
@@ -16,17 +18,14 @@ inline Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& a) {
 
 // x -> R(q) x + t for a block qw qx qy qz tx ty tz of unit quaternion, with
 //   R(q) x = x + 2 w (v x x) + 2 v x (v x x),  q = (w, v).
-struct RigidTransform {
-  explicit RigidTransform(const double* block)
-      : w(block[0]),
-        v(block[1], block[2], block[3]),
-        t(block[4], block[5], block[6]),
-        R(Eigen::Quaterniond(block[0], block[1], block[2], block[3])
-              .toRotationMatrix()) {}
-
-  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const {
-    return R * x + t;
-  }
+struct BlockTransform : RigidTransform {
+  explicit BlockTransform(const double* block)
+      : RigidTransform{Eigen::Quaterniond(block[0], block[1], block[2],
+                                          block[3])
+                           .toRotationMatrix(),
+                       {block[4], block[5], block[6]}},
+        w(block[0]),
+        v(block[1], block[2], block[3]) {}
 
   // d (R(q) x + t) / d block.
   Eigen::Matrix<double, 3, 7> BlockJacobian(const Eigen::Vector3d& x) const {
@@ -41,8 +40,6 @@ struct RigidTransform {
 
   double w;
   Eigen::Vector3d v;
-  Eigen::Vector3d t;
-  Eigen::Matrix3d R;
 };
 
 // Writes a Jacobian where Ceres asks for it, nowhere if `to` is null.
@@ -122,10 +119,10 @@ class ReprojectionCost final
   bool Evaluate(double const* const* blocks, double* residuals,
                 double** jacobians) const override {
     const Eigen::Map<const Eigen::Vector3d> x_world(blocks[kPoint]);
-    const RigidTransform rig_from_world(blocks[kFrame]);
+    const BlockTransform rig_from_world(blocks[kFrame]);
     const Eigen::Vector3d x_rig = rig_from_world * x_world;
     if constexpr (kHasSensor) {
-      const RigidTransform sensor_from_rig(blocks[kSensor]);
+      const BlockTransform sensor_from_rig(blocks[kSensor]);
       const Eigen::Vector3d x_cam = sensor_from_rig * x_rig;
       Matrix23 J_cam;
       if (!ProjectPoint(x_cam, blocks, residuals, jacobians, &J_cam)) {
@@ -136,7 +133,7 @@ class ReprojectionCost final
         StoreJacobian<7>(J_cam * sensor_from_rig.BlockJacobian(x_rig),
                          jacobians[kSensor]);
       }
-      const Matrix23 J_rig = J_cam * sensor_from_rig.R;
+      const Matrix23 J_rig = J_cam * sensor_from_rig.rotation;
       ChainToWorld(rig_from_world, x_world, J_rig, jacobians);
     } else {
       Matrix23 J_rig;
@@ -179,10 +176,10 @@ class ReprojectionCost final
     return residual.allFinite();
   }
 
-  static void ChainToWorld(const RigidTransform& rig_from_world,
+  static void ChainToWorld(const BlockTransform& rig_from_world,
                            const Eigen::Vector3d& x_world,
                            const Matrix23& J_rig, double** jacobians) {
-    StoreJacobian<3>(J_rig * rig_from_world.R, jacobians[kPoint]);
+    StoreJacobian<3>(J_rig * rig_from_world.rotation, jacobians[kPoint]);
     if (jacobians[kFrame] != nullptr) {
       StoreJacobian<7>(J_rig * rig_from_world.BlockJacobian(x_world),
                        jacobians[kFrame]);

@@ -7,6 +7,9 @@
 #include <Eigen/SVD>
 
 #include "krot/base/disjoint_sets.h"
+#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/rotation.h"
+#include "krot/geometry/similarity.h"
 
 namespace krot {
 namespace {
@@ -67,7 +70,7 @@ std::vector<Component> FindComponents(const AdjustmentBlocks& blocks,
 }
 
 Vector3d CenterOf(const PoseBlock& frame) {
-  return -(RotationOf(frame).transpose() * TranslationOf(frame));
+  return Center({RotationOf(frame), TranslationOf(frame)});
 }
 
 struct CenterStatistics {
@@ -105,26 +108,14 @@ Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
          svd.matrixV().transpose();
 }
 
-// x -> scale rotation (x - from) + to
-struct Similarity {
-  double scale = 1;
-  Matrix3d rotation = Matrix3d::Identity();
-  Vector3d from;
-  Vector3d to;
-
-  Vector3d operator*(const Vector3d& x) const {
-    return scale * (rotation * (x - from)) + to;
-  }
-};
-
-void MoveFrame(const Similarity& similarity, bool keep_rotation,
-               PoseBlock* frame) {
-  const Vector3d center = similarity * CenterOf(*frame);
+// Moves the frame's centre to `center`; turns it with the world unless
+// `keep_rotation`.
+void MoveFrame(const Vector3d& center, const Matrix3d& world_rotation,
+               bool keep_rotation, PoseBlock* frame) {
   Pose pose = ToPose(*frame);
   if (!keep_rotation) {
-    const Eigen::Quaterniond q(RotationOf(*frame) *
-                               similarity.rotation.transpose());
-    pose.quaternion_wxyz = {q.w(), q.x(), q.y(), q.z()};
+    pose.quaternion_wxyz = ToWxyz(
+        Eigen::Quaterniond(RotationOf(*frame) * world_rotation.transpose()));
   }
   pose.translation = -(pose.Rotation() * center);
   const PoseBlock moved = ToBlock(pose);
@@ -145,9 +136,9 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
         Summarize(before.frames, component.frames);
     const CenterStatistics new_centers =
         Summarize(after->frames, component.frames);
+    // Of what lies around the new centroid.
     Similarity similarity;
-    similarity.from = new_centers.centroid;
-    similarity.to = old_centers.centroid;
+    similarity.translation = old_centers.centroid;
     if (!component.has_fixed_scale && old_centers.rms > 0 &&
         new_centers.rms > 0) {
       similarity.scale = old_centers.rms / new_centers.rms;
@@ -156,14 +147,18 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
       similarity.rotation =
           MeanRotation(before.frames, after->frames, component.frames);
     }
+    const auto move = [&](const Vector3d& x) -> Vector3d {
+      return similarity * (x - new_centers.centroid);
+    };
     for (const size_t f : component.frames) {
-      MoveFrame(similarity, keep_rotation, &after->frames[f]);
+      MoveFrame(move(CenterOf(after->frames[f])), similarity.rotation,
+                keep_rotation, &after->frames[f]);
     }
     for (const size_t s : component.sensors) {
       Eigen::Map<Vector3d>(after->sensors[s].data() + 4) *= similarity.scale;
     }
     for (const size_t k : component.points) {
-      after->points[k] = similarity * after->points[k];
+      after->points[k] = move(after->points[k]);
     }
   }
 }

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 
+#include "krot/geometry/rotation.h"
+
 namespace krot {
 namespace {
 
@@ -16,9 +18,6 @@ using Eigen::Vector3d;
 constexpr double kDegrees = 180 / 3.14159265358979323846;
 // Below this share of the largest, an extent of the cameras is rounding.
 constexpr double kOnALine = 1e-6;
-// A mean rotation is unique if the two least singular values of the sum, the
-// last one signed, do not cancel.
-constexpr double kNoMean = 1e-9;
 
 Matrix3Xd Centers(const std::vector<PosePair>& poses,
                   Vector3d PosePair::*center) {
@@ -43,20 +42,6 @@ bool LieOnALine(const Matrix3Xd& centers) {
   return !(extents[1] > kOnALine * extents[0]);
 }
 
-// The rotation nearest to `sum`, in the Frobenius norm.
-std::optional<Matrix3d> NearestRotation(const Matrix3d& sum) {
-  const Eigen::JacobiSVD<Matrix3d> svd(
-      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Matrix3d& U = svd.matrixU();
-  const Matrix3d& V = svd.matrixV();
-  const double sign = (U * V.transpose()).determinant() < 0 ? -1 : 1;
-  const Vector3d& values = svd.singularValues();
-  if (!(values[1] + sign * values[2] > kNoMean * values[0])) {
-    return std::nullopt;
-  }
-  return U * Vector3d(1, 1, sign).asDiagonal() * V.transpose();
-}
-
 bool AreEqual(const PosePair& pose) {
   return pose.cam_from_world1_rotation == pose.cam_from_world2_rotation &&
          pose.center1 == pose.center2;
@@ -69,12 +54,10 @@ bool IsIdentity(const Similarity& similarity) {
 
 // Camera coordinates grow with the world: scale (R x2 + t) = R' x1 + t'.
 void Transform(const Similarity& world1_from_world2, Pose* cam_from_world) {
-  const auto& q = cam_from_world->quaternion_wxyz;
   const Eigen::Quaterniond rotated =
-      Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized() *
+      NormalizedQuaternion(cam_from_world->quaternion_wxyz) *
       Eigen::Quaterniond(world1_from_world2.rotation).conjugate();
-  cam_from_world->quaternion_wxyz = {rotated.w(), rotated.x(), rotated.y(),
-                                     rotated.z()};
+  cam_from_world->quaternion_wxyz = ToWxyz(rotated);
   cam_from_world->translation =
       world1_from_world2.scale * cam_from_world->translation -
       rotated * world1_from_world2.translation;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/geometry/similarity.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -14,17 +15,6 @@ enum class AlignmentKind {
   kNone,       // as stored
   kFrame,      // the frame that KROT keeps: see AlignFrames
   kSimilarity  // least squares on the camera centres: see AlignCenters
-};
-
-// x1 = scale * rotation * x2 + translation; the default is the identity.
-struct Similarity {
-  double scale = 1;
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-
-  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const {
-    return scale * (rotation * x) + translation;
-  }
 };
 
 // The angle between two rotations, in [0, 180] degrees; exact for small ones.

@@ -70,8 +70,8 @@ DepthStatistics ComputeDepthStatistics(const Model& model) {
       const ImageGeometry& image =
           geometries[indices.at(model.track_elements[e].image_id)];
       if (!image.has_pose) continue;
-      depths.push_back(image.cam_from_world_rotation.row(2).dot(point.xyz) +
-                       image.cam_from_world_translation.z());
+      depths.push_back(image.cam_from_world.rotation.row(2).dot(point.xyz) +
+                       image.cam_from_world.translation.z());
       statistics.not_positive += !(depths.back() > 0);
     }
   }
@@ -99,9 +99,7 @@ TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
             const ImageGeometry& image =
                 geometries[indices.at(model.track_elements[e].image_id)];
             if (!image.has_pose) continue;
-            const Vector3d centre = -image.cam_from_world_rotation.transpose() *
-                                    image.cam_from_world_translation;
-            rays.push_back(centre - point.xyz);
+            rays.push_back(Center(image.cam_from_world) - point.xyz);
           }
           angles[k] = LargestAngle(rays);
         }

@@ -12,7 +12,6 @@ namespace krot {
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::Vector3d;
 
 ModelCounts Count(const Model& model) {
   return {static_cast<int64_t>(model.images.size()),
@@ -26,18 +25,13 @@ ModelCounts Count(const ModelCorrespondence& correspondence) {
           static_cast<int64_t>(correspondence.observations.size())};
 }
 
-Vector3d Center(const ImageGeometry& image) {
-  return -image.cam_from_world_rotation.transpose() *
-         image.cam_from_world_translation;
-}
-
 // None if either has no pose.
 std::optional<PosePair> MakePosePair(const ImageGeometry& image1,
                                      const ImageGeometry& image2) {
   if (!image1.has_pose || !image2.has_pose) return std::nullopt;
-  return PosePair{image1.cam_from_world_rotation,
-                  image2.cam_from_world_rotation, Center(image1),
-                  Center(image2)};
+  return PosePair{image1.cam_from_world.rotation,
+                  image2.cam_from_world.rotation, Center(image1.cam_from_world),
+                  Center(image2.cam_from_world)};
 }
 
 // One per shared image.

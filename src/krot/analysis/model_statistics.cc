@@ -49,9 +49,11 @@ double MeanStoredError(const std::vector<Point3D>& points) {
 
 ColmapStatistics ComputeColmapStatistics(const Model& model) {
   ColmapStatistics statistics;
-  statistics.num_rigs = static_cast<int64_t>(model.rigs.size());
+  if (model.stores_rigs) {
+    statistics.num_rigs = static_cast<int64_t>(model.rigs.size());
+    statistics.num_frames = static_cast<int64_t>(model.frames.size());
+  }
   statistics.num_cameras = static_cast<int64_t>(model.cameras.size());
-  statistics.num_frames = static_cast<int64_t>(model.frames.size());
   statistics.num_images = static_cast<int64_t>(model.images.size());
   statistics.num_points = static_cast<int64_t>(model.points3D.size());
 

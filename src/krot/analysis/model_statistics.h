@@ -14,7 +14,7 @@ namespace krot {
 
 // The figures of COLMAP's model_analyzer, computed as COLMAP 3.8 does.
 struct ColmapStatistics {
-  int64_t num_rigs = 0;
+  int64_t num_rigs = 0;  // 0, as frames, if the files hold none
   int64_t num_cameras = 0;
   int64_t num_frames = 0;
   int64_t num_images = 0;

@@ -7,8 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
@@ -19,9 +17,9 @@ namespace {
 // What is added to the ids of a model.
 struct IdOffsets {
   CameraId camera = 0;
+  ImageId image = 0;
   RigId rig = 0;
   FrameId frame = 0;
-  ImageId image = 0;
   Point3DId point3D = 0;
 };
 
@@ -67,9 +65,9 @@ Id Offset(uint64_t max_id1, uint64_t max_id2, const std::string& kind) {
 IdOffsets Offsets(const Model& model1, const Model& model2) {
   return {
       Offset<CameraId>(MaxSensorId(model1), MaxSensorId(model2), "camera"),
+      Offset<ImageId>(MaxId(model1.images), MaxId(model2.images), "image"),
       Offset<RigId>(MaxId(model1.rigs), MaxId(model2.rigs), "rig"),
       Offset<FrameId>(MaxId(model1.frames), MaxId(model2.frames), "frame"),
-      Offset<ImageId>(MaxId(model1.images), MaxId(model2.images), "image"),
       Offset<Point3DId>(MaxId(model1.points3D), MaxId(model2.points3D),
                         "point"),
   };
@@ -110,32 +108,11 @@ void Renumber(const IdOffsets& offsets, Model* model) {
   }
 }
 
-// A rig per camera and a frame per image, all under the ids of what they hold.
-void AddTrivialRigs(Model* model) {
-  model->has_rigs = true;
-  for (const Camera& camera : model->cameras) {
-    Rig rig;
-    rig.id = camera.id;
-    rig.ref_sensor_id = SensorId{kSensorTypeCamera, camera.id};
-    model->rigs.push_back(std::move(rig));
-  }
-  for (const Image& image : model->images) {
-    const SensorId sensor_id{kSensorTypeCamera, image.camera_id};
-    model->frames.push_back({image.id,
-                             image.camera_id,
-                             image.cam_from_world,
-                             {{sensor_id, image.id}}});
-  }
-}
-
 // Gives every image the pose that its frame and rig say.
 void FollowFrames(Model* model) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
   for (size_t n = 0; n < model->images.size(); ++n) {
-    const ImageGeometry& geometry = geometries[n];
-    const Eigen::Quaterniond q(geometry.cam_from_world_rotation);
-    model->images[n].cam_from_world = {{q.w(), q.x(), q.y(), q.z()},
-                                       geometry.cam_from_world_translation};
+    model->images[n].cam_from_world = ToPose(geometries[n].cam_from_world);
   }
 }
 
@@ -153,6 +130,7 @@ void MoveRecords(std::vector<Record>* from, std::vector<Record>* to) {
 
 Model Join(Model model1, Model model2) {
   Model joined = std::move(model1);
+  joined.stores_rigs = joined.stores_rigs || model2.stores_rigs;
   const uint64_t num_elements = joined.track_elements.size();
   for (Point3D& point : model2.points3D) {
     point.track_begin += num_elements;
@@ -172,14 +150,11 @@ Model Join(Model model1, Model model2) {
 Model OverlayModels(const Model& model1, const Model& model2, int num_threads) {
   Model first = model1;
   Model second = model2;
-  if (first.has_rigs != second.has_rigs) {
-    AddTrivialRigs(first.has_rigs ? &second : &first);
-  }
   Renumber(Offsets(first, second), &second);
   Mark("1/", kOverlayColor1, &first);
   Mark("2/", kOverlayColor2, &second);
   Model overlay = Join(std::move(first), std::move(second));
-  if (overlay.has_rigs) FollowFrames(&overlay);
+  if (overlay.stores_rigs) FollowFrames(&overlay);
   UpdatePointErrors(PixelErrors(overlay, num_threads), &overlay);
   return overlay;
 }

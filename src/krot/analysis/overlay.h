@@ -18,9 +18,8 @@ inline constexpr std::array<uint8_t, 3> kOverlayColor2 = {213, 94, 0};
 //   of ten above the largest id of the first, kind by kind.
 // - Points bear one colour per model, and the mean true pixel error of their
 //   track.
-// - If either has rigs, so has the result: an image of a legacy model becomes
-//   a frame of its own, of a rig that holds its camera alone. The pose of an
-//   image is then its frame's, as COLMAP since 3.12 reads it.
+// - If either stores rigs, so does the result, and the pose of an image is
+//   then its frame's, as COLMAP since 3.12 reads it.
 // Everything else stays, coordinates included: bring them into one frame
 // first (TransformModel).
 //

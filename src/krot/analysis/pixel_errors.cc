@@ -39,15 +39,13 @@ std::optional<CameraPose> CameraPoseOf(const Model& model,
                                        const ImageGeometry& geometry) {
   if (!geometry.has_pose) return std::nullopt;
   const bool is_frame_pose =
-      geometry.cam_from_rig_rotation == Eigen::Matrix3d::Identity() &&
-      geometry.cam_from_rig_translation == Eigen::Vector3d::Zero();
+      geometry.cam_from_rig.rotation == Eigen::Matrix3d::Identity() &&
+      geometry.cam_from_rig.translation == Eigen::Vector3d::Zero();
   if (!is_frame_pose) {
-    return CameraPose{Eigen::Quaterniond(geometry.cam_from_world_rotation),
-                      geometry.cam_from_world_translation};
+    return CameraPose{Eigen::Quaterniond(geometry.cam_from_world.rotation),
+                      geometry.cam_from_world.translation};
   }
-  const Pose& pose = model.has_rigs
-                         ? model.frames[geometry.frame].rig_from_world
-                         : model.images[geometry.frame].cam_from_world;
+  const Pose& pose = model.frames[geometry.frame].rig_from_world;
   return CameraPose{NormalizedTwice(pose), pose.translation};
 }
 

@@ -1,7 +1,5 @@
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #include "krot/base/check.h"
 #include "krot/bridge/bridge.h"
 #include "krot/model/image_geometry.h"
@@ -9,7 +7,6 @@
 namespace krot {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // Stored poses that agree to this with those of frames and rigs differ by
@@ -20,28 +17,23 @@ bool IsSamePoint(const Vector3d& a, const Vector3d& b) {
   return (a - b).norm() <= kSamePose * a.norm();
 }
 
-void SetQuaternion(const Matrix3d& rotation, Pose* pose) {
-  const Eigen::Quaterniond q(rotation);
-  pose->quaternion_wxyz = {q.w(), q.x(), q.y(), q.z()};
-}
-
 // Makes the image agree with its frame, whose translation was `geometry`'s
 // and is now `translation`.
 void FollowFrame(const ImageGeometry& geometry, const Vector3d& translation,
                  Pose* cam_from_world) {
   const bool has_same_rotation =
-      (cam_from_world->Rotation() - geometry.cam_from_world_rotation).norm() <=
+      (cam_from_world->Rotation() - geometry.cam_from_world.rotation).norm() <=
       kSamePose;
   if (!has_same_rotation) {
-    SetQuaternion(geometry.cam_from_world_rotation, cam_from_world);
+    cam_from_world->quaternion_wxyz =
+        ToWxyz(Eigen::Quaterniond(geometry.cam_from_world.rotation));
   }
-  const bool frame_stays = translation == geometry.rig_from_world_translation;
-  if (frame_stays && IsSamePoint(geometry.cam_from_world_translation,
+  const bool frame_stays = translation == geometry.rig_from_world.translation;
+  if (frame_stays && IsSamePoint(geometry.cam_from_world.translation,
                                  cam_from_world->translation)) {
     return;
   }
-  cam_from_world->translation = geometry.cam_from_rig_rotation * translation +
-                                geometry.cam_from_rig_translation;
+  cam_from_world->translation = geometry.cam_from_rig * translation;
 }
 
 }  // namespace
@@ -59,11 +51,9 @@ Model ApplyEstimate(const Model& model, const BuiltProblem& built,
   for (size_t k = 0; k < built.point_of.size(); ++k) {
     result.points3D[built.point_of[k]].xyz = estimate.points[k];
   }
-  if (model.has_rigs) {
-    for (size_t f = 0; f < built.frame_of.size(); ++f) {
-      result.frames[built.frame_of[f]].rig_from_world.translation =
-          estimate.translations[f];
-    }
+  for (size_t f = 0; f < built.frame_of.size(); ++f) {
+    result.frames[built.frame_of[f]].rig_from_world.translation =
+        estimate.translations[f];
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (size_t j = 0; j < built.image_of.size(); ++j) {

@@ -43,7 +43,6 @@ struct BuiltProblem {
   // are ignored).
   Estimate start;
   std::vector<int32_t> frame_of;    // problem frame -> index in model.frames
-                                    // (model.images if !model.has_rigs)
   std::vector<int32_t> image_of;    // problem view -> index in model.images
   std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
@@ -70,12 +69,12 @@ BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 
 // A copy of `model` with the estimate's translations and points; rotations and
-// everything else are unchanged. In a model with rigs an image's pose becomes
-// that of its sensor in its frame, as COLMAP reads it: translations are
-// composed anew, and the quaternion of an image is replaced only if it is
-// another rotation than its frame and rig imply. What the estimate leaves
-// where it is keeps its bits. Throws std::invalid_argument where the estimate
-// does not have the size of the problem.
+// everything else are unchanged. An image's pose becomes that of its sensor in
+// its frame, as COLMAP reads it: translations are composed anew, and the
+// quaternion of an image is replaced only if it is another rotation than its
+// frame and rig imply. What the estimate leaves where it is keeps its bits.
+// Throws std::invalid_argument where the estimate does not have the size of the
+// problem.
 Model ApplyEstimate(const Model& model, const BuiltProblem& built,
                     const Estimate& estimate);
 

@@ -53,13 +53,12 @@ std::optional<Eigen::Matrix3d> RowAtPoint(const Sources& sources,
                                           const Eigen::Vector2d& pixel,
                                           const Vector3d& xyz) {
   const Camera& camera = sources.model.cameras[geometry.camera];
-  const Vector3d x_cam = geometry.cam_from_world_rotation * xyz +
-                         geometry.cam_from_world_translation;
+  const Vector3d x_cam = geometry.cam_from_world * xyz;
   const auto row =
       RowAtProjection(camera.model_id, camera.params.data(), pixel, x_cam);
   const double rounding =
       kDepthRounding *
-      (xyz.norm() + geometry.cam_from_world_translation.norm());
+      (xyz.norm() + geometry.cam_from_world.translation.norm());
   if (!row || !(row->row(0).dot(x_cam) > rounding)) return std::nullopt;
   return row;
 }
@@ -224,9 +223,7 @@ void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
 void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
   const std::vector<ImageGeometry>& geometries = sources.geometries;
   KnownRotationProblem& problem = built->problem;
-  const size_t num_model_frames = sources.model.has_rigs
-                                      ? sources.model.frames.size()
-                                      : sources.model.images.size();
+  const size_t num_model_frames = sources.model.frames.size();
   std::vector<int32_t> frame_index(num_model_frames, -1);
   for (const Observation& observation : problem.observations) {
     frame_index[geometries[observation.view].frame] = 0;
@@ -245,10 +242,10 @@ void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
     view_index[n] = static_cast<int32_t>(problem.views.size());
     built->image_of.push_back(static_cast<int32_t>(n));
     const int32_t frame = frame_index[image.frame];
-    problem.views.push_back({image.cam_from_world_rotation,
-                             image.cam_from_rig_rotation,
-                             image.cam_from_rig_translation, frame});
-    built->start.translations[frame] = image.rig_from_world_translation;
+    problem.views.push_back({image.cam_from_world.rotation,
+                             image.cam_from_rig.rotation,
+                             image.cam_from_rig.translation, frame});
+    built->start.translations[frame] = image.rig_from_world.translation;
   }
   for (Observation& observation : problem.observations) {
     observation.view = view_index[observation.view];
@@ -259,7 +256,7 @@ void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
 void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
   for (ImageGeometry& image : *geometries) {
     image.has_pose =
-        image.frame >= 0 && image.cam_from_rig_translation.allFinite();
+        image.frame >= 0 && image.cam_from_rig.translation.allFinite();
   }
 }
 

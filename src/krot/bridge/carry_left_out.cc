@@ -13,11 +13,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vector3d CentreOf(const ImageGeometry& image) {
-  return -image.cam_from_world_rotation.transpose() *
-         image.cam_from_world_translation;
-}
-
 // The largest error of a point's observations whose error was finite before;
 // infinite where one of those no longer projects.
 class TrackError {
@@ -36,10 +31,9 @@ class TrackError {
       const int32_t n = image_indices_.at(element.image_id);
       const Point2D& point2D = model_.images[n].points2D[element.point2D_idx];
       const Camera& camera = model_.cameras[images_[n].camera];
-      const auto error = ProjectionError(
-          camera.model_id, camera.params.data(), {point2D.x, point2D.y},
-          images_[n].cam_from_world_rotation * xyz +
-              images_[n].cam_from_world_translation);
+      const auto error = ProjectionError(camera.model_id, camera.params.data(),
+                                         {point2D.x, point2D.y},
+                                         images_[n].cam_from_world * xyz);
       if (!error) return std::numeric_limits<double>::infinity();
       largest = std::max(largest, error->norm());
     }
@@ -79,8 +73,9 @@ void CarryLeftOutPoints(const Model& before,
     for (uint64_t e = point.track_begin;
          e < point.track_end && lowest > allowed; ++e) {
       const int32_t n = error_after.ImageOf(after->track_elements[e]);
-      const Vector3d xyz = start + (CentreOf(error_after.images()[n]) -
-                                    CentreOf(error_before.images()[n]));
+      const Vector3d xyz =
+          start + (Center(error_after.images()[n].cam_from_world) -
+                   Center(error_before.images()[n].cam_from_world));
       const double error = error_after(point, xyz);
       if (!(error < lowest)) continue;
       lowest = error;

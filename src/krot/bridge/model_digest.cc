@@ -7,11 +7,11 @@
 #include <memory>
 #include <new>
 #include <numeric>
-#include <optional>
-#include <unordered_map>
 #include <vector>
 
 #include <openssl/evp.h>
+
+#include "krot/model/image_geometry.h"
 
 namespace krot {
 namespace {
@@ -81,46 +81,8 @@ std::vector<size_t> OrderById(const std::vector<Record>& records) {
   return order;
 }
 
-// How an image's camera sits: in which frame, how that is turned, where in it.
-struct Place {
-  uint64_t frame_id = 0;
-  std::array<double, 4> rig_from_world = {1, 0, 0, 0};
-  Pose cam_from_rig;
-};
-
-std::optional<Pose> CamFromRig(const Rig& rig, const SensorId& sensor_id) {
-  const auto is_same = [&](const SensorId& other) {
-    return other.type == sensor_id.type && other.id == sensor_id.id;
-  };
-  if (rig.ref_sensor_id && is_same(*rig.ref_sensor_id)) return Pose();
-  for (const RigSensor& sensor : rig.sensors) {
-    if (is_same(sensor.sensor_id)) return sensor.sensor_from_rig;
-  }
-  return std::nullopt;
-}
-
-// By image id; images without a place are absent.
-std::unordered_map<ImageId, Place> Places(const Model& model) {
-  std::unordered_map<ImageId, Place> places;
-  if (!model.has_rigs) {
-    for (const Image& image : model.images) {
-      places[image.id] = {image.id, image.cam_from_world.quaternion_wxyz, {}};
-    }
-    return places;
-  }
-  std::unordered_map<RigId, const Rig*> rigs;
-  for (const Rig& rig : model.rigs) rigs[rig.id] = &rig;
-  for (const Frame& frame : model.frames) {
-    for (const FrameData& data : frame.data) {
-      if (data.sensor_id.type != kSensorTypeCamera) continue;
-      const std::optional<Pose> cam_from_rig =
-          CamFromRig(*rigs.at(frame.rig_id), data.sensor_id);
-      if (!cam_from_rig) continue;
-      places[static_cast<ImageId>(data.data_id)] = {
-          frame.id, frame.rig_from_world.quaternion_wxyz, *cam_from_rig};
-    }
-  }
-  return places;
+void AddQuaternion(const Pose& pose, Digest* digest) {
+  for (const double q : pose.quaternion_wxyz) digest->Number(q);
 }
 
 void AddCamera(const Camera& camera, Digest* digest) {
@@ -130,18 +92,22 @@ void AddCamera(const Camera& camera, Digest* digest) {
   for (const double param : camera.params) digest->Number(param);
 }
 
-void AddImage(const Image& image, const Place* place, Digest* digest) {
-  digest->Integer(image.id);
-  digest->Integer(image.camera_id);
-  digest->Integer(place != nullptr);
-  if (place != nullptr) {
-    digest->Integer(place->frame_id);
-    for (const double q : place->rig_from_world) digest->Number(q);
-    for (const double q : place->cam_from_rig.quaternion_wxyz) {
-      digest->Number(q);
-    }
-    for (const double t : place->cam_from_rig.translation) digest->Number(t);
-  }
+// How the image's camera sits: in which frame, how that is turned, where in it.
+void AddPlace(const Model& model, const ImageGeometry& image, Digest* digest) {
+  digest->Integer(image.frame >= 0);
+  if (image.frame < 0) return;
+  const Frame& frame = model.frames[image.frame];
+  digest->Integer(frame.id);
+  AddQuaternion(frame.rig_from_world, digest);
+  const Pose cam_from_rig =
+      image.sensor < 0
+          ? Pose()
+          : *model.rigs[image.rig].sensors[image.sensor].sensor_from_rig;
+  AddQuaternion(cam_from_rig, digest);
+  for (const double t : cam_from_rig.translation) digest->Number(t);
+}
+
+void AddObservations(const Image& image, Digest* digest) {
   const auto is_observation = [](const Point2D& point2D) {
     return point2D.point3D_id != kInvalidPoint3DId;
   };
@@ -165,12 +131,14 @@ std::string ModelSha256(const Model& model) {
   for (const size_t n : OrderById(model.cameras)) {
     AddCamera(model.cameras[n], &digest);
   }
-  const std::unordered_map<ImageId, Place> places = Places(model);
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   digest.Integer(model.images.size());
   for (const size_t n : OrderById(model.images)) {
-    const auto place = places.find(model.images[n].id);
-    AddImage(model.images[n], place == places.end() ? nullptr : &place->second,
-             &digest);
+    const Image& image = model.images[n];
+    digest.Integer(image.id);
+    digest.Integer(image.camera_id);
+    AddPlace(model, geometries[n], &digest);
+    AddObservations(image, &digest);
   }
   return digest.Hex();
 }

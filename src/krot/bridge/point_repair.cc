@@ -11,12 +11,11 @@ using Eigen::Vector3d;
 
 // C = -R' t; its direction is where v = 0 and w > 0.
 Ray RayOf(const ImageGeometry& image, const Observation& observation) {
-  const Eigen::Matrix3d world_from_cam =
-      image.cam_from_world_rotation.transpose();
+  const RigidTransform world_from_cam = Inverse(image.cam_from_world);
   Vector3d ray = observation.E.row(1).cross(observation.E.row(2));
   if (observation.E.row(0).dot(ray) < 0) ray = -ray;
-  return {-world_from_cam * image.cam_from_world_translation,
-          world_from_cam * ray.normalized()};
+  return {world_from_cam.translation,
+          world_from_cam.rotation * ray.normalized()};
 }
 
 }  // namespace

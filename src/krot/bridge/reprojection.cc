@@ -15,6 +15,8 @@ namespace krot {
 namespace {
 
 constexpr int64_t kObservationsPerChunk = 4096;
+// Of a coordinate that is computed in a few operations, relative.
+constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double NormOfError(const Eigen::Vector2d& e, Norm norm) {
@@ -52,11 +54,25 @@ Eigen::Vector3d Reprojection::InCamera(const Estimate& estimate,
 double Reprojection::Error(const Estimate& estimate, Norm norm,
                            int64_t i) const {
   const Source& source = sources_[built_.problem.observations[i].view];
+  const Eigen::Vector3d x_cam = InCamera(estimate, i);
   const std::optional<Eigen::Vector2d> e = ProjectionError(
-      source.model_id, source.params, built_.pixels[i], InCamera(estimate, i));
+      source.model_id, source.params, built_.pixels[i], x_cam);
   if (!e) return kInfinity;
-  const double error = NormOfError(*e, norm);
+  const double error = NormOfError(*e, norm) + Resolution(estimate, i, x_cam);
   return std::isfinite(error) ? error : kInfinity;
+}
+
+// What a change of the coordinates' last digits does to the error, pixels:
+// next to nothing, but where a point all but coincides with its camera.
+double Reprojection::Resolution(const Estimate& estimate, int64_t i,
+                                const Eigen::Vector3d& x_cam) const {
+  const Observation& o = built_.problem.observations[i];
+  const int32_t frame = built_.problem.views[o.view].frame;
+  const double digits =
+      kDigits * (estimate.points[o.point].lpNorm<Eigen::Infinity>() +
+                 estimate.translations[frame].lpNorm<Eigen::Infinity>());
+  const double pixels_per_angle = o.E.bottomRows<2>().norm();
+  return pixels_per_angle * digits / std::abs(o.E.row(0).dot(x_cam));
 }
 
 double Reprojection::TrueCost(const Estimate& estimate, Norm norm,

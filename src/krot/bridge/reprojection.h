@@ -23,8 +23,10 @@ class Reprojection {
   // TrueCost differ by rounding alone.
   bool IsLinear() const { return is_linear_; }
 
-  // ||pi(x_cam) - pixel||_p of observation i, pixels; infinity where the point
-  // does not project, as behind its camera.
+  // ||pi(x_cam) - pixel||_p of observation i, pixels, and what the last digits
+  // of the coordinates may add to it: an estimate whose points lie closer to a
+  // camera than its coordinates resolve is not as good as it seems. Infinity
+  // where the point does not project, as behind its camera.
   double Error(const Estimate& estimate, Norm norm, int64_t i) const;
 
   // The largest error, pixels; 0 without observations. O(observations); the
@@ -49,6 +51,9 @@ class Reprojection {
   Eigen::Vector3d InCamera(const Estimate& estimate, int64_t i) const;
 
  private:
+  double Resolution(const Estimate& estimate, int64_t i,
+                    const Eigen::Vector3d& x_cam) const;
+
   const BuiltProblem& built_;
   std::vector<Source> sources_;  // per view
   bool is_linear_ = true;

@@ -10,6 +10,7 @@ namespace krot {
 namespace {
 
 constexpr int kMaxCells = 4000;
+constexpr int kMaxCellsAlong = 1000;
 constexpr int kMaxBoundaryDepth = 8;
 constexpr double kRelativeSlack = 0.1;  // of max |m| - 1
 constexpr double kAbsoluteSlack = 1e-6;
@@ -170,7 +171,8 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
 // all points of the box |q|_inf <= reach with |f| <= 1.
 template <typename BoundOn>
 std::optional<double> Search(const ErrorMap& map, double p, double reach,
-                             double target, const BoundOn& bound_on) {
+                             double target, int max_cells,
+                             const BoundOn& bound_on) {
   std::vector<Cell> heap;
   int num_cells = 0;
   const auto add = [&](const Box& box) {
@@ -186,7 +188,7 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
   const Interval side = {-reach, reach};
   add({{side, side}});
   while (!heap.empty() && heap.front().bound > target &&
-         num_cells < kMaxCells) {
+         num_cells < max_cells) {
     const auto [first, second] = Halves(heap.front().box);
     std::pop_heap(heap.begin(), heap.end(), ComesLater);
     heap.pop_back();
@@ -226,9 +228,10 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
   }
   const double target =
       sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
-  return Search(map, p, reach, target, [p](const Enclosure& enclosure) {
-    return BoundLinearError(enclosure, p);
-  });
+  return Search(map, p, reach, target, kMaxCells,
+                [p](const Enclosure& enclosure) {
+                  return BoundLinearError(enclosure, p);
+                });
 }
 
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,

@@ -10,8 +10,8 @@ namespace {
 // Every pair keeps its smallest eigenvalue above this share of their mean. A
 // larger one shortens steps, a smaller one lets the next ones become short.
 constexpr double kNeighbourhood = 1e-3;
-// No depth grows by more than this factor in a step: far beyond, neither the
-// gauge nor the linearised top = g w holds.
+// No depth that is not small grows by more than this factor in a step: far
+// beyond, neither the gauge nor the linearised top = g w holds.
 constexpr double kMaxDepthGrowth = 3;
 // After a step shorter than this, the next one only centres, so far. Scaling
 // or leaving out the corrector instead took more iterations (docs/method.md,
@@ -187,7 +187,8 @@ bool ConicSolver<Cone>::IsInside(const State& trial) const {
     const Vector s = system_.Slack(viewed, trial.scalar);
     if (program_.IsCost() &&
         (!(viewed.depth > 0) ||
-         viewed.depth > kMaxDepthGrowth * now_.viewed[i].depth)) {
+         viewed.depth > kMaxDepthGrowth * std::max(now_.viewed[i].depth,
+                                                   system_.small_depth()))) {
       return -1.0;
     }
     if (!(Cone::SmallestEigenvalue(s) > 0) ||

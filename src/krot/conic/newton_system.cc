@@ -10,6 +10,19 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+// Of the median depth; smaller ones count as this much.
+constexpr double kSmallDepth = 0.1;
+
+double MedianDepth(const std::vector<ViewedPoint>& viewed) {
+  std::vector<double> depths;
+  depths.reserve(viewed.size());
+  for (const ViewedPoint& v : viewed) depths.push_back(v.depth);
+  const auto middle =
+      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
 // T: (top; v) into the cone.
 template <int kDim>
 Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
@@ -112,16 +125,19 @@ bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
   return true;
 }
 
-// e = mean of c_i / w_i: e'dx is the mean relative change of the depths.
+// e = mean of c_i / w_i, w_i at least the small depth: e'dx is the mean
+// relative change of the depths. Its multiplier is as large as the gap, so that
+// with depths that fall like the gap alone its forces would not vanish.
 template <typename Cone>
 void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
   gauge_.SetZero(problem_.num_points, problem_.num_frames);
   if (!program_.IsCost()) return;
+  small_depth_ = kSmallDepth * MedianDepth(viewed);
   for (int64_t i = 0; i < loop_.count(); ++i) {
     const Observation& o = problem_.observations[i];
     const View& view = problem_.views[o.view];
-    const double weight =
-        1 / (static_cast<double>(loop_.count()) * viewed[i].depth);
+    const double weight = 1 / (static_cast<double>(loop_.count()) *
+                               std::max(viewed[i].depth, small_depth_));
     const Vector3d c = weight * o.E.row(0).transpose();
     gauge_.points[o.point] += view.cam_from_world_rotation.transpose() * c;
     if (structure_.frame_is_fixed[view.frame]) continue;

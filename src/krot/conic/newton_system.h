@@ -70,6 +70,8 @@ class NewtonSystem {
   const ObservationLoop& loop() const { return loop_; }
   double gap() const { return gap_; }  // sum s'z = sum |lambda|^2
   double mu() const { return mu_; }    // of each pair, on the central path
+  // Cost programme: depths below it are small beside the others.
+  double small_depth() const { return small_depth_; }
   const std::vector<Vector>& lambda() const { return lambda_; }
   const std::vector<Vector>& target() const { return target_; }  // the last f
 
@@ -101,6 +103,7 @@ class NewtonSystem {
   PointElimination<kDim> elimination_;
   double gap_ = 0;
   double mu_ = 0;
+  double small_depth_ = 0;
   std::vector<NtScaling<Cone>> scaling_;
   std::vector<Vector> lambda_;
   std::vector<Vector> border_;  // b: the column of g

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "krot/conic/interior_point.h"
-#include "krot/joint/feasible_start.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -35,6 +34,8 @@ constexpr double kFirstWidth = 1e-2;
 constexpr double kShareOfWidth = 0.25;
 constexpr double kStartMargin = 0.1;
 constexpr double kFreshStartMargin = 1e-2;
+// Smaller depths, of the median, are those of points in a camera.
+constexpr double kDepthInCamera = 1e-6;
 // In the unit of depth, of the median.
 constexpr double kShareOfDepth = 0.1;
 constexpr double kHopelessGap = 1e-5;
@@ -73,13 +74,13 @@ void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
   }
 }
 
-InteriorPointTermination CertifiedSolve::RunFromEstimate(
-    double start_margin, const TakeEstimate& take,
+InteriorPointTermination CertifiedSolve::RunFrom(
+    Estimate start, double start_margin, const TakeEstimate& take,
     const IterationReport& report) {
   InteriorPointOptions options;
   options.norm = options_.norm;
   options.start_margin = start_margin;
-  options.max_iterations = max_iterations_ - iterations_;
+  options.max_iterations = std::max(1, max_iterations_ - iterations_);
   options.smallest_gap = kFarBelow * options_.relative_gap;
   double next_gap = options_.relative_gap;
   double gap_to_ask = kFirstGapToAsk;
@@ -116,25 +117,47 @@ InteriorPointTermination CertifiedSolve::RunFromEstimate(
             iterate.gap > kLargeGap);
   };
   std::vector<Multiplier> multipliers;
-  Estimate last = estimate_;
-  return MinimizeJointly(problem_, options, context_, &last, &multipliers)
+  return MinimizeJointly(problem_, options, context_, &start, &multipliers)
       .termination;
 }
 
-// Either an estimate below `bound`, pixels, far from the boundary of the cones,
-// which becomes the best; or a proof, if all goes well, that there is none.
-bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
+FeasibleStartOptions CertifiedSolve::OptionsForStart(
+    const IterationReport& report) {
   FeasibleStartOptions options;
   options.norm = options_.norm;
   options.unit_depth = kShareOfDepth * MedianDepth(problem_, estimate_);
   options.known_bound = lower_bound_;
   options.hopeless_gap = kHopelessGap;
-  options.callback = [&](double target) {
+  options.callback = [this, &report](double target) {
     ++iterations_;
     JointIteration iteration;
     iteration.target = target;
     report(iteration);
   };
+  return options;
+}
+
+// Where a point lies in a camera, coordinates do not resolve its depth and its
+// multipliers are as large as the depth is small: the interior point would
+// settle far from balance. An estimate from the middle of the cones, where
+// points and cameras have come apart, takes its place, be it a little worse.
+void CertifiedSolve::LeaveCameras(const IterationReport& report,
+                                  Estimate* start) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const Observation& observation : problem_.observations) {
+    smallest =
+        std::min(smallest, ViewPoint(problem_, observation, *start).depth);
+  }
+  if (smallest >= kDepthInCamera * MedianDepth(problem_, *start)) return;
+  std::vector<Multiplier> multipliers;
+  FindEstimateBelow(problem_, (1 + kStartMargin) * cost_,
+                    OptionsForStart(report), context_, start, &multipliers);
+}
+
+// Either an estimate below `bound`, pixels, far from the boundary of the cones,
+// which becomes the best; or a proof, if all goes well, that there is none.
+bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
+  const FeasibleStartOptions options = OptionsForStart(report);
   std::vector<Multiplier> multipliers;
   if (FindEstimateBelow(problem_, bound, options, context_, &estimate_,
                         &multipliers) == InteriorPointTermination::kFeasible) {
@@ -188,9 +211,11 @@ JointTermination CertifiedSolve::Run(int max_iterations,
   width_ = kFirstWidth;
   if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
   double start_margin = kStartMargin;
+  Estimate start = estimate_;
+  LeaveCameras(report, &start);
   for (;;) {
     const InteriorPointTermination termination =
-        RunFromEstimate(start_margin, take, report);
+        RunFrom(start, start_margin, take, report);
     start_margin = kFreshStartMargin;
     if (IsGapReached()) return JointTermination::kGapReached;
     if (is_given_up_) return JointTermination::kStalled;
@@ -207,6 +232,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
       return JointTermination::kMaxIterations;
     }
     if (!is_fresh) return JointTermination::kStalled;
+    start = estimate_;
   }
 }
 

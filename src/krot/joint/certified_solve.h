@@ -3,6 +3,7 @@
 #include <functional>
 #include <optional>
 
+#include "krot/joint/feasible_start.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -49,9 +50,11 @@ class CertifiedSolve {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
            IsZeroUpToRounding(cost_);
   }
-  InteriorPointTermination RunFromEstimate(double start_margin,
-                                           const TakeEstimate& take,
-                                           const IterationReport& report);
+  InteriorPointTermination RunFrom(Estimate start, double start_margin,
+                                   const TakeEstimate& take,
+                                   const IterationReport& report);
+  FeasibleStartOptions OptionsForStart(const IterationReport& report);
+  void LeaveCameras(const IterationReport& report, Estimate* start);
   bool FindFreshStart(const IterationReport& report);
   bool Bisect(double width, const IterationReport& report);
   bool TryBelow(double bound, const IterationReport& report);

@@ -8,15 +8,18 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
+
+#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/rotation.h"
 
 namespace krot {
 
 // A COLMAP sparse model as plain data, every record in the order of its file
 // and every number with the bits it was stored with.
 //
-// Identifiers are COLMAP's. Files that hold no rigs and frames ("legacy",
-// COLMAP 3.8 to 3.11) have `has_rigs` false and both lists empty.
+// Identifiers are COLMAP's. Every image belongs to a frame, and every frame to
+// a rig, also in a model whose files hold neither ("legacy", COLMAP 3.8
+// to 3.11): there they are trivial (trivial_rigs.h), and only writing tells.
 
 using CameraId = uint32_t;
 using RigId = uint32_t;
@@ -31,17 +34,18 @@ inline constexpr Point3DId kInvalidPoint3DId =
 // A rigid transform x -> R(q) x + t as COLMAP stores it; the quaternion keeps
 // its stored norm and sign.
 struct Pose {
-  std::array<double, 4> quaternion_wxyz = {1, 0, 0, 0};
+  QuaternionWxyz quaternion_wxyz = {1, 0, 0, 0};
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  // The rotation, of the normalised quaternion.
-  Eigen::Matrix3d Rotation() const {
-    return Eigen::Quaterniond(quaternion_wxyz[0], quaternion_wxyz[1],
-                              quaternion_wxyz[2], quaternion_wxyz[3])
-        .normalized()
-        .toRotationMatrix();
-  }
+  // Of the normalised quaternion.
+  Eigen::Matrix3d Rotation() const { return RotationOf(quaternion_wxyz); }
+  RigidTransform Transform() const { return {Rotation(), translation}; }
 };
+
+inline Pose ToPose(const RigidTransform& transform) {
+  return {ToWxyz(Eigen::Quaterniond(transform.rotation)),
+          transform.translation};
+}
 
 struct Camera {
   CameraId id = 0;
@@ -58,6 +62,10 @@ inline constexpr int32_t kSensorTypeImu = 1;
 struct SensorId {
   int32_t type = kSensorTypeInvalid;
   uint32_t id = 0;  // the camera id if type is kSensorTypeCamera
+
+  bool operator==(const SensorId& other) const {
+    return type == other.type && id == other.id;
+  }
 };
 
 struct RigSensor {
@@ -113,8 +121,8 @@ struct Point3D {
 };
 
 struct Model {
+  bool stores_rigs = false;  // whether the files hold rigs and frames
   std::vector<Camera> cameras;
-  bool has_rigs = false;
   std::vector<Rig> rigs;
   std::vector<Frame> frames;
   std::vector<Image> images;

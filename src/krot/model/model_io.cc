@@ -9,6 +9,7 @@
 #include "krot/model/file_bytes.h"
 #include "krot/model/model_error.h"
 #include "krot/model/text_io.h"
+#include "krot/model/trivial_rigs.h"
 
 namespace krot {
 namespace {
@@ -133,7 +134,7 @@ bool HasRigs(const fs::path& folder, ModelFormat format) {
 void WriteModelFiles(const Model& model, ModelFormat format,
                      const fs::path& folder) {
   for (const ModelPart& part : kParts) {
-    if (part.is_optional && !model.has_rigs) continue;
+    if (part.is_optional && !model.stores_rigs) continue;
     const auto format_part =
         format == ModelFormat::kBinary ? part.format_binary : part.format_text;
     WriteFile(folder / part.FileName(format), format_part(model));
@@ -159,18 +160,19 @@ ModelFormat DetectModelFormat(const fs::path& folder) {
 }
 
 Model ReadModel(const fs::path& folder, ModelFormat format) {
-  const bool has_rigs = Translating<ModelError>(
+  const bool has_rig_files = Translating<ModelError>(
       folder, "read", [&] { return HasRigs(folder, format); });
   Model model;
   for (const ModelPart& part : kParts) {
-    if (part.is_optional && !has_rigs) continue;
+    if (part.is_optional && !has_rig_files) continue;
     const auto parse_part =
         format == ModelFormat::kBinary ? part.parse_binary : part.parse_text;
     parse_part(ReadFileBytes(folder / part.FileName(format)), &model);
   }
   // COLMAP takes a model whose rigs and frames are both empty for a legacy
   // one.
-  model.has_rigs = !model.rigs.empty() || !model.frames.empty();
+  model.stores_rigs = !model.rigs.empty() || !model.frames.empty();
+  if (!model.stores_rigs) UseTrivialRigs(&model);
   return model;
 }
 

@@ -20,7 +20,8 @@ ModelFormat DetectModelFormat(const std::filesystem::path& folder);
 // points3D, each file in one read. Every count is checked against the file's
 // size before memory is reserved. Throws ModelError. The result is
 // syntactically complete; ValidateModel says whether it is consistent.
-// Rigs and frames that are both empty mean a legacy model, as for COLMAP.
+// Rigs and frames that are both empty or missing mean a legacy model, as for
+// COLMAP; it gets trivial ones (trivial_rigs.h).
 Model ReadModel(const std::filesystem::path& folder, ModelFormat format);
 
 struct WriteModelOptions {
@@ -41,8 +42,8 @@ void CheckWritable(const std::filesystem::path& folder,
 // Writes the model into a new sibling folder and swaps that in, so that an
 // interruption leaves the old model or the new one and never a mix; foreign
 // files already in `folder` are carried over, model files of the other format
-// are not. Throws WriteError; nothing has changed then. Requires a valid model
-// (ValidateModel).
+// are not. Rigs and frames are written if model.stores_rigs. Throws WriteError;
+// nothing has changed then. Requires a valid model (ValidateModel).
 void WriteModel(const Model& model, const std::filesystem::path& folder,
                 const WriteModelOptions& options);
 

@@ -77,13 +77,13 @@ void CheckTracksAreConsecutive(const Model& model) {
 void ValidateModel(const Model& model) {
   const IndexedModel indexed(model);
   CheckUnique(indexed.cameras, "cameras");
+  CheckUnique(indexed.images, "images");
   CheckUnique(indexed.rigs, "rigs");
   CheckUnique(indexed.frames, "frames");
-  CheckUnique(indexed.images, "images");
   CheckUnique(indexed.points3D, "points3D");
   for (const Camera& camera : model.cameras) CheckCamera(camera);
   for (const Image& image : model.images) CheckImage(image, indexed.cameras);
-  if (model.has_rigs) ValidateRigsAndFrames(indexed);
+  ValidateRigsAndFrames(indexed);
   for (const Point3D& point : model.points3D) CheckPoint3D(point);
   CheckTracksAreConsecutive(model);
   ValidateObservations(indexed);

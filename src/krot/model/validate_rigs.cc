@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/model/image_geometry.h"
 #include "krot/model/sensor_type.h"
 #include "krot/model/validate_parts.h"
 
@@ -14,10 +15,6 @@ std::string Describe(const SensorId& sensor_id) {
   return (name ? std::string(*name)
                : "type " + std::to_string(sensor_id.type)) +
          " " + std::to_string(sensor_id.id);
-}
-
-bool SameSensor(const SensorId& a, const SensorId& b) {
-  return a.type == b.type && a.id == b.id;
 }
 
 void CheckSensorExists(const Rig& rig, const SensorId& sensor_id,
@@ -36,7 +33,7 @@ void CheckSensorsDiffer(const Rig& rig,
                         const std::vector<SensorId>& sensor_ids) {
   for (size_t i = 0; i < sensor_ids.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
-      if (!SameSensor(sensor_ids[i], sensor_ids[j])) continue;
+      if (!(sensor_ids[i] == sensor_ids[j])) continue;
       Fail("rig ", rig.id, ": found the sensor ", Describe(sensor_ids[i]),
            " twice, expected different sensors");
     }
@@ -89,16 +86,16 @@ int32_t ResolveImage(const IndexedModel& model, const Frame& frame,
 }
 
 void CheckCameraHasPose(const Rig& rig, const Image& image) {
-  const SensorId camera{kSensorTypeCamera, image.camera_id};
-  if (rig.ref_sensor_id && SameSensor(*rig.ref_sensor_id, camera)) return;
-  for (const RigSensor& sensor : rig.sensors) {
-    if (!SameSensor(sensor.sensor_id, camera)) continue;
-    if (sensor.sensor_from_rig) return;
+  const std::optional<SensorPlace> place =
+      FindSensor(rig, {kSensorTypeCamera, image.camera_id});
+  if (!place) {
+    Fail(Describe(image), ": found its frame in rig ", rig.id,
+         ", expected a rig with its camera ", image.camera_id);
+  }
+  if (!place->sensor_from_rig) {
     Fail(Describe(image), ": found its camera ", image.camera_id,
          " without a pose in rig ", rig.id, ", expected one");
   }
-  Fail(Describe(image), ": found its frame in rig ", rig.id,
-       ", expected a rig with its camera ", image.camera_id);
 }
 
 // Sets the frame of each of this frame's images.

@@ -23,6 +23,8 @@ constexpr double kStationary = 1e-6;
 constexpr int kPatience = 3;
 // What the rows' cost may be exceeded by for a linear promise to be kept.
 constexpr double kKeptPromise = 1e-5;
+// In gaps.
+constexpr double kWorthProving = 3;
 // Sweeps behind the last round: after them a third would hardly lower any
 // block's own maximum.
 constexpr int kFinishingSweeps = 2;
@@ -60,12 +62,18 @@ class Rounds {
     return certificate_ && cost_ - certificate_->lower_bound <=
                                options_.joint.relative_gap * cost_;
   }
+  // Whether the true cost is so near to what is proved of the rows that its own
+  // proof may reach the gap.
+  bool IsWorthProving() const {
+    return rows_certificate_ &&
+           cost_ - rows_certificate_->lower_bound <=
+               kWorthProving * options_.joint.relative_gap * cost_;
+  }
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
   }
   bool RunOne();
-  void Prove(const Certificate& certificate,
-             const std::vector<int64_t>& observation_of);
+  void Prove();
 
   const Model& model_;
   const SolveModelOptions& options_;
@@ -79,13 +87,18 @@ class Rounds {
   double cost_;  // true, pixels
   TrustRegions trust_;
   int num_idle_rounds_ = 0;
+  // Of the last round: the rows' certificate, and what its observations are
+  // called among the rows, or -1; empty: the same.
+  std::optional<Certificate> rows_certificate_;
+  std::vector<int64_t> observation_of_;
   std::optional<PixelCertificate> certificate_;
 };
 
-// `observation_of`: what the certificate's observations are called among the
-// rows, or -1; empty: the same.
-void Rounds::Prove(const Certificate& certificate,
-                   const std::vector<int64_t>& observation_of) {
+// From the last round's certificate of the rows, which is used up.
+void Rounds::Prove() {
+  if (!rows_certificate_) return;
+  const Certificate certificate =
+      *std::exchange(rows_certificate_, std::nullopt);
   std::optional<PixelCertificate> proof;
   if (reprojection_.IsLinear()) {
     proof = MakePixelCertificate(
@@ -94,8 +107,9 @@ void Rounds::Prove(const Certificate& certificate,
   } else {
     std::vector<int64_t> support;
     for (const CertifiedObservation& o : certificate.observations) {
-      const int64_t i = observation_of.empty() ? o.observation
-                                               : observation_of[o.observation];
+      const int64_t i = observation_of_.empty()
+                            ? o.observation
+                            : observation_of_[o.observation];
       if (i >= 0) support.push_back(i);
     }
     proof = ProveInPixels(model_, built_, estimate_, options_.norm,
@@ -110,15 +124,20 @@ void Rounds::Prove(const Certificate& certificate,
 // Whether another round may lower the cost.
 bool Rounds::RunOne() {
   const KnownRotationProblem& rows = built_.problem;
-  std::vector<int64_t> observation_of;
   std::optional<KnownRotationProblem> bounded;
+  observation_of_.clear();
   if (!trust_.IsEmpty()) {
-    bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
+    bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of_);
+  }
+  const KnownRotationProblem& problem = bounded ? *bounded : rows;
+  if (!std::isfinite(
+          Cost(problem, estimate_, options_.norm, context_.num_threads))) {
+    return false;  // a depth is rounding alone
   }
   Estimate solved = estimate_;
-  const std::optional<Certificate> certificate =
-      SolveRows(bounded ? *bounded : rows, options_, method_,
-                summary_.rounds.empty(), context_, timer_, &solved, &summary_);
+  rows_certificate_ =
+      SolveRows(problem, options_, method_, summary_.rounds.empty(), context_,
+                timer_, &solved, &summary_);
   if (options_.res_int.update_frames) {
     RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_.num_threads,
                            &solved);
@@ -126,8 +145,8 @@ bool Rounds::RunOne() {
 
   Round round;
   round.linear_cost = Cost(rows, solved, options_.norm, context_.num_threads);
-  if (certificate && !bounded) {
-    round.linear_lower_bound = certificate->lower_bound;
+  if (rows_certificate_ && !bounded) {
+    round.linear_lower_bound = rows_certificate_->lower_bound;
   }
   const double before = cost_;
   Estimate from = std::exchange(estimate_, Estimate());
@@ -149,13 +168,14 @@ bool Rounds::RunOne() {
     trust_.Clear();
   }
   reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
-  if (certificate) Prove(*certificate, observation_of);
+  if (IsWorthProving()) Prove();
 
   round.cost = cost_;
   if (certificate_) round.lower_bound = certificate_->lower_bound;
   round.seconds = timer_.Seconds();
   summary_.rounds.push_back(round);
-  if (reprojection_.IsLinear() || IsInterrupted() || IsGapReached()) {
+  if (reprojection_.IsLinear() || IsInterrupted() || IsGapReached() ||
+      IsZeroUpToRounding(cost_)) {
     return false;
   }
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
@@ -174,9 +194,13 @@ void Rounds::Run() {
   reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
   while (RunOne() && summary_.rounds.size() < kMaxRounds) {
   }
+  if (!certificate_ && !IsInterrupted()) Prove();
   if (method_ == SolveMethod::kAuto && !IsInterrupted()) Finish();
   summary_.cost_final = cost_;
-  if (!summary_.rounds.empty() && certificate_ && !IsInterrupted()) {
+  if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
+      !IsInterrupted()) {
+    summary_.termination = SolveTermination::kZeroCost;
+  } else if (certificate_ && !IsInterrupted()) {
     summary_.termination = IsGapReached() ? SolveTermination::kGapReached
                                           : SolveTermination::kStalled;
   }

@@ -63,6 +63,7 @@ class Schedule {
   // Leaves an estimate that is still worse than a start found from nothing.
   void StartAfresh();
 
+  bool IsZero() const { return IsZeroUpToRounding(cost_); }
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
   }
@@ -155,7 +156,7 @@ std::optional<Certificate> SolveRows(const KnownRotationProblem& problem,
   }
   schedule.LeadingSweeps();
   if (is_first_round && !schedule.IsInterrupted()) schedule.StartAfresh();
-  if (schedule.IsInterrupted()) return std::nullopt;
+  if (schedule.IsInterrupted() || schedule.IsZero()) return std::nullopt;
   return schedule.Joint();
 }
 

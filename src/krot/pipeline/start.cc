@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "krot/geometry/rigid_transform.h"
 #include "krot/joint/initializer.h"
 
 namespace krot {
@@ -17,9 +18,10 @@ bool IsLarger(const BuiltProblem& a, const BuiltProblem& b) {
 // baselines have several places.
 bool CentresCoincide(const BuiltProblem& built) {
   const auto centre = [&](const View& view) -> Eigen::Vector3d {
-    return -view.cam_from_world_rotation.transpose() *
-           (view.cam_from_rig_rotation * built.start.translations[view.frame] +
-            view.cam_from_rig_translation);
+    const RigidTransform cam_from_rig{view.cam_from_rig_rotation,
+                                      view.cam_from_rig_translation};
+    return Center({view.cam_from_world_rotation,
+                   cam_from_rig * built.start.translations[view.frame]});
   };
   if (built.problem.num_frames < 2) return false;
   const Eigen::Vector3d first = centre(built.problem.views.front());

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/geometry/rigid_transform.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 
@@ -40,7 +41,7 @@ std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem) {
     const View& view = problem.views[observation.view];
     FrameGeometry& frame = frames[view.frame];
     const Vector3d centre_in_rig =
-        -view.cam_from_rig_rotation.transpose() * view.cam_from_rig_translation;
+        Center({view.cam_from_rig_rotation, view.cam_from_rig_translation});
     if (!frame.is_seen_through) {
       frame.is_seen_through = true;
       frame.centre_in_rig = centre_in_rig;

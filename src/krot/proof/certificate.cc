@@ -22,6 +22,8 @@ constexpr int kMaxDrops = 20;
 // Smaller multipliers, by the largest, are left out at first: a smaller
 // support is easier to balance, but may lack what decides.
 constexpr double kSharesOfLargest[] = {1e-3, 1e-5, 0};
+// The same beside the supports by scores.
+constexpr double kSharesBesideScores[] = {1e-3, 1e-5};
 // Of SelectSupport, the cheapest first: a strict one gives a small support,
 // which may lack what decides. Multipliers that matter span eight decades.
 constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
@@ -263,6 +265,12 @@ std::optional<Certificate> MakeCertificate(
       if (search.IsEnough()) return search.best();
     }
   }
+  // Scores do not tell an observation whose depth vanishes at the optimum.
+  const double delta = SuggestedBound(problem, estimate, multipliers);
+  for (const double share : kSharesBesideScores) {
+    search.TryBalanced(delta, multipliers, SelectLarge(multipliers, share));
+    if (search.IsEnough()) break;
+  }
   return search.best();
 }
 
@@ -271,17 +279,9 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
     const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options, const Context& context) {
   CheckInput(problem, multipliers, options);
-  double largest = 0;
-  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
   CertificateSearch search(problem, norm, options, context);
   for (const double share : kSharesOfLargest) {
-    std::vector<int64_t> candidates;
-    for (size_t i = 0; i < multipliers.size(); ++i) {
-      if (multipliers[i].lambda > share * largest) {
-        candidates.push_back(static_cast<int64_t>(i));
-      }
-    }
-    search.TryBalanced(bound, multipliers, candidates);
+    search.TryBalanced(bound, multipliers, SelectLarge(multipliers, share));
     if (search.IsEnough()) break;
   }
   return search.best();

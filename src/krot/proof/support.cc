@@ -79,6 +79,19 @@ std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
   return PruneUnconstrained(problem, support);
 }
 
+std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
+                                 double share) {
+  double largest = 0;
+  for (const Multiplier& m : multipliers) largest = std::max(largest, m.lambda);
+  std::vector<int64_t> large;
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    if (multipliers[i].lambda > share * largest) {
+      large.push_back(static_cast<int64_t>(i));
+    }
+  }
+  return large;
+}
+
 std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     double delta,
                                     const std::vector<Multiplier>& multipliers,

@@ -27,6 +27,10 @@ std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
                                    const std::vector<double>& scores,
                                    double threshold);
 
+// The observations whose lambda exceeds `share` of the largest.
+std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
+                                 double share);
+
 // The largest part of the `candidates`, ascending, in which the forces of the
 // multipliers at `delta` pixels (force_balance.h) balance at every point and
 // frame, up to `tolerance` > 0 of the largest delta lambda there: what does not

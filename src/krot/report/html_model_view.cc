@@ -102,12 +102,11 @@ Json ImageJson(const ImageErrors& image, const Camera& camera,
   Json center;
   Json world_from_cam;
   if (geometry.has_pose) {
-    const Eigen::Matrix3d rotation =
-        geometry.cam_from_world_rotation.transpose();
-    center = VectorJson(-rotation * geometry.cam_from_world_translation);
+    const RigidTransform inverse = Inverse(geometry.cam_from_world);
+    center = VectorJson(inverse.translation);
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
-        world_from_cam.push_back(rotation(row, column));
+        world_from_cam.push_back(inverse.rotation(row, column));
       }
     }
   }

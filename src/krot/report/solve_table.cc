@@ -68,8 +68,8 @@ std::string Verdict(const SolveSummary& summary) {
 
 // " on 3 % of the observations"; empty where the joint solver did not run.
 std::string WorkingSetWords(const SolveSummary& summary) {
-  if (!summary.num_working_observations) return "";
-  const int64_t count = *summary.num_working_observations;
+  const int64_t count = summary.num_working_observations.value_or(0);
+  if (count == 0) return "";
   if (count == summary.num_observations) return " on all observations";
   const double percent = 100 * static_cast<double>(count) /
                          static_cast<double>(summary.num_observations);

@@ -10,7 +10,8 @@ std::vector<Pose> CamFromWorld(const SceneGeometry& geometry) {
                          geometry.sensor_from_rig.size());
   for (const Pose& rig_from_world : geometry.rig_from_world) {
     for (const Pose& sensor_from_rig : geometry.sensor_from_rig) {
-      cam_from_world.push_back(Compose(sensor_from_rig, rig_from_world));
+      cam_from_world.push_back(
+          UnitPose(sensor_from_rig.Transform() * rig_from_world.Transform()));
     }
   }
   return cam_from_world;

@@ -53,15 +53,14 @@ Imaging::Imaging(const Camera& camera, double margin_px,
              static_cast<double>(camera.height) - margin_px),
       max_ray_radius_(MaxRayRadius(camera)) {
   for (const Pose& pose : cam_from_world) {
-    rotations_.push_back(pose.Rotation());
-    translations_.push_back(pose.translation);
+    cam_from_world_.push_back(pose.Transform());
   }
 }
 
 std::optional<Eigen::Vector2d> Imaging::Project(
     int image, const Eigen::Vector3d& x_world) const {
   const size_t j = static_cast<size_t>(image);
-  const Eigen::Vector3d x_cam = rotations_[j] * x_world + translations_[j];
+  const Eigen::Vector3d x_cam = cam_from_world_[j] * x_world;
   if (x_cam.z() < kMinDepth) return std::nullopt;
   const Eigen::Vector2d u = x_cam.head<2>() / x_cam.z();
   if (u.norm() > max_ray_radius_) return std::nullopt;
@@ -77,12 +76,13 @@ std::optional<Eigen::Vector3d> Imaging::PointAt(int image,
                                                 const Eigen::Vector2d& fraction,
                                                 double depth) const {
   const size_t j = static_cast<size_t>(image);
+  const RigidTransform& pose = cam_from_world_[j];
   const Eigen::Vector2d pixel = lower_ + fraction.cwiseProduct(upper_ - lower_);
   const std::optional<Eigen::Vector2d> u = RayOf(camera_, pixel);
   if (!u) return std::nullopt;
   const Eigen::Vector3d x_cam = depth * u->homogeneous();
   const Eigen::Vector3d x_world =
-      rotations_[j].transpose() * (x_cam - translations_[j]);
+      pose.rotation.transpose() * (x_cam - pose.translation);
   if (!Project(image, x_world)) return std::nullopt;
   return x_world;
 }

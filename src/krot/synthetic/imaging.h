@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/geometry/rigid_transform.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -24,7 +25,7 @@ class Imaging {
   Imaging(const Camera& camera, double margin_px,
           const std::vector<Pose>& cam_from_world);
 
-  int num_images() const { return static_cast<int>(rotations_.size()); }
+  int num_images() const { return static_cast<int>(cam_from_world_.size()); }
 
   // The exact pixel of the point if it is in view.
   std::optional<Eigen::Vector2d> Project(int image,
@@ -41,8 +42,7 @@ class Imaging {
   Eigen::Vector2d lower_;  // pixels in view
   Eigen::Vector2d upper_;
   double max_ray_radius_ = 0;  // ||u|| on z = 1
-  std::vector<Eigen::Matrix3d> rotations_;
-  std::vector<Eigen::Vector3d> translations_;
+  std::vector<RigidTransform> cam_from_world_;
 };
 
 }  // namespace krot

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/default_camera.h"
 #include "krot/synthetic/geometry.h"
 #include "krot/synthetic/imaging.h"
@@ -70,8 +71,7 @@ Model MakeSkeleton(const SceneOptions& options, const SceneGeometry& geometry) {
       model.images.push_back(std::move(image));
     }
   }
-  model.has_rigs = options.has_rigs;
-  if (!options.has_rigs) return model;
+  model.stores_rigs = options.has_rigs;
   model.rigs = {MakeRig(geometry)};
   for (int f = 0; f < options.num_frames; ++f) {
     Frame frame;
@@ -96,6 +96,7 @@ void SetGeometry(const SceneGeometry& geometry, Model* model) {
   for (size_t k = 0; k < model->points3D.size(); ++k) {
     model->points3D[k].xyz = geometry.points[k];
   }
+  if (!model->stores_rigs) UseTrivialRigs(model);
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ SceneGeometry PerturbStart(const SceneGeometry& truth,
   for (Pose& pose : start.rig_from_world) {
     const Eigen::Matrix3d rotation =
         RandomRotation(options.rotation_noise_deg, random) * pose.Rotation();
-    pose = PoseFromCenter(rotation, Center(pose));
+    pose = PoseFromCenter(rotation, Center(pose.Transform()));
   }
   const SmallestDepths smallest = FindSmallestDepths(start, structure);
   for (size_t f = 0; f < start.rig_from_world.size(); ++f) {

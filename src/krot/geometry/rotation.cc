@@ -1,0 +1,43 @@
+#include "krot/geometry/rotation.h"
+
+#include <Eigen/SVD>
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+
+// The nearest rotation is unique if the two least singular values, the last
+// one signed, do not cancel; relative to the largest.
+constexpr double kNotUnique = 1e-9;
+
+}  // namespace
+
+Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz) {
+  return Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized();
+}
+
+QuaternionWxyz ToWxyz(const Quaterniond& q) {
+  return {q.w(), q.x(), q.y(), q.z()};
+}
+
+Matrix3d RotationOf(const QuaternionWxyz& wxyz) {
+  return NormalizedQuaternion(wxyz).toRotationMatrix();
+}
+
+std::optional<Matrix3d> NearestRotation(const Matrix3d& M) {
+  const Eigen::JacobiSVD<Matrix3d> svd(
+      M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Matrix3d& U = svd.matrixU();
+  const Matrix3d& V = svd.matrixV();
+  const double sign = (U * V.transpose()).determinant() < 0 ? -1 : 1;
+  const Vector3d& values = svd.singularValues();
+  if (!(values[1] + sign * values[2] > kNotUnique * values[0])) {
+    return std::nullopt;
+  }
+  return U * Vector3d(1, 1, sign).asDiagonal() * V.transpose();
+}
+
+}  // namespace krot
