@@ -90,7 +90,7 @@ TEST(DocumentationOfKrot, ListsTheExitCodesOfHelp) {
               std::string::npos)
         << line;
   }
-  EXPECT_EQ(num_codes, 9);
+  EXPECT_EQ(num_codes, 10);
 }
 
 }  // namespace

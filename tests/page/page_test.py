@@ -155,10 +155,15 @@ class PageTest(unittest.TestCase):
                     self.assertEqual(
                         self.browser.text(f"#error-{key}-{end}"),
                         pixels(self.report["pixel_error"][end][key]))
-        self.assertEqual(self.browser.text("#error-cost-before"),
-                         pixels(self.report["cost_initial"]))
-        self.assertEqual(self.browser.text("#error-cost-after"),
-                         pixels(self.report["cost_final"]))
+
+    def test_error_table_has_the_cost_only_if_it_is_no_maximum(self):
+        costs = [pixels(self.report[key])
+                 for key in ("cost_initial", "cost_final")]
+        maxima = [pixels(self.report["pixel_error"][end]["max"])
+                  for end in ("before", "after")]
+        shown = [text for end in ("before", "after")
+                 for text in self.browser.texts(f"#error-cost-{end}")]
+        self.assertEqual(shown, [] if costs == maxima else costs)
 
     def test_cards_show_the_bound_and_the_observations(self):
         self.assertEqual(self.browser.text("#card-bound"),

@@ -55,8 +55,8 @@ TEST(SolveJson, SaysNullForErrorsThatNoObservationHas) {
 
 TEST(SolveTable, ShowsErrorsCountsAndWhyItEnded) {
   const std::string table = SolveTable(SomeReport());
-  EXPECT_THAT(table, HasSubstr("max error               4.5000  0.2500"));
-  EXPECT_THAT(table, HasSubstr("cost (max, linearised)  4.0000  0.1000"));
+  EXPECT_THAT(table, HasSubstr("max error                    4.5000  0.2500"));
+  EXPECT_THAT(table, HasSubstr("cost (max optimised, p = 2)  4.0000  0.1000"));
   EXPECT_THAT(table, HasSubstr("1 frame, 0 images"));
   EXPECT_THAT(table,
               HasSubstr("5 observations left out (behind 2, short_track 3)"));
@@ -64,6 +64,16 @@ TEST(SolveTable, ShowsErrorsCountsAndWhyItEnded) {
   EXPECT_THAT(table, HasSubstr("Stalled after 2 sweeps"));
   EXPECT_THAT(table, HasSubstr("not proved optimal"));
   EXPECT_THAT(table, Not(HasSubstr("support")));
+}
+
+TEST(SolveTable, HasNoRowForACostThatIsTheMaximum) {
+  SolveReport report = SomeReport();
+  report.summary.pixel_error_before.max = report.summary.cost_initial;
+  report.summary.pixel_error_after.max = report.summary.cost_final;
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr("cost (")));
+  report.summary.norm = Norm::LInf();
+  EXPECT_THAT(SolveTable(report), HasSubstr("cost (max optimised, p = inf)"));
+  EXPECT_THAT(SolveTable(report), HasSubstr("Maximum 0.1000 px (p = inf), "));
 }
 
 // A certified solve with a support of twelve.
@@ -121,8 +131,9 @@ TEST(SolveJson, HoldsBoundIterationsAndSupport) {
 
 TEST(SolveTable, GivesTheVerdictAndTheTenWorstOfTheSupport) {
   const std::string table = SolveTable(CertifiedReport());
-  EXPECT_THAT(table, HasSubstr("Maximum 3.1011 px (linearised), proved optimal "
-                               "to 0.0003 %: no estimate is below 3.1010 px."));
+  EXPECT_THAT(table, HasSubstr("Maximum 3.1011 px, proved optimal to 0.0003 %: "
+                               "no translations and points bring all errors "
+                               "below 3.1010 px.\n"));
   EXPECT_THAT(table, HasSubstr("12 observations, worst first; the first 10"));
   EXPECT_THAT(table, HasSubstr("  79  "));
   EXPECT_THAT(table, Not(HasSubstr("  80  ")));
@@ -130,6 +141,76 @@ TEST(SolveTable, GivesTheVerdictAndTheTenWorstOfTheSupport) {
                                "iterations on 3 % of the observations and 2 "
                                "sweeps with the gap"));
   EXPECT_THAT(table, HasSubstr("falls into 2 components"));
+}
+
+// Ended with a proof of the linear problem that is better than the true one.
+SolveReport CurvedReport() {
+  SolveReport report = CertifiedReport();
+  SolveSummary& summary = report.summary;
+  summary.termination = SolveTermination::kStalled;
+  summary.cost_final = 4;
+  summary.lower_bound = 3.98;
+  summary.relative_gap = 0.005;
+  summary.rounds = {{3.5, 3.25, 0.5, 4.5, std::nullopt, 1},
+                    {4, 3.9998, 1, 4, 3.98, 2}};
+  return report;
+}
+
+TEST(SolveTable, SaysBothGapsWhereTheTrueOneIsTheLarger) {
+  const std::string both =
+      " With every lens linearised at this estimate the gap is 0.0050 %";
+  SolveReport report = CurvedReport();
+  std::string table = SolveTable(report);
+  EXPECT_THAT(table, HasSubstr("proved optimal to 0.5000 %"));
+  EXPECT_THAT(table, HasSubstr("below 3.9800 px." + both));
+  EXPECT_THAT(table, HasSubstr("Stalled after 2 rounds, 1 iteration to a "));
+
+  report.summary.rounds.back().linear_lower_bound = 3.98;
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr(both)));
+  report.summary.rounds.back().linear_lower_bound.reset();
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr(both)));
+}
+
+TEST(SolveJson, HoldsEveryRoundAndTheLastOnesLinearProblem) {
+  const auto json = nlohmann::json::parse(SolveJson(CurvedReport()));
+  ASSERT_EQ(json["rounds"].size(), 2u);
+  const nlohmann::json& first = json["rounds"][0];
+  EXPECT_EQ(first["linear_cost"], 3.5);
+  EXPECT_EQ(first["linear_lower_bound"], 3.25);
+  EXPECT_EQ(first["step"], 0.5);
+  EXPECT_EQ(first["cost"], 4.5);
+  EXPECT_TRUE(first.at("lower_bound").is_null());
+  EXPECT_EQ(first["seconds"], 1);
+  EXPECT_EQ(json["linear_cost"], 4);
+  EXPECT_EQ(json["linear_lower_bound"], 3.9998);
+  EXPECT_NEAR(json["linear_relative_gap"].get<double>(), 5e-5, 1e-12);
+  EXPECT_EQ(json["is_given_back"], false);
+}
+
+TEST(SolveJson, KnowsOfNoLinearProblemWithoutARound) {
+  const auto json = nlohmann::json::parse(SolveJson(SomeReport()));
+  EXPECT_TRUE(json.at("rounds").empty());
+  for (const char* key :
+       {"linear_cost", "linear_lower_bound", "linear_relative_gap"}) {
+    EXPECT_TRUE(json.at(key).is_null()) << key;
+  }
+}
+
+TEST(SolveReport, SaysThatTheInputWasGivenBack) {
+  SolveReport report = CertifiedReport();
+  report.summary.is_given_back = true;
+  std::string table = SolveTable(report);
+  EXPECT_THAT(table,
+              HasSubstr("No better estimate was found: the model is written as "
+                        "it was read. It is proved that no translations and "
+                        "points bring all errors below 3.1010 px.\n"));
+  EXPECT_THAT(table, Not(HasSubstr("Maximum")));
+  EXPECT_THAT(table, Not(HasSubstr("cost (")));
+  EXPECT_EQ(nlohmann::json::parse(SolveJson(report))["is_given_back"], true);
+
+  report.summary.polish.emplace();
+  EXPECT_THAT(SolveTable(report), HasSubstr("the polish began at the model as "
+                                            "it was read."));
 }
 
 TEST(SolveTable, SaysHowMuchTheJointSolverLookedAt) {

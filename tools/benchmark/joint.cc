@@ -78,7 +78,7 @@ Race RunRace(const JointBenchmarkOptions& options, const std::string& path) {
   for (int repeat = 0; repeat < options.common.repeats; ++repeat) {
     if (timer.Seconds() > kEnoughSeconds) break;
     const ProcessResult ours = RunProcess(krot);
-    if (ours.exit_code != kExitDone) {
+    if (ours.exit_code != kExitDone && ours.exit_code != kExitGivenBack) {
       throw CommandError(kExitInternal,
                          options.krot_path + " solver ended with exit code " +
                              std::to_string(ours.exit_code) + " on " + path);

@@ -15,6 +15,7 @@ enum ExitCode {
   kExitNotWritten = 5,
   kExitInternal = 6,
   kExitNoStart = 7,
+  kExitGivenBack = 8,
   kExitInterrupted = 130,
 };
 

@@ -62,6 +62,7 @@ constexpr char kHelpTail[] =
     "    5  the output cannot be written\n"
     "    6  out of memory, or an error in KROT itself\n"
     "    7  no estimate below the error that a start may have\n"
+    "    8  no better estimate: the model is written as it was read\n"
     "  130  interrupted by SIGINT or SIGTERM\n";
 
 const Command* FindCommand(const std::string& name) {

@@ -171,7 +171,8 @@ int RunSolveCommand(const SolveCommand& command) {
                 command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);
-  return kExitDone;
+  const bool is_copy = report.summary.is_given_back && !report.summary.polish;
+  return is_copy ? kExitGivenBack : kExitDone;
 }
 
 }  // namespace krot

@@ -36,9 +36,11 @@ quietly "$output/mapper.log" colmap mapper --database_path "$database" \
 num_models=0
 while [[ -d $output/$num_models ]]; do
   model=$output/$num_models
+  code=0
   "$krot" solver --input_path "$model" --output_path "${model}_linf" \
     --certificate_path "${model}_linf_certificate.json" \
-    --html_path "${model}_linf.html"
+    --html_path "${model}_linf.html" || code=$?
+  ((code == 0 || code == 8)) || exit "$code"  # 8: the model as it was read
   "$krot" model_comparer --input_path1 "$model" --input_path2 "${model}_linf" \
     --certificate_path2 "${model}_linf_certificate.json" \
     --overlay_path "${model}_overlay"

@@ -13,9 +13,9 @@ namespace krot {
 
 // Why an observation takes no part in the optimisation. It stays in the model.
 enum class LeftOut {
-  kBehind,        // not in front of its camera, even after re-triangulation
-  kUndistortion,  // no trustworthy ray for this pixel
-  kOffAxis,       // 90 degrees or more off the optical axis
+  kBehind,        // does not see its point, even after re-triangulation
+  kUndistortion,  // neither a projection nor a trustworthy ray
+  kOffAxis,       // never any more; reports keep the name
   kShortTrack,    // fewer than min_track_length usable observations
   kNoPose,        // the image has no frame or no finite translation
 };
@@ -56,14 +56,15 @@ struct BuiltProblem {
 // whether or not it sees a point, so that the gauge knows all cameras.
 //
 // An observation is left out for the first of these reasons: its image has no
-// pose; its pixel has no trustworthy ray (UndistortPixel, starting at the
-// model's own projection); it is behind its camera, and re-triangulating the
-// point from all its rays does not bring all of them in front (then the fewest
-// are left out); its point has too few usable observations.
+// pose; its point does not project and its pixel has no trustworthy ray
+// (PixelBearing); it does not see its point, and re-triangulating that from all
+// its rays does not bring it into sight of all (then the fewest are left out);
+// its point has too few usable observations. Rows are taken where the points
+// project (RowAtProjection).
 //
-// Requires a valid model (ValidateModel). Throws ModelError for an observing
-// camera without an image plane, std::invalid_argument for bad options. A
-// problem without observations is no error. O(observations); 72 bytes each.
+// Requires a valid model (ValidateModel). Throws std::invalid_argument for bad
+// options. A problem without observations is no error. O(observations); 100
+// bytes each.
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 

@@ -18,7 +18,8 @@ struct SupportObservation {
   uint32_t point2D_idx = 0;
   Point3DId point3D_id = 0;
   double multiplier = 0;  // lambda, of a sum of 1
-  // The estimate's residual, linearised pixels; infinite behind the camera.
+  // That of the problem's row, pixels: the true error where the row was taken
+  // at the estimate. Infinite behind the camera.
   double error_px = 0;
 };
 

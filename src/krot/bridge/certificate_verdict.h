@@ -15,9 +15,9 @@ struct CertificateVerdict {
   bool is_accepted = false;
   std::string refusal;  // one sentence; empty if accepted
   // The rest is meaningful only if accepted.
-  double lower_bound = 0;  // proved, linearised pixels
-  // Of the model as it is, linearised pixels; none where that puts an
-  // observation behind its camera.
+  double lower_bound = 0;  // proved, pixels
+  // Of the model as it is, true pixels; none where that puts an observation
+  // behind its camera.
   std::optional<double> cost;
   std::optional<double> relative_gap;  // (cost - lower_bound) / cost
   // Version 1: the bound is one of rows linearised at the observations.
@@ -27,12 +27,13 @@ struct CertificateVerdict {
 };
 
 // Accepts if the digest of the model agrees, every observation is one of the
-// problem that BuildProblem makes of the model, its u and J are those of the
-// model to 1e-9, and CheckCertificate accepts the multipliers for the problem
-// with the file's u and J. Translations and points do not enter into that:
+// problem that BuildProblem makes of the model, and CheckPixelCertificate
+// accepts the multipliers and bearings. Version 1: u and J have to be those of
+// the model to 1e-9, and CheckCertificate accepts the multipliers for the rows
+// of the file's u and J. Translations and points do not enter into that:
 // where they keep BuildProblem from using an observation of the certificate,
 // it ignores them. Requires a valid model; throws what BuildProblem does.
-// O(observations), and CheckCertificate.
+// O(observations), and the check.
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);
 

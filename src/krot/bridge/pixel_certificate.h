@@ -18,7 +18,7 @@ namespace krot {
 // error of the support below `lower_bound`.
 //
 // Let S_i be the rays of observation i whose true error is at most gamma, of
-// the region that krot/camera/support_bound.h speaks of. The multipliers of
+// the region that krot/camera/remainder_bound.h speaks of. The multipliers of
 // `rows`, with x_cam at depth w_i and v_i = w_i L_i(u) linear in it, satisfy
 //
 //   sum_i (delta lambda_i w_i + y_i'v_i) <= 0      for all translations, points

@@ -140,8 +140,7 @@ std::string NoModelBelowCapSentence(const AdjustModelSummary& summary) {
        << errors.max << " px";
   if (summary.start->lower_bound) {
     text << ", and it is proved that none is below "
-         << std::floor(*summary.start->lower_bound * 1e6) / 1e6
-         << " px (linearised)";
+         << std::floor(*summary.start->lower_bound * 1e6) / 1e6 << " px";
   }
   return text.str();
 }

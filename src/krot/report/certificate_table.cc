@@ -6,6 +6,16 @@
 #include "krot/report/text_table.h"
 
 namespace krot {
+namespace {
+
+std::string LinearisedSentence(const CertificateVerdict& verdict) {
+  if (!verdict.is_linearised) return "";
+  return "Its file is of version 1: the error that it speaks of is linearised "
+         "at the\nobservation, which is exact for pinhole cameras alone.\n";
+}
+
+}  // namespace
+
 std::string SupportTable(const std::vector<SupportObservation>& support,
                          int max_observations) {
   const size_t count =
@@ -37,8 +47,9 @@ std::string CertificateTable(const CertificateVerdict& verdict,
                                      ? Scientific(*verdict.relative_gap)
                                      : "-"});
   return "The certificate holds: whatever the translations and points, the "
-         "largest error is at least\nthe lower bound. Linearised pixels\n" +
-         bounds.ToString() + SupportTable(verdict.support, max_observations);
+         "largest error is at least\nthe lower bound, in pixels.\n" +
+         LinearisedSentence(verdict) + bounds.ToString() +
+         SupportTable(verdict.support, max_observations);
 }
 
 }  // namespace krot

@@ -65,6 +65,7 @@ Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
   return {{"lower_bound", verdict->lower_bound},
           {"cost", NumberOrNull(verdict->cost)},
           {"relative_gap", NumberOrNull(verdict->relative_gap)},
+          {"is_linearised", verdict->is_linearised},
           {"num_support", verdict->support.size()}};
 }
 

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "krot/report/error_rows.h"
+#include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -16,10 +17,25 @@ std::string PolishSentence(const SolveSummary& summary) {
          "maximum it no longer has.\n";
 }
 
+// The cost, unless it is the maximum that is there already: it is with p = 2 if
+// every observation takes part.
+void AddCost(const SolveSummary& summary, TextTable* table) {
+  if (summary.is_given_back) return;
+  const std::string before = FormatNumber(summary.cost_initial, 4);
+  const std::string after = FormatNumber(summary.cost_final, 4);
+  if (summary.norm.p == 2 &&
+      before == FormatNumber(summary.pixel_error_before.max, 4) &&
+      after == FormatNumber(summary.pixel_error_after.max, 4)) {
+    return;
+  }
+  table->AddRow({"cost (max optimised, p = " + NormName(summary.norm) + ")",
+                 before, after});
+}
+
 }  // namespace
 
 std::string SolveErrorTable(const SolveSummary& summary) {
-  std::vector<std::string> head = {"pixels", "before", "after"};
+  std::vector<std::string> head = {"", "before", "after"};
   std::vector<PixelErrorStatistics> estimates = {summary.pixel_error_before,
                                                  summary.pixel_error_after};
   if (summary.polish) {
@@ -29,8 +45,7 @@ std::string SolveErrorTable(const SolveSummary& summary) {
   TextTable table;
   table.AddRow(head);
   AddErrorColumns(estimates, &table);
-  table.AddRow({"cost (max, linearised)", FormatNumber(summary.cost_initial, 4),
-                FormatNumber(summary.cost_final, 4)});
+  AddCost(summary, &table);
   return table.ToString() + PolishSentence(summary);
 }
 

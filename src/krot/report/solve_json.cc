@@ -46,6 +46,20 @@ Json JointIterationsJson(const std::vector<JointIteration>& iterations) {
   return json;
 }
 
+Json RoundsJson(const std::vector<Round>& rounds) {
+  Json json = Json::array();
+  for (const Round& round : rounds) {
+    json.push_back(
+        {{"linear_cost", round.linear_cost},
+         {"linear_lower_bound", NumberOrNull(round.linear_lower_bound)},
+         {"step", round.step},
+         {"cost", round.cost},
+         {"lower_bound", NumberOrNull(round.lower_bound)},
+         {"seconds", round.seconds}});
+  }
+  return json;
+}
+
 Json SupportJson(const std::vector<SupportObservation>& support) {
   Json json = Json::array();
   for (const SupportObservation& observation : support) {
@@ -81,6 +95,11 @@ std::string SolveJson(const SolveReport& report) {
   for (const Sweep& sweep : summary.sweeps) {
     sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
   }
+  std::optional<double> linear_cost, linear_lower_bound;  // of the last round
+  if (!summary.rounds.empty()) {
+    linear_cost = summary.rounds.back().linear_cost;
+    linear_lower_bound = summary.rounds.back().linear_lower_bound;
+  }
   const Json json = {
       {"version", report.run.version},
       {"command", report.command},
@@ -100,11 +119,16 @@ std::string SolveJson(const SolveReport& report) {
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},
       {"relative_gap", NumberOrNull(summary.relative_gap)},
+      {"linear_cost", NumberOrNull(linear_cost)},
+      {"linear_lower_bound", NumberOrNull(linear_lower_bound)},
+      {"linear_relative_gap", NumberOrNull(LinearRelativeGap(summary))},
       {"certified", summary.is_certified},
+      {"is_given_back", summary.is_given_back},
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
       {"polish", PolishJson(summary.polish)},
+      {"rounds", RoundsJson(summary.rounds)},
       {"sweeps", sweeps},
       {"iterations", JointIterationsJson(summary.iterations)},
       {"support", SupportJson(summary.support)},

@@ -32,6 +32,21 @@ std::string MissedGapSentence(const SolveSummary& summary) {
               : "; no bound is proved");
 }
 
+std::optional<double> LinearRelativeGap(const SolveSummary& summary) {
+  if (summary.rounds.empty()) return std::nullopt;
+  const Round& last = summary.rounds.back();
+  if (!last.linear_lower_bound || !(last.linear_cost > 0)) return std::nullopt;
+  return (last.linear_cost - *last.linear_lower_bound) / last.linear_cost;
+}
+
+std::string GivenBackSentence(const SolveSummary& summary) {
+  return summary.polish
+             ? "No better estimate was found: the polish began at the model as "
+               "it was read."
+             : "No better estimate was found: the model is written as it was "
+               "read.";
+}
+
 std::string MethodName(SolveMethod method) {
   switch (method) {
     case SolveMethod::kResInt:

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "krot/pipeline/solve_model.h"
@@ -31,6 +32,12 @@ std::string NothingToSolveSentence(const SolveSummary& summary);
 
 // "the gap asked for is not reached after 300 iterations, as many as ...".
 std::string MissedGapSentence(const SolveSummary& summary);
+
+// That of the last round's linear problem; none if nothing is proved of it.
+std::optional<double> LinearRelativeGap(const SolveSummary& summary);
+
+// What was written instead of a better model. Requires is_given_back.
+std::string GivenBackSentence(const SolveSummary& summary);
 
 // As --Solver.method takes it.
 std::string MethodName(SolveMethod method);

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <sstream>
 
 #include "krot/problem/cost.h"
@@ -14,23 +15,55 @@ namespace {
 
 // How many observations of the support the terminal shows.
 constexpr int kListedSupport = 10;
+// From which share of the true gap on the rows' own is no other number.
+constexpr double kNoticeablySmaller = 0.5;
+
+std::string GapPercent(double relative_gap) {
+  const double percent = 100 * relative_gap;
+  return (percent < 1e-4 ? std::string("less than 0.0001")
+                         : FormatNumber(percent, 4)) +
+         " %";
+}
+
+// "no translations and points bring all errors below 3.4201 px", which has to
+// be proved.
+std::string BoundWords(const SolveSummary& summary) {
+  // Downwards: more than this is not proved.
+  const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
+  return "no translations and points bring all errors below " +
+         FormatNumber(bound, 4) + " px";
+}
+
+// Where the linear problem has the gap asked for and the true one has not.
+std::string LinearGapSentence(const SolveSummary& summary) {
+  const std::optional<double> linear_gap = LinearRelativeGap(summary);
+  if (summary.termination == SolveTermination::kGapReached || !linear_gap ||
+      *linear_gap > kNoticeablySmaller * *summary.relative_gap) {
+    return "";
+  }
+  return " With every lens linearised at this estimate the gap is " +
+         GapPercent(*linear_gap) +
+         "; the rest is due to the lenses' curvature.";
+}
 
 // What is proved, and what is not.
 std::string Verdict(const SolveSummary& summary) {
-  const std::string maximum =
-      "Maximum " + FormatNumber(summary.cost_final, 4) + " px (linearised)";
+  if (summary.is_given_back) {
+    return GivenBackSentence(summary) +
+           (summary.is_certified
+                ? " It is proved that " + BoundWords(summary) + "."
+                : std::string());
+  }
   if (IsZeroUpToRounding(summary.cost_final)) {
     return "Every error is zero up to rounding (" +
            Scientific(summary.cost_final) + " px at most).";
   }
+  const std::string maximum =
+      "Maximum " + FormatNumber(summary.cost_final, 4) + " px" +
+      (summary.norm.p == 2 ? "" : " (p = " + NormName(summary.norm) + ")");
   if (!summary.is_certified) return maximum + ", not proved optimal.";
-  // Downwards: more than this is not proved.
-  const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
-  const double gap_percent = 100 * *summary.relative_gap;
-  const std::string gap =
-      gap_percent < 1e-4 ? "less than 0.0001" : FormatNumber(gap_percent, 4);
-  return maximum + ", proved optimal to " + gap + " %: no estimate is below " +
-         FormatNumber(bound, 4) + " px.";
+  return maximum + ", proved optimal to " + GapPercent(*summary.relative_gap) +
+         ": " + BoundWords(summary) + "." + LinearGapSentence(summary);
 }
 
 // " on 3 % of the observations"; empty where the joint solver did not run.
@@ -46,7 +79,8 @@ std::string WorkingSetWords(const SolveSummary& summary) {
          " % of the observations";
 }
 
-// " after 12 joint iterations on 3 % of the observations and 4 sweeps".
+// " after 2 rounds, 12 joint iterations on 3 % of the observations and 4
+// sweeps".
 std::string StepsWords(const SolveSummary& summary) {
   const std::string sweeps =
       Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
@@ -55,13 +89,15 @@ std::string StepsWords(const SolveSummary& summary) {
       [](const JointIteration& state) { return state.target.has_value(); });
   const int64_t num_joint =
       static_cast<int64_t>(summary.iterations.size()) - num_starting;
-  const std::string starting =
-      num_starting > 0 ? Counted(num_starting, "iteration") + " to a start, "
-                       : "";
+  const int64_t num_rounds = static_cast<int64_t>(summary.rounds.size());
+  const std::string before =
+      (num_rounds > 1 ? Counted(num_rounds, "round") + ", " : "") +
+      (num_starting > 0 ? Counted(num_starting, "iteration") + " to a start, "
+                        : "");
   if (summary.method == SolveMethod::kResInt) {
-    return " after " + starting + sweeps;
+    return " after " + before + sweeps;
   }
-  return " after " + starting + Counted(num_joint, "joint iteration") +
+  return " after " + before + Counted(num_joint, "joint iteration") +
          WorkingSetWords(summary) + " and " + sweeps;
 }
 
@@ -108,8 +144,7 @@ std::string SolveCountsSentence(const SolveSummary& summary) {
 std::string SolveTable(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   std::ostringstream text;
-  text << "\nReprojection errors, p = " << NormName(summary.norm)
-       << " for the cost, Euclidean for the rest\n"
+  text << "\nReprojection errors, pixels\n"
        << SolveErrorTable(summary) << SolveCountsSentence(summary) << '\n'
        << NotFiniteSentence(summary.pixel_error_after);
   if (summary.num_components > 1) {

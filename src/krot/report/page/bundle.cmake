@@ -5,7 +5,7 @@
 # each other, so that the imports and the word `export` can go.
 cmake_minimum_required(VERSION 3.22)
 
-set(modules dom data format errors_table verdict facts lists axes curves
+set(modules dom format data errors_table verdict facts lists axes curves
     convergence vectors frusta colors framing orbit shaders renderer layers
     picking selection viewer controls main)
 

@@ -45,7 +45,8 @@ export function convergenceChart(report) {
   const high = values.reduce((a, b) => Math.max(a, b));
   const { figure, at, add } = chart({
     caption: isMinimax(report) ?
-      'Cost, and the lower bound proved so far, after every step' :
+      `Cost and lower bound${report.rounds?.length > 1 ?
+        ' of the round’s linear problem' : ''}, after every step` :
       'Cost, half the sum of the squared errors, after every step',
     legend: [['after', 'cost'], ...(bounds.length ? [['bound', 'bound']] : [])],
     x: linear(0, steps.length),

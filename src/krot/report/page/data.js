@@ -2,6 +2,7 @@
 // drawn of the two models.
 
 import { byId } from './dom.js';
+import { pixels } from './format.js';
 
 export function readJson(id) {
   return JSON.parse(byId(id).textContent);
@@ -42,9 +43,17 @@ export function isComparison(report) {
   return report.command === 'model_comparer';
 }
 
-// Whether the cost is a largest residual in pixels, and may have a proof.
+// Whether the cost is a largest error in pixels, and may have a proof.
 export function isMinimax(report) {
   return 'certified' in report;
+}
+
+// Whether that cost is, to the digits shown, the maximum over all observations.
+export function costIsLargestError(report) {
+  const errors = report.pixel_error;
+  return report.norm === '2' &&
+    pixels(report.cost_initial) === pixels(errors.before.max) &&
+    pixels(report.cost_final) === pixels(errors.after.max);
 }
 
 // How the two models of a report are called.
@@ -53,7 +62,7 @@ export function modelLabels(report) {
   return ['Before', report.polish ? 'Polished' : 'After'];
 }
 
-// The statistics of the true errors of both. What is written after a solve is
+// The statistics of the errors of both. What is written after a solve is
 // the polished model, if there was a polish.
 export function modelErrors(report) {
   const errors = report.pixel_error;

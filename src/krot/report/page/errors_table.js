@@ -1,4 +1,4 @@
-import { isMinimax, modelErrors } from './data.js';
+import { costIsLargestError, isMinimax, modelErrors } from './data.js';
 import { html, table } from './dom.js';
 import { pixels } from './format.js';
 
@@ -21,14 +21,16 @@ function row(name, id, before, after) {
     change(before, after)];
 }
 
-// The true errors of all observations, and the cost that was minimised.
+// The errors of all observations, and the cost that was minimised if it is no
+// maximum of theirs.
 export function errorsTable(report, labels) {
   const [before, after] = modelErrors(report);
   const rows = kRows.map(([key, name]) =>
     row(name, key, before[key], after[key]));
-  if (isMinimax(report)) {
-    rows.push(row('Cost: maximum, linearised', 'cost', report.cost_initial,
-      report.cost_final));
+  if (isMinimax(report) && !report.is_given_back &&
+    !costIsLargestError(report)) {
+    rows.push(row(`Cost: maximum optimised, p = ${report.norm}`, 'cost',
+      report.cost_initial, report.cost_final));
   }
   return table(['Pixels', ...labels, 'Change'], rows);
 }

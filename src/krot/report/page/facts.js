@@ -66,6 +66,7 @@ export function factsTable(report) {
     ['Observations', counts(report.num_observations)],
     ['Parameters', counts(report.num_parameters)],
     ['Iterations', counts(report.num_iterations)],
+    ['Rounds', counts(report.rounds?.length)],
     ['Linear solver', report.linear_solver],
     ['Cap on every error, px', report.max_error],
     ['Left out', report.left_out &&

@@ -1,5 +1,7 @@
-import { isComparison, isMinimax, modelErrors } from './data.js';
-import { lowerBound, pixels } from './format.js';
+import {
+  costIsLargestError, isComparison, isMinimax, modelErrors,
+} from './data.js';
+import { lowerBound } from './format.js';
 
 function movement(before, after, decimals) {
   const from = before.toFixed(decimals);
@@ -8,18 +10,12 @@ function movement(before, after, decimals) {
   return `${after < before ? 'fell' : 'rose'} from ${from} px to ${to} px`;
 }
 
-// Whether the cost is, to the digits shown, the largest true error.
-function costIsLargestError(report) {
-  return report.norm === '2' &&
-    pixels(report.cost_final) === pixels(report.pixel_error.after.max);
-}
-
 function proof(report) {
-  const bound = `no camera translations and points can lower it below ` +
+  const bound = `no translations and points can lower it below ` +
     `${lowerBound(report.lower_bound)} px (proved)`;
   if (costIsLargestError(report)) return `; ${bound}.`;
-  return `. The cost, which is the largest residual linearised at the ` +
-    `observations (p = ${report.norm}), ` +
+  return `. The cost, which is the largest error of the observations that ` +
+    `took part in the optimisation (p = ${report.norm}), ` +
     `${movement(report.cost_initial, report.cost_final, 4)}; ${bound}.`;
 }
 
@@ -51,6 +47,10 @@ export function verdict(report) {
       `of model 2 ${after.max.toFixed(2)} px.`;
   }
   if (!isMinimax(report)) return adjustmentVerdict(report, before, after);
+  if (report.is_given_back) {
+    return 'No better estimate was found: the model is the one that was read.' +
+      polishSentence(report);
+  }
   const sentence = `The largest error ${movement(before.max, after.max, 2)}`;
   return sentence + (report.certified ? proof(report) :
     '; whether it can be lower was not proved.') + polishSentence(report);
