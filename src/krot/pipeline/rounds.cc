@@ -155,7 +155,8 @@ bool Rounds::RunOne() {
   if (certificate_) round.lower_bound = certificate_->lower_bound;
   round.seconds = timer_.Seconds();
   summary_.rounds.push_back(round);
-  if (reprojection_.IsLinear() || IsInterrupted() || IsGapReached()) {
+  if (reprojection_.IsLinear() || IsInterrupted() || IsGapReached() ||
+      IsZeroUpToRounding(cost_)) {
     return false;
   }
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
@@ -176,7 +177,10 @@ void Rounds::Run() {
   }
   if (method_ == SolveMethod::kAuto && !IsInterrupted()) Finish();
   summary_.cost_final = cost_;
-  if (!summary_.rounds.empty() && certificate_ && !IsInterrupted()) {
+  if (method_ != SolveMethod::kResInt && IsZeroUpToRounding(cost_) &&
+      !IsInterrupted()) {
+    summary_.termination = SolveTermination::kZeroCost;
+  } else if (!summary_.rounds.empty() && certificate_ && !IsInterrupted()) {
     summary_.termination = IsGapReached() ? SolveTermination::kGapReached
                                           : SolveTermination::kStalled;
   }
