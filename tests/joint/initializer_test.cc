@@ -224,16 +224,15 @@ TEST(FindStart, IsInterruptedWhileInfeasibilityIsBeingProved) {
   const RandomScene scene = MakeSmallScene(33);
   Estimate estimate;
   const InitializerSummary proved =
-      FindStart(scene.problem, Options(Norm::L2(), 1e-3), &estimate);
+      FindStart(scene.problem, Options(Norm::L2(), 1e-3), {}, &estimate);
   ASSERT_EQ(proved.termination, InitializerTermination::kInfeasible);
   CancelFlag is_cancelled = false;
   InitializerOptions options = Options(Norm::L2(), 1e-3);
-  options.cancel = &is_cancelled;
   options.callback = [&](int iteration, const JointIteration&) {
     is_cancelled = iteration == static_cast<int>(proved.iterations.size());
   };
   const InitializerSummary summary =
-      FindStart(scene.problem, options, &estimate);
+      FindStart(scene.problem, options, {-1, &is_cancelled}, &estimate);
   EXPECT_EQ(summary.termination, InitializerTermination::kInterrupted);
   EXPECT_FALSE(summary.certificate);
 }
