@@ -29,13 +29,16 @@ RandomScene WithAPointInTwoCameras(const RandomScene& scene) {
     problem.observations.push_back(o);
     problem.observations.back().view = twin;
   }
+  // The twin sees the point a tenth off along x, in its first ray's coordinates.
   const Eigen::Vector2d disparity(0.1, 0);
   Observation near = from.observations[0];
+  const Eigen::Matrix2d J = near.E.block<2, 2>(1, 0);
+  const Eigen::Vector2d u = -J.inverse() * near.E.block<2, 1>(1, 2);
   near.point = from.num_points;
   near.view = 0;
   problem.observations.push_back(near);
   near.view = twin;
-  near.u += disparity;
+  near.E = RowAtRay(u + disparity, J);
   problem.observations.push_back(near);
   IndexObservations(&problem);
 
@@ -43,8 +46,7 @@ RandomScene WithAPointInTwoCameras(const RandomScene& scene) {
   const Eigen::Vector3d t = scene.estimate.translations[0];
   result.estimate.translations.push_back(
       t + kTinyDepth * Eigen::Vector3d(disparity[0], disparity[1], 0));
-  const Eigen::Vector3d ray(near.u[0] - disparity[0], near.u[1] - disparity[1],
-                            1);
+  const Eigen::Vector3d ray = u.homogeneous();
   result.estimate.points.push_back(
       from.views[0].cam_from_world_rotation.transpose() *
       (kTinyDepth * ray - t));

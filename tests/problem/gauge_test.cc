@@ -279,9 +279,9 @@ TEST(RestoreGaugeIfHarmless, DoesTheSameWhereNothingIsLost) {
 TEST(RestoreGaugeIfHarmless, StaysWhereCoordinatesWouldLoseTheirDigits) {
   const RandomScene scene = MakeRandomScene({});
   const double cost = Cost(scene.problem, scene.estimate, Norm::L2(), 1);
-  // 1e8 away, coordinates are multiples of 1.5e-8, some 1e-5 px.
+  // 1e13 away, coordinates are multiples of 2e-3, a pixel and more.
   const Estimate far =
-      Moved(scene.problem, scene.estimate, 1, Vector3d(1e8, -1e8, 1e8));
+      Moved(scene.problem, scene.estimate, 1, Vector3d(1e13, -1e13, 1e13));
   Estimate restored = scene.estimate;
   RestoreGauge(scene.problem, far, &restored);
   ASSERT_GT(Cost(scene.problem, restored, Norm::L2(), 1), (1 + 1e-8) * cost);

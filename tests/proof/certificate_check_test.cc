@@ -35,8 +35,8 @@ Twice MakeTwice(double separation) {
                            Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero(),
                            0});
   const Eigen::Matrix2d J = kFocal * Eigen::Matrix2d::Identity();
-  problem.observations = {{{-separation / 2, 0}, J, 0, 0},
-                          {{separation / 2, 0}, J, 0, 0}};
+  problem.observations = {{RowAtRay({-separation / 2, 0}, J), 0, 0},
+                          {RowAtRay({separation / 2, 0}, J), 0, 0}};
   IndexObservations(&problem);
   // f (y_1 + y_2) = 0,  f (u_2 - u_1)'y_1 + delta (lambda_1 + lambda_2) = 0.
   twice.certificate = {
@@ -68,10 +68,10 @@ TEST(CheckCertificate, AcceptsTheOneOfTwoPointsThatChangePlacesByHand) {
   }
   const double u = 1.0 / 64;
   const Eigen::Matrix2d J = kFocal * Eigen::Matrix2d::Identity();
-  problem.observations = {{{-u, 0}, J, 0, 0},
-                          {{u, 0}, J, 1, 0},
-                          {{u, 0}, J, 0, 1},
-                          {{-u, 0}, J, 1, 1}};
+  problem.observations = {{RowAtRay({-u, 0}, J), 0, 0},
+                          {RowAtRay({u, 0}, J), 1, 0},
+                          {RowAtRay({u, 0}, J), 0, 1},
+                          {RowAtRay({-u, 0}, J), 1, 1}};
   IndexObservations(&problem);
   const Certificate certificate = {
       u * kFocal,
