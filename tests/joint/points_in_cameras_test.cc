@@ -1,3 +1,5 @@
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
 #include "krot/joint/initializer.h"
