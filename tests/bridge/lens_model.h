@@ -8,6 +8,7 @@
 
 #include "krot/camera/projection_row.h"
 #include "krot/model/model.h"
+#include "krot/model/trivial_rigs.h"
 
 namespace krot {
 
@@ -66,6 +67,7 @@ inline Model MakeLensModel(const LensModelOptions& options) {
     }
     point.track_end = model.track_elements.size();
   }
+  UseTrivialRigs(&model);
   return model;
 }
 

@@ -42,8 +42,8 @@ INSTANTIATE_TEST_SUITE_P(
     Local, BuildProblemOfRealModel,
     ::testing::Values(RealModel{"crane8_txt", 6037, 3.995},
                       RealModel{"room50_opencv", 55090, 4.368},
-                      RealModel{"task41_rigs_frames", 20785, 3.991},
-                      RealModel{"longtracks92", 39489, 3.988},
+                      RealModel{"task41_rigs_frames", 20785, 3.9919},
+                      RealModel{"longtracks92", 39489, 3.9860},
                       RealModel{"tower", 169618, 8.682}),
     [](const auto& test) { return std::string(test.param.folder); });
 

@@ -109,14 +109,16 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
                 .exit_code,
             0);
   const Json report = Report();
-  EXPECT_THAT(Keys(report),
-              ::testing::UnorderedElementsAre(
-                  "version", "command", "method", "norm", "termination",
-                  "num_frames", "num_images", "num_points", "num_observations",
-                  "working_observations", "left_out", "cost_initial",
-                  "cost_final", "lower_bound", "relative_gap", "certified",
-                  "pixel_error", "polish", "sweeps", "iterations", "support",
-                  "seconds", "peak_memory_bytes", "threads", "seed"));
+  EXPECT_THAT(
+      Keys(report),
+      ::testing::UnorderedElementsAre(
+          "version", "command", "method", "norm", "termination", "num_frames",
+          "num_images", "num_points", "num_observations",
+          "working_observations", "left_out", "cost_initial", "cost_final",
+          "lower_bound", "relative_gap", "certified", "pixel_error", "polish",
+          "sweeps", "iterations", "support", "seconds", "peak_memory_bytes",
+          "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
+          "linear_relative_gap", "is_given_back", "contradictions"));
   EXPECT_EQ(
       Keys(report["left_out"]),
       (std::vector<std::string>{"behind", "no_pose", "off_axis", "short_track",
@@ -131,7 +133,7 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
   ASSERT_FALSE(report["sweeps"].empty());
   EXPECT_EQ(Keys(report["sweeps"][0]),
             (std::vector<std::string>{"cost", "seconds"}));
-  EXPECT_NEAR(report["sweeps"].back()["cost"], report["cost_final"], 1e-9);
+  EXPECT_NEAR(report["sweeps"].back()["cost"], report["cost_final"], 1e-4);
   EXPECT_EQ(report["version"], KROT_VERSION);
   EXPECT_EQ(report["command"], "solver");
   EXPECT_EQ(report["method"], "auto");
@@ -321,7 +323,7 @@ TEST_F(Commands, PointTriangulatorMovesPointsOnly) {
   EXPECT_THAT(Load(folder_ / "output"), IsModel(before, points_only));
   EXPECT_EQ(Report()["command"], "point_triangulator");
   EXPECT_EQ(Report()["method"], "intersection");
-  EXPECT_EQ(Report()["sweeps"].size(), 1u);
+  EXPECT_EQ(Report()["sweeps"].size(), Report()["rounds"].size());
   EXPECT_LT(Report()["cost_final"], Report()["cost_initial"]);
 }
 

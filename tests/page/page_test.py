@@ -352,7 +352,7 @@ class PathTest(unittest.TestCase):
              ".", "--html_path", "same", "--report_path", "same"],
             capture_output=True, text=True, check=False)
         self.assertEqual(run.returncode, 1)
-        self.assertIn("--html_path = same, must not be --report_path",
+        self.assertIn("--report_path = same, must not be --html_path",
                       run.stderr)
 
 

@@ -86,7 +86,7 @@ TEST(IndexObservations, RefusesObservationsThatAreNotOrderedByPoint) {
             "observation before it");
 }
 
-TEST(Observation, TakesSixtyFourBytes) { EXPECT_EQ(sizeof(Observation), 64); }
+TEST(Observation, TakesEightyBytes) { EXPECT_EQ(sizeof(Observation), 80); }
 
 }  // namespace
 }  // namespace krot

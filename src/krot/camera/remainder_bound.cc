@@ -31,6 +31,11 @@ bool IsPinhole(int model_id) {
   return model_id == SimplePinhole::kId || model_id == Pinhole::kId;
 }
 
+void CheckArguments(double level_px, double p) {
+  CheckArgument(level_px > 0, "level_px", level_px, "> 0");
+  CheckArgument(p == 1 || p == 2 || std::isinf(p), "p", p, "1, 2 or infinity");
+}
+
 struct Region {
   std::unique_ptr<ErrorMap> map;
   double reach = 0;
@@ -41,8 +46,6 @@ std::optional<Region> FindRegion(int model_id, const double* params,
                                  const Eigen::Vector2d& pixel,
                                  const Eigen::Vector3d& x_hat, double level_px,
                                  double p) {
-  CheckArgument(level_px > 0, "level_px", level_px, "> 0");
-  CheckArgument(p == 1 || p == 2 || std::isinf(p), "p", p, "1, 2 or infinity");
   const auto E = RowAtProjection(model_id, params, pixel, x_hat);
   const auto bearing = PixelBearing(model_id, params, pixel, x_hat);
   const auto chart = ChartAt(model_id, params, x_hat);
@@ -83,6 +86,7 @@ std::optional<double> RemainderBound(int model_id, const double* params,
                                      const Eigen::Vector2d& pixel,
                                      const Eigen::Vector3d& x_hat,
                                      double level_px, double p) {
+  CheckArguments(level_px, p);
   if (IsPinhole(model_id)) {
     if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
     return 0;
@@ -99,6 +103,7 @@ std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector3d& x_hat,
                                    const Eigen::Vector2d& y, double level_px,
                                    double p) {
+  CheckArguments(level_px, p);
   const double length = DualNorm(y, p) * (1 + kRounding);
   if (!(length > 0))
     return length == 0 ? std::optional<double>(0) : std::nullopt;

@@ -10,7 +10,6 @@ namespace krot {
 namespace {
 
 constexpr int kMaxCells = 4000;
-constexpr int kMaxCellsAlong = 1000;
 constexpr int kMaxBoundaryDepth = 8;
 constexpr double kRelativeSlack = 0.1;  // of max |m| - 1
 constexpr double kAbsoluteSlack = 1e-6;
@@ -171,8 +170,7 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
 // all points of the box |q|_inf <= reach with |f| <= 1.
 template <typename BoundOn>
 std::optional<double> Search(const ErrorMap& map, double p, double reach,
-                             double target, int max_cells,
-                             const BoundOn& bound_on) {
+                             double target, const BoundOn& bound_on) {
   std::vector<Cell> heap;
   int num_cells = 0;
   const auto add = [&](const Box& box) {
@@ -188,7 +186,7 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
   const Interval side = {-reach, reach};
   add({{side, side}});
   while (!heap.empty() && heap.front().bound > target &&
-         num_cells < max_cells) {
+         num_cells < kMaxCells) {
     const auto [first, second] = Halves(heap.front().box);
     std::pop_heap(heap.begin(), heap.end(), ComesLater);
     heap.pop_back();
@@ -228,10 +226,9 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
   }
   const double target =
       sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
-  return Search(map, p, reach, target, kMaxCells,
-                [p](const Enclosure& enclosure) {
-                  return BoundLinearError(enclosure, p);
-                });
+  return Search(map, p, reach, target, [p](const Enclosure& enclosure) {
+    return BoundLinearError(enclosure, p);
+  });
 }
 
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
@@ -251,15 +248,15 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
       });
   // -y'm = -y'f + y'r, of which the first is at most |f| <= 1, and the second
   // small of second order around x_hat.
-  return Search(map, p, reach, sampled + kAlongSlack, kMaxCellsAlong,
-                [&](const Enclosure& enclosure) {
-                  const double direct = along(enclosure.m).hi;
-                  const double first = along(enclosure.f).hi;
-                  const Interval sum = Interval{0, first < 1 ? first : 1.0} -
-                                       along(enclosure.remainder);
-                  if (!(sum.hi < kInfinity)) return direct;
-                  return direct < sum.hi ? direct : sum.hi;
-                });
+  return Search(
+      map, p, reach, sampled + kAlongSlack, [&](const Enclosure& enclosure) {
+        const double direct = along(enclosure.m).hi;
+        const double first = along(enclosure.f).hi;
+        const Interval sum =
+            Interval{0, first < 1 ? first : 1.0} - along(enclosure.remainder);
+        if (!(sum.hi < kInfinity)) return direct;
+        return direct < sum.hi ? direct : sum.hi;
+      });
 }
 
 }  // namespace krot

@@ -174,8 +174,11 @@ bool Rounds::RunOne() {
   if (certificate_) round.lower_bound = certificate_->lower_bound;
   round.seconds = timer_.Seconds();
   summary_.rounds.push_back(round);
-  if (reprojection_.IsLinear() || IsInterrupted() || IsGapReached() ||
-      IsZeroUpToRounding(cost_)) {
+  // The published algorithms know one linear problem.
+  const bool is_as_in_paper =
+      options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
+  if (reprojection_.IsLinear() || is_as_in_paper || IsInterrupted() ||
+      IsGapReached() || IsZeroUpToRounding(cost_)) {
     return false;
   }
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
