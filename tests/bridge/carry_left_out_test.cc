@@ -34,7 +34,7 @@ TEST(CarryLeftOutPoints, KeepsTheErrorOfAPointWhoseOnlyImageHasMoved) {
             static_cast<int>(before.points3D.size()) - 1);
   const std::vector<double> errors_px = PixelErrors(before);
   Model moved = before;
-  moved.images[0].cam_from_world.translation += Eigen::Vector3d(0.3, 0.1, 0);
+  moved.frames[0].rig_from_world.translation += Eigen::Vector3d(0.3, 0.1, 0);
   ASSERT_GT(PixelErrors(moved)[0], errors_px[0] + 10);
 
   Model after = moved;

@@ -189,8 +189,8 @@ TEST_P(CertificateOfModel, IsRefusedOnceAnythingThatItSpeaksOfChanges) {
   expect_refused([](Model* m) { m->cameras[0].model_id = 3; });
   expect_refused([](Model* m) { m->images[2].points2D[0].x += 1e-9; });
   expect_refused([](Model* m) {
-    std::swap(m->images[2].points2D[0].point3D_id,
-              m->images[2].points2D[1].point3D_id);
+    std::swap(m->points3D[0].track_begin, m->points3D[1].track_begin);
+    std::swap(m->points3D[0].track_end, m->points3D[1].track_end);
   });
   expect_refused(
       [](Model* m) { m->frames[1].rig_from_world.quaternion_wxyz[1] += 1e-9; });

@@ -323,7 +323,7 @@ TEST_F(Options, ComeFromAProjectFileUnlessGivenExplicitly) {
       Solve({"--project_path", folder_ / "project.ini", "--Solver.norm", "1"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
-  EXPECT_THAT(result.out, ::testing::HasSubstr("p = 1 "));
+  EXPECT_THAT(result.out, ::testing::HasSubstr("(p = 1)"));
   EXPECT_THAT(result.out, ::testing::HasSubstr("after 1 sweep"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.txt"));
 }

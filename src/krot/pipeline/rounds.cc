@@ -72,6 +72,10 @@ class Rounds {
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
   }
+  bool IsOutOfSweeps() const {
+    return summary_.termination == SolveTermination::kMaxSweeps &&
+           options_.res_int.update_frames;
+  }
   bool RunOne();
   void Prove();
 
@@ -177,8 +181,8 @@ bool Rounds::RunOne() {
   // The published algorithms know one linear problem.
   const bool is_as_in_paper =
       options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
-  if (reprojection_.IsLinear() || is_as_in_paper || IsInterrupted() ||
-      IsGapReached() || IsZeroUpToRounding(cost_)) {
+  if (reprojection_.IsLinear() || is_as_in_paper || IsOutOfSweeps() ||
+      IsInterrupted() || IsGapReached() || IsZeroUpToRounding(cost_)) {
     return false;
   }
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
