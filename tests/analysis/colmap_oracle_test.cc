@@ -1,5 +1,7 @@
 // COLMAP itself as the judge: what it recomputes must be what we compute.
 
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -39,7 +41,7 @@ class ColmapOracle : public ::testing::TestWithParam<const char*> {
     }
     input_ = fs::path(root) / GetParam();
     scratch_ = fs::path(::testing::TempDir()) /
-               (std::string("krot_colmap_oracle_") + GetParam());
+               ("krot_colmap_oracle_" + std::to_string(::getpid()));
     fs::remove_all(scratch_);
     fs::create_directories(scratch_ / "output");
     model_ = ReadModel(input_, DetectModelFormat(input_));
