@@ -73,8 +73,8 @@ struct SolveSummary {
   int64_t num_retriangulated_points = 0;
 
   // The largest true error of the observations in the optimisation, pixels;
-  // initial: of the start, after re-triangulation; final: of the model that is
-  // given back.
+  // initial: of the start, after re-triangulation; final: of the estimate, which
+  // is what the model holds unless `is_given_back`.
   double cost_initial = 0;
   double cost_final = 0;
   std::vector<Round> rounds;
