@@ -26,13 +26,14 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"sweeps", {"problem"}},
       {"proof", {"conic"}},
       {"joint", {"proof", "sweeps"}},
+      {"finish", {"conic"}},
       {"camera", {}},
       {"model", {"camera", "geometry"}},
       {"analysis", {"model"}},
       {"synthetic", {"model"}},
       {"adjust", {"model"}},
       {"bridge", {"model", "proof"}},
-      {"pipeline", {"bridge", "joint", "analysis", "adjust"}},
+      {"pipeline", {"bridge", "joint", "finish", "analysis", "adjust"}},
       {"report", {"pipeline", "analysis"}},
   };
   return kDependencies;

@@ -91,11 +91,12 @@ double Reprojection::TrueCost(const Estimate& estimate, Norm norm,
   return cost;
 }
 
-void Reprojection::TakeRows(const Estimate& estimate, int num_threads,
+bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                             KnownRotationProblem* problem) const {
-  if (is_linear_) return;
-  ParallelFor(static_cast<int64_t>(problem->observations.size()),
-              kObservationsPerChunk, num_threads,
+  if (is_linear_) return true;
+  const int64_t count = static_cast<int64_t>(problem->observations.size());
+  std::vector<char> do_project(NumChunks(count, kObservationsPerChunk), 1);
+  ParallelFor(count, kObservationsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {
                 for (int64_t i = begin; i < end; ++i) {
                   Observation& observation = problem->observations[i];
@@ -103,9 +104,14 @@ void Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                   const auto row =
                       RowAtProjection(source.model_id, source.params,
                                       built_.pixels[i], InCamera(estimate, i));
-                  if (row) observation.E = *row;
+                  if (row) {
+                    observation.E = *row;
+                  } else {
+                    do_project[begin / kObservationsPerChunk] = 0;
+                  }
                 }
               });
+  return std::count(do_project.begin(), do_project.end(), 0) == 0;
 }
 
 }  // namespace krot

@@ -33,9 +33,9 @@ class Reprojection {
   // same bits at any number of threads.
   double TrueCost(const Estimate& estimate, Norm norm, int num_threads) const;
 
-  // Takes every row where its point projects at the estimate, which all of
-  // them must: exact there, and to first order around.
-  void TakeRows(const Estimate& estimate, int num_threads,
+  // Takes every row where its point projects at the estimate: exact there, and
+  // to first order around. Whether all do; a row that does not stays.
+  bool TakeRows(const Estimate& estimate, int num_threads,
                 KnownRotationProblem* problem) const;
 
   // The camera of observation i.

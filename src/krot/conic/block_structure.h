@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include "krot/problem/known_rotation_problem.h"
+
 namespace krot {
 
 // Which observation sees what; observations stand in the order of points.
@@ -21,6 +23,10 @@ struct BlockStructure {
     return static_cast<int64_t>(frame_is_fixed.size());
   }
 };
+
+// That of a problem, with the translation's gauge: of each connected component
+// the frame with the most observations is fixed, and so is one without any.
+BlockStructure AnchoredStructure(const KnownRotationProblem& problem);
 
 // A vector with the structure of the unknowns.
 struct BlockVector {

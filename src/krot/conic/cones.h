@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "krot/minimax/norm.h"
+
 namespace krot {
 
 // The symmetric cones of one observation and their Jordan algebras
@@ -123,5 +125,19 @@ struct FourHalfLines {
     return limit;
   }
 };
+
+// T: (top; v) into the cone of kDim numbers, which it is in if ||v||_p <= top.
+template <int kDim>
+Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
+  Eigen::Matrix<double, kDim, 3> T;
+  if constexpr (kDim == 3) {
+    T.setIdentity();
+  } else if (norm.p == 1) {  // top +- v1 +- v2
+    T << 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, -1;
+  } else {  // top +- v1, top +- v2
+    T << 1, 1, 0, 1, -1, 0, 1, 0, 1, 1, 0, -1;
+  }
+  return T;
+}
 
 }  // namespace krot

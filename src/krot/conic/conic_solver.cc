@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "krot/conic/centrality.h"
+
 namespace krot {
 namespace {
 
@@ -25,18 +27,6 @@ constexpr double kSmallestSigma = 1e-6;
 constexpr double kDamping = 0.98;
 constexpr double kBacktracking = 0.7;
 constexpr double kSmallestStep = 1e-8;
-// Centrality correctors aim at a step that is longer by kLonger, where they
-// bring the pairs' products within these shares of the target mu. One that
-// does not gain kWorthwhile of kLonger is the last [Colombo, Gondzio 2008].
-// Each is a solve without a factor; two took a fifth of the iterations away
-// (docs/benchmarks.md, "The joint iteration").
-constexpr int kCentralityCorrectors = 2;
-constexpr double kLonger = 0.3;
-constexpr double kLeastProduct = 0.1;
-constexpr double kLargestProduct = 10;
-constexpr double kWorthwhile = 0.1;
-// Steps beyond this one need no corrector.
-constexpr double kLongStep = 0.9;
 
 void Move(const BlockVector& direction, double step, Estimate* x) {
   for (size_t k = 0; k < x->points.size(); ++k) {
@@ -115,37 +105,9 @@ void ConicSolver<Cone>::FindDirection(bool only_centre) {
         return Cone::Divide(system_.lambda()[i], target);
       },
       sigma);
-  for (int n = 0; n < kCentralityCorrectors; ++n) {
-    if (!ImproveCentrality(sigma)) break;
-  }
-}
-
-// Adds to lambda o f what the products of the pairs lack, a longer step
-// ahead, of being near sigma mu. Takes it back if the step becomes shorter for
-// it. Whether another one may be worth while.
-template <typename Cone>
-bool ConicSolver<Cone>::ImproveCentrality(double sigma) {
-  const StepLengths before = MaxSteps(kDamping);
-  if (before.Least() > kLongStep) return false;
-  const double ahead = std::min(1.0, before.Least() + kLonger);
-  const double mu = sigma * system_.mu();
-  typename NewtonSystem<Cone>::Direction direction = system_.direction();
-  system_.Solve(
-      [&](int64_t i) -> Vector {
-        const Vector& lambda = system_.lambda()[i];
-        const Vector product = Cone::Product(lambda + ahead * direction.ds[i],
-                                             lambda + ahead * direction.dz[i]);
-        const Vector lacking =
-            Cone::Clamp(product, kLeastProduct * mu, kLargestProduct * mu) -
-            product;
-        return system_.target()[i] +
-               Cone::Divide(lambda, Cone::Clamp(lacking, -kLargestProduct * mu,
-                                                kLargestProduct * mu));
-      },
-      sigma);
-  const double gain = MaxSteps(kDamping).Least() - before.Least();
-  if (gain < 0) system_.Restore(std::move(direction));
-  return gain >= kWorthwhile * kLonger;
+  ImproveCentrality<Cone>(
+      sigma * system_.mu(), sigma, [&] { return MaxSteps(kDamping).Least(); },
+      &system_);
 }
 
 // Mehrotra's choice: the cube of what the predictor leaves of the gap.

@@ -60,7 +60,6 @@ class ConicSolver {
   void ViewAll(State* state) const;
   void CentreMultipliers();
   void FindDirection(bool only_centre);
-  bool ImproveCentrality(double sigma);
   double AffineSigma() const;
   StepLengths MaxSteps(double damping) const;
   bool IsInside(const State& trial) const;

@@ -17,6 +17,7 @@ class ObservationLoop {
       : count_(count), num_threads_(num_threads) {}
 
   int64_t count() const { return count_; }
+  int num_threads() const { return num_threads_; }
 
   template <typename Body>
   void ForEach(const Body& body) const {  // body(i)

@@ -22,8 +22,6 @@ using Rows = Eigen::Matrix<double, kRows, 1>;
 constexpr double kHighLeverage = 0.5;
 // |Q|^2 = 3 allows fewer, but for rounding.
 constexpr int kMaxHighLeverage = 6;
-// One takes the effect of the frames' regularisation away; each is a solve.
-constexpr int kRefinements = 1;
 // Waking a thread takes longer than its share of so few observations: with
 // threads, certificates of small models took twice the time.
 constexpr int64_t kFewObservations = 4000;
@@ -266,12 +264,13 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
 
 template <int kRows>
 void PointElimination<kRows>::Solve(const BlockVector& g, const double* r,
-                                    BlockVector* x) const {
+                                    BlockVector* x, int refinements) const {
   SolveOnce(g, r, x);
+  if (refinements == 0) return;
   const int64_t n = structure_.num_observations() * kRows;
   std::vector<double> rest(n);
   BlockVector correction;
-  for (int refinement = 0; refinement < kRefinements; ++refinement) {
+  for (int refinement = 0; refinement < refinements; ++refinement) {
     Multiply(*x, rest.data());
     for (int64_t i = 0; i < n; ++i) {
       rest[i] = (r != nullptr ? r[i] : 0) - rest[i];

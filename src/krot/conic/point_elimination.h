@@ -54,9 +54,11 @@ class PointElimination {
   // False if the frames' system has no Cholesky factor even when regularised.
   bool Factorize();
 
-  // x = H^-1 (g + A'r), with iterative refinement; r holds kRows numbers per
-  // observation, or is null for 0.
-  void Solve(const BlockVector& g, const double* r, BlockVector* x) const;
+  // x = H^-1 (g + A'r); r holds kRows numbers per observation, or is null for
+  // 0. A refinement takes the effect of the frames' regularisation away; each is
+  // another solve.
+  void Solve(const BlockVector& g, const double* r, BlockVector* x,
+             int refinements = 1) const;
 
   // y = A x, laid out like r.
   void Multiply(const BlockVector& x, double* y) const;

@@ -1,5 +1,6 @@
 #include "krot/pipeline/rounds.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -48,7 +49,6 @@ class Rounds {
         cost_(TrueCost(estimate_)) {}
 
   void Run();
-  void Finish();
   std::optional<PixelCertificate> certificate() && {
     return std::move(certificate_);
   }
@@ -78,6 +78,9 @@ class Rounds {
   }
   bool RunOne();
   void Prove();
+  void RunFinish();
+  void FinishByLeastSquares();
+  void FinishBySweeps();
 
   const Model& model_;
   const SolveModelOptions& options_;
@@ -202,18 +205,43 @@ void Rounds::Run() {
   while (RunOne() && summary_.rounds.size() < kMaxRounds) {
   }
   if (!certificate_ && !IsInterrupted()) Prove();
-  if (method_ == SolveMethod::kAuto && !IsInterrupted()) Finish();
+  const bool is_gap_reached = IsGapReached();
+  if (method_ == SolveMethod::kAuto && !IsInterrupted()) RunFinish();
   summary_.cost_final = cost_;
   if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
       !IsInterrupted()) {
     summary_.termination = SolveTermination::kZeroCost;
   } else if (certificate_ && !IsInterrupted()) {
-    summary_.termination = IsGapReached() ? SolveTermination::kGapReached
+    summary_.termination = is_gap_reached ? SolveTermination::kGapReached
                                           : SolveTermination::kStalled;
   }
 }
 
-void Rounds::Finish() {
+void Rounds::RunFinish() {
+  switch (options_.finish.finish) {
+    case Finish::kNone:
+      return;
+    case Finish::kSweeps:
+      return FinishBySweeps();
+    case Finish::kLeastSquares:
+      return FinishByLeastSquares();
+  }
+}
+
+// Below a cap of (1 + slack) times the lowest maximum, as far as that is known,
+// and no error above the start's largest.
+void Rounds::FinishByLeastSquares() {
+  if (IsZeroUpToRounding(cost_)) return;
+  const double lowest = IsGapReached() ? certificate_->lower_bound : cost_;
+  const double cap =
+      std::min((1 + options_.finish.slack) * lowest, summary_.cost_initial);
+  summary_.finish =
+      krot::FinishByLeastSquares(reprojection_, options_.finish, options_.norm,
+                                 cap, context_, &built_.problem, &estimate_);
+  cost_ = TrueCost(estimate_);
+}
+
+void Rounds::FinishBySweeps() {
   for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
     Estimate swept = estimate_;
     const double highest = (1 + kCostRounding) * cost_;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "krot/bridge/reprojection.h"
 #include "krot/conic/interior_point.h"
+#include "krot/finish/bounded_least_squares.h"
 #include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
@@ -91,6 +93,12 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
       memory.likely, component + PartBytes(working) +
                          EstimateInteriorPointMemory(working, summary.norm) +
                          PartBytes(problem));
+  if (summary.method == SolveMethod::kAuto) {
+    const bool rows_are_taken_anew = !Reprojection(model, built).IsLinear();
+    memory.likely = std::max(
+        memory.likely,
+        held + EstimateBoundedMemory(problem, summary.norm, rows_are_taken_anew));
+  }
   memory.at_most = std::max(memory.at_most, memory.likely);
   return memory;
 }

@@ -103,7 +103,9 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
   if (summary->termination != SolveTermination::kGapReached) return;
   if (IsZeroUpToRounding(summary->cost_final)) {
     summary->termination = SolveTermination::kZeroCost;
-  } else if (!(summary->relative_gap && *summary->relative_gap <= wanted_gap)) {
+  } else if (!summary->lower_bound ||
+             !(summary->LowestCost() - *summary->lower_bound <=
+               wanted_gap * summary->LowestCost())) {
     summary->termination = SolveTermination::kStalled;
   }
 }

@@ -14,6 +14,7 @@
 #include "krot/bridge/certificate_support.h"
 #include "krot/joint/joint.h"
 #include "krot/model/model.h"
+#include "krot/pipeline/finish.h"
 #include "krot/pipeline/polish.h"
 #include "krot/sweeps/res_int.h"
 
@@ -24,7 +25,7 @@ namespace krot {
 // and writing.
 
 enum class SolveMethod {
-  kAuto,    // sweeps while they pay, the joint solver, finishing sweeps
+  kAuto,    // sweeps while they pay, the joint solver, the finish
   kResInt,  // sweeps alone: no bound
   kJoint,   // the joint solver alone
 };
@@ -97,6 +98,14 @@ struct SolveSummary {
   // a finite one, is not above the input's: the input is what is given back.
   bool is_given_back = false;
 
+  // The finish by least squares, if there was one: it gives up (cost_final -
+  // finish->lowest_cost) of the maximum.
+  std::optional<FinishSummary> finish;
+  // The largest error that was reached, pixels: what the gap asked for is about.
+  double LowestCost() const {
+    return finish ? finish->lowest_cost : cost_final;
+  }
+
   // Over all observations of the model, those left out included.
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
@@ -136,6 +145,8 @@ struct SolveModelOptions {
   double leading_sweep_tolerance = 0.05;  // relative; >= 0
   // kAuto, kJoint. Its callback is also told of iterations towards a start.
   JointOptions joint;
+
+  FinishOptions finish;  // of kAuto
 
   // Called once, with the counts filled in, before the solve; may be empty.
   std::function<void(const SolveSummary&)> on_built;

@@ -85,6 +85,41 @@ Json PolishJson(const std::optional<PolishSummary>& polish) {
           {"seconds", adjustment.seconds}};
 }
 
+const char* FinishTerminationName(BoundedTermination termination) {
+  switch (termination) {
+    case BoundedTermination::kConverged:
+      return "converged";
+    case BoundedTermination::kMaxIterations:
+      return "max_iterations";
+    case BoundedTermination::kNoProgress:
+      return "no_progress";
+    case BoundedTermination::kSingular:
+      return "singular";
+    case BoundedTermination::kInterrupted:
+      return "interrupted";
+    case BoundedTermination::kNotRun:
+      break;
+  }
+  return "not_run";
+}
+
+Json FinishJson(const std::optional<FinishSummary>& finish) {
+  if (!finish) return {};
+  const BoundedSummary& solve = finish->solve;
+  return {{"finish", FinishName(Finish::kLeastSquares)},
+          {"loss", LossName(finish->loss.kind)},
+          {"termination", FinishTerminationName(solve.termination)},
+          {"cap", finish->cap},
+          {"lowest_cost", finish->lowest_cost},
+          {"cost_initial", solve.cost_initial},
+          {"cost_final", solve.cost_final},
+          {"duality_gap", NumberOrNull(solve.duality_gap)},
+          {"stationarity", NumberOrNull(solve.stationarity)},
+          {"num_active", solve.num_active},
+          {"num_iterations", solve.iterations},
+          {"seconds", finish->seconds}};
+}
+
 }  // namespace
 
 std::string SolveJson(const SolveReport& report) {
@@ -127,6 +162,7 @@ std::string SolveJson(const SolveReport& report) {
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"finish", FinishJson(summary.finish)},
       {"polish", PolishJson(summary.polish)},
       {"rounds", RoundsJson(summary.rounds)},
       {"sweeps", sweeps},

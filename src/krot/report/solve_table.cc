@@ -46,6 +46,26 @@ std::string LinearGapSentence(const SolveSummary& summary) {
          "; the rest is due to the lenses' curvature.";
 }
 
+// What the room above the lowest maximum was for.
+std::string FinishSentence(const SolveSummary& summary) {
+  if (!summary.finish) return "";
+  const BoundedSummary& solve = summary.finish->solve;
+  const auto rms = [&](double cost) {
+    return FormatNumber(
+        std::sqrt(2 * cost / static_cast<double>(summary.num_observations)), 4);
+  };
+  return std::string(" Within that, ") +
+         (summary.finish->loss.kind == ErrorLoss::Kind::kTrivial
+              ? "the least squares: the RMS error"
+              : "the least robust loss: its root mean") +
+         " fell from " + rms(solve.cost_initial) + " to " +
+         rms(solve.cost_final) + " px in " +
+         Counted(solve.iterations, "iteration") +
+         (solve.termination == BoundedTermination::kConverged
+              ? "."
+              : ", and might fall a little more.");
+}
+
 // What is proved, and what is not.
 std::string Verdict(const SolveSummary& summary) {
   if (summary.is_given_back) {
@@ -61,9 +81,14 @@ std::string Verdict(const SolveSummary& summary) {
   const std::string maximum =
       "Maximum " + FormatNumber(summary.cost_final, 4) + " px" +
       (summary.norm.p == 2 ? "" : " (p = " + NormName(summary.norm) + ")");
-  if (!summary.is_certified) return maximum + ", not proved optimal.";
-  return maximum + ", proved optimal to " + GapPercent(*summary.relative_gap) +
-         ": " + BoundWords(summary) + "." + LinearGapSentence(summary);
+  if (!summary.is_certified) {
+    return maximum + ", not proved optimal." + FinishSentence(summary);
+  }
+  return maximum +
+         (summary.finish ? ", proved to be within " : ", proved optimal to ") +
+         GapPercent(*summary.relative_gap) +
+         (summary.finish ? " of the lowest: " : ": ") + BoundWords(summary) +
+         "." + LinearGapSentence(summary) + FinishSentence(summary);
 }
 
 // " on 3 % of the observations"; empty where the joint solver did not run.

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "krot/base/context.h"
+#include "krot/finish/error_loss.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// Of all estimates with every error below a cap, the least squares:
+//
+//   min 1/2 sum rho(|e_i|^2)   subject to   ||e_i||_p <= cap,  e_i = v_i / w_i,
+//
+// over all frames and points at once, by a primal-dual interior point method
+// (docs/method.md, "The finish"). Not convex, but for the constraints: what is
+// found is a local minimum.
+
+// An iterate; every one of them is below the cap.
+struct BoundedIterate {
+  int iteration = 0;
+  double cost = 0;  // 1/2 sum rho, squared pixels
+  double gap = 0;   // sum of multiplier times slack, relative to the cost
+  double step = 0;  // length of the step that led here, in (0, 1]
+};
+
+struct BoundedOptions {
+  Norm norm;       // of the cap: p = 1, 2 or infinity
+  double cap = 0;  // pixels; > 0
+  ErrorLoss loss;
+  double gap_tolerance = 1e-4;           // > 0, relative to the cost
+  double stationarity_tolerance = 1e-6;  // > 0
+  int max_iterations = 200;              // >= 1
+  // Takes all rows of a problem anew where their points project at an estimate,
+  // to first order around; false if one does not project. Empty where rows do
+  // not depend on where they are taken.
+  std::function<bool(const Estimate&, KnownRotationProblem*)> take_rows;
+  std::function<void(const BoundedIterate&)> callback;  // may be empty
+};
+
+enum class BoundedTermination {
+  kNotRun,
+  kConverged,  // gap and stationarity are below their tolerances
+  kMaxIterations,
+  kNoProgress,  // steps have become too short, or gain next to nothing
+  kSingular,    // the linear system could not be factorised
+  kInterrupted,
+};
+
+struct BoundedSummary {
+  BoundedTermination termination = BoundedTermination::kNotRun;
+  int iterations = 0;
+  double cost_initial = 0;  // 1/2 sum rho, squared pixels
+  double cost_final = 0;    // <= cost_initial
+  // Sum of multiplier times slack relative to the cost: were the problem
+  // convex, no estimate would be lower by more.
+  std::optional<double> duality_gap;
+  // What Newton's step would still gain on the central path, relative to the
+  // cost.
+  std::optional<double> stationarity;
+  int64_t num_active = 0;  // multipliers above 1e-3 of an error's own weight
+};
+
+// Requires a connected problem and an estimate with every residual below the
+// cap, strictly (throws std::invalid_argument). Every iterate stays there. Rows
+// of `problem` must be those at `*estimate`. The frame with the most
+// observations stays; so does the scale, nearly. An iteration is that of
+// MinimizeJointly; the same bits at any number of threads.
+BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
+                               const BoundedOptions& options,
+                               const Context& context, Estimate* estimate);
+
+// What MinimizeBounded will allocate, bytes. O(problem).
+int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm,
+                              bool rows_are_taken_anew);
+
+}  // namespace krot

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "krot/finish/bounded_least_squares.h"
+#include "krot/finish/bounded_system.h"
+
+namespace krot {
+
+// One run of bounded least squares along the central path: the minima of
+//
+//   1/2 sum rho + mu sum Barrier,   Barrier of the errors alone,
+//
+// as mu falls. An iteration
+//
+//   Factorize       the Newton system at now_
+//   IsConverged     if mu is small enough: whether a Newton step would gain
+//                   next to nothing
+//   FindDirection   a predictor, f = 0, and a corrector [Mehrotra 1992]
+//   TakeStep        the longest, then shorter ones until the barrier cost does
+//                   not rise: trial_ becomes now_; where none is found along
+//                   the corrector's direction, along Newton's
+//
+// Multipliers have a step length of their own. Pairs that leave a wide
+// neighbourhood of the path are centred anew: the barrier cost alone decides on
+// progress, since that of a problem that is not convex can be trusted no
+// further.
+template <typename Cone>
+class BoundedPath {
+ public:
+  BoundedPath(const KnownRotationProblem& problem,
+              const BoundedOptions& options, const Context& context,
+              const Estimate& start);
+
+  BoundedSummary Run();
+
+  const Estimate& estimate() const { return now_.x; }
+
+  static int64_t MemoryBytes(const KnownRotationProblem& problem,
+                             bool rows_are_taken_anew);
+
+ private:
+  using Vector = typename Cone::Vector;
+
+  struct State {
+    Estimate x;
+    // With the rows at x, where they depend on it; otherwise unused.
+    KnownRotationProblem rows;
+    std::vector<ViewedPoint> viewed;
+    double cost = 0;     // 1/2 sum rho
+    double barrier = 0;  // sum, at mu = 1
+  };
+
+  // Whether every residual is below the cap.
+  bool View(State* state) const;
+  const KnownRotationProblem& RowsOf(const State& state) const {
+    return options_.take_rows ? state.rows : problem_;
+  }
+  double BarrierCost(const State& state, double mu) const {
+    return state.cost + mu * state.barrier;
+  }
+  double Count() const {  // of pairs' eigenvalues
+    return static_cast<double>(system_.loop().count() * Cone::kDegree);
+  }
+  double RelativeGap() const {
+    return now_.cost > 0 ? Count() * system_.mu() / now_.cost : 0;
+  }
+
+  void CentreMultipliers(double mu);
+  void RestoreNeighbourhood(double mu);
+  void FindNewtonDirection(double mu);
+  double FindDirection();
+  double AffineSigma() const;
+  double MaxStep(const std::vector<Vector>& direction, double damping) const;
+  // Sets step_, 0 if none is found, and returns what it takes off the cost.
+  double TakeStep(double mu);
+  std::optional<BoundedTermination> Iterate(BoundedSummary* summary);
+  int64_t NumActive() const;
+
+  const KnownRotationProblem& problem_;
+  const BoundedOptions options_;
+  const Context context_;
+  BoundedSystem<Cone> system_;
+  State now_;
+  State trial_;
+  std::vector<Vector> z_;
+  double step_ = 1;  // that led to now_
+};
+
+}  // namespace krot
