@@ -9,6 +9,7 @@ function(krot_library folder)
     add_library(${target} ${ARG_SOURCES})
     set(scope PUBLIC)
     krot_warnings(${target})
+    krot_precompiled_headers(${target})
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -31,6 +32,25 @@ function(krot_warnings target)
   endif()
 endfunction()
 
+# krot_precompiled_headers(<target>)
+#
+# What nearly every source includes, parsed once, by the lowest folder that
+# needs Eigen. Not where the compiler is launched by a cache, which would not
+# hold what is compiled so.
+function(krot_precompiled_headers target)
+  if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT KROT_UNITY OR target STREQUAL krot_base)
+    return()
+  endif()
+  if(target STREQUAL krot_geometry)
+    target_precompile_headers(${target} PRIVATE
+      <algorithm> <cmath> <cstdint> <functional> <limits> <map> <memory>
+      <optional> <sstream> <string> <unordered_map> <utility> <vector>
+      <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <Eigen/SVD>)
+  else()
+    target_precompile_headers(${target} REUSE_FROM krot_geometry)
+  endif()
+endfunction()
+
 # krot_native_kernel(<file>)
 #
 # Compiles one source file of this folder's library for the machine at hand.
@@ -46,7 +66,7 @@ function(krot_native_kernel file)
     endif()
   endif()
   set_source_files_properties(${file} PROPERTIES
-    COMPILE_OPTIONS "${kernel_flags}")
+    COMPILE_OPTIONS "${kernel_flags}" SKIP_PRECOMPILE_HEADERS ON)
 endfunction()
 
 # krot_test(<name> SOURCES file... DEPENDS target...)

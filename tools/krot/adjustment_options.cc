@@ -9,15 +9,6 @@ namespace {
 constexpr char kCeres[] = "BundleAdjustmentCeres.";
 constexpr char kPlain[] = "BundleAdjustment.";
 
-bool ParseLoss(const std::string& text, RobustLoss* loss) {
-  if (text == "TRIVIAL") *loss = RobustLoss::kTrivial;
-  if (text == "SOFT_L1") *loss = RobustLoss::kSoftL1;
-  if (text == "CAUCHY") *loss = RobustLoss::kCauchy;
-  if (text == "HUBER") *loss = RobustLoss::kHuber;
-  return text == "TRIVIAL" || text == "SOFT_L1" || text == "CAUCHY" ||
-         text == "HUBER";
-}
-
 // Of what COLMAP 4 and COLMAP 3.8 both know, in two groups.
 const std::vector<std::string> kMoved = {
     "max_num_iterations", "max_linear_solver_iterations", "function_tolerance",
@@ -27,12 +18,6 @@ void RefuseBoth(const OptionParser& parser, const std::string& a,
                 const std::string& b) {
   if (!parser.IsGiven(a) || !parser.IsGiven(b)) return;
   throw OptionError("--" + a + " and --" + b + " are the same; give one");
-}
-
-void RefuseWith(const OptionParser& parser, const std::string& name,
-                const std::string& why) {
-  if (!parser.IsGiven(name)) return;
-  throw OptionError("--" + name + " has no effect " + why);
 }
 
 }  // namespace
@@ -111,12 +96,13 @@ void AdjustmentOptions::AddCeres(OptionParser* parser) {
                     "them" +
                         suffix);
   }
-  parser->Add({"BundleAdjustmentCeres.loss_function_type",
-               "How large errors are weighed",
-               "one of {TRIVIAL, SOFT_L1, CAUCHY, HUBER}", "TRIVIAL", false,
-               [options](const std::string& text) {
-                 return ParseLoss(text, &options->loss);
-               }});
+  parser->AddNamed<RobustLoss>("BundleAdjustmentCeres.loss_function_type",
+                               &options->loss,
+                               {{"TRIVIAL", RobustLoss::kTrivial},
+                                {"SOFT_L1", RobustLoss::kSoftL1},
+                                {"CAUCHY", RobustLoss::kCauchy},
+                                {"HUBER", RobustLoss::kHuber}},
+                               "How large errors are weighed");
   parser->AddReal("BundleAdjustmentCeres.loss_function_scale",
                   &options->loss_scale, Above(0.0, "pixels"),
                   "The error above which a loss other than TRIVIAL weighs "
@@ -130,16 +116,9 @@ void AdjustmentOptions::AddCeres(OptionParser* parser) {
       &options->max_num_images_direct_sparse, AtLeast(0),
       "Up to so many images it is sparse; beyond them conjugate gradients "
       "solve it");
-  parser->Add({"BundleAdjustmentCeres.num_threads",
-               "Threads, -1 being all; with more than one the last digits "
-               "differ from run to run",
-               "-1 or an integer in [1, 1024]", "-1", false,
-               [this](const std::string& text) {
-                 int threads = 0;
-                 if (!ParseInteger(text, &threads)) return false;
-                 num_threads_ = threads;
-                 return threads == -1 || (threads >= 1 && threads <= 1024);
-               }});
+  parser->AddThreads("BundleAdjustmentCeres.num_threads", &num_threads_,
+                     "with more than one the last digits differ from run to "
+                     "run");
 }
 
 AdjustModelOptions AdjustmentOptions::Resolve(
@@ -162,13 +141,13 @@ AdjustModelOptions AdjustmentOptions::Resolve(
     adjustment.refine_sensor_from_rig = false;
   }
   if (!adjustment.refine_rig_from_world) {
-    RefuseWith(parser, "BundleAdjustment.constant_rig_from_world_rotation",
-               "where frames may not move");
+    parser.Refuse("BundleAdjustment.constant_rig_from_world_rotation",
+                  "where frames may not move");
   }
   const bool is_trivial = adjustment.loss == RobustLoss::kTrivial;
   if (is_trivial) {
-    RefuseWith(parser, "BundleAdjustmentCeres.loss_function_scale",
-               "without --BundleAdjustmentCeres.loss_function_type");
+    parser.Refuse("BundleAdjustmentCeres.loss_function_scale",
+                  "without --BundleAdjustmentCeres.loss_function_type");
   }
   const bool has_cap = parser.IsGiven("BundleAdjustment.max_error");
   const bool has_factor = parser.IsGiven("BundleAdjustment.max_error_factor");

@@ -4,7 +4,6 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
-#include "krot/base/write_file.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/adjustment_report.h"
 #include "krot/report/peak_memory.h"
@@ -12,9 +11,9 @@
 #include "tools/krot/adjustment_options.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
-#include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
 namespace krot {
@@ -86,13 +85,8 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   report.run.seconds_write = write_timer.Seconds();
   report.run.seconds_total = total_timer.Seconds();
   report.run.peak_memory_bytes = PeakMemoryBytes();
-  const std::string report_json = AdjustmentJson(report);
-  if (!paths.report_path.empty()) {
-    LogLine(common.log, 2, "writing " + paths.report_path);
-    WriteFileAtomically(paths.report_path, report_json);
-  }
-  WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                report.run.threads, common.log);
+  WriteReports(paths.report_path, paths.html_path, AdjustmentJson(report),
+               model, result.model, report.run.threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
   return kExitDone;
 }

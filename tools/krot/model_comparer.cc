@@ -12,8 +12,8 @@
 #include "krot/report/comparison_report.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
-#include "tools/krot/html_path.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/report_files.h"
 #include "tools/krot/same_path.h"
 
 namespace krot {
@@ -28,7 +28,7 @@ constexpr char kTableName[] = "errors_summary.txt";
 struct ComparerOptions {
   std::string input_path1;
   std::string input_path2;
-  std::string alignment = "frame";
+  AlignmentKind alignment = AlignmentKind::kFrame;
   int num_worst = 10;
   std::string output_path;
   std::string report_path;
@@ -47,11 +47,14 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
                   "The COLMAP model to compare with; its scene units are used");
   parser->AddPath("input_path2", &options->input_path2, true, "a folder",
                   "The COLMAP model to compare, of the same images by name");
-  parser->AddChoice("alignment", &options->alignment,
-                    {"frame", "similarity", "none"},
-                    "How the second model is brought to the first: frame: mean "
-                    "rotation, centroid and radius of the cameras; similarity: "
-                    "least squares on the camera centres; none: as stored");
+  parser->AddNamed<AlignmentKind>(
+      "alignment", &options->alignment,
+      {{"frame", AlignmentKind::kFrame},
+       {"similarity", AlignmentKind::kSimilarity},
+       {"none", AlignmentKind::kNone}},
+      "How the second model is brought to the first: frame: mean rotation, "
+      "centroid and radius of the cameras; similarity: least squares on the "
+      "camera centres; none: as stored");
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many of the worst cameras, images and points to "
                      "list");
@@ -76,11 +79,6 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
   AddOnContradiction(&options->on_contradiction, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
-}
-
-AlignmentKind ParseAlignment(const std::string& name) {
-  if (name == "none") return AlignmentKind::kNone;
-  return name == "frame" ? AlignmentKind::kFrame : AlignmentKind::kSimilarity;
 }
 
 WriteModelOptions OverlayWriteOptions(const ComparerOptions& options) {
@@ -146,7 +144,7 @@ std::optional<CertificateVerdict> Verify(const Model& model,
 std::string NoAlignmentSentence(const ComparerOptions& options,
                                 size_t num_poses) {
   const std::string found = std::to_string(num_poses);
-  if (options.alignment == "similarity") {
+  if (options.alignment == AlignmentKind::kSimilarity) {
     return "--alignment similarity needs three images with a pose in both "
            "models, with centres that are not on one line; there are " +
            found + "; use --alignment frame or none";
@@ -166,7 +164,7 @@ ComparisonSummary Compare(const ComparerOptions& options, const Model& model1,
                            options.input_path2);
   }
   CompareModelsOptions compare;
-  compare.alignment = ParseAlignment(options.alignment);
+  compare.alignment = options.alignment;
   compare.num_worst = options.num_worst;
   std::optional<ComparisonSummary> summary =
       CompareModels(model1, model2, correspondence, compare);
@@ -225,12 +223,8 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   if (!options.output_path.empty()) {
     WriteErrorFiles(options.output_path, report.summary, table);
   }
-  const std::string report_json = ComparisonJson(report);
-  if (!options.report_path.empty()) {
-    WriteFileAtomically(options.report_path, report_json);
-  }
-  WriteHtmlPage(options.html_path, report_json, model1, aligned, -1,
-                options.common.log);
+  WriteReports(options.report_path, options.html_path, ComparisonJson(report),
+               model1, aligned, -1, options.common.log);
   PrintTable(options.common.log, table);
   return kExitDone;
 }

@@ -8,7 +8,7 @@
 #include "krot/model/model_error.h"
 #include "krot/model/validate.h"
 #include "krot/report/text_table.h"
-#include "tools/krot/html_path.h"
+#include "tools/krot/report_files.h"
 #include "tools/krot/same_path.h"
 
 namespace krot {

@@ -113,6 +113,22 @@ void OptionParser::AddChoice(const std::string& name, std::string* value,
        }});
 }
 
+void OptionParser::AddThreads(const std::string& name, int* value,
+                              const std::string& remark) {
+  Add({name, "Threads, -1 being all; " + remark,
+       "-1 or an integer in [1, 1024]", "-1", false,
+       [value](const std::string& text) {
+         return ParseInteger(text, value) &&
+                (*value == -1 || (*value >= 1 && *value <= 1024));
+       }});
+}
+
+void OptionParser::Refuse(const std::string& name,
+                          const std::string& why) const {
+  if (!IsGiven(name)) return;
+  throw OptionError("--" + name + " has no effect " + why);
+}
+
 bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) {
     if (argument == "-h" || argument == "--help") return false;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tools/krot/command_error.h"
@@ -54,6 +55,14 @@ class OptionParser {
   void AddChoice(const std::string& name, std::string* value,
                  const std::vector<std::string>& choices,
                  const std::string& description);
+  // A choice of what the names stand for; the value's own is the default.
+  template <typename T>
+  void AddNamed(const std::string& name, T* value,
+                const std::vector<std::pair<std::string, T>>& choices,
+                const std::string& description);
+  // -1 stands for all; `remark` says what their number changes.
+  void AddThreads(const std::string& name, int* value,
+                  const std::string& remark);
 
   // Sets the values. Returns false, with nothing set, if the arguments ask
   // for help. Throws OptionError for the first thing wrong; an unknown name
@@ -62,6 +71,9 @@ class OptionParser {
 
   // Whether the arguments or the project file set this option.
   bool IsGiven(const std::string& name) const;
+
+  // Throws OptionError if it is given: it "has no effect `why`".
+  void Refuse(const std::string& name, const std::string& why) const;
 
   // Every option with its range and default; 80 columns.
   std::string Help() const;
@@ -87,5 +99,27 @@ class OptionParser {
   std::vector<PathOption> paths_;
   std::set<std::string> given_;
 };
+
+template <typename T>
+void OptionParser::AddNamed(
+    const std::string& name, T* value,
+    const std::vector<std::pair<std::string, T>>& choices,
+    const std::string& description) {
+  std::vector<std::string> names;
+  std::string default_text;
+  for (const auto& [text, meaning] : choices) {
+    names.push_back(text);
+    if (meaning == *value) default_text = text;
+  }
+  Add({name, description, "one of " + ChoiceText(names), default_text, false,
+       [value, choices](const std::string& given) {
+         for (const auto& [text, meaning] : choices) {
+           if (text != given) continue;
+           *value = meaning;
+           return true;
+         }
+         return false;
+       }});
+}
 
 }  // namespace krot

@@ -9,8 +9,8 @@
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
-#include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
+#include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
 namespace krot {
@@ -162,13 +162,8 @@ int RunSolveCommand(const SolveCommand& command) {
   report.run.seconds_total = total_timer.Seconds();
   report.run.peak_memory_bytes = PeakMemoryBytes();
   WriteCertificate(command, report.summary);
-  const std::string report_json = SolveJson(report);
-  if (!paths.report_path.empty()) {
-    LogLine(log, 2, "writing " + paths.report_path);
-    WriteFileAtomically(paths.report_path, report_json);
-  }
-  WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                command.context.num_threads, log);
+  WriteReports(paths.report_path, paths.html_path, SolveJson(report), model,
+               result.model, command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;

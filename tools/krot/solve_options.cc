@@ -22,13 +22,6 @@ bool ParseNorm(const std::string& text, Norm* norm) {
   return true;
 }
 
-bool ParseSettings(const std::string& text, FastDescentSettings* settings) {
-  if (text != "fast" && text != "paper") return false;
-  *settings =
-      text == "fast" ? FastDescentSettings::kFast : FastDescentSettings::kPaper;
-  return true;
-}
-
 void AddFastDescentOptions(FastDescentOptions* options, OptionParser* parser) {
   parser->AddReal("FastDescent.stationarity_tolerance",
                   &options->stationarity_tolerance, AtLeast(0.0),
@@ -63,22 +56,14 @@ void AddSolveOptions(SolveModelOptions* options, Context* context,
                [options](const std::string& text) {
                  return ParseNorm(text, &options->norm);
                }});
-  parser->Add({"Solver.num_threads",
-               "Threads, -1 being all; the result is the same, bit by bit",
-               "-1 or an integer in [1, 1024]", "-1", false,
-               [context](const std::string& text) {
-                 int threads = 0;
-                 if (!ParseInteger(text, &threads)) return false;
-                 context->num_threads = threads;
-                 return threads == -1 || (threads >= 1 && threads <= 1024);
-               }});
-  parser->Add({"Solver.settings",
-               "paper: Algorithms 2 to 4 to the letter; fast: the same "
-               "optima by better means",
-               "one of {fast, paper}", "fast", false,
-               [res_int](const std::string& text) {
-                 return ParseSettings(text, &res_int->fast_descent.settings);
-               }});
+  parser->AddThreads("Solver.num_threads", &context->num_threads,
+                     "the result is the same, bit by bit");
+  parser->AddNamed<FastDescentSettings>(
+      "Solver.settings", &res_int->fast_descent.settings,
+      {{"fast", FastDescentSettings::kFast},
+       {"paper", FastDescentSettings::kPaper}},
+      "paper: Algorithms 2 to 4 to the letter; fast: the same optima by better "
+      "means");
   AddFastDescentOptions(&res_int->fast_descent, parser);
   parser->AddInteger("Problem.min_track_length",
                      &options->problem.min_track_length,
@@ -110,11 +95,9 @@ void CheckSolveOptions(const SolveModelOptions& options,
     return;
   }
   for (const std::string& name : kPaperOnlyNames) {
-    if (parser.IsGiven(name)) {
-      throw OptionError("--" + name +
-                        " has no effect with --Solver.settings fast; add "
-                        "--Solver.settings paper or leave it out");
-    }
+    parser.Refuse(name,
+                  "with --Solver.settings fast; add --Solver.settings paper or "
+                  "leave it out");
   }
 }
 

@@ -11,39 +11,24 @@ namespace {
 // The paper's own rule, where its settings are asked for [Zhang18, Sec. 5].
 constexpr double kPaperSweepTolerance = 1e-3;
 
-bool ParseMethod(const std::string& text, SolveMethod* method) {
-  if (text == "auto") *method = SolveMethod::kAuto;
-  if (text == "res_int") *method = SolveMethod::kResInt;
-  if (text == "joint") *method = SolveMethod::kJoint;
-  return text == "auto" || text == "res_int" || text == "joint";
-}
-
-bool ParseInit(const std::string& text, SolveInit* init) {
-  *init = text == "feasible" ? SolveInit::kFeasible : SolveInit::kModel;
-  return text == "feasible" || text == "model";
-}
-
 void AddScheduleOptions(SolveModelOptions* options, OptionParser* parser) {
-  parser->Add({"Solver.method",
-               "auto: sweeps while they pay, the joint solver to the gap, "
-               "finishing sweeps; res_int: Resection-Intersection sweeps alone "
-               "[Zhang18, Alg. 1], without a bound; joint: the joint solver "
-               "alone",
-               "one of {auto, res_int, joint}", "auto", false,
-               [options](const std::string& text) {
-                 return ParseMethod(text, &options->method);
-               }});
+  parser->AddNamed<SolveMethod>(
+      "Solver.method", &options->method,
+      {{"auto", SolveMethod::kAuto},
+       {"res_int", SolveMethod::kResInt},
+       {"joint", SolveMethod::kJoint}},
+      "auto: sweeps while they pay, the joint solver to the gap, finishing "
+      "sweeps; res_int: Resection-Intersection sweeps alone [Zhang18, Alg. 1], "
+      "without a bound; joint: the joint solver alone");
   parser->AddReal("Solver.relative_gap", &options->joint.relative_gap,
                   Above(0.0),
                   "How far the largest error may be above the proved bound, "
                   "relative to it");
-  parser->Add({"Solver.init",
-               "Where to start: model: its own translations and points; "
-               "feasible: from nothing but rotations and observations",
-               "one of {model, feasible}", "model", false,
-               [options](const std::string& text) {
-                 return ParseInit(text, &options->init);
-               }});
+  parser->AddNamed<SolveInit>(
+      "Solver.init", &options->init,
+      {{"model", SolveInit::kModel}, {"feasible", SolveInit::kFeasible}},
+      "Where to start: model: its own translations and points; feasible: from "
+      "nothing but rotations and observations");
   parser->AddReal("Problem.init_max_error", &options->init_max_error,
                   Above(0.0, "pixels"),
                   "With a feasible start: the largest error that it may have");
@@ -82,10 +67,6 @@ void CheckPairs(const SolveModelOptions& options, const OptionParser& parser) {
   const SolveMethod method = EffectiveMethod(options);
   const bool has_joint_norm =
       options.norm.p == 2 || options.norm.IsPolyhedral();
-  const auto refuse = [&](const char* name, const char* why) {
-    if (!parser.IsGiven(name)) return;
-    throw OptionError("--" + std::string(name) + " has no effect " + why);
-  };
   if (!has_joint_norm && options.method == SolveMethod::kJoint) {
     throw OptionError(
         "--Solver.method joint needs --Solver.norm 1, 2 or inf; sweeps alone "
@@ -98,18 +79,18 @@ void CheckPairs(const SolveModelOptions& options, const OptionParser& parser) {
     const char* why =
         "on sweeps alone, which know no bound; they are what --Solver.method "
         "res_int, --Solver.settings paper and any norm but 1, 2 and inf mean";
-    refuse("Solver.relative_gap", why);
-    refuse("Joint.max_iterations", why);
-    refuse("certificate_path", why);
+    parser.Refuse("Solver.relative_gap", why);
+    parser.Refuse("Joint.max_iterations", why);
+    parser.Refuse("certificate_path", why);
   }
   if (method == SolveMethod::kJoint) {
     for (const char* name : {"ResInt.max_sweeps", "ResInt.sweep_tolerance",
                              "Solver.settings", "FastDescent.max_iterations"}) {
-      refuse(name, "with --Solver.method joint, which makes no sweeps");
+      parser.Refuse(name, "with --Solver.method joint, which makes no sweeps");
     }
   }
   if (method != SolveMethod::kAuto && options.init == SolveInit::kModel) {
-    refuse("Problem.init_max_error", "without --Solver.init feasible");
+    parser.Refuse("Problem.init_max_error", "without --Solver.init feasible");
   }
 }
 

@@ -4,8 +4,6 @@
 #include <map>
 #include <vector>
 
-#include <Eigen/SVD>
-
 #include "krot/base/disjoint_sets.h"
 #include "krot/geometry/rigid_transform.h"
 #include "krot/geometry/rotation.h"
@@ -93,7 +91,7 @@ CenterStatistics Summarize(const std::vector<PoseBlock>& frames,
   return statistics;
 }
 
-// The rotation nearest to the sum of R_before^T R_after.
+// The rotation nearest to the sum of R_before^T R_after; none if several are.
 Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
                       const std::vector<PoseBlock>& after,
                       const std::vector<size_t>& indices) {
@@ -101,11 +99,7 @@ Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
   for (const size_t f : indices) {
     sum += RotationOf(before[f]).transpose() * RotationOf(after[f]);
   }
-  const Eigen::JacobiSVD<Matrix3d> svd(
-      sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * Vector3d(1, 1, sign).asDiagonal() *
-         svd.matrixV().transpose();
+  return NearestRotation(sum).value_or(Matrix3d::Identity());
 }
 
 // Moves the frame's centre to `center`; turns it with the world unless

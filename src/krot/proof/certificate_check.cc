@@ -6,12 +6,12 @@
 #include <optional>
 #include <utility>
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_input.h"
 #include "krot/proof/force_balance.h"
+#include "krot/proof/observation_force.h"
 
 // How (1) is proved. Forces (force_balance.h) balance but for g; changing those
 // of a spanning forest balances them exactly. The change F_i of a force is one
@@ -22,10 +22,10 @@
 namespace krot {
 namespace {
 
-using Real = long double;
+using Real = ObservationForce::Real;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
-using Vector2 = Eigen::Matrix<Real, 2, 1>;
-using Vector3 = Eigen::Matrix<Real, 3, 1>;
+using Vector2 = ObservationForce::Vector2;
+using Vector3 = ObservationForce::Vector3;
 
 constexpr double kUnitRoundoff = std::numeric_limits<double>::epsilon() / 2;
 constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
@@ -34,47 +34,6 @@ constexpr Real kRootTwo = 1.4142135623730951L;  // above it
 constexpr double kSmallestShare = 1e-100;
 // No lambda may have to change by more, relative.
 constexpr Real kLargestChange = 0.5L;
-
-// E'(delta lambda; y), and what it sums up, before any cancellation.
-struct Force {
-  Vector3 sum;
-  Vector3 terms;
-};
-
-Force MakeForce(const Observation& observation, const Vector2& y,
-                Real delta_lambda) {
-  const Matrix3 E = observation.E.cast<Real>();
-  const Vector3 multipliers(delta_lambda, y[0], y[1]);
-  return {E.transpose() * multipliers,
-          E.cwiseAbs().transpose() * multipliers.cwiseAbs()};
-}
-
-// How much the multipliers may change for a unit of a force's change: what the
-// rows of E^-T are long.
-struct Compliance {
-  Real y = 0;             // rows 1 and 2 together
-  Real delta_lambda = 0;  // row 0
-};
-
-// Infinite if E might be singular. With e_k the rows of E, those of E^-T are
-// e_1 x e_2, e_2 x e_0 and e_0 x e_1 over det E = e_0'(e_1 x e_2).
-Compliance MakeCompliance(const Observation& observation) {
-  const Matrix3 E = observation.E.cast<Real>();
-  const auto length = [&](int i, int j) {
-    const Vector3 a = E.row(i);
-    const Vector3 b = E.row(j);
-    return a.cross(b).norm() + 8 * kRealRoundoff * a.norm() * b.norm();
-  };
-  const Real det =
-      std::abs(E.determinant()) -
-      16 * kRealRoundoff * E.row(0).norm() * E.row(1).norm() * E.row(2).norm();
-  if (!(det > 0)) {
-    constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-    return {kInfinity, kInfinity};
-  }
-  return {std::hypot(length(2, 0), length(0, 1)) / det * kOutward,
-          length(1, 2) / det * kOutward};
-}
 
 // The forces at a point or frame, their uncertainty, and what they sum up.
 struct Balance {
@@ -126,7 +85,7 @@ class Checker {
   const ProblemSubset part_;  // the support
   std::vector<Real> lambda_;  // of part_, scaled to a maximum in [1/2, 1)
   std::vector<Vector2> y_;
-  std::vector<Force> forces_;
+  std::vector<ObservationForce> forces_;
   std::vector<Compliance> compliances_;
   std::vector<Real> corrections_;  // bound |F_i|
   double rho_ = 0;

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// The force of one observation's multipliers on its point and its frame, in its
+// camera: E'(delta lambda; y), in long double.
+struct ObservationForce {
+  using Real = long double;
+  using Vector2 = Eigen::Matrix<Real, 2, 1>;
+  using Vector3 = Eigen::Matrix<Real, 3, 1>;
+
+  Vector3 sum;
+  Vector3 terms;  // of absolute values: what it sums up before cancellation
+};
+
+ObservationForce MakeForce(const Observation& observation,
+                           const ObservationForce::Vector2& y,
+                           ObservationForce::Real delta_lambda);
+
+// How much the multipliers may change for a unit of a force's change: what the
+// rows of E^-T are long, at least.
+struct Compliance {
+  ObservationForce::Real y = 0;             // rows 1 and 2 together
+  ObservationForce::Real delta_lambda = 0;  // row 0
+};
+
+// Infinite if E might be singular.
+Compliance MakeCompliance(const Observation& observation);
+
+}  // namespace krot

@@ -1,0 +1,29 @@
+#include "tools/krot/report_files.h"
+
+#include "krot/base/write_file.h"
+#include "krot/report/html_page.h"
+
+namespace krot {
+
+void AddHtmlPath(std::string* html_path, OptionParser* parser) {
+  parser->AddOutputFile(
+      "html_path", html_path,
+      "Where the report goes as a page to look at: figures, charts "
+      "and both models in 3D, in one HTML file");
+}
+
+void WriteReports(const std::string& report_path, const std::string& html_path,
+                  const std::string& report_json, const Model& before,
+                  const Model& after, int num_threads, const LogOptions& log) {
+  if (!report_path.empty()) {
+    LogLine(log, 2, "writing " + report_path);
+    WriteFileAtomically(report_path, report_json);
+  }
+  if (!html_path.empty()) {
+    LogLine(log, 2, "writing " + html_path);
+    WriteFileAtomically(html_path,
+                        HtmlPage(report_json, before, after, num_threads));
+  }
+}
+
+}  // namespace krot

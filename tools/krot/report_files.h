@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "krot/model/model.h"
+#include "tools/krot/log.h"
+#include "tools/krot/option_parser.h"
+
+namespace krot {
+
+// --html_path, which commands with a report have.
+void AddHtmlPath(std::string* html_path, OptionParser* parser);
+
+// Writes the report and its page (HtmlPage); not where the path is "". Throws
+// WriteError.
+void WriteReports(const std::string& report_path, const std::string& html_path,
+                  const std::string& report_json, const Model& before,
+                  const Model& after, int num_threads, const LogOptions& log);
+
+}  // namespace krot
