@@ -72,23 +72,6 @@ void AddSolveOptions(SolveModelOptions* options, Context* context,
                      "stay in the model");
 }
 
-void AddPolishOption(SolveModelOptions* options, OptionParser* parser) {
-  parser->Add({"Solver.polish",
-               "A least squares step at the end, after which the maximum is no "
-               "longer the lowest: rotations_fixed: translations and points; "
-               "full: as bundle_adjuster",
-               "one of {none, rotations_fixed, full}", "none", false,
-               [options](const std::string& text) {
-                 for (const Polish polish :
-                      {Polish::kNone, Polish::kRotationsFixed, Polish::kFull}) {
-                   if (text != PolishName(polish)) continue;
-                   options->polish = polish;
-                   return true;
-                 }
-                 return false;
-               }});
-}
-
 void CheckSolveOptions(const SolveModelOptions& options,
                        const OptionParser& parser) {
   if (options.res_int.fast_descent.settings == FastDescentSettings::kPaper) {

@@ -12,9 +12,6 @@ namespace krot {
 void AddSolveOptions(SolveModelOptions* options, Context* context,
                      OptionParser* parser);
 
-// Solver.polish, of `solver` alone.
-void AddPolishOption(SolveModelOptions* options, OptionParser* parser);
-
 // Throws OptionError for pairs of options that contradict each other. To be
 // called after Parse.
 void CheckSolveOptions(const SolveModelOptions& options,

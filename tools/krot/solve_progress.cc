@@ -47,6 +47,9 @@ void SolveProgress::Follow(SolveModelOptions* options, Context* context) {
   options->joint.callback = [this](int iteration, const JointIteration& state) {
     Update(iteration, state);
   };
+  options->finish.callback = [this](const BoundedIterate& state) {
+    Update(state);
+  };
   context->on_note = [this](const std::string& sentence) { Note(sentence); };
 }
 
@@ -77,6 +80,14 @@ void SolveProgress::Update(int iteration, const JointIteration& state) {
   Show(IterationFraction(state),
        name + "cost " + Pixels(*state.cost) + ", proved bound " + bound +
            ", estimated gap " + Scientific(*state.gap) + seconds);
+}
+
+void SolveProgress::Update(const BoundedIterate& state) {
+  Enter(Stage::kFinish);
+  Show(LogFraction(std::min(state.gap, 1.0), goals_.finish_gap),
+       "finish " + std::to_string(state.iteration) + ": sum of squares " +
+           FormatNumber(2 * state.cost, 3) + " px^2, estimated gap " +
+           Scientific(state.gap));
 }
 
 void SolveProgress::Finish() {

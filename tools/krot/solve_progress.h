@@ -9,7 +9,7 @@
 namespace krot {
 
 // Tells the user on stderr that a solve is alive: what every sweep and every
-// joint iteration has reached.
+// joint iteration and every one of the finish has reached.
 class SolveProgress {
  public:
   enum class Style {
@@ -27,6 +27,7 @@ class SolveProgress {
     double sweep_tolerance = 0;
     int max_sweeps = 0;
     double relative_gap = 0;
+    double finish_gap = BoundedOptions().gap_tolerance;
   };
   static Goals GoalsOf(const SolveModelOptions& options);
 
@@ -42,6 +43,7 @@ class SolveProgress {
 
   void Update(int sweep, const Sweep& state);
   void Update(int iteration, const JointIteration& state);  // or to a start
+  void Update(const BoundedIterate& state);                 // of the finish
 
   // A sentence on a line of its own.
   void Note(const std::string& sentence);
@@ -50,7 +52,7 @@ class SolveProgress {
   void Finish();
 
  private:
-  enum class Stage { kNone, kSweeps, kStart, kIterations };
+  enum class Stage { kNone, kSweeps, kStart, kIterations, kFinish };
 
   // Begins a new line and an empty bar if `stage` is new.
   void Enter(Stage stage);

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "tools/krot/command.h"
+#include "tools/krot/finish_options.h"
 #include "tools/krot/solve_command.h"
 #include "tools/krot/solve_options.h"
 
@@ -17,8 +18,8 @@ void AddScheduleOptions(SolveModelOptions* options, OptionParser* parser) {
       {{"auto", SolveMethod::kAuto},
        {"res_int", SolveMethod::kResInt},
        {"joint", SolveMethod::kJoint}},
-      "auto: sweeps while they pay, the joint solver to the gap, finishing "
-      "sweeps; res_int: Resection-Intersection sweeps alone [Zhang18, Alg. 1], "
+      "auto: sweeps while they pay, the joint solver to the gap, the finish; "
+      "res_int: Resection-Intersection sweeps alone [Zhang18, Alg. 1], "
       "without a bound; joint: the joint solver alone");
   parser->AddReal("Solver.relative_gap", &options->joint.relative_gap,
                   Above(0.0),
@@ -133,7 +134,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
   AddScheduleOptions(&command.options, &parser);
-  AddPolishOption(&command.options, &parser);
+  AddFinishOptions(&command.options, &parser);
   AddSolveOptions(&command.options, &command.context, &parser);
   AddResIntOptions(SolveModelOptions(), &command.options.res_int, &parser);
   AddCommonOptions(
@@ -146,6 +147,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
   }
   CheckSolveOptions(command.options, parser);
   CheckPairs(command.options, parser);
+  CheckFinishOptions(command.options, parser);
   ChooseSweeps(parser, &command.options);
   ExplainMethod(command);
   return RunSolveCommand(command);

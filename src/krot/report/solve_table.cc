@@ -54,16 +54,17 @@ std::string FinishSentence(const SolveSummary& summary) {
     return FormatNumber(
         std::sqrt(2 * cost / static_cast<double>(summary.num_observations)), 4);
   };
+  const bool is_plain = summary.finish->loss.kind == ErrorLoss::Kind::kTrivial;
   return std::string(" Within that, ") +
-         (summary.finish->loss.kind == ErrorLoss::Kind::kTrivial
-              ? "the least squares: the RMS error"
-              : "the least robust loss: its root mean") +
-         " fell from " + rms(solve.cost_initial) + " to " +
-         rms(solve.cost_final) + " px in " +
+         (is_plain ? "the least squares: RMS "
+                   : "the least robust loss: root mean ") +
+         rms(solve.cost_final) + " px after " +
          Counted(solve.iterations, "iteration") +
+         ", where the lowest maximum alone left " + rms(solve.cost_initial) +
+         " px" +
          (solve.termination == BoundedTermination::kConverged
               ? "."
-              : ", and might fall a little more.");
+              : "; a little less might be possible.");
 }
 
 // What is proved, and what is not.
