@@ -28,7 +28,7 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"joint", {"proof", "sweeps"}},
       {"camera", {}},
       {"model", {"camera", "geometry"}},
-      {"analysis", {"model"}},
+      {"analysis", {"model", "minimax"}},
       {"synthetic", {"model"}},
       {"adjust", {"model"}},
       {"bridge", {"model", "proof"}},
