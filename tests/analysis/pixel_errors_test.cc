@@ -54,9 +54,13 @@ TEST(PixelErrors, AreDistancesInTheImage) {
   EXPECT_NEAR(errors[1], 1, 1e-13);
 }
 
+TEST(PixelErrors, AreMeasuredInTheNormAskedFor) {
+  EXPECT_NEAR(PixelErrors(TwoImages(), 1, Norm::L1())[0], 7, 1e-13);
+  EXPECT_NEAR(PixelErrors(TwoImages(), 1, Norm::LInf())[0], 4, 1e-13);
+}
+
 TEST(PixelErrors, OfExactObservationsVanishWhateverTheCamera) {
   for (const CameraModelInfo& camera : CameraModels()) {
-    if (!camera.has_image_plane) continue;
     SceneOptions options = SmallScene();
     options.camera_model_id = camera.id;
     options.sensors_per_rig = 2;

@@ -29,7 +29,7 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"finish", {"conic"}},
       {"camera", {}},
       {"model", {"camera", "geometry"}},
-      {"analysis", {"model"}},
+      {"analysis", {"model", "minimax"}},
       {"synthetic", {"model"}},
       {"adjust", {"model"}},
       {"bridge", {"model", "proof"}},

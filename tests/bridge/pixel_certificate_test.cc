@@ -173,6 +173,12 @@ TEST_P(PixelCertificateOf, HoldsForEveryEstimateThatWasTried) {
   EXPECT_LE(lowest, 1.01 * optimum_.cost);  // some were near
 }
 
+TEST(PixelCertificate, OfNoObservationsIsNotMade) {
+  const Model model = MakeLensModel({});
+  EXPECT_FALSE(MakePixelCertificate(model, BuildProblem(model, {}), Norm::L2(),
+                                    Certificate(), {}, {}));
+}
+
 TEST(PixelCertificate, OfASupportBeyondAFoldIsNotMade) {
   LensModelOptions options;
   Model model = MakeLensModel(options);

@@ -93,7 +93,7 @@ TEST_F(Options, OfTheSynthesizerAreCheckedAgainstTheirRanges) {
       {"--Scene.num_frames", "1"},
       {"--Scene.num_points", "0"},
       {"--Scene.track_length", "1.9"},
-      {"--Scene.camera_model", "EQUIRECTANGULAR"},
+      {"--Scene.camera_model", "PANORAMA"},
       {"--Scene.image_width", "63"},
       {"--Scene.image_height", "70000"},
       {"--Scene.focal_length_factor", "0.1"},

@@ -124,7 +124,7 @@ TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     RandomSceneOptions random;
     random.num_frames = 5;
-    random.num_points = 400;
+    random.num_points = 800;
     random.seed = seed;
     RandomScene scene = MakeRandomScene(random);
     JointOptions options;
@@ -133,7 +133,7 @@ TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
     const JointSummary summary =
         SolveJoint(scene.problem, options, {}, &scene.estimate);
     EXPECT_EQ(summary.termination, JointTermination::kGapReached);
-    EXPECT_LT(5 * summary.num_working_observations,
+    EXPECT_LT(4 * summary.num_working_observations,
               3 * static_cast<int64_t>(scene.problem.observations.size()));
     ASSERT_TRUE(summary.certificate);
     const CertificateCheck check =

@@ -131,5 +131,87 @@ TEST(SolveInRounds, LeavesTheRowsOfItsLastEstimate) {
   EXPECT_NEAR(Cost(built.problem, estimate, Norm::L2(), 1), cost, kRounding);
 }
 
+// Points of odd id are seen by the first half of the images alone, the others,
+// with larger errors and from a worse start, by the second.
+Model ModelOfTwoComponents() {
+  LensModelOptions options;
+  options.camera_model_id = 1;
+  options.params = {500, 500, 320, 240};
+  options.num_images = 6;
+  options.num_points = 24;
+  Model model = MakeLensModel(options);
+  std::vector<TrackElement> elements;
+  for (Point3D& point : model.points3D) {
+    const uint64_t begin = elements.size();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      const bool is_second_half = element.image_id > 3;
+      Point2D& point2D =
+          model.images[element.image_id - 1].points2D[element.point2D_idx];
+      if (is_second_half == (point.id % 2 == 0)) {
+        elements.push_back(element);
+        if (is_second_half) point2D.x += 20 * std::sin(point2D.y);
+      } else {
+        point2D.point3D_id = kInvalidPoint3DId;
+      }
+    }
+    point.track_begin = begin;
+    point.track_end = elements.size();
+    if (point.id % 2 == 0) point.xyz.z() *= point.id % 4 == 0 ? 1.5 : 0.7;
+  }
+  model.track_elements = elements;
+  return model;
+}
+
+TEST(SolveInRounds, SaysThatIterationsWereUsedUpWhateverIsProvedByThen) {
+  const Model model = ModelOfTwoComponents();
+  SolveModelOptions options;
+  options.method = SolveMethod::kJoint;
+  int num_with_certificate = 0;
+  for (int limit = 1; limit < 40; ++limit) {
+    options.joint.max_iterations = limit;
+    const SolveSummary summary = SolveModel(model, options).summary;
+    if (summary.termination == SolveTermination::kGapReached) break;
+    EXPECT_EQ(summary.termination, SolveTermination::kMaxIterations);
+    num_with_certificate += summary.is_certified;
+  }
+  EXPECT_GT(num_with_certificate, 0);
+}
+
+TEST(SolveInRounds, EndsAfterTheRoundThatUsedUpItsIterations) {
+  SolveModelOptions options;
+  options.joint.max_iterations = 2;
+  const SolveSummary summary = SolveModel(DisturbedModel(1), options).summary;
+  EXPECT_EQ(summary.rounds.size(), 1u);
+  EXPECT_EQ(summary.iterations.size(), 2u);
+}
+
+// Every pixel lies beyond what f (r + k r^3) reaches: no region, no proof.
+TEST(SolveInRounds, IsNoAnswerWithoutABound) {
+  Model model = MakeLensModel({});
+  for (Image& image : model.images) {
+    for (Point2D& point2D : image.points2D) point2D.x = 320 + 900;
+  }
+  const SolveSummary summary = SolveModel(model, {}).summary;
+  EXPECT_EQ(summary.termination, SolveTermination::kUnproved);
+  EXPECT_FALSE(summary.lower_bound);
+}
+
+// A thousand pixels off where all errors can be zero: rows that are exact only
+// there have optima that say nothing.
+TEST(SolveInRounds, TakesRowsAnewBeforeItSolvesThemFarFromWhereTheyHold) {
+  LensModelOptions options;
+  options.pixel_noise = 0;
+  Model model = MakeLensModel(options);
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.translation +=
+        Eigen::Vector3d(0.3, -0.2, 0.1) * static_cast<double>(frame.id % 3);
+  }
+  const SolveSummary summary = SolveModel(model, {}).summary;
+  EXPECT_GT(summary.cost_initial, 50);
+  EXPECT_EQ(summary.termination, SolveTermination::kZeroCost);
+  EXPECT_LT(summary.iterations.size(), 100u);
+}
+
 }  // namespace
 }  // namespace krot

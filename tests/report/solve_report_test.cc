@@ -226,6 +226,15 @@ TEST(SolveTable, SaysHowMuchTheJointSolverLookedAt) {
   EXPECT_THAT(SolveTable(report), HasSubstr("2 joint iterations and"));
 }
 
+TEST(SolveReport, SaysWhereNoBoundIsNear) {
+  SolveReport report = CertifiedReport();
+  report.summary.termination = SolveTermination::kUnproved;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("Gave up after 1 iteration to a start, 2 joint "));
+  EXPECT_EQ(nlohmann::json::parse(SolveJson(report))["termination"],
+            "unproved");
+}
+
 TEST(SolveTable, SaysWhereAllErrorsAreZero) {
   SolveReport report = SomeReport();
   report.summary.cost_final = 2e-14;
@@ -241,6 +250,10 @@ TEST(MissedGapSentence, SaysWhichLimitWasHit) {
             "the gap is 3.2e-06");
   summary.termination = SolveTermination::kStalled;
   summary.relative_gap.reset();
+  EXPECT_EQ(MissedGapSentence(summary),
+            "the gap asked for is not reached: no further progress was made; "
+            "there is no finite maximum");
+  summary.lower_bound.reset();
   EXPECT_EQ(MissedGapSentence(summary),
             "the gap asked for is not reached: no further progress was made; "
             "no bound is proved");

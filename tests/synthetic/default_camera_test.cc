@@ -59,8 +59,13 @@ TEST_P(DefaultCameraOfModel, DistortsByPixelsIfTheModelCanDistort) {
 
 INSTANTIATE_TEST_SUITE_P(All, DefaultCameraOfModel, testing::Range(0, 17));
 
-TEST(DefaultCamera, OfAModelWithoutImagePlaneIsRefused) {
-  EXPECT_THROW(DefaultCamera(17, 1024, 768, 1000), std::invalid_argument);
+TEST(DefaultCamera, OfAPanoramaFillsItsImage) {
+  const Camera camera = DefaultCamera(17, 1024, 768, 1000);
+  EXPECT_EQ(camera.params, (std::vector<double>{1024, 768}));
+}
+
+TEST(DefaultCamera, OfAnUnknownModelIsRefused) {
+  EXPECT_THROW(DefaultCamera(18, 1024, 768, 1000), std::invalid_argument);
   EXPECT_THROW(DefaultCamera(-1, 1024, 768, 1000), std::invalid_argument);
 }
 

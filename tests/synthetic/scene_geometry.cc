@@ -1,10 +1,27 @@
 #include "tests/synthetic/scene_geometry.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "krot/camera/camera_model.h"
 
 namespace krot {
+namespace {
+
+constexpr int kPanorama = 17;
+constexpr double kPi = 3.14159265358979323846;
+
+// Longitude and latitude, the axis in the middle.
+Eigen::Vector2d ProjectToPanorama(const Camera& camera,
+                                  const Eigen::Vector3d& x_cam) {
+  const double longitude = std::atan2(x_cam.x(), x_cam.z());
+  const double latitude = std::asin(x_cam.y() / x_cam.norm());
+  return {camera.params[0] * (0.5 + longitude / (2 * kPi)),
+          camera.params[1] * (0.5 + latitude / kPi)};
+}
+
+}  // namespace
 
 std::vector<SceneObservation> RecomputeObservations(const Model& model) {
   std::vector<SceneObservation> observations;
@@ -23,8 +40,11 @@ std::vector<SceneObservation> RecomputeObservations(const Model& model) {
       observation.point = k;
       observation.depth = x_cam.z();
       observation.measured = {point2D.x, point2D.y};
-      observation.projected = ProjectRay(camera.model_id, camera.params.data(),
-                                         x_cam.hnormalized());
+      observation.projected =
+          camera.model_id == kPanorama
+              ? ProjectToPanorama(camera, x_cam)
+              : ProjectRay(camera.model_id, camera.params.data(),
+                           x_cam.hnormalized());
       observations.push_back(observation);
     }
   }

@@ -27,7 +27,7 @@ TEST(SceneOptions, OutOfRangeAreNamedWithTheirValue) {
       {"track_length = 1.5, ", [](auto* o) { o->track_length = 1.5; }},
       {"track_length = 21, ", [](auto* o) { o->track_length = 21; }},
       {"track_length = nan, ", [=](auto* o) { o->track_length = nan; }},
-      {"camera_model_id = 17, ", [](auto* o) { o->camera_model_id = 17; }},
+      {"camera_model_id = 18, ", [](auto* o) { o->camera_model_id = 18; }},
       {"camera_model_id = -1, ", [](auto* o) { o->camera_model_id = -1; }},
       {"image_width = 10, ", [](auto* o) { o->image_width = 10; }},
       {"image_height = 99999, ", [](auto* o) { o->image_height = 99999; }},

@@ -91,6 +91,25 @@ TEST_P(SceneOfCamera, HasAllPixelsInsideItsImagesAndUndistortable) {
 
 INSTANTIATE_TEST_SUITE_P(All, SceneOfCamera, testing::Range(0, 17));
 
+TEST(SceneOfPanoramas, LooksInAllDirectionsAndItsTruthReproducesEveryPixel) {
+  SceneOptions options;
+  options.camera_model_id = 17;
+  options.start_translation_noise = 0.5;
+  options.start_point_noise = 0.5;
+  for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
+    options.layout = layout;
+    const SyntheticScene scene = SynthesizeScene(options);
+    EXPECT_NO_THROW(ValidateModel(scene.model));
+    int num_behind = 0;
+    for (const SceneObservation& o :
+         RecomputeObservations(scene.ground_truth)) {
+      EXPECT_LT(o.ErrorPx(), 1e-9);
+      num_behind += o.depth < 0;
+    }
+    EXPECT_GT(num_behind, 100);
+  }
+}
+
 TEST(Scene, HasTheNumbersOfFramesImagesAndPointsAskedFor) {
   SceneOptions options;
   options.num_frames = 12;

@@ -23,8 +23,8 @@ class Schedule : public KnownRotationSolver {
     SolveSummary summary;
     const Timer timer;
     const Context context{num_threads_, cancel};
-    SolveRows(problem, {}, method_, /*is_first_round=*/true, context, timer,
-              estimate, &summary);
+    SolveRows(problem, {}, method_, /*is_first_round=*/true,
+              /*have_rows_served=*/{}, context, timer, estimate, &summary);
     if (method_ == SolveMethod::kAuto) Finish(problem, context, estimate);
     return !IsCancelled(cancel);
   }

@@ -23,10 +23,10 @@ struct SynthesizerOptions {
   CommonOptions common;
 };
 
-std::vector<std::string> CameraModelsWithImagePlane() {
+std::vector<std::string> CameraModelNames() {
   std::vector<std::string> names;
   for (const CameraModelInfo& info : CameraModels()) {
-    if (info.has_image_plane) names.emplace_back(info.name);
+    names.emplace_back(info.name);
   }
   return names;
 }
@@ -44,14 +44,16 @@ void AddContents(SynthesizerOptions* options, OptionParser* parser) {
                   "Mean number of images that see a point; missed where fewer "
                   "have it in view");
   parser->AddChoice("Scene.camera_model", &options->camera_model,
-                    CameraModelsWithImagePlane(), "The model of every camera");
+                    CameraModelNames(), "The model of every camera");
   parser->AddInteger("Scene.image_width", &scene->image_width,
                      Between(64, 65536, "pixels"), "Width of every image");
   parser->AddInteger("Scene.image_height", &scene->image_height,
                      Between(64, 65536, "pixels"), "Height of every image");
-  parser->AddReal("Scene.focal_length_factor", &scene->focal_length_factor,
-                  Between(0.5, 10.0),
-                  "Focal length by the larger side of the image");
+  parser->AddReal(
+      "Scene.focal_length_factor", &scene->focal_length_factor,
+      Between(0.5, 10.0),
+      "Focal length by the larger side of the image; a panorama has "
+      "none");
   parser->AddBool("Scene.has_rigs", &scene->has_rigs,
                   "Write rigs and frames; without, as COLMAP 3.8 to 3.11 do");
   parser->AddInteger("Scene.sensors_per_rig", &scene->sensors_per_rig,

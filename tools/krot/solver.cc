@@ -33,10 +33,10 @@ void AddScheduleOptions(SolveModelOptions* options, OptionParser* parser) {
   parser->AddReal("Problem.init_max_error", &options->init_max_error,
                   Above(0.0, "pixels"),
                   "With a feasible start: the largest error that it may have");
-  parser->AddInteger("Joint.max_iterations", &options->joint.max_iterations,
-                     AtLeast(1),
-                     "Iterations per connected component after which to stop "
-                     "in any case");
+  parser->AddInteger(
+      "Joint.max_iterations", &options->joint.max_iterations, AtLeast(1),
+      "Iterations per connected component and round after which to "
+      "stop in any case");
 }
 
 void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,

@@ -11,6 +11,7 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/projection_row.h"
+#include "krot/minimax/residual.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -50,18 +51,20 @@ std::optional<CameraPose> CameraPoseOf(const Model& model,
 }
 
 double PixelError(const CameraPose& pose, const Camera& camera,
-                  const Point2D& point2D, const Eigen::Vector3d& xyz) {
+                  const Point2D& point2D, const Eigen::Vector3d& xyz,
+                  Norm norm) {
   const Eigen::Vector3d x_cam = pose.rotation * xyz + pose.translation;
   const std::optional<Eigen::Vector2d> difference = ProjectionError(
       camera.model_id, camera.params.data(), {point2D.x, point2D.y}, x_cam);
   if (!difference) return kNaN;
-  const double error = difference->norm();
+  const double error = NormOf(*difference, norm);
   return std::isfinite(error) ? error : kNaN;
 }
 
 }  // namespace
 
-std::vector<double> PixelErrors(const Model& model, int num_threads) {
+std::vector<double> PixelErrors(const Model& model, int num_threads,
+                                Norm norm) {
   const std::unordered_map<ImageId, int32_t> image_indices =
       ImageIndices(model);
   std::vector<std::optional<CameraPose>> poses;
@@ -83,7 +86,7 @@ std::vector<double> PixelErrors(const Model& model, int num_threads) {
             if (!poses[n]) continue;
             errors_px[e] = PixelError(
                 *poses[n], *cameras[n],
-                model.images[n].points2D[element.point2D_idx], point.xyz);
+                model.images[n].points2D[element.point2D_idx], point.xyz, norm);
           }
         }
       });

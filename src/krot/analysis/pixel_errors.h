@@ -3,17 +3,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "krot/minimax/norm.h"
 #include "krot/model/model.h"
 
 namespace krot {
 
-// True reprojection errors of a model: through the full camera, in pixels, in
-// the order of Model::track_elements. NaN where a point is not in front of
-// its camera, has no pose, or projects to no finite pixel (no camera without
-// an image plane gives one). Poses are those of ImageGeometries: in a model
-// with rigs the frames'. Requires a valid model (ValidateModel).
+// True reprojection errors of a model: through the full camera, in pixels of
+// the norm, in the order of Model::track_elements. NaN where a point is not in
+// front of its camera, has no pose, or projects to no finite pixel (no camera
+// without an image plane gives one). Poses are those of ImageGeometries: in a
+// model with rigs the frames'. Requires a valid model (ValidateModel).
 // O(observations).
-std::vector<double> PixelErrors(const Model& model, int num_threads = -1);
+std::vector<double> PixelErrors(const Model& model, int num_threads = -1,
+                                Norm norm = Norm::L2());
 
 // Over the finite errors.
 struct PixelErrorStatistics {

@@ -38,6 +38,18 @@ void FollowFrame(const ImageGeometry& geometry, const Vector3d& translation,
 
 }  // namespace
 
+Estimate OwnEstimate(const Model& model, const BuiltProblem& built) {
+  Estimate estimate;
+  for (const int32_t frame : built.frame_of) {
+    estimate.translations.push_back(
+        model.frames[frame].rig_from_world.translation);
+  }
+  for (const int32_t point : built.point_of) {
+    estimate.points.push_back(model.points3D[point].xyz);
+  }
+  return estimate;
+}
+
 Model ApplyEstimate(const Model& model, const BuiltProblem& built,
                     const Estimate& estimate) {
   CheckArgument(estimate.translations.size() == built.frame_of.size(),

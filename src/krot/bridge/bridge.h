@@ -68,6 +68,11 @@ struct BuiltProblem {
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 
+// The model's own translations and points as an estimate of a problem that was
+// built from it, wherever they are: nothing is re-triangulated, and depths may
+// be of any sign.
+Estimate OwnEstimate(const Model& model, const BuiltProblem& built);
+
 // A copy of `model` with the estimate's translations and points; rotations and
 // everything else are unchanged. An image's pose becomes that of its sensor in
 // its frame, as COLMAP reads it: translations are composed anew, and the

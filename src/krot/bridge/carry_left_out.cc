@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "krot/camera/projection_row.h"
+#include "krot/minimax/residual.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -17,9 +18,11 @@ using Eigen::Vector3d;
 // infinite where one of those no longer projects.
 class TrackError {
  public:
-  TrackError(const Model& model, const std::vector<double>& errors_before_px)
+  TrackError(const Model& model, const std::vector<double>& errors_before_px,
+             Norm norm)
       : model_(model),
         errors_before_px_(errors_before_px),
+        norm_(norm),
         images_(ImageGeometries(model)),
         image_indices_(ImageIndices(model)) {}
 
@@ -35,7 +38,7 @@ class TrackError {
                                          {point2D.x, point2D.y},
                                          images_[n].cam_from_world * xyz);
       if (!error) return std::numeric_limits<double>::infinity();
-      largest = std::max(largest, error->norm());
+      largest = std::max(largest, NormOf(*error, norm_));
     }
     return largest;
   }
@@ -48,6 +51,7 @@ class TrackError {
  private:
   const Model& model_;
   const std::vector<double>& errors_before_px_;
+  const Norm norm_;
   const std::vector<ImageGeometry> images_;
   const std::unordered_map<ImageId, int32_t> image_indices_;
 };
@@ -55,14 +59,14 @@ class TrackError {
 }  // namespace
 
 void CarryLeftOutPoints(const Model& before,
-                        const std::vector<double>& errors_px,
+                        const std::vector<double>& errors_px, Norm norm,
                         const BuiltProblem& built, double level, Model* after) {
   std::vector<char> is_in(before.points3D.size(), 0);
   for (const int32_t k : built.point_of) is_in[k] = 1;
   if (std::count(is_in.begin(), is_in.end(), 0) == 0) return;
 
-  const TrackError error_before(before, errors_px);
-  const TrackError error_after(*after, errors_px);
+  const TrackError error_before(before, errors_px, norm);
+  const TrackError error_after(*after, errors_px, norm);
   for (size_t k = 0; k < is_in.size(); ++k) {
     if (is_in[k]) continue;
     Point3D& point = after->points3D[k];

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
+#include "krot/minimax/norm.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -12,9 +13,10 @@ namespace krot {
 // above both its own old one and `level`, pixels, the point moves along with
 // the image, of those of its track, that serves it best, and stays where it is
 // if none does. A point of one observation keeps its error exactly to rounding.
-// `errors_px` are PixelErrors of `before`. O(observations of such points).
+// `errors_px` are PixelErrors of `before` in the norm.
+// O(observations of such points).
 void CarryLeftOutPoints(const Model& before,
-                        const std::vector<double>& errors_px,
+                        const std::vector<double>& errors_px, Norm norm,
                         const BuiltProblem& built, double level, Model* after);
 
 }  // namespace krot

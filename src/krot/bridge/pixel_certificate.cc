@@ -88,6 +88,7 @@ std::optional<PixelCertificate> MakePixelCertificate(
     const Model& model, const BuiltProblem& built, Norm norm,
     const Certificate& rows, std::vector<Eigen::Vector3d> bearings,
     const Context& context) {
+  if (rows.observations.empty()) return std::nullopt;
   const Reprojection reprojection(model, built);
   PixelCertificate certificate{rows, std::move(bearings), 0};
   double gamma = rows.lower_bound * (1 - kRoom);

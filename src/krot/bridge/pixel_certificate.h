@@ -66,7 +66,7 @@ std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
                                               const Certificate& rows);
 
 // The certificate with the largest gamma for these rows, which were taken at
-// `bearings`; none if an observation of the support has no region. Verifies
+// `bearings`; none without observations, or if one has no region. Verifies
 // nothing.
 std::optional<PixelCertificate> MakePixelCertificate(
     const Model& model, const BuiltProblem& built, Norm norm,

@@ -8,6 +8,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/camera/models.h"
 #include "krot/camera/projection_row.h"
+#include "krot/minimax/residual.h"
 #include "krot/model/image_geometry.h"
 #include "krot/problem/cameras.h"
 
@@ -18,17 +19,6 @@ constexpr int64_t kObservationsPerChunk = 4096;
 // Of a coordinate that is computed in a few operations, relative.
 constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double NormOfError(const Eigen::Vector2d& e, Norm norm) {
-  if (norm.p == 2) return e.norm();
-  if (norm.p == 1) return e.lpNorm<1>();
-  if (norm.IsPolyhedral()) return e.lpNorm<Eigen::Infinity>();
-  const double largest = e.lpNorm<Eigen::Infinity>();
-  if (!(largest > 0) || !std::isfinite(largest)) return largest;
-  return largest * std::pow(std::pow(std::abs(e[0]) / largest, norm.p) +
-                                std::pow(std::abs(e[1]) / largest, norm.p),
-                            1 / norm.p);
-}
 
 }  // namespace
 
@@ -55,10 +45,10 @@ double Reprojection::Error(const Estimate& estimate, Norm norm,
                            int64_t i) const {
   const Source& source = sources_[built_.problem.observations[i].view];
   const Eigen::Vector3d x_cam = InCamera(estimate, i);
-  const std::optional<Eigen::Vector2d> e = ProjectionError(
-      source.model_id, source.params, built_.pixels[i], x_cam);
+  const std::optional<Eigen::Vector2d> e =
+      ProjectionError(source.model_id, source.params, built_.pixels[i], x_cam);
   if (!e) return kInfinity;
-  const double error = NormOfError(*e, norm) + Resolution(estimate, i, x_cam);
+  const double error = NormOf(*e, norm) + Resolution(estimate, i, x_cam);
   return std::isfinite(error) ? error : kInfinity;
 }
 

@@ -18,6 +18,8 @@ namespace {
 // bound, and again, and its cost lowered to the optimum.
 constexpr double kBoundGrowth = 10;
 constexpr double kLargestBound = 1e7;  // pixels
+// A bound that is proved above another one, relative: well above roundings.
+constexpr double kClearlyAbove = 1e-9;
 // When lowering a start that already meets the bound is given up.
 constexpr double kHopelessStartGap = 1e-2;
 
@@ -126,9 +128,11 @@ InitializerTermination StartSearch::Run(Estimate* start) {
     return InitializerTermination::kInterrupted;
   }
   if (found != InteriorPointTermination::kFeasible) {
+    CertificateOptions enough;
+    enough.sufficient_bound = (1 + kClearlyAbove) * options_.max_error;
     const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
-        part_.problem(), options_.norm, options_.max_error, multipliers,
-        CertificateOptions(), context_);
+        part_.problem(), options_.norm, options_.max_error, multipliers, enough,
+        context_);
     if (certificate && Proves(*certificate)) {
       return InitializerTermination::kInfeasible;
     }

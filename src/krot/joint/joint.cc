@@ -20,13 +20,15 @@ namespace {
 
 // A working set takes in the points that do not fit in below this share of its
 // optimum, the worst first, and grows by this factor at most.
-constexpr double kShareOfLevel = 0.9;
+constexpr double kShareOfLevel = 0.8;
 constexpr double kMaxGrowth = 3;
 // Of the gap asked for, the share that a working set's own proof may leave; the
 // rest is what other points may exceed its cost by.
 constexpr double kShareOfGapForProof = 0.5;
 // After so many rounds it takes in everything.
 constexpr int kMaxRounds = 12;
+// A component of fewer is solved as it is: its iterations take a millisecond.
+constexpr size_t kFewObservations = 2000;
 
 void CheckOptions(const JointOptions& options) {
   CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
@@ -170,6 +172,7 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
+    if (problem_.observations.size() < kFewObservations) set_.AddAll();
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
     if (do_others_fit_) do_others_fit_ = FitOthers(&candidate);

@@ -22,6 +22,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               const BuiltProblem& built,
                                               const Estimate& x_hat, Norm norm,
                                               std::vector<int64_t> support,
+                                              double sufficient,
                                               const Context& context) {
   KnownRotationProblem rows = built.problem;
   std::vector<double> widths(rows.observations.size(), 1);
@@ -47,7 +48,8 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
       best = candidate;
     }
     if (best &&
-        best->lower_bound > (1 - kNegligibleLoss) * certificate.lower_bound) {
+        (best->lower_bound >= sufficient ||
+         best->lower_bound > (1 - kNegligibleLoss) * certificate.lower_bound)) {
       return best;
     }
     const double level =

@@ -20,11 +20,12 @@ namespace krot {
 // The support's own problem, which is small, is solved once more for these
 // rows; a row whose support line (pixel_certificate.h) is crossed by its
 // observation's true set is widened until it is not, and the problem solved
-// again. None if nothing is proved.
+// again, until the bound is `sufficient`, pixels. None if nothing is proved.
 std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               const BuiltProblem& built,
                                               const Estimate& x_hat, Norm norm,
                                               std::vector<int64_t> support,
+                                              double sufficient,
                                               const Context& context);
 
 }  // namespace krot

@@ -26,6 +26,12 @@ constexpr int kPatience = 3;
 constexpr double kKeptPromise = 1e-5;
 // In gaps.
 constexpr double kWorthProving = 3;
+// Of the gap asked for, what a proof may leave that is sufficient: the rest is
+// for roundings behind it.
+constexpr double kSufficientShare = 0.95;
+// Rows that have lowered the true cost to this share, and whose own is such a
+// share of that, are taken anew before they are solved.
+constexpr double kFarAway = 0.5;
 // Sweeps behind the last round: after them a third would hardly lower any
 // block's own maximum.
 constexpr int kFinishingSweeps = 2;
@@ -72,10 +78,14 @@ class Rounds {
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
   }
-  bool IsOutOfSweeps() const {
-    return summary_.termination == SolveTermination::kMaxSweeps &&
-           options_.res_int.update_frames;
+  // Whether the sweeps or iterations that were allowed are used up. Of points
+  // alone every round takes its sweep.
+  bool IsUsedUp() const {
+    return summary_.termination == SolveTermination::kMaxIterations ||
+           (summary_.termination == SolveTermination::kMaxSweeps &&
+            options_.res_int.update_frames);
   }
+  bool HaveRowsServed(const Estimate& swept, double linear_cost) const;
   bool RunOne();
   void Prove();
   void RunFinish();
@@ -119,13 +129,22 @@ void Rounds::Prove() {
                             : observation_of_[o.observation];
       if (i >= 0) support.push_back(i);
     }
-    proof = ProveInPixels(model_, built_, estimate_, options_.norm,
-                          std::move(support), context_);
+    proof = ProveInPixels(
+        model_, built_, estimate_, options_.norm, std::move(support),
+        (1 - kSufficientShare * options_.joint.relative_gap) * cost_, context_);
   }
   if (proof &&
       (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
     certificate_ = std::move(proof);
   }
+}
+
+// Whether sweeps came so far that the rows no longer say what is left to gain:
+// solving them would be in vain.
+bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) const {
+  if (reprojection_.IsLinear()) return false;
+  const double cost = TrueCost(swept);
+  return cost <= kFarAway * cost_ && linear_cost <= kFarAway * cost;
 }
 
 // Whether another round may lower the cost.
@@ -142,9 +161,12 @@ bool Rounds::RunOne() {
     return false;  // a depth is rounding alone
   }
   Estimate solved = estimate_;
-  rows_certificate_ =
-      SolveRows(problem, options_, method_, summary_.rounds.empty(), context_,
-                timer_, &solved, &summary_);
+  rows_certificate_ = SolveRows(
+      problem, options_, method_, summary_.rounds.empty(),
+      [this](const Estimate& swept, double linear_cost) {
+        return HaveRowsServed(swept, linear_cost);
+      },
+      context_, timer_, &solved, &summary_);
   if (options_.res_int.update_frames) {
     RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_.num_threads,
                            &solved);
@@ -184,7 +206,7 @@ bool Rounds::RunOne() {
   // The published algorithms know one linear problem.
   const bool is_as_in_paper =
       options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
-  if (reprojection_.IsLinear() || is_as_in_paper || IsOutOfSweeps() ||
+  if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() ||
       IsInterrupted() || IsGapReached() || IsZeroUpToRounding(cost_)) {
     return false;
   }
@@ -211,9 +233,12 @@ void Rounds::Run() {
   if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
       !IsInterrupted()) {
     summary_.termination = SolveTermination::kZeroCost;
-  } else if (certificate_ && !IsInterrupted()) {
-    summary_.termination = is_gap_reached ? SolveTermination::kGapReached
-                                          : SolveTermination::kStalled;
+  } else if (is_gap_reached && !IsInterrupted()) {
+    summary_.termination = SolveTermination::kGapReached;
+  } else if (summary_.termination == SolveTermination::kGapReached ||
+             summary_.termination == SolveTermination::kZeroCost ||
+             summary_.termination == SolveTermination::kNotRun) {
+    summary_.termination = SolveTermination::kStalled;  // that was of the rows
   }
 }
 

@@ -63,6 +63,7 @@ class Schedule {
   // Leaves an estimate that is still worse than a start found from nothing.
   void StartAfresh();
 
+  double cost() const { return cost_; }
   bool IsZero() const { return IsZeroUpToRounding(cost_); }
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
@@ -133,12 +134,13 @@ void Schedule::StartAfresh() {
 
 }  // namespace
 
-std::optional<Certificate> SolveRows(const KnownRotationProblem& problem,
-                                     const SolveModelOptions& options,
-                                     SolveMethod method, bool is_first_round,
-                                     const Context& context, const Timer& timer,
-                                     Estimate* estimate,
-                                     SolveSummary* summary) {
+std::optional<Certificate> SolveRows(
+    const KnownRotationProblem& problem, const SolveModelOptions& options,
+    SolveMethod method, bool is_first_round,
+    const std::function<bool(const Estimate& swept, double linear_cost)>&
+        have_rows_served,
+    const Context& context, const Timer& timer, Estimate* estimate,
+    SolveSummary* summary) {
   Schedule schedule(problem, options, context, timer, estimate, summary);
   switch (method) {
     case SolveMethod::kResInt: {
@@ -156,7 +158,15 @@ std::optional<Certificate> SolveRows(const KnownRotationProblem& problem,
   }
   schedule.LeadingSweeps();
   if (is_first_round && !schedule.IsInterrupted()) schedule.StartAfresh();
-  if (schedule.IsInterrupted() || schedule.IsZero()) return std::nullopt;
+  if (schedule.IsInterrupted()) return std::nullopt;
+  if (schedule.IsZero()) {
+    summary->termination = SolveTermination::kZeroCost;
+    return std::nullopt;
+  }
+  if (have_rows_served && have_rows_served(*estimate, schedule.cost())) {
+    summary->termination = SolveTermination::kStalled;
+    return std::nullopt;
+  }
   return schedule.Joint();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "krot/base/context.h"
@@ -13,11 +14,16 @@ namespace krot {
 // summary, with the seconds of `timer`, and sets its termination. Returns the
 // certificate of the joint solver, if it has one. The rows' cost rises by
 // rounding at most. Only the first round of kAuto looks for another start.
-std::optional<Certificate> SolveRows(const KnownRotationProblem& problem,
-                                     const SolveModelOptions& options,
-                                     SolveMethod method, bool is_first_round,
-                                     const Context& context, const Timer& timer,
-                                     Estimate* estimate, SolveSummary* summary);
+// kAuto ends with its sweeps, as kStalled, where `have_rows_served` says of
+// their estimate and the rows' cost, pixels, that it is better to take the rows
+// anew; may be empty.
+std::optional<Certificate> SolveRows(
+    const KnownRotationProblem& problem, const SolveModelOptions& options,
+    SolveMethod method, bool is_first_round,
+    const std::function<bool(const Estimate& swept, double linear_cost)>&
+        have_rows_served,
+    const Context& context, const Timer& timer, Estimate* estimate,
+    SolveSummary* summary);
 
 // Behind the last round of kAuto: lowers every block's own maximum. Returns
 // whether a sweep was taken, whose rows' cost is at most `highest`, pixels.

@@ -21,6 +21,8 @@
 namespace krot {
 namespace {
 
+// A joint solver's stall is an answer only with a bound so near, relative.
+constexpr double kGapOfAnswer = 1e-2;
 // What rounding may add to the largest error, relative.
 constexpr double kErrorRounding = 1e-9;
 
@@ -93,20 +95,32 @@ void CertifyInfeasible(const Model& model, const Start& start,
 // solver thought.
 void MeasureGap(double wanted_gap, SolveSummary* summary) {
   if (summary->cost_final == 0) summary->lower_bound = 0;  // without proof
-  if (summary->lower_bound) {
+  if (summary->lower_bound && std::isfinite(summary->cost_final)) {
     summary->relative_gap =
         summary->cost_final > 0
             ? (summary->cost_final - *summary->lower_bound) /
                   summary->cost_final
             : 0;
   }
-  if (summary->termination != SolveTermination::kGapReached) return;
+  // The gap that was asked for is one of the lowest maximum.
+  const auto is_within = [&](double gap) {
+    return summary->relative_gap &&
+           summary->LowestCost() - *summary->lower_bound <=
+               gap * summary->LowestCost();
+  };
+  const bool has_ended =
+      summary->termination == SolveTermination::kGapReached ||
+      summary->termination == SolveTermination::kZeroCost ||
+      summary->termination == SolveTermination::kStalled;
+  if (!has_ended || summary->method == SolveMethod::kResInt) return;
   if (IsZeroUpToRounding(summary->cost_final)) {
     summary->termination = SolveTermination::kZeroCost;
-  } else if (!summary->lower_bound ||
-             !(summary->LowestCost() - *summary->lower_bound <=
-               wanted_gap * summary->LowestCost())) {
-    summary->termination = SolveTermination::kStalled;
+  } else if (is_within(wanted_gap)) {
+    summary->termination = SolveTermination::kGapReached;
+  } else {
+    summary->termination = is_within(kGapOfAnswer)
+                               ? SolveTermination::kStalled
+                               : SolveTermination::kUnproved;
   }
 }
 
@@ -142,7 +156,8 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
-// Whether an error that was finite is now above the largest that was.
+// Whether an error that was finite is now above the largest that was; both in
+// the norm of the solve.
 bool IsWorse(const std::vector<double>& errors_before_px,
              const std::vector<double>& errors_after_px) {
   double largest = 0;
@@ -178,13 +193,12 @@ SolveModelResult SolveModel(const Model& model,
   summary.method = EffectiveMethod(options);
   summary.norm = options.norm;
 
+  const int num_threads = context.num_threads;
   const Timer build_timer;
   Start start = ChooseStart(model, options, summary.method, context);
   summary.init = start.init;
   CountProblem(model, start.built, &summary);
-  const std::vector<double> errors_before_px =
-      PixelErrors(model, context.num_threads);
-  summary.pixel_error_before = Summarize(errors_before_px);
+  summary.pixel_error_before = Summarize(PixelErrors(model, num_threads));
   summary.pixel_error_after = summary.pixel_error_before;
   summary.seconds_build = build_timer.Seconds();
   if (options.on_built) options.on_built(summary);
@@ -207,21 +221,27 @@ SolveModelResult SolveModel(const Model& model,
                     &start.built, &estimate, &summary);
   if (options.res_int.update_frames) {
     RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
-                           context.num_threads, &estimate);
-    summary.cost_final =
-        Reprojection(model, start.built)
-            .TrueCost(estimate, options.norm, context.num_threads);
+                           num_threads, &estimate);
   }
+  const Reprojection reprojection(model, start.built);
+  summary.cost_final =
+      reprojection.TrueCost(estimate, options.norm, num_threads);
   result.model = ApplyEstimate(model, start.built, estimate);
-  CarryLeftOutPoints(model, errors_before_px, start.built, summary.cost_final,
-                     &result.model);
-  std::vector<double> errors_px =
-      PixelErrors(result.model, context.num_threads);
-  if (options.norm.p == 2 && IsWorse(errors_before_px, errors_px)) {
-    result.model = model;
-    errors_px = errors_before_px;
+  const std::vector<double> before_px =
+      PixelErrors(model, num_threads, options.norm);
+  CarryLeftOutPoints(model, before_px, options.norm, start.built,
+                     summary.cost_final, &result.model);
+  if (IsWorse(before_px,
+              PixelErrors(result.model, num_threads, options.norm))) {
     summary.is_given_back = true;
+    summary.finish.reset();
+    result.model = model;
+    estimate = OwnEstimate(model, start.built);
+    reprojection.TakeRows(estimate, num_threads, &start.built.problem);
+    summary.cost_final =
+        reprojection.TrueCost(estimate, options.norm, num_threads);
   }
+  const std::vector<double> errors_px = PixelErrors(result.model, num_threads);
   UpdatePointErrors(errors_px, &result.model);
   summary.pixel_error_after = Summarize(errors_px);
   summary.seconds_solve = solve_timer.Seconds();

@@ -40,7 +40,11 @@ enum class SolveTermination {
   kNothingToSolve,  // every observation was left out
   kGapReached,      // a certificate shows the relative gap asked for
   kZeroCost,        // every residual is zero up to rounding: no gap is needed
-  kStalled,         // no further progress, and no proof that there is none
+  // No further progress. Sweeps alone know no bound; of the joint solver's
+  // estimates one within 1 % is proved.
+  kStalled,
+  kUnproved,  // no further progress, and no bound within 1 %: a lower maximum
+              // may well exist
   kMaxSweeps,
   kMaxIterations,
   kInfeasible,   // proved: no estimate below init_max_error
@@ -74,8 +78,9 @@ struct SolveSummary {
   int64_t num_retriangulated_points = 0;
 
   // The largest true error of the observations in the optimisation, pixels;
-  // initial: of the start, after re-triangulation; final: of the estimate, which
-  // is what the model holds unless `is_given_back`.
+  // initial: of the start, after re-triangulation; final: of the model written
+  // (before a polish): the input's if `is_given_back`, then infinite where a
+  // point does not project.
   double cost_initial = 0;
   double cost_final = 0;
   std::vector<Round> rounds;
@@ -90,12 +95,13 @@ struct SolveSummary {
   bool is_certified = false;
   std::optional<double> lower_bound;  // true pixels
   std::optional<double>
-      relative_gap;  // (cost_final - lower_bound) / cost_final
+      relative_gap;  // (cost_final - lower_bound) / cost_final, if finite
   std::vector<SupportObservation> support;     // worst first
   std::optional<CertificateFile> certificate;  // if asked for
 
-  // No estimate was found whose largest error, over all observations that had
-  // a finite one, is not above the input's: the input is what is given back.
+  // No estimate was found whose largest error in the p-norm, over all
+  // observations that had a finite one, is not above the input's: the input is
+  // what is given back.
   bool is_given_back = false;
 
   // The finish by least squares, if there was one: it gives up (cost_final -

@@ -15,6 +15,8 @@ const char* TerminationName(SolveTermination termination) {
       return "zero_cost";
     case SolveTermination::kStalled:
       return "stalled";
+    case SolveTermination::kUnproved:
+      return "unproved";
     case SolveTermination::kMaxSweeps:
       return "max_sweeps";
     case SolveTermination::kMaxIterations:

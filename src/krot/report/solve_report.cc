@@ -29,7 +29,8 @@ std::string MissedGapSentence(const SolveSummary& summary) {
   return "the gap asked for is not reached: " + why +
          (summary.relative_gap
               ? "; the gap is " + Scientific(*summary.relative_gap)
-              : "; no bound is proved");
+          : summary.lower_bound ? "; there is no finite maximum"
+                                : "; no bound is proved");
 }
 
 std::optional<double> LinearRelativeGap(const SolveSummary& summary) {

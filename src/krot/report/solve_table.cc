@@ -140,6 +140,10 @@ std::string SolveEndSentence(const SolveSummary& summary) {
                   ? ": the last one gained less than the tolerance; whether a "
                     "lower cost exists is not known."
                   : ": no further progress was made.");
+    case SolveTermination::kUnproved:
+      return "Gave up" + after +
+             ": no further progress was made, and no bound within 1 % of the "
+             "maximum is proved; a lower one may exist.";
     case SolveTermination::kZeroCost:
       return "Ended" + after + " with nothing left to lower.";
     case SolveTermination::kMaxSweeps:

@@ -40,8 +40,8 @@ const std::vector<double>& DefaultDistortion(int model_id) {
 Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
                      double focal_length) {
   const CameraModelInfo* info = FindCameraModel(model_id);
-  CheckArgument(info != nullptr && info->has_image_plane, "camera_model_id",
-                model_id, "the id of a camera model with an image plane");
+  CheckArgument(info != nullptr, "camera_model_id", model_id,
+                "the id of a camera model");
   constexpr std::string_view kTwoFocalLengths = "fx";
   const bool two_focal_lengths =
       info->param_names.substr(0, 2) == kTwoFocalLengths;
@@ -50,6 +50,10 @@ Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
   camera.model_id = model_id;
   camera.width = width;
   camera.height = height;
+  if (!info->has_image_plane) {
+    camera.params = {static_cast<double>(width), static_cast<double>(height)};
+    return camera;
+  }
   camera.params = {focal_length};
   if (two_focal_lengths) camera.params.push_back(1.01 * focal_length);
   camera.params.push_back(static_cast<double>(width) / 2);

@@ -4,6 +4,7 @@
 
 #include "krot/base/check.h"
 #include "krot/camera/camera_model.h"
+#include "krot/camera/projection_row.h"
 
 namespace krot {
 namespace {
@@ -51,7 +52,8 @@ Imaging::Imaging(const Camera& camera, double margin_px,
       lower_(margin_px, margin_px),
       upper_(static_cast<double>(camera.width) - margin_px,
              static_cast<double>(camera.height) - margin_px),
-      max_ray_radius_(MaxRayRadius(camera)) {
+      has_image_plane_(FindCameraModel(camera.model_id)->has_image_plane),
+      max_ray_radius_(has_image_plane_ ? MaxRayRadius(camera) : 0) {
   for (const Pose& pose : cam_from_world) {
     cam_from_world_.push_back(pose.Transform());
   }
@@ -61,11 +63,13 @@ std::optional<Eigen::Vector2d> Imaging::Project(
     int image, const Eigen::Vector3d& x_world) const {
   const size_t j = static_cast<size_t>(image);
   const Eigen::Vector3d x_cam = cam_from_world_[j] * x_world;
-  if (x_cam.z() < kMinDepth) return std::nullopt;
-  const Eigen::Vector2d u = x_cam.head<2>() / x_cam.z();
-  if (u.norm() > max_ray_radius_) return std::nullopt;
+  const double depth = has_image_plane_ ? x_cam.z() : x_cam.norm();
+  if (depth < kMinDepth) return std::nullopt;
+  if (has_image_plane_ && x_cam.hnormalized().norm() > max_ray_radius_) {
+    return std::nullopt;
+  }
   const Eigen::Vector2d pixel =
-      ProjectRay(camera_.model_id, camera_.params.data(), u);
+      ProjectPoint(camera_.model_id, camera_.params.data(), x_cam).value();
   const bool inside = (pixel.array() >= lower_.array()).all() &&
                       (pixel.array() <= upper_.array()).all();
   if (!inside) return std::nullopt;
@@ -78,9 +82,15 @@ std::optional<Eigen::Vector3d> Imaging::PointAt(int image,
   const size_t j = static_cast<size_t>(image);
   const RigidTransform& pose = cam_from_world_[j];
   const Eigen::Vector2d pixel = lower_ + fraction.cwiseProduct(upper_ - lower_);
-  const std::optional<Eigen::Vector2d> u = RayOf(camera_, pixel);
-  if (!u) return std::nullopt;
-  const Eigen::Vector3d x_cam = depth * u->homogeneous();
+  std::optional<Eigen::Vector3d> ray;  // at depth 1
+  if (has_image_plane_) {
+    const std::optional<Eigen::Vector2d> u = RayOf(camera_, pixel);
+    if (u) ray = u->homogeneous();
+  } else {
+    ray = PixelBearing(camera_.model_id, camera_.params.data(), pixel);
+  }
+  if (!ray) return std::nullopt;
+  const Eigen::Vector3d x_cam = depth * *ray;
   const Eigen::Vector3d x_world =
       pose.rotation.transpose() * (x_cam - pose.translation);
   if (!Project(image, x_world)) return std::nullopt;

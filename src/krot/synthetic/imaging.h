@@ -19,7 +19,8 @@ inline constexpr double kMinDepth = 0.2;
 class Imaging {
  public:
   // A point is in view if it is `margin_px` or more inside the image's
-  // border, at least kMinDepth away and less than 80 degrees off the axis.
+  // border, at least kMinDepth away and, but for panoramas, less than 80
+  // degrees off the axis.
   // Throws std::invalid_argument if the camera has no ray for a pixel of the
   // border.
   Imaging(const Camera& camera, double margin_px,
@@ -32,7 +33,7 @@ class Imaging {
                                          const Eigen::Vector3d& x_world) const;
 
   // The point on the ray of the pixel at a fraction of width and height, at
-  // the given depth, if it is in view.
+  // the given depth, on a panorama distance, if it is in view.
   std::optional<Eigen::Vector3d> PointAt(int image,
                                          const Eigen::Vector2d& fraction,
                                          double depth) const;
@@ -41,7 +42,8 @@ class Imaging {
   Camera camera_;
   Eigen::Vector2d lower_;  // pixels in view
   Eigen::Vector2d upper_;
-  double max_ray_radius_ = 0;  // ||u|| on z = 1
+  bool has_image_plane_ = true;
+  double max_ray_radius_ = 0;  // ||u|| on z = 1, if there is one
   std::vector<RigidTransform> cam_from_world_;
 };
 

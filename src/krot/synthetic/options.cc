@@ -22,9 +22,8 @@ void Check(const SceneOptions& options) {
   CheckRange("num_frames", options.num_frames, 2, 10'000'000);
   CheckRange("num_points", options.num_points, 1, 1'000'000'000);
   const CameraModelInfo* camera = FindCameraModel(options.camera_model_id);
-  CheckArgument(camera != nullptr && camera->has_image_plane, "camera_model_id",
-                options.camera_model_id,
-                "the id of a camera model with an image plane, 0 to 16");
+  CheckArgument(camera != nullptr, "camera_model_id", options.camera_model_id,
+                "the id of a camera model, 0 to 17");
   CheckRange("image_width", options.image_width, 64, 65536);
   CheckRange("image_height", options.image_height, 64, 65536);
   CheckRange("focal_length_factor", options.focal_length_factor, 0.5, 10.0);

@@ -25,10 +25,11 @@ struct SceneOptions {
   // target: it is missed where fewer images have the point in view.
   double track_length = 6;
 
-  int camera_model_id = 2;  // any model with an image plane: 0 to 16
+  int camera_model_id = 2;  // any model: 0 to 17
   int image_width = 1024;   // pixels; in [64, 65536]
   int image_height = 768;   // pixels; in [64, 65536]
-  // Focal length / larger side of the image; in [0.5, 10].
+  // Focal length / larger side of the image; in [0.5, 10]. EQUIRECTANGULAR has
+  // none: an image is all of the panorama.
   double focal_length_factor = 1.0;
 
   // False writes a legacy model, without rigs and frames; requires

@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "krot/camera/camera_model.h"
 #include "krot/synthetic/rigid_motion.h"
 
 namespace krot {
@@ -28,22 +29,23 @@ Eigen::Vector3d RandomDisplacement(double sigma, double max_length,
   return displacement;
 }
 
+// Of a panorama, which sees in all directions, distances.
 struct SmallestDepths {
   std::vector<double> of_frame;
   std::vector<double> of_point;
 };
 
 SmallestDepths FindSmallestDepths(const SceneGeometry& geometry,
-                                  const Structure& structure) {
+                                  const Structure& structure,
+                                  bool has_image_plane) {
   const double infinity = std::numeric_limits<double>::infinity();
   SmallestDepths smallest;
   smallest.of_frame.assign(geometry.rig_from_world.size(), infinity);
   smallest.of_point.assign(geometry.points.size(), infinity);
 
-  std::vector<Eigen::RowVector4d> depth_rows;
+  std::vector<RigidTransform> cam_from_world;
   for (const Pose& pose : CamFromWorld(geometry)) {
-    depth_rows.emplace_back();
-    depth_rows.back() << pose.Rotation().row(2), pose.translation.z();
+    cam_from_world.push_back(pose.Transform());
   }
   const size_t num_sensors = geometry.sensor_from_rig.size();
   for (size_t k = 0; k < geometry.points.size(); ++k) {
@@ -51,8 +53,8 @@ SmallestDepths FindSmallestDepths(const SceneGeometry& geometry,
          ++n) {
       const size_t image =
           static_cast<size_t>(structure.sightings[size_t(n)].image);
-      const double depth =
-          depth_rows[image].dot(geometry.points[k].homogeneous());
+      const Eigen::Vector3d x_cam = cam_from_world[image] * geometry.points[k];
+      const double depth = has_image_plane ? x_cam.z() : x_cam.norm();
       double& of_frame = smallest.of_frame[image / num_sensors];
       of_frame = std::min(of_frame, depth);
       smallest.of_point[k] = std::min(smallest.of_point[k], depth);
@@ -72,7 +74,9 @@ SceneGeometry PerturbStart(const SceneGeometry& truth,
         RandomRotation(options.rotation_noise_deg, random) * pose.Rotation();
     pose = PoseFromCenter(rotation, Center(pose.Transform()));
   }
-  const SmallestDepths smallest = FindSmallestDepths(start, structure);
+  const SmallestDepths smallest = FindSmallestDepths(
+      start, structure,
+      FindCameraModel(options.camera_model_id)->has_image_plane);
   for (size_t f = 0; f < start.rig_from_world.size(); ++f) {
     Pose& pose = start.rig_from_world[f];
     pose.translation -=

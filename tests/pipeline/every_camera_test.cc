@@ -1,0 +1,82 @@
+// Every camera model, panoramas included, against pinholes.
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "krot/bridge/bridge.h"
+#include "krot/bridge/reprojection.h"
+#include "krot/camera/projection_row.h"
+#include "krot/joint/joint.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/synthetic/scene.h"
+#include "tests/camera/random_camera.h"
+
+namespace krot {
+namespace {
+
+// Rows of the same bearings and the same noise, seen by pinholes: each
+// observation by its own, which looks along the ray of the point's true place
+// and has the lens' scale there, by central differences. With e the noise,
+// v / w = J q - e in coordinates q of the plane across that ray.
+void SeeByPinholes(const Model& model, const Estimate& truth,
+                   BuiltProblem* built) {
+  constexpr double kStep = 1e-5;
+  const Reprojection reprojection(model, *built);
+  for (size_t i = 0; i < built->pixels.size(); ++i) {
+    const int64_t index = static_cast<int64_t>(i);
+    const Reprojection::Source& source = reprojection.SourceOf(index);
+    const auto error_at = [&](const Eigen::Vector3d& ray) {
+      return ProjectionError(source.model_id, source.params, built->pixels[i],
+                             ray)
+          .value();
+    };
+    const Eigen::Vector3d n = reprojection.InCamera(truth, index).normalized();
+    Eigen::Matrix<double, 2, 3> B;
+    B.row(0) = n.unitOrthogonal();
+    B.row(1) = n.cross(Eigen::Vector3d(B.row(0)));
+    Eigen::Matrix2d J;
+    for (int k = 0; k < 2; ++k) {
+      const Eigen::Vector3d h = kStep * B.row(k).transpose();
+      J.col(k) = (error_at(n + h) - error_at(n - h)) / (2 * kStep);
+    }
+    auto& E = built->problem.observations[i].E;
+    E.row(0) = n.transpose();
+    E.bottomRows<2>() = J * B + error_at(n) * n.transpose();
+  }
+}
+
+class EveryCamera : public ::testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Models, EveryCamera, ::testing::Range(0, 18),
+                         [](const auto& test) {
+                           return ModelName(test.param);
+                         });
+
+TEST_P(EveryCamera, ReachesTheMaximumThatPinholesReachWithTheSameNoise) {
+  SceneOptions options;
+  options.camera_model_id = GetParam();
+  options.focal_length_factor = 0.5;  // up to 81 degrees off the axis
+  options.num_frames = 8;
+  options.num_points = 150;
+  options.track_length = 4;
+  options.pixel_noise = 1;
+  options.start_translation_noise = 0.01;
+  options.start_point_noise = 0.01;
+  const SyntheticScene scene = SynthesizeScene(options);
+  const SolveSummary summary = SolveModel(scene.model, {}).summary;
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
+  EXPECT_FALSE(summary.is_given_back);
+
+  BuiltProblem built = BuildProblem(scene.ground_truth, {});
+  ASSERT_EQ(built.problem.observations.size(),
+            static_cast<size_t>(summary.num_observations));
+  SeeByPinholes(scene.ground_truth, built.start, &built);
+  Estimate estimate = built.start;
+  const double expected =
+      SolveJoint(built.problem, {}, {}, &estimate).cost_final;
+  EXPECT_GT(expected, 1);
+  EXPECT_NEAR(summary.cost_final, expected, 0.01 * expected);
+}
+
+}  // namespace
+}  // namespace krot

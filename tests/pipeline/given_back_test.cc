@@ -1,0 +1,117 @@
+// A model that no estimate improves, as one that took no part would suffer.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/bridge/reprojection.h"
+#include "krot/camera/projection_row.h"
+#include "krot/pipeline/solve_model.h"
+#include "tests/bridge/lens_model.h"
+#include "tests/testing/model_matchers.h"
+
+namespace krot {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kBaseline = 1e-3;
+
+Eigen::Vector2d PixelOf(const Model& model, const Image& image,
+                        const Eigen::Vector3d& xyz) {
+  const Camera& camera = model.cameras[0];
+  return ProjectPoint(camera.model_id, camera.params.data(),
+                      image.cam_from_world.Transform() * xyz)
+      .value();
+}
+
+// Image 1 stands a thousandth beside image 0, and both see a point right in
+// front of them, without error. It has but two observations: where three are
+// asked for it takes no part, and whoever moves one of the two images against
+// the other moves it by hundreds of pixels.
+Model ModelThatAnyStepSpoils() {
+  Model model = MakeLensModel({});
+  Image& first = model.images[0];
+  Image& second = model.images[1];
+  const Eigen::Matrix3d R = second.cam_from_world.Rotation();
+  const Eigen::Vector3d centre = Center(first.cam_from_world.Transform()) +
+                                 Eigen::Vector3d(kBaseline, 0, 0);
+  std::vector<Eigen::Vector2d> noise;
+  for (const Point3D& point : model.points3D) {
+    const Point2D& old = second.points2D[point.id - 1];
+    noise.push_back(Eigen::Vector2d(old.x, old.y) -
+                    PixelOf(model, second, point.xyz));
+  }
+  second.cam_from_world.translation = -(R * centre);
+  for (const Point3D& point : model.points3D) {
+    const Eigen::Vector2d pixel =
+        PixelOf(model, second, point.xyz) + noise[point.id - 1];
+    second.points2D[point.id - 1] = {pixel.x(), pixel.y(), point.id};
+  }
+
+  Point3D near;
+  near.id = model.points3D.size() + 1;
+  near.xyz = centre + Eigen::Vector3d(0, 0, 2 * kBaseline);
+  near.track_begin = model.track_elements.size();
+  for (Image* image : {&first, &second}) {
+    const Eigen::Vector2d pixel = PixelOf(model, *image, near.xyz);
+    model.track_elements.push_back(
+        {image->id, static_cast<uint32_t>(image->points2D.size())});
+    image->points2D.push_back({pixel.x(), pixel.y(), near.id});
+  }
+  near.track_end = model.track_elements.size();
+  model.points3D.push_back(near);
+  UseTrivialRigs(&model);
+  return model;
+}
+
+class GivenBack : public ::testing::TestWithParam<double> {};
+
+INSTANTIATE_TEST_SUITE_P(Norms, GivenBack, ::testing::Values(1, 2, kInfinity));
+
+TEST_P(GivenBack, IsTheInputAndAllNumbersSpeakOfIt) {
+  const Model model = ModelThatAnyStepSpoils();
+  SolveModelOptions options;
+  options.norm = {GetParam()};
+  options.problem.min_track_length = 3;
+  const SolveModelResult result = SolveModel(model, options);
+  const SolveSummary& summary = result.summary;
+  ASSERT_TRUE(summary.is_given_back);
+  Ignoring stored_errors;
+  stored_errors.point_errors = true;
+  EXPECT_THAT(result.model, IsModel(model, stored_errors));
+  EXPECT_EQ(summary.pixel_error_after.max, summary.pixel_error_before.max);
+
+  const std::vector<double> errors = PixelErrors(model, -1, Norm{GetParam()});
+  const double largest = *std::max_element(errors.begin(), errors.end());
+  EXPECT_NEAR(summary.cost_final, largest, 1e-9);
+  ASSERT_TRUE(summary.is_certified);
+  EXPECT_LT(*summary.lower_bound, largest);
+  EXPECT_NEAR(*summary.relative_gap, 1 - *summary.lower_bound / largest, 1e-9);
+  EXPECT_EQ(summary.termination, SolveTermination::kUnproved);
+  ASSERT_FALSE(summary.support.empty());
+  for (const SupportObservation& o : summary.support) {
+    const uint64_t element = 3 * (o.point3D_id - 1) + o.image_id - 1;
+    EXPECT_NEAR(o.error_px, errors[element], 1e-9);
+  }
+}
+
+TEST_P(GivenBack, IsNotWhatCanBeImproved) {
+  const Model model = MakeLensModel({});
+  SolveModelOptions options;
+  options.norm = {GetParam()};
+  const SolveModelResult result = SolveModel(model, options);
+  EXPECT_FALSE(result.summary.is_given_back);
+  const auto largest = [&](const Model& m) {
+    const std::vector<double> errors = PixelErrors(m, -1, options.norm);
+    return *std::max_element(errors.begin(), errors.end());
+  };
+  EXPECT_LT(largest(result.model), largest(model));
+}
+
+}  // namespace
+}  // namespace krot
