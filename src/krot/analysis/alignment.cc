@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
-
 #include "krot/geometry/rotation.h"
 
 namespace krot {
@@ -16,8 +13,6 @@ using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
 
 constexpr double kDegrees = 180 / 3.14159265358979323846;
-// Below this share of the largest, an extent of the cameras is rounding.
-constexpr double kOnALine = 1e-6;
 
 Matrix3Xd Centers(const std::vector<PosePair>& poses,
                   Vector3d PosePair::*center) {
@@ -31,15 +26,6 @@ double Radius(const Matrix3Xd& centers) {
   const Vector3d centroid = centers.rowwise().mean();
   return (centers.colwise() - centroid).norm() /
          std::sqrt(static_cast<double>(centers.cols()));
-}
-
-bool LieOnALine(const Matrix3Xd& centers) {
-  const Matrix3Xd centered = centers.colwise() - centers.rowwise().mean();
-  const Vector3d extents =
-      Eigen::JacobiSVD<Matrix3d>(centered * centered.transpose())
-          .singularValues()
-          .cwiseSqrt();
-  return !(extents[1] > kOnALine * extents[0]);
 }
 
 bool AreEqual(const PosePair& pose) {
@@ -101,14 +87,26 @@ std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses) {
 
 std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses) {
   if (poses.size() < 3) return std::nullopt;
-  const Matrix3Xd centers1 = Centers(poses, &PosePair::center1);
-  const Matrix3Xd centers2 = Centers(poses, &PosePair::center2);
-  if (LieOnALine(centers1) || LieOnALine(centers2)) return std::nullopt;
-  const Eigen::Matrix4d fitted = Eigen::umeyama(centers2, centers1, true);
+  const double count = static_cast<double>(poses.size());
+  Vector3d mean1 = Vector3d::Zero();
+  Vector3d mean2 = Vector3d::Zero();
+  for (const PosePair& pose : poses) {
+    mean1 += pose.center1 / count;
+    mean2 += pose.center2 / count;
+  }
+  Matrix3d covariance = Matrix3d::Zero();
+  double variance2 = 0;
+  for (const PosePair& pose : poses) {
+    const Vector3d offset2 = pose.center2 - mean2;
+    covariance += (pose.center1 - mean1) * offset2.transpose();
+    variance2 += offset2.squaredNorm();
+  }
+  const std::optional<Matrix3d> rotation = NearestRotation(covariance);
+  if (!rotation) return std::nullopt;
   Similarity similarity;
-  similarity.scale = fitted.topLeftCorner<3, 1>().norm();
-  similarity.rotation = fitted.topLeftCorner<3, 3>() / similarity.scale;
-  similarity.translation = fitted.topRightCorner<3, 1>();
+  similarity.rotation = *rotation;
+  similarity.scale = rotation->cwiseProduct(covariance).sum() / variance2;
+  similarity.translation = mean1 - similarity.scale * (*rotation * mean2);
   return similarity;
 }
 

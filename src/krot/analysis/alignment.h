@@ -43,8 +43,8 @@ std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses);
 
 // The similarity that minimises the sum of squares of the distances between
 // the camera centres [Umeyama, PAMI 13(4), 1991]. None if there are fewer than
-// three, or if those of one model lie on a line: to 1e-6 of its length no
-// rotation about it could be told. O(images).
+// three, or if those of one model lie on a line, to 3e-5 of its length: the
+// rotation about it could not be told. O(images).
 std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses);
 
 // The identity for kNone, the above otherwise. Where all poses are equal, bit
