@@ -39,12 +39,12 @@ void ImproveCentrality(double mu, double centring,
     system->Solve(
         [&](int64_t i) -> Vector {
           const Vector& lambda = system->lambda()[i];
-          const Vector product = Cone::Product(
-              lambda + ahead * direction.ds[i], lambda + ahead * direction.dz[i]);
-          const Vector lacking =
-              Cone::Clamp(product, C::kLeastProduct * mu,
-                          C::kLargestProduct * mu) -
-              product;
+          const Vector product =
+              Cone::Product(lambda + ahead * direction.ds[i],
+                            lambda + ahead * direction.dz[i]);
+          const Vector lacking = Cone::Clamp(product, C::kLeastProduct * mu,
+                                             C::kLargestProduct * mu) -
+                                 product;
           return system->target()[i] +
                  Cone::Divide(lambda,
                               Cone::Clamp(lacking, -C::kLargestProduct * mu,

@@ -64,11 +64,12 @@ struct BoundedSummary {
   int64_t num_active = 0;  // multipliers above 1e-3 of an error's own weight
 };
 
-// Requires a connected problem and an estimate with every residual below the
-// cap, strictly (throws std::invalid_argument). Every iterate stays there. Rows
-// of `problem` must be those at `*estimate`. The frame with the most
-// observations stays; so does the scale, nearly. An iteration is that of
-// MinimizeJointly; the same bits at any number of threads.
+// Requires an estimate with every residual below the cap (throws
+// std::invalid_argument). Every iterate stays there. Rows of `problem` must be
+// those at `*estimate`. Of every connected component the frame with the most
+// observations stays, and the scale is free where no baseline sets it. An
+// iteration takes about as long as one of MinimizeJointly; the same bits at any
+// number of threads.
 BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const BoundedOptions& options,
                                const Context& context, Estimate* estimate);

@@ -26,10 +26,12 @@ constexpr double kLeastProduct = 1e-3;
 constexpr double kLargestProduct = 1e3;
 // After a step shorter than this, the next one only centres.
 constexpr double kShortStep = 0.1;
-// With a gap this near to that asked for, in such gaps, short steps that gain
-// less of the cost end it: lenses near their fold follow no linear row far.
+// With a gap this near to that asked for, in such gaps, so many short steps in a
+// row that gain less of the cost end it: lenses near their fold follow no linear
+// row far.
 constexpr double kNearGap = 10;
-constexpr double kLeastGain = 1e-5;
+constexpr double kLeastGain = 0.1;
+constexpr int kPatience = 3;
 // Mehrotra's sigma is no less, whatever the predictor leaves of the gap.
 constexpr double kSmallestSigma = 1e-3;
 // mu does not fall below this share of what the gap asked for needs.
@@ -118,8 +120,7 @@ void BoundedPath<Cone>::FindNewtonDirection(double mu) {
 // Returns the mu that the direction aims at.
 template <typename Cone>
 double BoundedPath<Cone>::FindDirection() {
-  const double last =
-      kLastShare * options_.gap_tolerance * now_.cost / Count();
+  const double last = kLastShare * options_.gap_tolerance * now_.cost / Count();
   if (step_ < kShortStep) {
     FindNewtonDirection(system_.mu());
     return system_.mu();
@@ -129,8 +130,8 @@ double BoundedPath<Cone>::FindDirection() {
   system_.Solve(
       [&](int64_t i) -> Vector {
         const Vector target =
-            mu * Cone::Identity() - Cone::Product(system_.direction().ds[i],
-                                                  system_.direction().dz[i]);
+            mu * Cone::Identity() -
+            Cone::Product(system_.direction().ds[i], system_.direction().dz[i]);
         return Cone::Divide(system_.lambda()[i], target);
       },
       mu);
@@ -169,8 +170,8 @@ template <typename Cone>
 double BoundedPath<Cone>::TakeStep(double mu) {
   const double before = BarrierCost(now_, mu);
   const double highest = before + kCostRounding * (now_.cost + mu * Count());
-  for (double step = MaxStep(system_.direction().ds, kDamping); step >= kSmallestStep;
-       step *= kBacktracking) {
+  for (double step = MaxStep(system_.direction().ds, kDamping);
+       step >= kSmallestStep; step *= kBacktracking) {
     MoveTo(now_.x, system_.direction().dx, step, &trial_.x);
     if (!View(&trial_) || !(BarrierCost(trial_, mu) <= highest)) continue;
     std::swap(now_, trial_);
@@ -215,10 +216,12 @@ std::optional<BoundedTermination> BoundedPath<Cone>::Iterate(
   if (options_.callback) {
     options_.callback({summary->iterations, now_.cost, RelativeGap(), step_});
   }
-  if (step_ < kShortStep && gain < kLeastGain * now_.cost &&
-      *summary->duality_gap <= kNearGap * options_.gap_tolerance) {
-    return BoundedTermination::kNoProgress;
-  }
+  const bool is_idle =
+      step_ < kShortStep &&
+      gain < kLeastGain * options_.gap_tolerance * now_.cost &&
+      *summary->duality_gap <= kNearGap * options_.gap_tolerance;
+  num_idle_ = is_idle ? num_idle_ + 1 : 0;
+  if (num_idle_ == kPatience) return BoundedTermination::kNoProgress;
   return std::nullopt;
 }
 

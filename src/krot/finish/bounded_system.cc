@@ -39,8 +39,8 @@ Matrix3d Triangle(Eigen::Matrix<double, kRows, 3> A) {
 
 template <typename Cone>
 BoundedSystem<Cone>::BoundedSystem(const KnownRotationProblem& problem,
-                                   Norm norm, double cap,
-                                   const ErrorLoss& loss, int num_threads)
+                                   Norm norm, double cap, const ErrorLoss& loss,
+                                   int num_threads)
     : problem_(problem),
       cap_(cap),
       loss_(loss),
@@ -125,18 +125,18 @@ void BoundedSystem<Cone>::FindGradient(double mu) {
                   }
                 }
               });
-  ParallelFor(
-      problem_.num_frames, 1, loop_.num_threads(),
-      [&](int64_t f, int64_t, int) {
-        if (structure_.frame_is_fixed[f]) return;
-        for (int64_t n = problem_.frame_begin[f];
-             n < problem_.frame_begin[f + 1]; ++n) {
-          const int64_t i = problem_.frame_observations[n];
-          const View& view = problem_.views[problem_.observations[i].view];
-          gradient_.frames[f].noalias() +=
-              view.cam_from_rig_rotation.transpose() * pull_[i];
-        }
-      });
+  ParallelFor(problem_.num_frames, 1, loop_.num_threads(),
+              [&](int64_t f, int64_t, int) {
+                if (structure_.frame_is_fixed[f]) return;
+                for (int64_t n = problem_.frame_begin[f];
+                     n < problem_.frame_begin[f + 1]; ++n) {
+                  const int64_t i = problem_.frame_observations[n];
+                  const View& view =
+                      problem_.views[problem_.observations[i].view];
+                  gradient_.frames[f].noalias() +=
+                      view.cam_from_rig_rotation.transpose() * pull_[i];
+                }
+              });
 }
 
 template <typename Cone>
@@ -151,8 +151,8 @@ void BoundedSystem<Cone>::SolveForTarget(double mu) {
     const Vector3d dwv =
         o.E * (view.cam_from_world_rotation * d.dx.points[o.point] +
                view.cam_from_rig_rotation * d.dx.frames[view.frame]);
-    d.ds[i] = scaling_[i].ApplyInverse(
-        T_ * Vector3d(cap_ * dwv[0], dwv[1], dwv[2]));
+    d.ds[i] =
+        scaling_[i].ApplyInverse(T_ * Vector3d(cap_ * dwv[0], dwv[1], dwv[2]));
     d.dz[i] = target_[i] - lambda_[i] - d.ds[i];
   });
 }

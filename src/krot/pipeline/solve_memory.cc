@@ -95,9 +95,9 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
                          PartBytes(problem));
   if (summary.method == SolveMethod::kAuto) {
     const bool rows_are_taken_anew = !Reprojection(model, built).IsLinear();
-    memory.likely = std::max(
-        memory.likely,
-        held + EstimateBoundedMemory(problem, summary.norm, rows_are_taken_anew));
+    memory.likely = std::max(memory.likely,
+                             held + EstimateBoundedMemory(problem, summary.norm,
+                                                          rows_are_taken_anew));
   }
   memory.at_most = std::max(memory.at_most, memory.likely);
   return memory;
