@@ -27,8 +27,9 @@ constexpr double kMaxGrowth = 3;
 constexpr double kShareOfGapForProof = 0.5;
 // After so many rounds it takes in everything.
 constexpr int kMaxRounds = 12;
-// A component of fewer is solved as it is: its iterations take a millisecond.
-constexpr size_t kFewObservations = 2000;
+// A component of fewer points for each frame is solved as it is: ties alone
+// take in most of it.
+constexpr int kFewPointsPerFrame = 10;
 
 void CheckOptions(const JointOptions& options) {
   CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
@@ -171,8 +172,10 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
+  if (problem_.num_points < kFewPointsPerFrame * problem_.num_frames) {
+    set_.AddAll();
+  }
   for (int round = 1;; ++round) {
-    if (problem_.observations.size() < kFewObservations) set_.AddAll();
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
     if (do_others_fit_) do_others_fit_ = FitOthers(&candidate);
