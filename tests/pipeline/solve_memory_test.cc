@@ -83,7 +83,10 @@ TEST(EstimateSolveMemory, CountsAWorkingSetAndAtMostEveryObservation) {
   for (const SolveMethod method : {SolveMethod::kAuto, SolveMethod::kJoint}) {
     const SolveMemory memory = Estimate(model, method);
     EXPECT_GE(memory.likely, Estimate(model, SolveMethod::kResInt).likely);
-    EXPECT_GT(memory.at_most, 3 * memory.likely / 2);
+    // The finish of kAuto looks at all observations in any case.
+    EXPECT_GT(memory.at_most, method == SolveMethod::kJoint
+                                  ? 3 * memory.likely / 2
+                                  : memory.likely);
   }
 }
 

@@ -1,10 +1,7 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 
-#include "krot/base/context.h"
-#include "krot/bridge/reprojection.h"
 #include "krot/finish/bounded_least_squares.h"
 
 namespace krot {
@@ -29,6 +26,7 @@ struct FinishOptions {
   std::function<void(const BoundedIterate&)> callback;
 };
 
+// Of a finish by least squares.
 struct FinishSummary {
   double cap = 0;          // pixels
   double lowest_cost = 0;  // the largest error before it, pixels
@@ -36,13 +34,5 @@ struct FinishSummary {
   BoundedSummary solve;
   double seconds = 0;
 };
-
-// The least squares of true errors, over translations and points, with every
-// error below the cap; none if the estimate itself is not clearly below it.
-// The rows of `problem` are in the end those at `*estimate`.
-std::optional<FinishSummary> FinishByLeastSquares(
-    const Reprojection& reprojection, const FinishOptions& options, Norm norm,
-    double cap, const Context& context, KnownRotationProblem* problem,
-    Estimate* estimate);
 
 }  // namespace krot

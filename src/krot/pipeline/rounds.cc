@@ -32,11 +32,6 @@ constexpr double kSufficientShare = 0.95;
 // Rows that have lowered the true cost to this share, and whose own is such a
 // share of that, are taken anew before they are solved.
 constexpr double kFarAway = 0.5;
-// Sweeps behind the last round: after them a third would hardly lower any
-// block's own maximum.
-constexpr int kFinishingSweeps = 2;
-// What a finishing sweep may add to the cost by rounding, relative.
-constexpr double kCostRounding = 1e-12;
 
 class Rounds {
  public:
@@ -88,9 +83,6 @@ class Rounds {
   bool HaveRowsServed(const Estimate& swept, double linear_cost) const;
   bool RunOne();
   void Prove();
-  void RunFinish();
-  void FinishByLeastSquares();
-  void FinishBySweeps();
 
   const Model& model_;
   const SolveModelOptions& options_;
@@ -227,62 +219,16 @@ void Rounds::Run() {
   while (RunOne() && summary_.rounds.size() < kMaxRounds) {
   }
   if (!certificate_ && !IsInterrupted()) Prove();
-  const bool is_gap_reached = IsGapReached();
-  if (method_ == SolveMethod::kAuto && !IsInterrupted()) RunFinish();
   summary_.cost_final = cost_;
   if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
       !IsInterrupted()) {
     summary_.termination = SolveTermination::kZeroCost;
-  } else if (is_gap_reached && !IsInterrupted()) {
+  } else if (IsGapReached() && !IsInterrupted()) {
     summary_.termination = SolveTermination::kGapReached;
   } else if (summary_.termination == SolveTermination::kGapReached ||
              summary_.termination == SolveTermination::kZeroCost ||
              summary_.termination == SolveTermination::kNotRun) {
     summary_.termination = SolveTermination::kStalled;  // that was of the rows
-  }
-}
-
-void Rounds::RunFinish() {
-  switch (options_.finish.finish) {
-    case Finish::kNone:
-      return;
-    case Finish::kSweeps:
-      return FinishBySweeps();
-    case Finish::kLeastSquares:
-      return FinishByLeastSquares();
-  }
-}
-
-// Below a cap of (1 + slack) times the lowest maximum, as far as that is known,
-// and no error above the start's largest.
-void Rounds::FinishByLeastSquares() {
-  if (IsZeroUpToRounding(cost_)) return;
-  const double lowest = IsGapReached() ? certificate_->lower_bound : cost_;
-  const double cap =
-      std::min((1 + options_.finish.slack) * lowest, summary_.cost_initial);
-  summary_.finish =
-      krot::FinishByLeastSquares(reprojection_, options_.finish, options_.norm,
-                                 cap, context_, &built_.problem, &estimate_);
-  cost_ = TrueCost(estimate_);
-}
-
-void Rounds::FinishBySweeps() {
-  for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
-    Estimate swept = estimate_;
-    const double highest = (1 + kCostRounding) * cost_;
-    if (!SweepToFinish(built_.problem, options_, context_, highest, &swept)) {
-      return;
-    }
-    const double cost = TrueCost(swept);
-    if (!(cost <= highest)) return;
-    estimate_ = std::move(swept);
-    cost_ = cost;
-    summary_.sweeps.push_back({cost, timer_.Seconds()});
-    if (options_.res_int.callback) {
-      options_.res_int.callback(static_cast<int>(summary_.sweeps.size()),
-                                summary_.sweeps.back());
-    }
-    reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
   }
 }
 

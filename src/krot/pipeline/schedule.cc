@@ -5,7 +5,6 @@
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
 
 namespace krot {
 namespace {
@@ -168,22 +167,6 @@ std::optional<Certificate> SolveRows(
     return std::nullopt;
   }
   return schedule.Joint();
-}
-
-bool SweepToFinish(const KnownRotationProblem& problem,
-                   const SolveModelOptions& options, const Context& context,
-                   double highest, Estimate* estimate) {
-  Estimate swept = *estimate;
-  BlockSweep blocks(problem, options.res_int.fast_descent, options.norm,
-                    context);
-  blocks.IntersectPoints(&swept);
-  blocks.ResectFrames(&swept);
-  if (context.IsCancelled() ||
-      !(Cost(problem, swept, options.norm, context.num_threads) <= highest)) {
-    return false;
-  }
-  *estimate = std::move(swept);
-  return true;
 }
 
 }  // namespace krot

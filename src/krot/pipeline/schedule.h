@@ -25,10 +25,4 @@ std::optional<Certificate> SolveRows(
     const Context& context, const Timer& timer, Estimate* estimate,
     SolveSummary* summary);
 
-// Behind the last round of kAuto: lowers every block's own maximum. Returns
-// whether a sweep was taken, whose rows' cost is at most `highest`, pixels.
-bool SweepToFinish(const KnownRotationProblem& problem,
-                   const SolveModelOptions& options, const Context& context,
-                   double highest, Estimate* estimate);
-
 }  // namespace krot

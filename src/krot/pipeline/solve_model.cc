@@ -12,6 +12,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
+#include "krot/pipeline/run_finish.h"
 #include "krot/pipeline/solve_memory.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/components.h"
@@ -219,6 +220,13 @@ SolveModelResult SolveModel(const Model& model,
   const std::optional<PixelCertificate> certificate =
       SolveInRounds(model, options, summary.method, context, solve_timer,
                     &start.built, &estimate, &summary);
+  if (summary.method == SolveMethod::kAuto &&
+      summary.termination != SolveTermination::kInterrupted) {
+    RunFinish(model, options,
+              certificate ? std::optional(certificate->lower_bound)
+                          : std::nullopt,
+              context, solve_timer, &start.built, &estimate, &summary);
+  }
   if (options.res_int.update_frames) {
     RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
                            num_threads, &estimate);

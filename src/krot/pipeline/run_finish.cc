@@ -1,0 +1,123 @@
+#include "krot/pipeline/run_finish.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "krot/bridge/reprojection.h"
+#include "krot/problem/cost.h"
+#include "krot/sweeps/block_sweep.h"
+
+namespace krot {
+namespace {
+
+// An estimate that is nearer to the cap, relative, leaves no room.
+constexpr double kLeastRoom = 1e-6;
+// What rounding may add to the largest error, relative.
+constexpr double kRounding = 1e-7;
+// After them a third would hardly lower any block's own maximum.
+constexpr int kSweeps = 2;
+// What a sweep may add to the cost by rounding, relative.
+constexpr double kCostRounding = 1e-12;
+
+void FinishByLeastSquares(const Reprojection& reprojection,
+                          const SolveModelOptions& options,
+                          std::optional<double> lower_bound,
+                          const Context& context, BuiltProblem* built,
+                          Estimate* estimate, SolveSummary* summary) {
+  const Timer timer;
+  FinishSummary finish;
+  finish.lowest_cost = summary->cost_final;
+  finish.loss = options.finish.loss;
+  const double room = finish.lowest_cost - lower_bound.value_or(0);
+  const bool is_lowest_known =
+      room <= options.joint.relative_gap * finish.lowest_cost;
+  finish.cap = std::min(
+      (1 + options.finish.slack) *
+          (is_lowest_known ? lower_bound.value_or(0) : finish.lowest_cost),
+      summary->cost_initial);
+  if (!(finish.lowest_cost < (1 - kLeastRoom) * finish.cap)) return;
+
+  BoundedOptions bounded;
+  bounded.norm = options.norm;
+  bounded.cap = (1 - kRounding) * finish.cap;
+  bounded.loss = options.finish.loss;
+  bounded.callback = options.finish.callback;
+  if (!reprojection.IsLinear()) {
+    bounded.take_rows = [&](const Estimate& x, KnownRotationProblem* rows) {
+      return reprojection.TakeRows(x, context.num_threads, rows);
+    };
+  }
+  Estimate finished = *estimate;
+  finish.solve = MinimizeBounded(built->problem, bounded, context, &finished);
+  const double cost =
+      reprojection.TrueCost(finished, options.norm, context.num_threads);
+  if (!(cost <= finish.cap)) return;
+  *estimate = std::move(finished);
+  reprojection.TakeRows(*estimate, context.num_threads, &built->problem);
+  summary->cost_final = cost;
+  finish.seconds = timer.Seconds();
+  summary->finish = finish;
+}
+
+void FinishBySweeps(const Reprojection& reprojection,
+                    const SolveModelOptions& options, const Context& context,
+                    const Timer& timer, BuiltProblem* built, Estimate* estimate,
+                    SolveSummary* summary) {
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    const double highest = (1 + kCostRounding) * summary->cost_final;
+    Estimate swept = *estimate;
+    BlockSweep blocks(built->problem, options.res_int.fast_descent,
+                      options.norm, context);
+    blocks.IntersectPoints(&swept);
+    blocks.ResectFrames(&swept);
+    if (context.IsCancelled() || !(Cost(built->problem, swept, options.norm,
+                                        context.num_threads) <= highest)) {
+      return;
+    }
+    const double cost =
+        reprojection.TrueCost(swept, options.norm, context.num_threads);
+    if (!(cost <= highest)) return;
+    *estimate = std::move(swept);
+    reprojection.TakeRows(*estimate, context.num_threads, &built->problem);
+    summary->cost_final = cost;
+    summary->sweeps.push_back({cost, timer.Seconds()});
+    if (options.res_int.callback) {
+      options.res_int.callback(static_cast<int>(summary->sweeps.size()),
+                               summary->sweeps.back());
+    }
+  }
+}
+
+}  // namespace
+
+const char* FinishName(Finish finish) {
+  switch (finish) {
+    case Finish::kSweeps:
+      return "sweeps";
+    case Finish::kLeastSquares:
+      return "least_squares";
+    case Finish::kNone:
+      break;
+  }
+  return "none";
+}
+
+void RunFinish(const Model& model, const SolveModelOptions& options,
+               std::optional<double> lower_bound, const Context& context,
+               const Timer& timer, BuiltProblem* built, Estimate* estimate,
+               SolveSummary* summary) {
+  if (options.finish.finish == Finish::kNone) return;
+  const Reprojection reprojection(model, *built);
+  if (options.finish.finish == Finish::kSweeps) {
+    FinishBySweeps(reprojection, options, context, timer, built, estimate,
+                   summary);
+  } else if (!IsZeroUpToRounding(summary->cost_final)) {
+    FinishByLeastSquares(reprojection, options, lower_bound, context, built,
+                         estimate, summary);
+  }
+  if (context.IsCancelled()) {
+    summary->termination = SolveTermination::kInterrupted;
+  }
+}
+
+}  // namespace krot
