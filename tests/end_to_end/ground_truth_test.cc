@@ -206,7 +206,7 @@ TEST_F(EndToEnd, TheMappersScriptMakesModelProofReportAndOverlay) {
        "--image_path", (*folder_ / "sharp_photos").string(), "--output_path",
        output.string(), "--Mapper.num_threads", "1", "--random_seed", "0"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("proved optimal"));
+  EXPECT_THAT(run.out, HasSubstr("proved to be within"));
   EXPECT_THAT(run.out, HasSubstr("How far cameras and points are apart"));
   EXPECT_EQ(FileNames(output),
             (std::vector<std::string>{"0", "0_linf", "0_linf.html",
