@@ -29,7 +29,7 @@ Comparison CompareWithTruth(const fs::path& model, const fs::path& truth,
         Json::parse(ReadBytes(certificate))["lower_bound"].get<double>();
   }
   for (const char* name : {"input", "colmap_ba", "ba", "cauchy", "ba_rotations",
-                           "bounded", "linf"}) {
+                           "bounded", "linf", "linf_cauchy", "linf_only"}) {
     const Json report =
         Json::parse(ReadBytes(reports / (std::string(name) + ".json")));
     const Json& errors = report["pixel_error"]["model2"];

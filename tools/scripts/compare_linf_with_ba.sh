@@ -9,8 +9,8 @@
 #   --max_error_factor F  the cap of bounded bundle adjustment, as a multiple
 #                         of the lowest maximum; 1.1 if not given
 #
-# FOLDER takes the models (colmap_ba, ba, cauchy, ba_rotations, bounded, linf),
-# and in FOLDER/reports what each command said and a report of each comparison.
+# FOLDER takes the models (colmap_ba, ba, cauchy, ba_rotations, bounded, linf,
+# linf_cauchy, linf_only), and in FOLDER/reports what each command said and a report of each comparison.
 # Results already there are replaced. Needs colmap, jq and krot: the one that the
 # environment's KROT names, that is built here, or that is installed.
 set -euo pipefail
@@ -45,6 +45,8 @@ adjust colmap_ba colmap bundle_adjuster
 rm -f "$reports/certificate.json"  # there may be none this time
 adjust linf "$krot" solver --overwrite 1 \
   --certificate_path "$reports/certificate.json"
+adjust linf_cauchy "$krot" solver --overwrite 1 --Solver.finish_loss cauchy
+adjust linf_only "$krot" solver --overwrite 1 --Solver.finish none
 adjust ba "${krot_ba[@]}"
 adjust cauchy "${krot_ba[@]}" --BundleAdjustmentCeres.loss_function_type CAUCHY
 adjust ba_rotations "${krot_ba[@]}" \
@@ -83,5 +85,7 @@ row "$output/cauchy" cauchy "  Cauchy loss"
 row "$output/ba_rotations" ba_rotations "  rotations, intrinsics kept"
 row "$output/bounded" bounded "  bounded, $factor x the lowest"
 row "$output/linf" linf "lowest maximum"
+row "$output/linf_cauchy" linf_cauchy "  finish with Cauchy loss"
+row "$output/linf_only" linf_only "  no finish"
 jq -r '"Centres are in units of a scene in which the cameras are \(.scene_radius
   * 1e4 | round / 1e4) from their centroid (RMS)."' "$reports/input.json"
