@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include "krot/conic/problem_blocks.h"
+
 namespace krot {
 namespace {
 
@@ -23,40 +25,6 @@ double MedianDepth(const std::vector<ViewedPoint>& viewed) {
   return *middle;
 }
 
-// T: (top; v) into the cone.
-template <int kDim>
-Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
-  Eigen::Matrix<double, kDim, 3> T;
-  if constexpr (kDim == 3) {
-    T.setIdentity();
-  } else if (norm.p == 1) {  // top +- v1 +- v2
-    T << 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, -1;
-  } else {  // top +- v1, top +- v2
-    T << 1, 1, 0, 1, -1, 0, 1, 0, 1, 1, 0, -1;
-  }
-  return T;
-}
-
-// The translation gauge: the frame with the most observations stays put.
-BlockStructure MakeStructure(const KnownRotationProblem& problem) {
-  BlockStructure structure;
-  structure.point_begin = problem.point_begin;
-  structure.frame_of.reserve(problem.observations.size());
-  for (const Observation& observation : problem.observations) {
-    structure.frame_of.push_back(problem.views[observation.view].frame);
-  }
-  structure.frame_is_fixed.assign(problem.num_frames, 0);
-  int32_t anchor = 0;
-  for (int32_t f = 1; f < problem.num_frames; ++f) {
-    if (problem.frame_begin[f + 1] - problem.frame_begin[f] >
-        problem.frame_begin[anchor + 1] - problem.frame_begin[anchor]) {
-      anchor = f;
-    }
-  }
-  if (problem.num_frames > 0) structure.frame_is_fixed[anchor] = 1;
-  return structure;
-}
-
 }  // namespace
 
 template <typename Cone>
@@ -67,7 +35,7 @@ NewtonSystem<Cone>::NewtonSystem(const KnownRotationProblem& problem,
       program_(program),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       has_free_scale_(program.IsCost() && !HasBaseline(problem)),
-      structure_(MakeStructure(problem)),
+      structure_(StructureOf(problem)),
       T_(ConeMap<kDim>(norm)),
       elimination_(structure_, num_threads),
       scaling_(problem.observations.size()),
@@ -194,7 +162,7 @@ int64_t NewtonSystem<Cone>::MemoryBytes(const KnownRotationProblem& problem) {
   constexpr int64_t kPerUnknown = 10 * sizeof(Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
          (problem.num_points + problem.num_frames) * kPerUnknown +
-         FrameSystem(MakeStructure(problem)).MemoryBytes();
+         FrameSystem(StructureOf(problem)).MemoryBytes();
 }
 
 template class NewtonSystem<SecondOrderCone>;

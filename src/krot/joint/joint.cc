@@ -33,6 +33,8 @@ void CheckOptions(const JointOptions& options) {
                 options.norm.p, "1, 2 or infinity");
   CheckArgument(options.relative_gap > 0, "relative_gap", options.relative_gap,
                 "> 0");
+  CheckArgument(options.sufficient_cost >= 0, "sufficient_cost",
+                options.sufficient_cost, ">= 0");
   CheckArgument(options.max_iterations >= 1, "max_iterations",
                 options.max_iterations, ">= 1");
 }
@@ -66,7 +68,7 @@ class ComponentSolve {
   }
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
-           IsZeroUpToRounding(cost_);
+           cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
   }
   JointTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
@@ -168,7 +170,7 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
-  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
+  if (IsGapReached()) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);
