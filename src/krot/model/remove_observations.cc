@@ -46,6 +46,7 @@ RemovedObservations RemoveObservations(const Model& model,
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
       if (!is_removed[e]) {
         result.model.track_elements.push_back(model.track_elements[e]);
+        result.element_of.push_back(e);
       }
     }
     kept.track_end = result.model.track_elements.size();

@@ -9,6 +9,7 @@ namespace krot {
 
 struct RemovedObservations {
   Model model;
+  std::vector<uint64_t> element_of;  // what each track element was
   // Elements that went because fewer than two of their track were left.
   int64_t num_left_alone = 0;
   int64_t num_points = 0;  // whose tracks went with them
