@@ -36,6 +36,7 @@ class Packing {
         removal_(removal),
         context_(context),
         is_free_(problem_.observations.size(), 1),
+        is_taken_(problem_.observations.size(), 0),
         points_of_frame_(problem_.num_frames) {
     small_context_ = context;
     small_context_.num_threads = 1;
@@ -65,7 +66,9 @@ class Packing {
                                      std::vector<int32_t> frames) const;
   std::vector<std::vector<int32_t>> FrameSets(int64_t i, int num_others) const;
   std::optional<Conflict> Try(const std::vector<int64_t>& observations) const;
+  bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
   bool Charge(int64_t i, int num_others);
+  void Charge(std::vector<std::pair<double, int64_t>>* open);
   void ChargeTight();
   void Take(Conflict conflict);
 
@@ -76,7 +79,8 @@ class Packing {
   const Removal& removal_;
   const Context context_;
   Context small_context_;
-  std::vector<char> is_free_;  // neither removed nor of a conflict
+  std::vector<char> is_free_;   // to make conflicts with others
+  std::vector<char> is_taken_;  // by a conflict
   std::vector<std::vector<int32_t>> points_of_frame_;  // ascending
   std::vector<Conflict> conflicts_;
 };
@@ -198,7 +202,10 @@ std::optional<Conflict> Packing::Try(
 }
 
 void Packing::Take(Conflict conflict) {
-  for (const int64_t i : conflict.observations) is_free_[i] = 0;
+  for (const int64_t i : conflict.observations) {
+    is_free_[i] = 0;
+    is_taken_[i] = 1;
+  }
   conflicts_.push_back(std::move(conflict));
 }
 
@@ -224,6 +231,18 @@ bool Packing::Charge(int64_t i, int num_others) {
   return true;
 }
 
+// Those that are left open found no conflict of their own.
+void Packing::Charge(std::vector<std::pair<double, int64_t>>* open) {
+  for (const int num_others : {1, 2, 3}) {
+    std::vector<std::pair<double, int64_t>> left;
+    for (const auto& removed : *open) {
+      if (context_.IsCancelled() || IsTaken(removed.second)) continue;
+      if (!Charge(removed.second, num_others)) left.push_back(removed);
+    }
+    *open = std::move(left);
+  }
+}
+
 std::vector<Conflict> Packing::Run() {
   const Reprojection reprojection(model_, built_);
   std::vector<std::pair<double, int64_t>> open;  // -error, observation
@@ -232,15 +251,9 @@ std::vector<Conflict> Packing::Run() {
                       i);
   }
   std::sort(open.begin(), open.end());
-  for (const int num_others : {1, 2, 3}) {
-    std::vector<std::pair<double, int64_t>> left;
-    for (const auto& removed : open) {
-      if (context_.IsCancelled()) break;
-      if (!Charge(removed.second, num_others)) left.push_back(removed);
-    }
-    open = std::move(left);
-  }
+  Charge(&open);
   for (const auto& removed : open) is_free_[removed.second] = 1;
+  Charge(&open);
   ChargeTight();
   return std::move(conflicts_);
 }

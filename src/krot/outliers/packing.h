@@ -18,8 +18,9 @@ namespace krot {
 //     the observations there whose rays miss each other by most,
 //   and at last among the removal's tight observations,
 //
-// always among those that are neither removed nor taken already: small
-// conflicts leave more to others.
+// first among those that are neither removed nor taken already, so that no
+// other has to share the charge, then with the removed ones that found none.
+// Small conflicts leave more to others.
 std::vector<Conflict> PackAgainstRemoval(const Model& model,
                                          const BuiltProblem& built,
                                          const ErrorBound& bound,
