@@ -108,17 +108,22 @@ TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {
   options.random_seed = 7;
   Model model = SynthesizeScene(options).model;
   const BuiltProblem built = BuildProblem(model, {});
-  // Without noise, nothing but the twins is above a tenth of a pixel.
-  const std::vector<Conflict> conflicts =
-      PackConflicts(model, built, {Norm::L2(), 0.1}, All(built), {});
-  ASSERT_FALSE(conflicts.empty());
-  for (const Conflict& conflict : conflicts) {
-    ASSERT_EQ(conflict.observations.size(), 2u);
-    const Observation& a = built.problem.observations[conflict.observations[0]];
-    const Observation& b = built.problem.observations[conflict.observations[1]];
-    EXPECT_EQ(a.view, b.view);
-    EXPECT_EQ(a.point, b.point);
+  // Without noise, nothing but a twin is above a tenth of a pixel.
+  int num_pairs = 0;
+  const KnownRotationProblem& problem = built.problem;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    std::vector<int64_t> track(problem.point_begin[k + 1] -
+                               problem.point_begin[k]);
+    std::iota(track.begin(), track.end(), problem.point_begin[k]);
+    const std::optional<Conflict> conflict =
+        FindConflict(model, built, {Norm::L2(), 0.1}, track, {});
+    if (!conflict) continue;
+    ++num_pairs;
+    ASSERT_EQ(conflict->observations.size(), 2u);
+    EXPECT_EQ(problem.observations[conflict->observations[0]].view,
+              problem.observations[conflict->observations[1]].view);
   }
+  EXPECT_GT(num_pairs, 5);
 }
 
 }  // namespace

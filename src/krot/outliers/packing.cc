@@ -9,7 +9,9 @@
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/built_part.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/problem/components.h"
 #include "krot/problem/subset.h"
+#include "krot/sweeps/block_sweep.h"
 
 namespace krot {
 namespace {
@@ -21,6 +23,7 @@ using Eigen::Vector3d;
 constexpr int kStrainedPoints = 16;
 // Frames of a track that are looked at together; no more.
 constexpr size_t kMaxFramesTogether = 8;
+constexpr size_t kFramesInTriples = 4;
 // Parts of the tight observations that are larger are left alone.
 constexpr size_t kMaxTight = 400;
 
@@ -65,7 +68,9 @@ class Packing {
   std::vector<int64_t> Neighbourhood(int64_t i,
                                      std::vector<int32_t> frames) const;
   std::vector<std::vector<int32_t>> FrameSets(int64_t i, int num_others) const;
-  std::optional<Conflict> Try(const std::vector<int64_t>& observations) const;
+  bool FitsIn(int64_t i, const std::vector<int32_t>& frames) const;
+  std::optional<Conflict> Try(int64_t i,
+                              const std::vector<int32_t>& frames) const;
   bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
   bool Charge(int64_t i, int num_others);
   void Charge(std::vector<std::pair<double, int64_t>>* open);
@@ -161,23 +166,29 @@ std::vector<int64_t> Packing::Neighbourhood(int64_t i,
   return observations;
 }
 
-// Those of the track, beside its own, that observation i is tried with.
+// Those of the track, beside its own, that observation i is tried with: the
+// most strained first.
 std::vector<std::vector<int32_t>> Packing::FrameSets(int64_t i,
                                                      int num_others) const {
   const int32_t k = problem_.observations[i].point;
-  std::vector<int32_t> others;
+  std::vector<std::pair<double, int32_t>> strained;  // -strain, frame
   for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
        ++j) {
-    if (is_free_[j]) others.push_back(FrameOf(j));
+    if (is_free_[j] && j != i) strained.emplace_back(-Strain(i, j), FrameOf(j));
   }
-  std::sort(others.begin(), others.end());
-  others.erase(std::unique(others.begin(), others.end()), others.end());
+  std::sort(strained.begin(), strained.end());
+  std::vector<int32_t> others;
+  for (const auto& [strain, frame] : strained) {
+    if (std::find(others.begin(), others.end(), frame) == others.end()) {
+      others.push_back(frame);
+    }
+  }
   if (others.size() > kMaxFramesTogether) others.resize(kMaxFramesTogether);
   std::vector<std::vector<int32_t>> sets;
   if (num_others == 1) {
     for (const int32_t f : others) sets.push_back({f});
   } else if (num_others == 2) {
-    for (size_t n = 0; n < others.size(); ++n) {
+    for (size_t n = 0; n < std::min(others.size(), kFramesInTriples); ++n) {
       for (size_t m = 0; m < n; ++m) sets.push_back({others[m], others[n]});
     }
   } else if (others.size() > 2) {
@@ -186,19 +197,46 @@ std::vector<std::vector<int32_t>> Packing::FrameSets(int64_t i,
   return sets;
 }
 
-std::optional<Conflict> Packing::Try(
-    const std::vector<int64_t>& observations) const {
-  const ProblemSubset subset(problem_, observations);
-  const BuiltProblem part = BuiltPart(built_, subset, built_.start);
-  std::vector<int64_t> all(observations.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<Conflict> found =
-      PackConflicts(model_, part, bound_, all, small_context_);
-  if (found.empty()) return std::nullopt;
-  Conflict conflict = std::move(found.front());
-  conflict.observations = subset.InWhole(std::move(conflict.observations));
-  conflict.proof.rows = InWhole(subset, std::move(conflict.proof.rows));
-  return conflict;
+// Whether observation i and the others of its point in the frames are within
+// the bound where the frames stand, as all that stay are: then they are part of
+// no conflict with these.
+bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
+  const int32_t k = problem_.observations[i].point;
+  std::vector<int64_t> observations;
+  for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
+       ++j) {
+    const bool is_there =
+        std::find(frames.begin(), frames.end(), FrameOf(j)) != frames.end() ||
+        FrameOf(j) == FrameOf(i);
+    if (j == i || (is_free_[j] && is_there)) observations.push_back(j);
+  }
+  const ProblemSubset subset(problem_, std::move(observations));
+  Estimate estimate = subset.Restrict(removal_.estimate);
+  return BlockSweep(subset.problem(), FastDescentOptions(), bound_.norm,
+                    small_context_)
+             .IntersectPoints(&estimate) <= bound_.max_error;
+}
+
+// A conflict of observation i in its frame and others.
+std::optional<Conflict> Packing::Try(int64_t i,
+                                     const std::vector<int32_t>& frames) const {
+  if (FitsIn(i, frames)) return std::nullopt;
+  const std::vector<int64_t> near = Neighbourhood(i, frames);
+  for (const std::vector<int64_t>& part :
+       SplitIntoComponents(problem_, PruneUnconstrained(problem_, near))) {
+    if (!std::binary_search(part.begin(), part.end(), i)) continue;
+    const ProblemSubset subset(problem_, part);
+    std::vector<int64_t> all(part.size());
+    std::iota(all.begin(), all.end(), 0);
+    std::optional<Conflict> conflict =
+        FindConflict(model_, BuiltPart(built_, subset, built_.start), bound_,
+                     all, small_context_);
+    if (!conflict) return std::nullopt;
+    conflict->observations = subset.InWhole(std::move(conflict->observations));
+    conflict->proof.rows = InWhole(subset, std::move(conflict->proof.rows));
+    return conflict;
+  }
+  return std::nullopt;
 }
 
 void Packing::Take(Conflict conflict) {
@@ -215,9 +253,7 @@ bool Packing::Charge(int64_t i, int num_others) {
   const std::vector<std::vector<int32_t>> sets = FrameSets(i, num_others);
   std::vector<std::optional<Conflict>> found(sets.size());
   ParallelFor(static_cast<int64_t>(sets.size()), 1, context_.num_threads,
-              [&](int64_t n, int64_t, int) {
-                found[n] = Try(Neighbourhood(i, sets[n]));
-              });
+              [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n]); });
   std::optional<Conflict>* smallest = nullptr;
   for (std::optional<Conflict>& conflict : found) {
     if (conflict &&
