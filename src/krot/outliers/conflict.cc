@@ -27,6 +27,9 @@ std::vector<std::vector<int64_t>> Parts(
                              PruneUnconstrained(built.problem, observations));
 }
 
+// Larger supports stay as they are: deletion would take as many solves.
+constexpr size_t kMaxDeletions = 60;
+
 // Makes a refuted support irreducible, within its own small problem.
 class Deletion {
  public:
@@ -42,6 +45,7 @@ class Deletion {
 
   // False if an observation is kept only because nothing was decided.
   bool Run() {
+    if (kept_.size() > kMaxDeletions) return false;
     bool is_irreducible = true;
     std::vector<int64_t> untried = kept_;
     while (!untried.empty() && !context_.IsCancelled()) {

@@ -19,7 +19,7 @@ struct Conflict {
   // Of the built problem; its support is the observations.
   PixelCertificate proof;
   // Whether none of the observations can be spared: an estimate was found for
-  // the others.
+  // the others. Not asked of large ones.
   bool is_irreducible = false;
 };
 
