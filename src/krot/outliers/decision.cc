@@ -15,6 +15,11 @@ namespace {
 constexpr double kDecisionGaps[] = {1e-2, 1e-3, 1e-5, 1e-6};
 // What true errors may be above those of the rows.
 constexpr double kRoomForLenses = 1e-6;
+// Of the rows of a refutation that is to be proved.
+constexpr double kProofGap = 1e-6;
+constexpr double kJustAbove = 1e-9;
+// Rows whose bound is nearer to it have no room to be widened.
+constexpr double kWorthWidening = 1e-2;
 
 }  // namespace
 
@@ -63,15 +68,33 @@ std::optional<PixelCertificate> ProveRefutation(const Model& model,
   BuiltProblem at_estimate = part;
   Reprojection(model, part)
       .TakeRows(refuted.estimate, context.num_threads, &at_estimate.problem);
-  std::optional<PixelCertificate> proof =
-      ProveInPixels(model, at_estimate, refuted.estimate, bound.norm,
-                    refuted.support, context);
-  if (!proof || !(proof->lower_bound > bound.max_error) ||
-      !CheckPixelCertificate(model, part, bound.norm, *proof, context)
-           .is_accepted) {
+  const auto is_accepted = [&](const PixelCertificate& proof) {
+    return proof.lower_bound > bound.max_error &&
+           CheckPixelCertificate(model, part, bound.norm, proof, context)
+               .is_accepted;
+  };
+  // No more than the bound need be proved: what the rows' bound is above it by
+  // is room for the lenses.
+  JointOptions options;
+  options.norm = bound.norm;
+  options.relative_gap = kProofGap;
+  Estimate estimate = refuted.estimate;
+  const JointSummary summary =
+      SolveJoint(at_estimate.problem, options, context, &estimate);
+  if (!summary.certificate) return std::nullopt;
+  PixelCertificate proof;
+  proof.rows = *summary.certificate;
+  proof.bearings = BearingsOfPoints(model, part, refuted.estimate, proof.rows);
+  proof.lower_bound = (1 + kJustAbove) * bound.max_error;
+  if (is_accepted(proof)) return proof;
+  if (summary.lower_bound < (1 + kWorthWidening) * bound.max_error) {
     return std::nullopt;
   }
-  return proof;
+  std::optional<PixelCertificate> best =
+      ProveInPixels(model, at_estimate, refuted.estimate, bound.norm,
+                    refuted.support, context);
+  if (!best || !is_accepted(*best)) return std::nullopt;
+  return best;
 }
 
 }  // namespace krot
