@@ -68,7 +68,10 @@ class ComponentSolve {
   }
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
-           cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
+           IsLowEnough();
+  }
+  bool IsLowEnough() const {
+    return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
   }
   JointTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
@@ -170,7 +173,7 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
-  if (IsGapReached()) return JointTermination::kGapReached;
+  if (IsLowEnough()) return JointTermination::kGapReached;
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
     const JointTermination termination = SolveWorkingSet(report, &candidate);

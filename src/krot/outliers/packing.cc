@@ -16,6 +16,8 @@
 namespace krot {
 namespace {
 
+// More open observations than these are tried with one other frame only.
+constexpr size_t kMaxForMoreFrames = 2000;
 // More tight observations than these are left alone.
 constexpr size_t kMaxTight = 250;
 
@@ -140,6 +142,7 @@ bool Packing::Charge(int64_t i, int num_others) {
 // Those that are left open found no conflict of their own.
 void Packing::Charge(std::vector<std::pair<double, int64_t>>* open) {
   for (const int num_others : {1, 2, 3}) {
+    if (num_others > 1 && open->size() > kMaxForMoreFrames) return;
     std::vector<std::pair<double, int64_t>> left;
     for (const auto& removed : *open) {
       if (context_.IsCancelled() || IsTaken(removed.second)) continue;
