@@ -65,6 +65,21 @@ TEST(MinimizeExcess, LeavesNoneWhereTheBoundIsTheCostOfTheStart) {
   }
 }
 
+TEST(MinimizeExcess, FindsAnEstimateWithinTheBoundFromNothing) {
+  for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
+    const RandomScene scene = MakeScene(5);
+    const double bound = 1.01 * Cost(scene.problem, scene.estimate, norm, 1);
+    ExcessOptions options;
+    options.norm = norm;
+    Estimate estimate = scene.estimate;
+    for (Eigen::Vector3d& s : estimate.points) s.setZero();
+    for (Eigen::Vector3d& t : estimate.translations) t.setZero();
+    MinimizeExcess(scene.problem, bound, options, {}, &estimate);
+    EXPECT_TRUE(AllDepthsPositive(scene.problem, estimate, 1));
+    EXPECT_LT(Cost(scene.problem, estimate, norm, 1), 1.01 * bound);
+  }
+}
+
 // A convex function: nothing nearby is lower than a minimum, up to the gap that
 // the interior point leaves.
 TEST(MinimizeExcess, CannotBeLoweredByAnyNearbyEstimate) {

@@ -81,7 +81,10 @@ TEST(ConflictFile, IsRefusedOnceItIsTamperedWith) {
        [](auto* f) { f->conflicts[0].observations[0].lambda *= 1.01; }},
       {"conflict 1: ",
        [](auto* f) { f->conflicts[0].observations[0].y *= 0.9; }},
-      {"conflict 1: ", [](auto* f) { f->conflicts[0].lower_bound *= 2; }},
+      {"conflict 1: ",
+       [](auto* f) {
+         f->conflicts[0].lower_bound = 1.01 * f->conflicts[0].rows_bound;
+       }},
       {"conflict 1: ",
        [](auto* f) {
          f->conflicts[0].observations[0].bearing = {0, 0, -1};

@@ -40,7 +40,9 @@ struct ExcessSolution {
 };
 
 // The problem must be connected; depths of `*estimate` need not be positive. If
-// none is, it starts from the origin, with mean depth 1. Same memory as
+// most are not, as those of zeros, it starts from nothing: from the origin,
+// with mean depth 1, and w_i less a small share of that in place of w_i, as
+// otherwise all but a few points would shrink into one. Same memory as
 // MinimizeJointly, and about its work per iteration.
 ExcessSolution MinimizeExcess(const KnownRotationProblem& problem, double bound,
                               const ExcessOptions& options,

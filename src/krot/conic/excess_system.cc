@@ -11,11 +11,12 @@ template <typename Cone>
 ExcessSystem<Cone>::ExcessSystem(const KnownRotationProblem& problem, Norm norm,
                                  double bound, std::vector<double> costs,
                                  const std::vector<double>& depths,
-                                 int num_threads)
+                                 double min_depth, int num_threads)
     : problem_(problem),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       has_free_scale_(!HasBaseline(problem)),
       bound_(bound),
+      min_depth_(min_depth),
       costs_(std::move(costs)),
       structure_(StructureOf(problem)),
       T_(ConeMap<kDim>(norm)),

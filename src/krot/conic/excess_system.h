@@ -59,14 +59,14 @@ class ExcessSystem {
   // `costs` are the c_i, and `depths` those that are 1 in the gauge.
   ExcessSystem(const KnownRotationProblem& problem, Norm norm, double bound,
                std::vector<double> costs, const std::vector<double>& depths,
-               int num_threads);
+               double min_depth, int num_threads);
 
   // e'x, but for what the frame that stays put adds.
   double MeanDepth(const Estimate& x) const;
 
   Vector Slack(const ViewedPoint& viewed, double sigma) const {
-    return T_ * Eigen::Vector3d(bound_ * viewed.depth + sigma, viewed.v[0],
-                                viewed.v[1]);
+    return T_ * Eigen::Vector3d(bound_ * (viewed.depth - min_depth_) + sigma,
+                                viewed.v[0], viewed.v[1]);
   }
   // `shortfall`: what e'x is to grow by, where the scale is free. False if
   // there is no factor.
@@ -114,6 +114,7 @@ class ExcessSystem {
   const ObservationLoop loop_;
   const bool has_free_scale_;
   const double bound_;
+  const double min_depth_;
   const std::vector<double> costs_;
   const BlockStructure structure_;
   const Eigen::Matrix<double, kDim, 3> T_;
