@@ -34,7 +34,8 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"adjust", {"model"}},
       {"bridge", {"model", "proof"}},
       {"pipeline", {"bridge", "joint", "finish", "analysis", "adjust"}},
-      {"report", {"pipeline", "analysis"}},
+      {"outliers", {"pipeline"}},
+      {"report", {"outliers", "pipeline", "analysis"}},
   };
   return kDependencies;
 }

@@ -3,7 +3,9 @@
 #include <vector>
 
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/bridge/conflict_verdict.h"
 #include "krot/report/certificate_table.h"
+#include "krot/report/outlier_report.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
@@ -22,10 +24,41 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
   parser->AddPath("input_path", &options->input_path, true, "a folder",
                   "The COLMAP model that the certificate speaks of");
   parser->AddPath("certificate_path", &options->certificate_path, true,
-                  "a file", "The certificate, as JSON");
+                  "a file", "The certificate, or conflicts, as JSON");
   AddOnContradiction(&options->on_contradiction, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
+}
+
+Model ReadSubject(const CheckerOptions& options) {
+  return ReadValidModel(options.input_path, options.on_contradiction,
+                        options.common.log)
+      .model;
+}
+
+template <typename Verdict>
+void RequireAccepted(const Verdict& verdict) {
+  if (verdict.is_accepted) return;
+  throw CommandError(kExitCertificateRefused, "refused: " + verdict.refusal);
+}
+
+int CheckCertificate(const CheckerOptions& options, const std::string& json) {
+  const CertificateFile file = ParseCertificate(json, options.certificate_path);
+  const CertificateVerdict verdict =
+      VerifyCertificateFile(ReadSubject(options), file);
+  RequireAccepted(verdict);
+  PrintTable(options.common.log,
+             CertificateTable(verdict, std::numeric_limits<int>::max()));
+  return kExitDone;
+}
+
+int CheckConflicts(const CheckerOptions& options, const std::string& json) {
+  const ConflictFile file = ParseConflicts(json, options.certificate_path);
+  const ConflictVerdict verdict =
+      VerifyConflictFile(ReadSubject(options), file);
+  RequireAccepted(verdict);
+  PrintTable(options.common.log, ConflictTable(verdict));
+  return kExitDone;
 }
 
 }  // namespace
@@ -34,23 +67,17 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
   CheckerOptions options;
   OptionParser parser("certificate_checker",
                       "re-checks the proof that no translations and points "
-                      "have a smaller largest error, from a COLMAP model and "
-                      "the certificate's file alone");
+                      "have a smaller largest error, or that so many "
+                      "observations must go, from a COLMAP model and the "
+                      "certificate's file alone");
   AddCheckerOptions(&options, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(options.common.log, parser.Help());
     return kExitDone;
   }
-  const CertificateFile file = ReadCertificateFile(options.certificate_path);
-  const ValidModel read = ReadValidModel(
-      options.input_path, options.on_contradiction, options.common.log);
-  const CertificateVerdict verdict = VerifyCertificateFile(read.model, file);
-  if (!verdict.is_accepted) {
-    throw CommandError(kExitCertificateRefused, "refused: " + verdict.refusal);
-  }
-  PrintTable(options.common.log,
-             CertificateTable(verdict, std::numeric_limits<int>::max()));
-  return kExitDone;
+  const std::string json = ReadCertificateText(options.certificate_path);
+  return HoldsConflicts(json) ? CheckConflicts(options, json)
+                              : CheckCertificate(options, json);
 }
 
 }  // namespace krot

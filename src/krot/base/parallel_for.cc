@@ -13,7 +13,10 @@ namespace krot {
 
 int ResolveNumThreads(int requested) {
   if (requested > 0) return requested;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  // Asking the system opens a file, which takes longer than a small loop.
+  static const int num_hardware_threads =
+      std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return num_hardware_threads;
 }
 
 void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,

@@ -44,7 +44,13 @@ struct CertificateFile {
   std::vector<SupportObservation> observations;
 };
 
-// `certificate` must be one of built.problem.
+// Its support in terms of the model's ids; `certificate` must be one of
+// built.problem.
+std::vector<CertificateFile::SupportObservation> DescribeSupport(
+    const Model& model, const BuiltProblem& built,
+    const PixelCertificate& certificate);
+
+// The same of all of it.
 CertificateFile DescribeCertificate(const Model& model,
                                     const BuiltProblem& built, Norm norm,
                                     const PixelCertificate& certificate);
@@ -57,6 +63,8 @@ std::string CertificateJson(const CertificateFile& file);
 // certificate proves.
 CertificateFile ParseCertificate(const std::string& json,
                                  const std::string& file_name);
+// The text of such a file; throws ModelError if it cannot be read or is empty.
+std::string ReadCertificateText(const std::filesystem::path& path);
 CertificateFile ReadCertificateFile(const std::filesystem::path& path);
 
 }  // namespace krot

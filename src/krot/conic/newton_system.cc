@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 
+
 namespace krot {
 namespace {
 

@@ -209,7 +209,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
                                      const IterationReport& report) {
   max_iterations_ = max_iterations;
   width_ = kFirstWidth;
-  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
+  if (IsLowEnough()) return JointTermination::kGapReached;
   double start_margin = kStartMargin;
   Estimate start = estimate_;
   LeaveCameras(report, &start);

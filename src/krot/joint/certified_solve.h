@@ -48,7 +48,10 @@ class CertifiedSolve {
  private:
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
-           IsZeroUpToRounding(cost_);
+           IsLowEnough();
+  }
+  bool IsLowEnough() const {
+    return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
   }
   InteriorPointTermination RunFrom(Estimate start, double start_margin,
                                    const TakeEstimate& take,

@@ -36,6 +36,8 @@ void CheckOptions(const JointOptions& options) {
                 options.norm.p, "1, 2 or infinity");
   CheckArgument(options.relative_gap > 0, "relative_gap", options.relative_gap,
                 "> 0");
+  CheckArgument(options.sufficient_cost >= 0, "sufficient_cost",
+                options.sufficient_cost, ">= 0");
   CheckArgument(options.max_iterations >= 1, "max_iterations",
                 options.max_iterations, ">= 1");
 }
@@ -69,7 +71,10 @@ class ComponentSolve {
   }
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
-           IsZeroUpToRounding(cost_);
+           IsLowEnough();
+  }
+  bool IsLowEnough() const {
+    return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
   }
   JointTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
@@ -171,7 +176,7 @@ void ComponentSolve::Keep(const Estimate& candidate) {
 }
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
-  if (IsZeroUpToRounding(cost_)) return JointTermination::kGapReached;
+  if (IsLowEnough()) return JointTermination::kGapReached;
   if (problem_.num_points < kFewPointsPerFrame * problem_.num_frames) {
     set_.AddAll();
   }

@@ -36,12 +36,14 @@ struct JointOptions {
   Norm norm;                   // p = 1, 2 or infinity
   double relative_gap = 1e-4;  // (cost - lower_bound) / cost; > 0
   int max_iterations = 2000;   // per component; >= 1
+  double sufficient_cost = 0;  // nothing below it is sought, pixels; >= 0
   JointCallback callback;      // counts over all components; may be empty
 };
 
 enum class JointTermination {
   kNotRun,
-  kGapReached,  // certified, or a cost that is zero up to rounding
+  // Certified, or a cost that is zero up to rounding, or sufficient.
+  kGapReached,
   kMaxIterations,
   kStalled,  // rounding ended the progress before the gap was reached
   kInterrupted,

@@ -1,0 +1,157 @@
+#include "krot/bridge/certificate_json.h"
+
+#include <limits>
+#include <utility>
+
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+using Json = CertificateFileJson;
+
+// Version 1: u and J.
+void ReadRow(const JsonReader& reader, const Json& u, const Json& J,
+             const std::string& place,
+             CertificateFile::SupportObservation* observation) {
+  observation->u = reader.Pair(u, place + ".u");
+  if (!J.is_array() || J.size() != 2) {
+    reader.Fail(place + ".J", J, "two rows of two numbers");
+  }
+  observation->J.row(0) = reader.Pair(J[0], place + ".J[0]").transpose();
+  observation->J.row(1) = reader.Pair(J[1], place + ".J[1]").transpose();
+}
+
+CertificateFile::SupportObservation ReadObservation(const JsonReader& reader,
+                                                    int version,
+                                                    const Json& json,
+                                                    const std::string& place) {
+  const auto member = [&](const char* key) -> const Json& {
+    return reader.Member(json, place, key);
+  };
+  constexpr uint64_t kLargest32 = std::numeric_limits<uint32_t>::max();
+  CertificateFile::SupportObservation o;
+  o.image_id = static_cast<ImageId>(
+      reader.Id(member("image_id"), place + ".image_id", kLargest32));
+  o.point2D_idx = static_cast<uint32_t>(
+      reader.Id(member("point2D_idx"), place + ".point2D_idx", kLargest32));
+  o.point3D_id = reader.Id(member("point3D_id"), place + ".point3D_id",
+                           std::numeric_limits<uint64_t>::max());
+  if (version == 1) {
+    ReadRow(reader, member("u"), member("J"), place, &o);
+  } else {
+    const Json& bearing = member("bearing");
+    if (!bearing.is_array() || bearing.size() != 3) {
+      reader.Fail(place + ".bearing", bearing, "an array of three numbers");
+    }
+    for (int k = 0; k < 3; ++k) {
+      o.bearing[k] = reader.Number(bearing[k], place + ".bearing");
+    }
+  }
+  o.lambda = reader.Number(member("lambda"), place + ".lambda");
+  o.y = reader.Pair(member("y"), place + ".y");
+  return o;
+}
+
+}  // namespace
+
+JsonReader::JsonReader(std::string file_name)
+    : file_name_(std::move(file_name)) {}
+
+void JsonReader::Fail(const std::string& place, const Json& found,
+                      const std::string& expected) const {
+  std::string text = found.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (text.size() > 40) text = text.substr(0, 40) + "...";
+  throw ModelError(file_name_ + ": " + place + " is " + text + ", expected " +
+                   expected);
+}
+
+const Json& JsonReader::Member(const Json& object, const std::string& place,
+                               const char* key) const {
+  if (!object.is_object()) Fail(place, object, "an object");
+  const auto found = object.find(key);
+  if (found == object.end()) {
+    throw ModelError(file_name_ + ": " + place + " has no \"" + key + "\"");
+  }
+  return *found;
+}
+
+double JsonReader::Number(const Json& value, const std::string& place) const {
+  if (!value.is_number()) Fail(place, value, "a number");
+  return value.get<double>();
+}
+
+uint64_t JsonReader::Id(const Json& value, const std::string& place,
+                        uint64_t largest) const {
+  if (!value.is_number_unsigned() || value.get<uint64_t>() > largest) {
+    Fail(place, value, "an integer in [0, " + std::to_string(largest) + "]");
+  }
+  return value.get<uint64_t>();
+}
+
+std::string JsonReader::String(const Json& value,
+                               const std::string& place) const {
+  if (!value.is_string()) Fail(place, value, "a string");
+  return value.get<std::string>();
+}
+
+const Json& JsonReader::Array(const Json& value,
+                              const std::string& place) const {
+  if (!value.is_array()) Fail(place, value, "an array");
+  return value;
+}
+
+Eigen::Vector2d JsonReader::Pair(const Json& value,
+                                 const std::string& place) const {
+  if (!value.is_array() || value.size() != 2) {
+    Fail(place, value, "an array of two numbers");
+  }
+  return {Number(value[0], place), Number(value[1], place)};
+}
+
+Norm JsonReader::ReadNorm(const Json& value) const {
+  const std::string name = String(value, "norm");
+  if (name == "1") return Norm::L1();
+  if (name == "2") return Norm::L2();
+  if (name == "inf") return Norm::LInf();
+  Fail("norm", value, "\"1\", \"2\" or \"inf\"");
+}
+
+std::vector<CertificateFile::SupportObservation> JsonReader::ReadSupport(
+    const Json& observations, int version, const std::string& place) const {
+  std::vector<CertificateFile::SupportObservation> support;
+  Array(observations, place);
+  for (size_t n = 0; n < observations.size(); ++n) {
+    support.push_back(ReadObservation(*this, version, observations[n],
+                                      place + "[" + std::to_string(n) + "]"));
+  }
+  return support;
+}
+
+CertificateFileJson NormJson(Norm norm) {
+  if (norm.p == 1) return "1";
+  return norm.p == 2 ? "2" : "inf";
+}
+
+CertificateFileJson SupportJson(
+    const std::vector<CertificateFile::SupportObservation>& support,
+    int version) {
+  Json observations = Json::array();
+  for (const CertificateFile::SupportObservation& o : support) {
+    Json json = {{"image_id", o.image_id},
+                 {"point2D_idx", o.point2D_idx},
+                 {"point3D_id", o.point3D_id}};
+    if (version == 1) {
+      json["u"] = {o.u[0], o.u[1]};
+      json["J"] = {{o.J(0, 0), o.J(0, 1)}, {o.J(1, 0), o.J(1, 1)}};
+    } else {
+      json["bearing"] = {o.bearing[0], o.bearing[1], o.bearing[2]};
+    }
+    json["lambda"] = o.lambda;
+    json["y"] = {o.y[0], o.y[1]};
+    observations.push_back(std::move(json));
+  }
+  return observations;
+}
+
+}  // namespace krot

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "krot/bridge/certificate_file.h"
+#include "krot/minimax/norm.h"
+
+namespace krot {
+
+// What the files of certificates and of conflicts have in common.
+
+using CertificateFileJson = nlohmann::ordered_json;
+
+// Reads values out of a parsed file; every error is a ModelError that names the
+// file and the place.
+class JsonReader {
+ public:
+  using Json = CertificateFileJson;
+
+  explicit JsonReader(std::string file_name);
+
+  [[noreturn]] void Fail(const std::string& place, const Json& found,
+                         const std::string& expected) const;
+  const Json& Member(const Json& object, const std::string& place,
+                     const char* key) const;
+  double Number(const Json& value, const std::string& place) const;
+  uint64_t Id(const Json& value, const std::string& place,
+              uint64_t largest) const;
+  std::string String(const Json& value, const std::string& place) const;
+  const Json& Array(const Json& value, const std::string& place) const;
+  Eigen::Vector2d Pair(const Json& value, const std::string& place) const;
+  Norm ReadNorm(const Json& value) const;
+  // The support of a certificate of a version.
+  std::vector<CertificateFile::SupportObservation> ReadSupport(
+      const Json& observations, int version, const std::string& place) const;
+
+ private:
+  const std::string file_name_;
+};
+
+CertificateFileJson NormJson(Norm norm);
+CertificateFileJson SupportJson(
+    const std::vector<CertificateFile::SupportObservation>& observations,
+    int version);
+
+}  // namespace krot

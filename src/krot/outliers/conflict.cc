@@ -1,0 +1,141 @@
+#include "krot/outliers/conflict.h"
+
+#include <algorithm>
+#include <iterator>
+#include <numeric>
+#include <utility>
+
+#include "krot/bridge/built_part.h"
+#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
+#include "krot/proof/certificate.h"
+
+namespace krot {
+namespace {
+
+std::vector<int64_t> Without(const std::vector<int64_t>& from,
+                             const std::vector<int64_t>& what) {
+  std::vector<int64_t> rest;
+  std::set_difference(from.begin(), from.end(), what.begin(), what.end(),
+                      std::back_inserter(rest));
+  return rest;
+}
+
+std::vector<std::vector<int64_t>> Parts(
+    const BuiltProblem& built, const std::vector<int64_t>& observations) {
+  return SplitIntoComponents(built.problem,
+                             PruneUnconstrained(built.problem, observations));
+}
+
+// Larger supports stay as they are: deletion would take as many solves.
+constexpr size_t kMaxDeletions = 60;
+
+// Makes a refuted support irreducible, within its own small problem.
+class Deletion {
+ public:
+  Deletion(const Model& model, const BuiltProblem& support,
+           const ErrorBound& bound, const Context& context)
+      : model_(model),
+        built_(support),
+        bound_(bound),
+        context_(context),
+        kept_(support.pixels.size()) {
+    std::iota(kept_.begin(), kept_.end(), 0);
+  }
+
+  // False if an observation is kept only because nothing was decided.
+  bool Run() {
+    if (kept_.size() > kMaxDeletions) return false;
+    bool is_irreducible = true;
+    std::vector<int64_t> untried = kept_;
+    while (!untried.empty() && !context_.IsCancelled()) {
+      const int64_t spared = untried.back();
+      untried.pop_back();
+      bool is_feasible = true;
+      for (const std::vector<int64_t>& part :
+           Parts(built_, Without(kept_, {spared}))) {
+        const ProblemSubset subset(built_.problem, part);
+        Decision decision = Decide(
+            model_, BuiltPart(built_, subset, built_.start), bound_, context_);
+        is_feasible = is_feasible && decision.is_feasible;
+        if (!decision.is_refuted) continue;
+        is_feasible = true;
+        kept_ = subset.InWhole(std::move(decision.support));
+        std::vector<int64_t> left;
+        std::set_intersection(untried.begin(), untried.end(), kept_.begin(),
+                              kept_.end(), std::back_inserter(left));
+        untried = std::move(left);
+        break;
+      }
+      is_irreducible = is_irreducible && is_feasible;
+    }
+    return is_irreducible;
+  }
+
+  const std::vector<int64_t>& kept() const { return kept_; }
+
+ private:
+  const Model& model_;
+  const BuiltProblem& built_;
+  const ErrorBound bound_;
+  const Context context_;
+  std::vector<int64_t> kept_;  // ascending
+};
+
+}  // namespace
+
+std::optional<Conflict> FindConflict(const Model& model,
+                                     const BuiltProblem& built,
+                                     const ErrorBound& bound,
+                                     const std::vector<int64_t>& observations,
+                                     const Context& context) {
+  const ProblemSubset subset(built.problem, observations);
+  const BuiltProblem part = BuiltPart(built, subset, built.start);
+  const Decision first = Decide(model, part, bound, context);
+  if (!first.is_refuted) return std::nullopt;
+
+  const ProblemSubset support(part.problem, first.support);
+  const BuiltProblem small = BuiltPart(part, support, part.start);
+  Deletion deletion(model, small, bound, context);
+  Conflict conflict;
+  conflict.is_irreducible = deletion.Run();
+
+  const ProblemSubset core(small.problem, deletion.kept());
+  const BuiltProblem smallest = BuiltPart(small, core, small.start);
+  const Decision last = Decide(model, smallest, bound, context);
+  if (!last.is_refuted) return std::nullopt;
+  std::optional<PixelCertificate> proof =
+      ProveRefutation(model, smallest, bound, last, context);
+  if (!proof) return std::nullopt;
+  conflict.proof = *std::move(proof);
+  conflict.proof.rows = InWhole(
+      subset, InWhole(support, InWhole(core, std::move(conflict.proof.rows))));
+  for (const CertifiedObservation& o : conflict.proof.rows.observations) {
+    conflict.observations.push_back(o.observation);
+  }
+  return conflict;
+}
+
+std::vector<Conflict> PackConflicts(const Model& model,
+                                    const BuiltProblem& built,
+                                    const ErrorBound& bound,
+                                    const std::vector<int64_t>& observations,
+                                    const Context& context) {
+  std::vector<Conflict> conflicts;
+  std::vector<std::vector<int64_t>> open = Parts(built, observations);
+  while (!open.empty() && !context.IsCancelled()) {
+    const std::vector<int64_t> part = std::move(open.back());
+    open.pop_back();
+    std::optional<Conflict> conflict =
+        FindConflict(model, built, bound, part, context);
+    if (!conflict) continue;
+    for (std::vector<int64_t>& rest :
+         Parts(built, Without(part, conflict->observations))) {
+      open.push_back(std::move(rest));
+    }
+    conflicts.push_back(*std::move(conflict));
+  }
+  return conflicts;
+}
+
+}  // namespace krot

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/bridge/bridge.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/minimax/norm.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// What observations are asked to stay within.
+struct ErrorBound {
+  Norm norm;             // p = 1, 2 or infinity
+  double max_error = 0;  // true pixels; > 0
+};
+
+// Whether some observations go together: either an estimate whose true errors
+// are all within the bound, or some of them that do not, as far as the linear
+// rows at `estimate` tell. Neither where the optimum all but is the bound.
+struct Decision {
+  bool is_feasible = false;
+  bool is_refuted = false;
+  Estimate estimate;
+  std::vector<int64_t> support;  // if refuted; ascending
+};
+
+// Decides on all observations of `part`, which hang together, from its start,
+// whose depths must be positive, in a few rounds: solves the linear rows, and
+// takes them anew at the solution.
+Decision Decide(const Model& model, const BuiltProblem& part,
+                const ErrorBound& bound, const Context& context);
+
+// The proof in true pixels of what Decide found; none if the lenses take too
+// much of it. It is checked.
+std::optional<PixelCertificate> ProveRefutation(const Model& model,
+                                                const BuiltProblem& part,
+                                                const ErrorBound& bound,
+                                                const Decision& refuted,
+                                                const Context& context);
+
+}  // namespace krot

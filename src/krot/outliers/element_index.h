@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/bridge/bridge.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Where each observation of a built problem stands among the model's track
+// elements. O(track elements).
+std::vector<uint64_t> ElementsOf(const Model& model, const BuiltProblem& built);
+
+}  // namespace krot

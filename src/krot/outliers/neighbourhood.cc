@@ -1,0 +1,149 @@
+#include "krot/outliers/neighbourhood.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "krot/problem/cameras.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Vector3d;
+
+// Of the points that two frames see: so many with the most strained rays are
+// looked at.
+constexpr int kStrainedPoints = 16;
+// Frames of a track that are looked at together; no more.
+constexpr size_t kMaxFramesTogether = 8;
+constexpr size_t kFramesInTriples = 4;
+
+}  // namespace
+
+Neighbourhoods::Neighbourhoods(const KnownRotationProblem& problem,
+                               const Estimate& estimate)
+    : problem_(problem),
+      estimate_(estimate),
+      points_of_frame_(problem.num_frames) {
+  for (int32_t f = 0; f < problem_.num_frames; ++f) {
+    for (int64_t n = problem_.frame_begin[f]; n < problem_.frame_begin[f + 1];
+         ++n) {
+      const int32_t k =
+          problem_.observations[problem_.frame_observations[n]].point;
+      std::vector<int32_t>& points = points_of_frame_[f];
+      if (points.empty() || points.back() != k) points.push_back(k);
+    }
+  }
+}
+
+// Of the ray on which v = 0, in the world.
+Vector3d Neighbourhoods::Direction(int64_t i) const {
+  const Observation& o = problem_.observations[i];
+  const Vector3d u = o.E.row(1).cross(o.E.row(2)).transpose();
+  return (problem_.views[o.view].cam_from_world_rotation.transpose() * u)
+      .normalized();
+}
+
+Vector3d Neighbourhoods::CentreOf(int64_t i) const {
+  const View& view = problem_.views[problem_.observations[i].view];
+  const AffineMap map = CamFromWorld(view, estimate_.translations[view.frame]);
+  return -map.leftCols<3>().transpose() * map.col(3);
+}
+
+// By how much two rays miss each other, about, pixels: their epipolar error.
+double Neighbourhoods::Strain(int64_t i, int64_t j) const {
+  const Vector3d baseline = CentreOf(j) - CentreOf(i);
+  const Vector3d normal = baseline.cross(Direction(i));
+  const double length = normal.norm();
+  if (!(length > 0)) return 0;
+  const double angle = std::abs(normal.dot(Direction(j))) / length;
+  return angle * problem_.observations[j].E.bottomRows<2>().norm();
+}
+
+// The points that both frames see freely, the most strained.
+void Neighbourhoods::AddStrained(int32_t a, int32_t b,
+                                 const std::vector<char>& is_free,
+                                 std::vector<int32_t>* points) const {
+  std::vector<int32_t> common;
+  std::set_intersection(points_of_frame_[a].begin(), points_of_frame_[a].end(),
+                        points_of_frame_[b].begin(), points_of_frame_[b].end(),
+                        std::back_inserter(common));
+  std::vector<std::pair<double, int32_t>> strained;  // -strain, point
+  for (const int32_t k : common) {
+    int64_t in_a = -1;
+    int64_t in_b = -1;
+    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+         ++i) {
+      if (!is_free[i]) continue;
+      if (FrameOf(i) == a) in_a = i;
+      if (FrameOf(i) == b) in_b = i;
+    }
+    if (in_a >= 0 && in_b >= 0) strained.emplace_back(-Strain(in_a, in_b), k);
+  }
+  const size_t count =
+      std::min(strained.size(), static_cast<size_t>(kStrainedPoints));
+  std::partial_sort(strained.begin(),
+                    strained.begin() + static_cast<std::ptrdiff_t>(count),
+                    strained.end());
+  for (size_t n = 0; n < count; ++n) points->push_back(strained[n].second);
+}
+
+// Observation i, and free ones of the frames.
+std::vector<int64_t> Neighbourhoods::Around(
+    int64_t i, std::vector<int32_t> frames,
+    const std::vector<char>& is_free) const {
+  frames.push_back(FrameOf(i));
+  std::sort(frames.begin(), frames.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  std::vector<int32_t> points = {problem_.observations[i].point};
+  for (size_t n = 0; n < frames.size(); ++n) {
+    for (size_t m = 0; m < n; ++m)
+      AddStrained(frames[m], frames[n], is_free, &points);
+  }
+  std::sort(points.begin(), points.end());
+  points.erase(std::unique(points.begin(), points.end()), points.end());
+  std::vector<int64_t> observations;
+  for (const int32_t k : points) {
+    for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
+         ++j) {
+      const bool is_there =
+          std::binary_search(frames.begin(), frames.end(), FrameOf(j));
+      if (j == i || (is_free[j] && is_there)) observations.push_back(j);
+    }
+  }
+  return observations;
+}
+
+// Those of the track, beside its own, that observation i is tried with: the
+// most strained first.
+std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
+    int64_t i, int num_others, const std::vector<char>& is_free) const {
+  const int32_t k = problem_.observations[i].point;
+  std::vector<std::pair<double, int32_t>> strained;  // -strain, frame
+  for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
+       ++j) {
+    if (is_free[j] && j != i) strained.emplace_back(-Strain(i, j), FrameOf(j));
+  }
+  std::sort(strained.begin(), strained.end());
+  std::vector<int32_t> others;
+  for (const auto& [strain, frame] : strained) {
+    if (std::find(others.begin(), others.end(), frame) == others.end()) {
+      others.push_back(frame);
+    }
+  }
+  if (others.size() > kMaxFramesTogether) others.resize(kMaxFramesTogether);
+  std::vector<std::vector<int32_t>> sets;
+  if (num_others == 1) {
+    for (const int32_t f : others) sets.push_back({f});
+  } else if (num_others == 2) {
+    for (size_t n = 0; n < std::min(others.size(), kFramesInTriples); ++n) {
+      for (size_t m = 0; m < n; ++m) sets.push_back({others[m], others[n]});
+    }
+  } else if (others.size() > 2) {
+    sets.push_back(others);
+  }
+  return sets;
+}
+
+}  // namespace krot

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/base/context.h"
+#include "krot/bridge/conflict_file.h"
+#include "krot/model/model.h"
+#include "krot/pipeline/solve_model.h"
+
+namespace krot {
+
+// Removes observations until all others are within a bound, and proves how many
+// had to go: what `krot outlier_filter` does between reading and writing.
+
+enum class OutlierMethod {
+  kConflicts,  // few, and a proof of how many at least
+  kThreshold,  // what is above the bound, solve, again: to compare with
+};
+
+struct OutlierFilterOptions {
+  OutlierMethod method = OutlierMethod::kConflicts;
+  double max_error = 0;     // the bound, true pixels; > 0
+  SolveModelOptions solve;  // of what is left; its norm is the errors'
+
+  // Called before the last solve, of what is left; may be empty.
+  std::function<void(int64_t num_removed)> on_removed;
+};
+
+struct RemovedObservation {
+  ImageId image_id = 0;
+  std::string image_name;
+  uint32_t point2D_idx = 0;
+  Point3DId point3D_id = 0;
+  double error_before_px = 0;  // in the input; NaN where there is none
+  // Of the result's camera and point; NaN where there is none, as where the
+  // point went.
+  double error_after_px = 0;
+  std::optional<int64_t> conflict;  // that it is in, from 0
+};
+
+// A track or an image that removed observations or conflicts gather in.
+struct Suspect {
+  uint64_t id = 0;
+  std::string name;  // of an image
+  int64_t num_observations = 0;
+  int64_t num_removed = 0;
+  int64_t num_conflicts = 0;  // that it takes part in
+};
+
+struct OutlierFilterSummary {
+  OutlierMethod method = OutlierMethod::kConflicts;
+  double max_error = 0;  // true pixels
+  Norm norm;
+
+  int64_t num_observations = 0;  // of the input
+  int64_t num_points = 0;
+  // That do not fit; worst before first.
+  std::vector<RemovedObservation> removed;
+  // That fit, but were left alone in their tracks, which went with them.
+  int64_t num_left_alone = 0;
+  int64_t num_points_removed = 0;
+  // So many at least had to go, whatever is done: disjoint conflicts.
+  int64_t num_proved = 0;
+  int64_t num_irreducible = 0;            // of the conflicts
+  std::optional<ConflictFile> conflicts;  // kConflicts
+  // Most removed observations first; those without are left out.
+  std::vector<Suspect> tracks, images, cameras;
+
+  PixelErrorStatistics pixel_error_before;
+  PixelErrorStatistics pixel_error_after;
+  // Whether all errors of the result are within the bound.
+  bool is_within = false;
+  std::optional<SolveSummary> solve;  // of what is left; none if nothing is
+  int num_solves = 0;
+
+  double seconds_removal = 0;  // wall clock
+  double seconds_conflicts = 0;
+  double seconds_solve = 0;
+};
+
+struct OutlierFilterResult {
+  Model model;
+  OutlierFilterSummary summary;
+};
+
+// A copy of `model` without the observations that do not fit, solved with what
+// is left. Tracks that keep fewer than two go. Everything else is as SolveModel
+// leaves it. Requires a valid model; throws what SolveModel does.
+OutlierFilterResult FilterOutliers(const Model& model,
+                                   const OutlierFilterOptions& options,
+                                   const Context& context);
+
+}  // namespace krot

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/bridge/bridge.h"
+#include "krot/model/model.h"
+#include "krot/outliers/conflict.h"
+#include "krot/outliers/removal.h"
+
+namespace krot {
+
+// Disjoint conflicts, each of which charges one of the removed observations
+// with what others it does not go together with, so that as many as possible
+// have one of their own. For each, worst first, it looks
+//
+//   in its image and one other of its track, then two others, then all, among
+//     the observations there whose rays miss each other by most,
+//   and at last among the removal's tight observations,
+//
+// first among those that are neither removed nor taken already, so that no
+// other has to share the charge, then with the removed ones that found none.
+// Small conflicts leave more to others.
+std::vector<Conflict> PackAgainstRemoval(const Model& model,
+                                         const BuiltProblem& built,
+                                         const ErrorBound& bound,
+                                         const Removal& removal,
+                                         const Context& context);
+
+}  // namespace krot

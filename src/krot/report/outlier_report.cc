@@ -1,0 +1,198 @@
+#include "krot/report/outlier_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <vector>
+
+#include "krot/report/error_rows.h"
+#include "krot/report/report_json.h"
+#include "krot/report/solve_report.h"
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+constexpr size_t kShownSuspects = 5;
+
+// "26,268".
+std::string Thousands(int64_t count) {
+  std::string digits = std::to_string(count);
+  for (std::ptrdiff_t n = static_cast<std::ptrdiff_t>(digits.size()) - 3; n > 0;
+       n -= 3) {
+    digits.insert(static_cast<size_t>(n), ",");
+  }
+  return digits;
+}
+
+Json FiniteOrNull(double value) {
+  return std::isfinite(value) ? Json(value) : Json();
+}
+
+Json RemovedJson(const std::vector<RemovedObservation>& removed) {
+  Json json = Json::array();
+  for (const RemovedObservation& o : removed) {
+    json.push_back({{"image_id", o.image_id},
+                    {"image_name", o.image_name},
+                    {"point2D_idx", o.point2D_idx},
+                    {"point3D_id", o.point3D_id},
+                    {"error_before_px", FiniteOrNull(o.error_before_px)},
+                    {"error_after_px", FiniteOrNull(o.error_after_px)},
+                    {"conflict", o.conflict ? Json(*o.conflict) : Json()}});
+  }
+  return json;
+}
+
+Json SuspectsJson(const std::vector<Suspect>& suspects, const char* id) {
+  Json json = Json::array();
+  for (const Suspect& suspect : suspects) {
+    Json one = {{id, suspect.id}};
+    if (!suspect.name.empty()) one["image_name"] = suspect.name;
+    one["num_observations"] = suspect.num_observations;
+    one["num_removed"] = suspect.num_removed;
+    one["num_conflicts"] = suspect.num_conflicts;
+    json.push_back(std::move(one));
+  }
+  return json;
+}
+
+Json SolveOfRestJson(const std::optional<SolveSummary>& solve) {
+  if (!solve) return {};
+  return {{"num_observations", solve->num_observations},
+          {"cost_initial", solve->cost_initial},
+          {"cost_final", solve->cost_final},
+          {"certified", solve->is_certified},
+          {"lower_bound", NumberOrNull(solve->lower_bound)},
+          {"relative_gap", NumberOrNull(solve->relative_gap)}};
+}
+
+std::string SuspectTable(const OutlierFilterSummary& summary) {
+  if (summary.images.empty()) return "";
+  TextTable table;
+  table.AddRow({"image", "observations", "removed", "conflicts"});
+  const size_t count = std::min(summary.images.size(), kShownSuspects);
+  for (size_t n = 0; n < count; ++n) {
+    const Suspect& image = summary.images[n];
+    table.AddRow({image.name, std::to_string(image.num_observations),
+                  std::to_string(image.num_removed),
+                  std::to_string(image.num_conflicts)});
+  }
+  return "\nImages with most of them\n" + table.ToString();
+}
+
+}  // namespace
+
+std::string OutlierMethodName(OutlierMethod method) {
+  return method == OutlierMethod::kConflicts ? "conflicts" : "threshold";
+}
+
+std::string BracketSentence(const OutlierFilterSummary& summary) {
+  std::string sentence =
+      "removed " + Thousands(static_cast<int64_t>(summary.removed.size())) +
+      " of " + Thousands(summary.num_observations);
+  if (summary.conflicts) {
+    sentence += "; at least " + Thousands(summary.num_proved) + " must go (" +
+                Thousands(summary.num_proved) + " disjoint conflict" +
+                (summary.num_proved == 1 ? "" : "s") + ", certificate)";
+  }
+  return sentence;
+}
+
+std::string OutlierTable(const OutlierReport& report) {
+  const OutlierFilterSummary& summary = report.summary;
+  std::string text = BracketSentence(summary) + "\n";
+  if (summary.num_points_removed > 0) {
+    text += Counted(summary.num_points_removed, "track") +
+            " kept fewer than two and went, with " +
+            Counted(summary.num_left_alone, "observation") +
+            " that had been left alone.\n";
+  }
+  TextTable errors;
+  errors.AddRow({"", "before", "after"});
+  AddErrorColumns({summary.pixel_error_before, summary.pixel_error_after},
+                  &errors);
+  text += "\nReprojection errors, pixels\n" + errors.ToString() +
+          SuspectTable(summary) + "\n";
+  return text +
+         RunSentence(
+             report.run,
+             "chose " + FormatNumber(summary.seconds_removal, 2) +
+                 " s, proved " + FormatNumber(summary.seconds_conflicts, 2) +
+                 " s, solved " + FormatNumber(summary.seconds_solve, 2) + " s");
+}
+
+std::string OutlierJson(const OutlierReport& report) {
+  const OutlierFilterSummary& summary = report.summary;
+  const Json json = {
+      {"version", report.run.version},
+      {"command", "outlier_filter"},
+      {"method", OutlierMethodName(summary.method)},
+      {"norm", NormName(summary.norm)},
+      {"max_error", summary.max_error},
+      {"is_within", summary.is_within},
+      {"num_observations", summary.num_observations},
+      {"num_points", summary.num_points},
+      {"num_removed", summary.removed.size()},
+      {"num_left_alone", summary.num_left_alone},
+      {"num_points_removed", summary.num_points_removed},
+      {"num_must_go", summary.conflicts ? Json(summary.num_proved) : Json()},
+      {"num_irreducible",
+       summary.conflicts ? Json(summary.num_irreducible) : Json()},
+      {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"pixel_error",
+       {{"before", ErrorJson(summary.pixel_error_before)},
+        {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"solve", SolveOfRestJson(summary.solve)},
+      {"num_solves", summary.num_solves},
+      {"removed", RemovedJson(summary.removed)},
+      {"suspects",
+       {{"tracks", SuspectsJson(summary.tracks, "point3D_id")},
+        {"images", SuspectsJson(summary.images, "image_id")},
+        {"cameras", SuspectsJson(summary.cameras, "camera_id")}}},
+      {"seconds",
+       {{"read", report.run.seconds_read},
+        {"removal", summary.seconds_removal},
+        {"conflicts", summary.seconds_conflicts},
+        {"solve", summary.seconds_solve},
+        {"write", report.run.seconds_write},
+        {"total", report.run.seconds_total}}},
+      {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"threads", report.run.threads},
+      {"seed", report.run.seed},
+  };
+  return ReportText(json);
+}
+
+std::string OutlierCsv(const OutlierFilterSummary& summary) {
+  std::ostringstream csv;
+  csv.precision(9);
+  csv << "image_id,image_name,point2D_idx,point3D_id,error_before_px,"
+         "error_after_px,conflict\n";
+  for (const RemovedObservation& o : summary.removed) {
+    csv << o.image_id << ",\"";
+    for (const char c : o.image_name) {
+      if (c == '"') csv << c;
+      csv << c;
+    }
+    csv << "\"," << o.point2D_idx << ',' << o.point3D_id << ',';
+    if (std::isfinite(o.error_before_px)) csv << o.error_before_px;
+    csv << ',';
+    if (std::isfinite(o.error_after_px)) csv << o.error_after_px;
+    csv << ',';
+    if (o.conflict) csv << *o.conflict;
+    csv << '\n';
+  }
+  return csv.str();
+}
+
+std::string ConflictTable(const ConflictVerdict& verdict) {
+  return "The conflicts hold: whatever the translations and points, at least " +
+         Counted(verdict.num_conflicts, "observation") +
+         " must go\nfor all others to be within " +
+         FormatNumber(verdict.max_error, 6) + " px.\n  " +
+         Counted(verdict.num_conflicts, "conflict") + " of " +
+         Counted(verdict.num_observations, "observation") +
+         " in all, none in two\n";
+}
+
+}  // namespace krot

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "krot/bridge/conflict_verdict.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/report/run_record.h"
+
+namespace krot {
+
+// What one run of `krot outlier_filter` did.
+struct OutlierReport {
+  RunRecord run;
+  OutlierFilterSummary summary;
+};
+
+// "removed 74 of 26,268; at least 61 must go (61 disjoint conflicts,
+// certificate)".
+std::string BracketSentence(const OutlierFilterSummary& summary);
+
+// For the terminal: the bracket, errors before and after, who is to blame.
+std::string OutlierTable(const OutlierReport& report);
+
+// report.json; the keys are listed in docs/cli.md. What is not known is null.
+std::string OutlierJson(const OutlierReport& report);
+
+// One line per removed observation, worst first, behind a line of names.
+std::string OutlierCsv(const OutlierFilterSummary& summary);
+
+// What certificate_checker says of an accepted file of conflicts.
+std::string ConflictTable(const ConflictVerdict& verdict);
+
+// As --OutlierFilter.method takes it.
+std::string OutlierMethodName(OutlierMethod method);
+
+}  // namespace krot

@@ -1,0 +1,113 @@
+#include <algorithm>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+using Json = nlohmann::json;
+
+class OutlierFilterCommand : public ::testing::Test {
+ protected:
+  OutlierFilterCommand() {
+    SceneOptions options = SmallScene();
+    options.outlier_ratio = 0.03;
+    Save(SynthesizeScene(options).model, folder_ / "input");
+  }
+
+  KrotResult Filter(std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"outlier_filter",
+                                          "--input_path",
+                                          folder_ / "input",
+                                          "--output_path",
+                                          folder_ / "output",
+                                          "--report_path",
+                                          folder_ / "r.json",
+                                          "--OutlierFilter.max_error",
+                                          "3",
+                                          "--overwrite",
+                                          "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  }
+  KrotResult Check(const std::string& file) const {
+    return RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+                    "--certificate_path", folder_ / file});
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(OutlierFilterCommand, PrintsABracketWhoseProofTheCheckerAccepts) {
+  const KrotResult result = Filter({"--conflicts_path", folder_ / "c.json",
+                                    "--outliers_path", folder_ / "o.csv"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  const int removed = report["num_removed"];
+  const int must_go = report["num_must_go"];
+  EXPECT_GT(must_go, 0);
+  EXPECT_LE(must_go, removed);
+  EXPECT_TRUE(report["is_within"]);
+  EXPECT_EQ(report["removed"].size(), static_cast<size_t>(removed));
+  EXPECT_THAT(result.out,
+              HasSubstr("removed " + std::to_string(removed) + " of "));
+  EXPECT_THAT(result.out,
+              HasSubstr("at least " + std::to_string(must_go) + " must go"));
+  for (const double error : PixelErrors(Load(folder_ / "output"))) {
+    EXPECT_LE(error, 3 * (1 + 1e-9));
+  }
+  const std::string csv = ReadBytes(folder_ / "o.csv");
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), removed + 1);
+
+  const KrotResult check = Check("c.json");
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+  EXPECT_THAT(check.out, HasSubstr("at least " + std::to_string(must_go) +
+                                   " observation"));
+}
+
+TEST_F(OutlierFilterCommand, IsRefusedByTheCheckerOnceItsFileIsTamperedWith) {
+  ASSERT_EQ(Filter({"--conflicts_path", folder_ / "c.json"}).exit_code, 0);
+  Json json = Json::parse(ReadBytes(folder_ / "c.json"));
+  json["conflicts"].push_back(json["conflicts"][0]);
+  std::ofstream(folder_ / "twice.json") << json;
+  const KrotResult twice = Check("twice.json");
+  EXPECT_EQ(twice.exit_code, 4);
+  EXPECT_THAT(twice.err, IsOneSentence("krot certificate_checker", "refused"));
+  json["conflicts"].erase(json["conflicts"].size() - 1);
+  json["conflicts"][0].erase("rows_bound");
+  std::ofstream(folder_ / "less.json") << json;
+  EXPECT_EQ(Check("less.json").exit_code, 2);
+}
+
+TEST_F(OutlierFilterCommand, ProvesNothingByTheThreshold) {
+  const KrotResult result = Filter({"--OutlierFilter.method", "threshold"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_TRUE(report["num_must_go"].is_null());
+  EXPECT_TRUE(report["is_within"]);
+  EXPECT_EQ(Filter({"--OutlierFilter.method", "threshold", "--conflicts_path",
+                    folder_ / "c.json"})
+                .exit_code,
+            1);
+}
+
+TEST_F(OutlierFilterCommand, RefusesABoundThatIsNoPositiveNumber) {
+  EXPECT_EQ(RunKrot({"outlier_filter", "--input_path", folder_ / "input",
+                     "--output_path", folder_ / "output",
+                     "--OutlierFilter.max_error", "0"})
+                .exit_code,
+            1);
+}
+
+}  // namespace
+}  // namespace krot

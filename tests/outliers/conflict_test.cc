@@ -1,0 +1,130 @@
+#include "krot/outliers/conflict.h"
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "krot/bridge/built_part.h"
+#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
+#include "tests/oracle/lp_oracle.h"
+#include "tests/outliers/outlier_scenes.h"
+
+namespace krot {
+namespace {
+
+constexpr double kBound = 2;
+
+std::vector<int64_t> All(const BuiltProblem& built) {
+  std::vector<int64_t> all(built.pixels.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
+}
+
+// The optimum of some observations, by linear programmes that know nothing of
+// the library: the largest of those of their connected parts.
+double OptimumByOracle(const KnownRotationProblem& problem, Norm norm,
+                       const std::vector<int64_t>& observations) {
+  double largest = 0;
+  for (const std::vector<int64_t>& part : SplitIntoComponents(
+           problem, PruneUnconstrained(problem, observations))) {
+    const ProblemSubset subset(problem, part);
+    largest = std::max(
+        largest, *OptimalCostByBisection(subset.problem(), norm, 1000, 1e-3));
+  }
+  return largest;
+}
+
+bool HasOracle() {
+  const SyntheticScene scene = MakeOutlierScene(1, 0);
+  return OptimalCostByBisection(BuildProblem(scene.model, {}).problem,
+                                Norm::LInf(), 1000, 1e-3)
+      .has_value();
+}
+
+TEST(PackConflicts, AreInfeasibleAndIrreducibleByAnIndependentOracle) {
+  if (!HasOracle()) GTEST_SKIP() << "built without CLP";
+  for (const Norm norm : {Norm::LInf(), Norm::L1()}) {
+    for (const uint64_t seed : {1u, 2u, 3u}) {
+      SCOPED_TRACE(testing::Message() << "p = " << norm.p << ", " << seed);
+      const SyntheticScene scene = MakeOutlierScene(seed, 0.03);
+      const BuiltProblem built = BuildProblem(scene.model, {});
+      const std::vector<Conflict> conflicts =
+          PackConflicts(scene.model, built, {norm, kBound}, All(built), {});
+      ASSERT_FALSE(conflicts.empty());
+      for (const Conflict& conflict : conflicts) {
+        EXPECT_TRUE(conflict.is_irreducible);
+        EXPECT_GT(OptimumByOracle(built.problem, norm, conflict.observations),
+                  kBound);
+        for (const int64_t spared : conflict.observations) {
+          std::vector<int64_t> others = conflict.observations;
+          others.erase(std::find(others.begin(), others.end(), spared));
+          EXPECT_LE(OptimumByOracle(built.problem, norm, others),
+                    kBound * (1 + 1e-6));
+        }
+      }
+    }
+  }
+}
+
+TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
+  for (const uint64_t seed : {4u, 5u}) {
+    const SyntheticScene scene = MakeOutlierScene(seed, 0.05);
+    const BuiltProblem built = BuildProblem(scene.model, {});
+    const ErrorBound bound{Norm::L2(), kBound};
+    const std::vector<Conflict> conflicts =
+        PackConflicts(scene.model, built, bound, All(built), {});
+    ASSERT_FALSE(conflicts.empty());
+    std::set<int64_t> seen;
+    for (const Conflict& conflict : conflicts) {
+      const PixelCertificateCheck check = CheckPixelCertificate(
+          scene.model, built, bound.norm, conflict.proof, {});
+      EXPECT_TRUE(check.is_accepted) << check.refusal;
+      EXPECT_GT(check.lower_bound, kBound);
+      for (const int64_t i : conflict.observations) {
+        EXPECT_TRUE(seen.insert(i).second) << "observation " << i;
+      }
+    }
+    // Whatever is proved, the planted ones suffice.
+    EXPECT_LE(conflicts.size(), scene.outliers.size());
+  }
+}
+
+TEST(PackConflicts, AreNoneWhereEverythingFits) {
+  const SyntheticScene scene = MakeOutlierScene(6, 0);
+  const BuiltProblem built = BuildProblem(scene.model, {});
+  EXPECT_TRUE(PackConflicts(scene.model, built, {Norm::L2(), 4}, All(built), {})
+                  .empty());
+}
+
+TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {
+  SceneOptions options;
+  options.num_frames = 5;
+  options.num_points = 40;
+  options.track_length = 4;
+  options.duplicate_ratio = 0.2;
+  options.random_seed = 7;
+  Model model = SynthesizeScene(options).model;
+  const BuiltProblem built = BuildProblem(model, {});
+  // Without noise, nothing but a twin is above a tenth of a pixel.
+  int num_pairs = 0;
+  const KnownRotationProblem& problem = built.problem;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    std::vector<int64_t> track(problem.point_begin[k + 1] -
+                               problem.point_begin[k]);
+    std::iota(track.begin(), track.end(), problem.point_begin[k]);
+    const std::optional<Conflict> conflict =
+        FindConflict(model, built, {Norm::L2(), 0.1}, track, {});
+    if (!conflict) continue;
+    ++num_pairs;
+    ASSERT_EQ(conflict->observations.size(), 2u);
+    EXPECT_EQ(problem.observations[conflict->observations[0]].view,
+              problem.observations[conflict->observations[1]].view);
+  }
+  EXPECT_GT(num_pairs, 5);
+}
+
+}  // namespace
+}  // namespace krot

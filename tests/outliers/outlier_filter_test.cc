@@ -1,0 +1,110 @@
+#include "krot/outliers/outlier_filter.h"
+
+#include <set>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/bridge/conflict_verdict.h"
+#include "krot/model/validate.h"
+#include "tests/outliers/outlier_scenes.h"
+
+namespace krot {
+namespace {
+
+OutlierFilterOptions Within(double max_error) {
+  OutlierFilterOptions options;
+  options.max_error = max_error;
+  return options;
+}
+
+TEST(FilterOutliers, FindsPlantedOutliersAboveFourTimesTheBound) {
+  for (const uint64_t seed : {1u, 2u}) {
+    const SyntheticScene scene = MakeOutlierScene(seed, 0.05, 200);
+    const double bound = 3;
+    const OutlierFilterResult result =
+        FilterOutliers(scene.model, Within(bound), {});
+    std::set<std::pair<ImageId, uint32_t>> removed;
+    for (const RemovedObservation& o : result.summary.removed) {
+      removed.emplace(o.image_id, o.point2D_idx);
+    }
+    const std::vector<double> errors = PixelErrors(scene.ground_truth);
+    int num_large = 0;
+    int num_found = 0;
+    for (const int64_t e : scene.outliers) {
+      if (errors[e] < 4 * bound) continue;
+      const TrackElement& element = scene.model.track_elements[e];
+      ++num_large;
+      num_found += removed.count({element.image_id, element.point2D_idx}) > 0;
+    }
+    EXPECT_GE(num_found, 0.9 * num_large) << "of " << num_large;
+    EXPECT_LE(result.summary.num_proved,
+              static_cast<int64_t>(scene.outliers.size()));
+  }
+}
+
+TEST(FilterOutliers, WritesAValidModelWithinTheBoundAndConflictsThatHold) {
+  const SyntheticScene scene = MakeOutlierScene(3, 0.05, 100);
+  const OutlierFilterResult result = FilterOutliers(scene.model, Within(2), {});
+  ValidateModel(result.model);
+  EXPECT_TRUE(result.summary.is_within);
+  for (const double error : PixelErrors(result.model)) {
+    EXPECT_LE(error, 2 * (1 + 1e-9));
+  }
+  for (const Point3D& point : result.model.points3D) {
+    EXPECT_GE(point.track_end - point.track_begin, 2u);
+  }
+  const OutlierFilterSummary& summary = result.summary;
+  EXPECT_EQ(summary.num_observations -
+                static_cast<int64_t>(summary.removed.size()) -
+                summary.num_left_alone,
+            static_cast<int64_t>(result.model.track_elements.size()));
+  ASSERT_TRUE(summary.conflicts);
+  EXPECT_GT(summary.num_proved, 0);
+  EXPECT_LE(summary.num_proved, static_cast<int64_t>(summary.removed.size()));
+  const ConflictVerdict verdict =
+      VerifyConflictFile(scene.model, *summary.conflicts);
+  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+  EXPECT_EQ(verdict.num_conflicts, summary.num_proved);
+}
+
+TEST(FilterOutliers, RemovesNoMoreThanTheThresholdDoes) {
+  for (const uint64_t seed : {4u, 5u, 6u}) {
+    const SyntheticScene scene = MakeOutlierScene(seed, 0.03, 100);
+    OutlierFilterOptions options = Within(2);
+    const OutlierFilterResult few = FilterOutliers(scene.model, options, {});
+    options.method = OutlierMethod::kThreshold;
+    const OutlierFilterResult plain = FilterOutliers(scene.model, options, {});
+    EXPECT_TRUE(plain.summary.is_within);
+    EXPECT_LE(few.summary.removed.size(), plain.summary.removed.size());
+  }
+}
+
+TEST(FilterOutliers, HasTheSameBitsAtOneAndTwoThreads) {
+  const SyntheticScene scene = MakeOutlierScene(7, 0.05, 80);
+  Context one, two;
+  one.num_threads = 1;
+  two.num_threads = 2;
+  const OutlierFilterResult a = FilterOutliers(scene.model, Within(2), one);
+  const OutlierFilterResult b = FilterOutliers(scene.model, Within(2), two);
+  EXPECT_EQ(ConflictJson(*a.summary.conflicts),
+            ConflictJson(*b.summary.conflicts));
+  ASSERT_EQ(a.model.points3D.size(), b.model.points3D.size());
+  for (size_t k = 0; k < a.model.points3D.size(); ++k) {
+    EXPECT_EQ(a.model.points3D[k].xyz, b.model.points3D[k].xyz);
+  }
+}
+
+TEST(FilterOutliers, ChangesNoObservationWhereEverythingFits) {
+  const SyntheticScene scene = MakeOutlierScene(8, 0);
+  const OutlierFilterResult result =
+      FilterOutliers(scene.model, Within(10), {});
+  EXPECT_TRUE(result.summary.removed.empty());
+  EXPECT_EQ(result.summary.num_proved, 0);
+  EXPECT_EQ(result.model.track_elements.size(),
+            scene.model.track_elements.size());
+}
+
+}  // namespace
+}  // namespace krot

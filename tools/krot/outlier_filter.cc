@@ -1,0 +1,178 @@
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "krot/base/parallel_for.h"
+#include "krot/base/timer.h"
+#include "krot/base/write_file.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/report/outlier_report.h"
+#include "krot/report/peak_memory.h"
+#include "krot/report/text_table.h"
+#include "tools/krot/command.h"
+#include "tools/krot/common_options.h"
+#include "tools/krot/html_path.h"
+#include "tools/krot/interrupt.h"
+#include "tools/krot/model_files.h"
+#include "tools/krot/solve_progress.h"
+
+namespace krot {
+namespace {
+
+struct OutlierCommand {
+  ModelPaths paths;
+  std::string conflicts_path;
+  std::string outliers_path;
+  std::string method = "conflicts";
+  int num_threads = -1;
+  OutlierFilterOptions options;
+  CommonOptions common;
+};
+
+void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
+  AddModelPaths(&command->paths, parser);
+  parser->AddOutputFile("conflicts_path", &command->conflicts_path,
+                        "Where the conflicts go, as JSON: the proof of how "
+                        "many must go; see certificate_checker");
+  parser->AddOutputFile("outliers_path", &command->outliers_path,
+                        "Where the list of removed observations goes, as CSV");
+  OutlierFilterOptions* options = &command->options;
+  parser->Add(
+      {"OutlierFilter.max_error", "The bound that all errors are to be within",
+       "a number > 0, pixels", "", true, [options](const std::string& text) {
+         return ParseReal(text, &options->max_error) && options->max_error > 0;
+       }});
+  parser->AddChoice(
+      "OutlierFilter.method", &command->method, {"conflicts", "threshold"},
+      "conflicts: few, by the least sum of excesses, and a proof of how many "
+      "must go; threshold: what is above the bound, solve, and again, to "
+      "compare with");
+  parser->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
+                  Above(0.0),
+                  "How far the largest error of what is left may be above the "
+                  "proved bound, relative to it");
+  int* threads = &command->num_threads;
+  parser->Add({"Solver.num_threads",
+               "Threads, -1 being all; the result is the same, bit by bit",
+               "-1 or an integer in [1, 1024]", "-1", false,
+               [threads](const std::string& text) {
+                 return ParseInteger(text, threads) &&
+                        (*threads == -1 || (*threads >= 1 && *threads <= 1024));
+               }});
+  AddCommonOptions(
+      "Recorded in the report; this command draws no random numbers",
+      &command->common, parser);
+}
+
+void CheckPairs(const OutlierCommand& command) {
+  if (command.options.method == OutlierMethod::kThreshold &&
+      !command.conflicts_path.empty()) {
+    throw OptionError(
+        "--conflicts_path has no effect with --OutlierFilter.method threshold, "
+        "which proves nothing");
+  }
+}
+
+OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
+                           const CancelFlag& cancel) {
+  const LogOptions& log = command.common.log;
+  OutlierFilterOptions options = command.options;
+  Context context;
+  context.num_threads = command.num_threads;
+  context.cancel = &cancel;
+  SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
+  progress.Follow(&options.solve, &context);
+  options.on_removed = [&](int64_t num_removed) {
+    LogLine(log, 1,
+            Counted(num_removed, "observation") +
+                " to remove; solving what is left");
+  };
+  OutlierFilterResult result = FilterOutliers(model, options, context);
+  progress.Finish();
+  ThrowIfInterrupted();
+  return result;
+}
+
+void WriteSideFiles(const OutlierCommand& command,
+                    const OutlierReport& report) {
+  const LogOptions& log = command.common.log;
+  const auto write = [&](const std::string& path, const std::string& text) {
+    LogLine(log, 2, "writing " + path);
+    WriteFileAtomically(path, text);
+  };
+  if (!command.conflicts_path.empty() && report.summary.conflicts) {
+    write(command.conflicts_path, ConflictJson(*report.summary.conflicts));
+  }
+  if (!command.outliers_path.empty()) {
+    write(command.outliers_path, OutlierCsv(report.summary));
+  }
+}
+
+int Run(const OutlierCommand& command) {
+  const Timer total_timer;
+  const LogOptions& log = command.common.log;
+  const ModelPaths& paths = command.paths;
+  const CancelFlag& cancel = CatchInterrupts();
+  const WriteModelOptions write_options = CheckModelPaths(paths);
+  CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
+  CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
+  OutlierReport report;
+  report.run.version = KROT_VERSION;
+  report.run.threads = ResolveNumThreads(command.num_threads);
+  report.run.seed = command.common.random_seed;
+
+  const Timer read_timer;
+  const auto [model, contradictions] =
+      ReadValidModel(paths.input_path, paths.on_contradiction, log);
+  report.run.contradictions = contradictions;
+  report.run.seconds_read = read_timer.Seconds();
+  ThrowIfInterrupted();
+  OutlierFilterResult result = Filter(command, model, cancel);
+  report.summary = std::move(result.summary);
+  if (result.model.track_elements.empty()) {
+    throw CommandError(kExitNothingToSolve,
+                       "nothing to solve: no track keeps two observations");
+  }
+
+  LogLine(log, 2, "writing " + paths.output_path);
+  const Timer write_timer;
+  WriteModel(result.model, paths.output_path, write_options);
+  report.run.seconds_write = write_timer.Seconds();
+  report.run.seconds_total = total_timer.Seconds();
+  report.run.peak_memory_bytes = PeakMemoryBytes();
+  WriteSideFiles(command, report);
+  const std::string report_json = OutlierJson(report);
+  if (!paths.report_path.empty()) {
+    LogLine(log, 2, "writing " + paths.report_path);
+    WriteFileAtomically(paths.report_path, report_json);
+  }
+  WriteHtmlPage(paths.html_path, report_json, model, result.model,
+                command.num_threads, log);
+  PrintTable(log, OutlierTable(report));
+  if (!report.summary.is_within) {
+    LogLine(log, 0, "warning: not all errors are within the bound");
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+int RunOutlierFilter(const std::vector<std::string>& arguments) {
+  OutlierCommand command;
+  OptionParser parser("outlier_filter",
+                      "removes few observations of a COLMAP model so that all "
+                      "others are within a bound, and proves how many must go; "
+                      "rotations, intrinsics and the coordinate frame stay");
+  AddOutlierOptions(&command, &parser);
+  if (!parser.Parse(arguments)) {
+    PrintTable(command.common.log, parser.Help());
+    return kExitDone;
+  }
+  command.options.method = command.method == "threshold"
+                               ? OutlierMethod::kThreshold
+                               : OutlierMethod::kConflicts;
+  CheckPairs(command);
+  return Run(command);
+}
+
+}  // namespace krot
