@@ -11,9 +11,9 @@
 #include "krot/report/text_table.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
-#include "tools/krot/html_path.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
+#include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
 namespace krot {
@@ -142,12 +142,8 @@ int Run(const OutlierCommand& command) {
   report.run.peak_memory_bytes = PeakMemoryBytes();
   WriteSideFiles(command, report);
   const std::string report_json = OutlierJson(report);
-  if (!paths.report_path.empty()) {
-    LogLine(log, 2, "writing " + paths.report_path);
-    WriteFileAtomically(paths.report_path, report_json);
-  }
-  WriteHtmlPage(paths.html_path, report_json, model, result.model,
-                command.num_threads, log);
+  WriteReports(paths.report_path, paths.html_path, report_json, model,
+               result.model, command.num_threads, log);
   PrintTable(log, OutlierTable(report));
   if (!report.summary.is_within) {
     LogLine(log, 0, "warning: not all errors are within the bound");

@@ -92,7 +92,7 @@ std::optional<PixelCertificate> ProveRefutation(const Model& model,
   }
   std::optional<PixelCertificate> best =
       ProveInPixels(model, at_estimate, refuted.estimate, bound.norm,
-                    refuted.support, context);
+                    refuted.support, proof.lower_bound, context);
   if (!best || !is_accepted(*best)) return std::nullopt;
   return best;
 }

@@ -109,7 +109,10 @@ void OutlierFilter::Solve(Model moved) {
   const Timer timer;
   kept_ = RemoveObservations(moved, is_removed_);
   if (!kept_.model.track_elements.empty()) {
-    SolveModelResult solved = SolveModel(kept_.model, options_.solve, context_);
+    // Where all that is left can be within the bound, the least squares there.
+    SolveModelOptions options = options_.solve;
+    options.finish.max_error = options_.max_error;
+    SolveModelResult solved = SolveModel(kept_.model, options, context_);
     kept_.model = std::move(solved.model);
     summary_.solve = std::move(solved.summary);
     ++summary_.num_solves;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "krot/finish/bounded_least_squares.h"
 
@@ -21,6 +22,8 @@ struct FinishOptions {
   Finish finish = Finish::kLeastSquares;
   // eta: every error stays below (1 + slack) times the lowest maximum.
   double slack = 5e-4;  // > 0
+  // Pixels; > 0: the cap instead, if the lowest maximum is below it.
+  std::optional<double> max_error;
   ErrorLoss loss;
   // Told of every iteration; may be empty.
   std::function<void(const BoundedIterate&)> callback;

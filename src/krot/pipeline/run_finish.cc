@@ -28,13 +28,15 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   FinishSummary finish;
   finish.lowest_cost = summary->cost_final;
   finish.loss = options.finish.loss;
-  const double room = finish.lowest_cost - lower_bound.value_or(0);
   const bool is_lowest_known =
-      room <= options.joint.relative_gap * finish.lowest_cost;
-  finish.cap = std::min(
-      (1 + options.finish.slack) *
-          (is_lowest_known ? lower_bound.value_or(0) : finish.lowest_cost),
-      summary->cost_initial);
+      lower_bound && finish.lowest_cost - *lower_bound <=
+                         options.joint.relative_gap * finish.lowest_cost;
+  finish.cap = (1 + options.finish.slack) *
+               (is_lowest_known ? *lower_bound : finish.lowest_cost);
+  if (finish.lowest_cost < options.finish.max_error.value_or(0)) {
+    finish.cap = *options.finish.max_error;
+  }
+  finish.cap = std::min(finish.cap, summary->cost_initial);
   if (!(finish.lowest_cost < (1 - kLeastRoom) * finish.cap)) return;
 
   BoundedOptions bounded;

@@ -11,8 +11,9 @@ namespace krot {
 // that the options ask for:
 //
 //   least squares   of true errors, below a cap of (1 + slack) times the lowest
-//                   maximum: `lower_bound` if the gap asked for is reached, else
-//                   the estimate's own; no error rises above the start's largest
+//                   maximum, or max_error: `lower_bound` if the gap asked for is
+//                   reached, else the estimate's own; no error rises above the
+//                   start's largest
 //   sweeps          two, that do not raise the largest true error; they count
 //                   among the summary's
 //
