@@ -39,8 +39,7 @@ void AddFinishOptions(SolveModelOptions* options, OptionParser* parser) {
 
 void CheckFinishOptions(const SolveModelOptions& options,
                         const OptionParser& parser) {
-  const bool has_least_squares =
-      options.finish.finish == Finish::kLeastSquares;
+  const bool has_least_squares = options.finish.finish == Finish::kLeastSquares;
   for (const char* name : {"Solver.finish_slack", "Solver.finish_loss",
                            "Solver.finish_loss_scale"}) {
     if (!has_least_squares) {

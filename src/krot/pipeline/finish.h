@@ -23,7 +23,11 @@ const char* FinishName(Finish finish);
 struct FinishOptions {
   Finish finish = Finish::kLeastSquares;
   // eta: every error stays below (1 + slack) times the lowest maximum.
-  double slack = 5e-4;  // > 0
+  double slack = 5e-4;        // > 0
+  std::optional<double> cap;  // in place of that; pixels; > 0
+  double CapAbove(double lowest) const {
+    return cap.value_or((1 + slack) * lowest);
+  }
   ErrorLoss loss;
   // Told of every iteration; may be empty.
   std::function<void(const BoundedIterate&)> callback;
