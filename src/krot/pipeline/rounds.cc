@@ -258,9 +258,8 @@ void Rounds::RunFinish() {
 void Rounds::FinishByLeastSquares() {
   if (IsZeroUpToRounding(cost_)) return;
   const double lowest = IsGapReached() ? certificate_->lower_bound : cost_;
-  const double cap = std::min(
-      options_.finish.cap.value_or((1 + options_.finish.slack) * lowest),
-      summary_.cost_initial);
+  const double cap =
+      std::min(options_.finish.CapAbove(lowest), summary_.cost_initial);
   summary_.finish =
       krot::FinishByLeastSquares(reprojection_, options_.finish, options_.norm,
                                  cap, context_, &built_.problem, &estimate_);
