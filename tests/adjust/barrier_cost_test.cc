@@ -25,9 +25,10 @@ struct Blocks {
   std::array<double, 7> frame = {0.9, 0.1, -0.3, 0.2, 0.1, -0.2, 0.5};
   std::array<double, 7> sensor = {0.8, -0.1, 0.2, 0.1, -0.05, 0.1, 0.02};
   std::array<double, 4> camera = {900, 512, 384, 0.05};
+  double cap2 = 9.0;
 
   std::vector<double*> Pointers() {
-    return {point.data(), frame.data(), sensor.data(), camera.data()};
+    return {point.data(), frame.data(), sensor.data(), camera.data(), &cap2};
   }
 };
 
@@ -77,8 +78,8 @@ class BarrierCostTest : public ::testing::Test {
     return {pixel - pixel_, x.z()};
   }
 
-  double Slack(const Blocks& blocks) const {
-    return (barrier_.cap2 - See(blocks).r.squaredNorm()) / 2;
+  double SlackOf(const Blocks& blocks) const {
+    return (blocks.cap2 - See(blocks).r.squaredNorm()) / 2;
   }
 
   // What a function of the blocks changes by, per unit of a motion.
@@ -106,7 +107,7 @@ class BarrierCostTest : public ::testing::Test {
 
   Blocks blocks_;
   Vector2d pixel_ = Vector2d::Zero();
-  Barrier barrier_ = {9.0, 0.25};
+  Barrier barrier_ = {0.25};
   double multiplier_ = 1.7;
 };
 
@@ -125,19 +126,20 @@ TEST_F(BarrierCostTest, RowsAreThoseOfThePrimalDualSystem) {
   ASSERT_TRUE(
       cost.Evaluate(pointers.data(), residuals.data(), row_pointers.data()));
 
-  const double h = Slack(blocks_), w = See(blocks_).w;
+  const double h = SlackOf(blocks_), w = See(blocks_).w;
   const auto barrier_cost = [&](const Blocks& blocks) {
     return See(blocks).r.squaredNorm() / 2 -
-           barrier_.mu * std::log(Slack(blocks));
+           barrier_.mu * std::log(SlackOf(blocks));
   };
   const auto depth_times_slack = [&](const Blocks& blocks) {
-    return See(blocks).w * Slack(blocks);
+    return See(blocks).w * SlackOf(blocks);
   };
   const auto error_x = [&](const Blocks& blocks) { return See(blocks).r.x(); };
-  const int num_motions[] = {3, 6, 6, 4};
-  for (size_t b = 0; b < 4; ++b) {
+  const int num_motions[] = {3, 6, 6, 4, 1};
+  for (size_t b = 0; b < 5; ++b) {
     for (int i = 0; i < num_motions[b]; ++i) {
-      const double gradient = Slope(b, i, barrier_cost);
+      // That by the cap is CapCost's.
+      const double gradient = b < 4 ? Slope(b, i, barrier_cost) : 0;
       EXPECT_NEAR(RowSlope(b, i, residuals.transpose() * rows[b]), gradient,
                   1e-6 * (1 + std::abs(gradient)));
       const double constraint =
@@ -158,6 +160,17 @@ TEST_F(BarrierCostTest, HasNoCostToOffer) {
   Vector3d residuals;
   EXPECT_FALSE(
       cost.Evaluate(blocks_.Pointers().data(), residuals.data(), nullptr));
+}
+
+TEST(CapCost, IsARowWithTheCapsSlopeAndNextToNoCurvature) {
+  CapSlope cap = {-3.5, 20};
+  const CapCost cost(&cap);
+  double cap2 = 9, residual = 0, row = 0;
+  double* blocks[] = {&cap2};
+  double* rows[] = {&row};
+  ASSERT_TRUE(cost.Evaluate(blocks, &residual, rows));
+  EXPECT_DOUBLE_EQ(row * residual, cap.slope);
+  EXPECT_LT(row * row, 1e-6 * cap.curvature);
 }
 
 }  // namespace

@@ -341,7 +341,7 @@ TEST(AdjustBundle, RefusesOptionsOutOfRangeByName) {
                 options->max_error = 3;
                 options->loss = RobustLoss::kHuber;
               }),
-              testing::HasSubstr("trivial with a max_error"));
+              testing::HasSubstr("trivial with a cap"));
 }
 
 TEST(AdjustBundle, RefusesPanoramas) {

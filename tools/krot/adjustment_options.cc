@@ -58,18 +58,22 @@ void AdjustmentOptions::AddRefined(OptionParser* parser) {
 }
 
 void AdjustmentOptions::AddCap(OptionParser* parser) {
-  const auto add = [&](const char* name, double* value, double min,
-                       const char* range, const char* description) {
-    parser->Add({name, description, range, "", false,
-                 [value, min](const std::string& text) {
-                   return ParseReal(text, value) && *value > min;
-                 }});
-  };
-  add("BundleAdjustment.max_error", &max_error_, 0, "a number > 0, pixels",
-      "Bounded bundle adjustment: every error stays below this");
-  add("BundleAdjustment.max_error_factor", &max_error_factor_, 1,
-      "a number > 1",
-      "The same, times the largest error of what krot solver finds");
+  parser->Add({"BundleAdjustment.max_error",
+               "Bounded bundle adjustment: every error stays below this; "
+               "minimum: first the largest error is lowered over all that "
+               "moves, to a local minimum",
+               "a number > 0, pixels, or minimum", "", false,
+               [this](const std::string& text) {
+                 adjustment_.lower_max_error = text == "minimum";
+                 return adjustment_.lower_max_error ||
+                        (ParseReal(text, &max_error_) && max_error_ > 0);
+               }});
+  parser->Add({"BundleAdjustment.max_error_factor",
+               "The same, times the lowest maximum of krot solver",
+               "a number > 1", "", false, [this](const std::string& text) {
+                 return ParseReal(text, &max_error_factor_) &&
+                        max_error_factor_ > 1;
+               }});
 }
 
 void AdjustmentOptions::AddCeres(OptionParser* parser) {
@@ -156,7 +160,9 @@ AdjustModelOptions AdjustmentOptions::Resolve(
         "--BundleAdjustment.max_error and max_error_factor need "
         "--BundleAdjustmentCeres.loss_function_type TRIVIAL");
   }
-  if (has_cap) adjustment.max_error = max_error_;
+  if (has_cap && !adjustment.lower_max_error) {
+    adjustment.max_error = max_error_;
+  }
   if (has_factor) options.max_error_factor = max_error_factor_;
   return options;
 }

@@ -26,6 +26,7 @@ std::string IterationLine(const BundleAdjustmentIteration& iteration) {
   } else {
     line += "step rejected";
   }
+  if (iteration.cap) line += ", cap " + FormatNumber(*iteration.cap, 4) + " px";
   if (iteration.barrier) {
     line += ", barrier " + Scientific(*iteration.barrier);
   }

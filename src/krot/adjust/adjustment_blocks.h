@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -36,6 +37,9 @@ struct AdjustmentBlocks {
   std::vector<std::vector<double>> cameras;
   std::vector<int> camera_models;  // their ids
   std::vector<Eigen::Vector3d> points;
+  // The cap on every error, squared, of a bounded adjustment; pixels^2. Not of
+  // the model, but unknown where it is lowered.
+  double cap2 = std::numeric_limits<double>::infinity();
   std::vector<AdjustmentObservation> observations;  // point by point
 
   int64_t num_images = 0;  // with observations
@@ -49,6 +53,11 @@ struct AdjustmentBlocks {
 // Throws ModelError for a camera without an image plane that an image with a
 // point uses. O(observations).
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length);
+
+// Sets `*blocks` to from + step (to - from), quaternions of unit norm. What is
+// the same in both keeps its bits. All three are of the same model.
+void Interpolate(const AdjustmentBlocks& from, const AdjustmentBlocks& to,
+                 double step, AdjustmentBlocks* blocks);
 
 // A copy of the model with the blocks in place of what they were made from.
 // Records whose blocks are those of `before` keep their bits; the poses of

@@ -99,6 +99,7 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
       parameters.push_back(blocks->sensors[observation.sensor].data());
     }
     parameters.push_back(blocks->cameras[observation.camera].data());
+    if (cost_of) parameters.push_back(&blocks->cap2);
     problem->AddResidualBlock(cost.release(), loss, parameters);
   }
   for (PoseBlock& frame : blocks->frames) {
@@ -113,6 +114,9 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
     const CameraModelInfo& info = *FindCameraModel(blocks->camera_models[c]);
     HoldStill(blocks->cameras[c].data(), info.num_params,
               ConstantParams(info, options), problem);
+  }
+  if (problem->HasParameterBlock(&blocks->cap2)) {
+    problem->SetParameterBlockConstant(&blocks->cap2);
   }
   if (options.refine_points3D) return;
   for (Eigen::Vector3d& point : blocks->points) {
@@ -161,6 +165,7 @@ ceres::Solver::Options AdjustmentSolverOptions(
   for (std::vector<double>& camera : blocks->cameras) {
     add(camera.data(), group++);
   }
+  add(&blocks->cap2, group);
   solver.linear_solver_ordering = std::move(ordering);
   return solver;
 }

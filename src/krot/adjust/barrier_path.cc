@@ -4,16 +4,12 @@
 #include <cmath>
 
 #include "krot/adjust/optimality.h"
-#include "krot/adjust/projected_errors.h"
-#include "krot/base/timer.h"
 
 namespace krot {
 namespace {
 
-// The path ends with a gap of this share of the cost,
+// The path ends with a gap of this share of what is minimised.
 constexpr double kGapTolerance = 1e-4;
-// and no less stationary than this.
-constexpr double kStationarityTolerance = 1e-6;
 // What a step leaves of the way to the cap, and of a multiplier, at least.
 constexpr double kBoundaryShare = 0.01;
 // Multipliers stay within this factor of mu / h.
@@ -40,110 +36,70 @@ constexpr double kCostRounding = 1e-12;
 // Multipliers above this count as active; a squared error has the weight 1.
 constexpr double kActiveMultiplier = 1e-3;
 
-// a + step (b - a), its quaternions of unit norm.
-void Interpolate(const AdjustmentBlocks& a, const AdjustmentBlocks& b,
-                 double step, AdjustmentBlocks* blocks) {
-  const auto mix = [step](const auto& from, const auto& to, auto* result) {
-    for (size_t i = 0; i < from.size(); ++i) {
-      (*result)[i] = from[i] + step * (to[i] - from[i]);
-    }
-  };
-  const auto mix_poses = [&](const std::vector<PoseBlock>& from,
-                             const std::vector<PoseBlock>& to,
-                             std::vector<PoseBlock>* result) {
-    for (size_t i = 0; i < from.size(); ++i) {
-      if (from[i] == to[i]) continue;
-      mix(from[i], to[i], &(*result)[i]);
-      Eigen::Map<Eigen::Vector4d>((*result)[i].data()).normalize();
-    }
-  };
-  mix_poses(a.frames, b.frames, &blocks->frames);
-  mix_poses(a.sensors, b.sensors, &blocks->sensors);
-  for (size_t c = 0; c < a.cameras.size(); ++c) {
-    mix(a.cameras[c], b.cameras[c], &blocks->cameras[c]);
-  }
-  mix(a.points, b.points, &blocks->points);
+}  // namespace
+
+BarrierPath::BarrierPath(const ceres::Solver::Options& solver_options,
+                         BarrierProblem* bounded)
+    : solver_options_(solver_options),
+      bounded_(*bounded),
+      radius_(kLargestRadius) {
+  solver_options_.max_num_iterations = 1;
+  solver_options_.update_state_every_iteration = false;
+  errors_ = *ProjectBlocks();
+  cost_ = HalfSquaredNorm(errors_);
 }
 
-class BarrierPath {
- public:
-  // Requires errors below the cap.
-  BarrierPath(const ceres::Solver::Options& solver_options,
-              const BarrierProblem& bounded)
-      : solver_options_(solver_options), bounded_(bounded) {
-    solver_options_.max_num_iterations = 1;
-    solver_options_.update_state_every_iteration = false;
-    errors_ = *ProjectBlocks();
-    cost_ = HalfSquaredNorm(errors_);
-    set_mu(cost_ / count());
-    CenterMultipliers();
+void BarrierPath::Begin(double mu) {
+  set_mu(mu);
+  CentreMultipliers();
+}
+
+double BarrierPath::WeightOfCap() const {
+  double sum = 0;
+  for (const ProjectedError& error : errors_) sum += 1 / SlackOf(error);
+  return cap_weight() / sum;
+}
+
+double BarrierPath::gap() const {
+  const double objective = Objective();
+  return objective > 0 ? count() * mu() / objective : 0;
+}
+
+bool BarrierPath::IsGapReached() const {
+  return count() * mu() <= kGapTolerance * Objective();
+}
+
+double BarrierPath::LargestError() const {
+  double largest2 = 0;
+  for (const ProjectedError& error : errors_) {
+    largest2 = std::max(largest2, error.r.squaredNorm());
   }
+  return std::sqrt(largest2);
+}
 
-  // Takes a step, and says how much of it; 0: none that lowers the barrier
-  // cost was found.
-  double Step();
+std::optional<double> BarrierPath::MeasureStationarity() {
+  if (cap_weight() > 0) FindCapSlope();
+  return Stationarity(solver_options_.num_threads, Objective(),
+                      bounded_.problem);
+}
 
-  // Chooses the weight for the next step after one of length `step`.
-  void LowerWeight(double step);
+std::optional<BarrierPath::Errors> BarrierPath::ProjectBlocks() const {
+  return ProjectErrors(*bounded_.blocks, std::sqrt(cap2()),
+                       solver_options_.num_threads);
+}
 
-  bool IsGapReached() const { return count() * mu() <= kGapTolerance * cost_; }
+std::optional<BarrierPath::Errors> BarrierPath::ProjectAt(
+    const AdjustmentBlocks& from, const AdjustmentBlocks& to,
+    double step) const {
+  Interpolate(from, to, step, bounded_.blocks);
+  return ProjectBlocks();
+}
 
-  double mu() const { return bounded_.barrier->mu; }
-  double cost() const { return cost_; }
-  double radius() const { return radius_; }
-  double gap() const { return cost_ > 0 ? count() * mu() / cost_ : 0; }
-  std::optional<double> MeasureStationarity() const {
-    return Stationarity(solver_options_.num_threads, cost_, bounded_.problem);
+void BarrierPath::CentreMultipliers() {
+  for (size_t i = 0; i < errors_.size(); ++i) {
+    multipliers()[i] = mu() / SlackOf(errors_[i]);
   }
-  int64_t NumActive() const;
-
- private:
-  using Errors = std::vector<ProjectedError>;
-
-  void set_mu(double mu) { bounded_.barrier->mu = mu; }
-  std::vector<double>& multipliers() const { return *bounded_.multipliers; }
-  double count() const { return static_cast<double>(multipliers().size()); }
-  double cap2() const { return bounded_.barrier->cap2; }
-  double Slack(const ProjectedError& error) const {
-    return bounded_.barrier->Slack(error.r.squaredNorm());
-  }
-
-  double BarrierCost(const Errors& errors) const;
-  // None where an error reaches the cap.
-  std::optional<Errors> ProjectBlocks() const {
-    return ProjectErrors(*bounded_.blocks, std::sqrt(cap2()),
-                         solver_options_.num_threads);
-  }
-  std::optional<Errors> ProjectAt(const AdjustmentBlocks& from,
-                                  const AdjustmentBlocks& to,
-                                  double step) const {
-    Interpolate(from, to, step, bounded_.blocks);
-    return ProjectBlocks();
-  }
-
-  // Where Newton's step leads.
-  std::optional<AdjustmentBlocks> FindTrial();
-  // The derivatives of errors and depths on the way to the trial.
-  std::optional<Errors> FindSlopes(const AdjustmentBlocks& from,
-                                   const AdjustmentBlocks& trial) const;
-  // The longest step at most 1 that the linearised errors allow.
-  double LongestStep(const Errors& slopes) const;
-  // mu / h, what they are at the minimum of the barrier.
-  void CenterMultipliers() {
-    for (size_t i = 0; i < errors_.size(); ++i) {
-      multipliers()[i] = mu() / Slack(errors_[i]);
-    }
-  }
-  void UpdateMultipliers(const Errors& slopes, const Errors& stepped);
-  // After a step that was this share of the longest.
-  void UpdateRadius(double share);
-
-  ceres::Solver::Options solver_options_;
-  BarrierProblem bounded_;
-  Errors errors_;    // at the blocks
-  double cost_ = 0;  // half their squared norm
-  double radius_ = kLargestRadius;
-};
+}
 
 double BarrierPath::BarrierCost(const Errors& errors) const {
   double sum = 0;
@@ -151,15 +107,29 @@ double BarrierPath::BarrierCost(const Errors& errors) const {
     const double squared = error.r.squaredNorm();
     sum += squared / 2 - mu() * std::log1p(-squared / cap2());
   }
+  if (cap_weight() > 0) {
+    sum += cap_weight() * cap2() / 2 - mu() * count() * std::log(cap2());
+  }
   return sum;
 }
 
+void BarrierPath::FindCapSlope() {
+  CapSlope& cap = bounded_.cap_slope;
+  cap = {cap_weight() / 2, 0};
+  for (size_t i = 0; i < errors_.size(); ++i) {
+    const double h = SlackOf(errors_[i]);
+    cap.slope -= mu() / (2 * h);
+    cap.curvature += multipliers()[i] / (4 * h);
+  }
+}
+
 std::optional<AdjustmentBlocks> BarrierPath::FindTrial() {
+  if (cap_weight() > 0) FindCapSlope();
   solver_options_.initial_trust_region_radius = radius_;
-  bounded_.recorder->Start();
+  bounded_.recorder.Start();
   ceres::Solver::Summary summary;
   ceres::Solve(solver_options_, bounded_.problem, &summary);
-  return bounded_.recorder->Stop();
+  return bounded_.recorder.Stop();
 }
 
 std::optional<BarrierPath::Errors> BarrierPath::FindSlopes(
@@ -177,15 +147,16 @@ std::optional<BarrierPath::Errors> BarrierPath::FindSlopes(
   return std::nullopt;
 }
 
-double BarrierPath::LongestStep(const Errors& slopes) const {
+double BarrierPath::LongestStep(const Errors& slopes, double cap2_slope) const {
   double longest = 1;
   for (size_t i = 0; i < errors_.size(); ++i) {
-    // w r and w are nearly affine: |r + step v| = cap (1 + step u)
-    const double u = slopes[i].w / errors_[i].w;
-    const Eigen::Vector2d v = slopes[i].r + u * errors_[i].r;
+    // w r, w and cap w are nearly affine: |r + step v| = cap (1 + step u)
+    const double w_slope = slopes[i].w / errors_[i].w;
+    const Eigen::Vector2d v = slopes[i].r + w_slope * errors_[i].r;
+    const double u = w_slope + cap2_slope / (2 * cap2());
     const double a = cap2() * u * u - v.squaredNorm();
     const double b = cap2() * u - errors_[i].r.dot(v);
-    const double c = 2 * Slack(errors_[i]);
+    const double c = 2 * SlackOf(errors_[i]);
     const double discriminant = b * b - a * c;
     if (discriminant < 0) continue;
     const double denominator = std::sqrt(discriminant) - b;
@@ -195,16 +166,17 @@ double BarrierPath::LongestStep(const Errors& slopes) const {
   return longest;
 }
 
-void BarrierPath::UpdateMultipliers(const Errors& slopes,
-                                    const Errors& stepped) {
+void BarrierPath::UpdateMultipliers(const Errors& slopes, double cap2_slope,
+                                    const Errors& stepped, double cap2_before) {
   for (size_t i = 0; i < errors_.size(); ++i) {
-    const double h = Slack(errors_[i]);
+    const double h = Slack(cap2_before, errors_[i].r.squaredNorm());
     const double h_change = h * slopes[i].w / errors_[i].w -
-                            errors_[i].r.dot(slopes[i].r);  // w h, by w
+                            errors_[i].r.dot(slopes[i].r) +
+                            cap2_slope / 2;  // w h, by w
     const double lambda = multipliers()[i];
     // lambda h + h dlambda + lambda dh = mu
     const double newton = (mu() - lambda * h_change) / h;
-    const double central = mu() / Slack(stepped[i]);
+    const double central = mu() / SlackOf(stepped[i]);
     multipliers()[i] =
         std::clamp(std::max(newton, kBoundaryShare * lambda),
                    central / kMultiplierRange, central * kMultiplierRange);
@@ -213,16 +185,18 @@ void BarrierPath::UpdateMultipliers(const Errors& slopes,
 
 double BarrierPath::Step() {
   const AdjustmentBlocks from = *bounded_.blocks;
-  const double highest = BarrierCost(errors_) + kCostRounding * cost_;
+  const double highest = BarrierCost(errors_) + kCostRounding * Objective();
   while (radius_ >= kMinRadius) {
     const std::optional<AdjustmentBlocks> trial = FindTrial();
     const std::optional<Errors> slopes =
         trial ? FindSlopes(from, *trial) : std::nullopt;
-    const double longest = slopes ? LongestStep(*slopes) : 0;
+    bounded_.blocks->cap2 = from.cap2;
+    const double cap2_slope = trial ? trial->cap2 - from.cap2 : 0;
+    const double longest = slopes ? LongestStep(*slopes, cap2_slope) : 0;
     for (double step = longest; step > kShortestStep; step *= kShortening) {
       std::optional<Errors> stepped = ProjectAt(from, *trial, step);
       if (!stepped || !(BarrierCost(*stepped) <= highest)) continue;
-      UpdateMultipliers(*slopes, *stepped);
+      UpdateMultipliers(*slopes, cap2_slope, *stepped, from.cap2);
       errors_ = std::move(*stepped);
       cost_ = HalfSquaredNorm(errors_);
       UpdateRadius(step / longest);
@@ -232,7 +206,7 @@ double BarrierPath::Step() {
     radius_ /= 100;
   }
   radius_ = kLargestRadius;
-  CenterMultipliers();
+  CentreMultipliers();
   return 0;
 }
 
@@ -246,55 +220,16 @@ void BarrierPath::UpdateRadius(double share) {
 
 void BarrierPath::LowerWeight(double step) {
   if (step < kFallingStep) return;
-  const double last = 0.5 * kGapTolerance * cost_ / count();
+  const double last = 0.5 * kGapTolerance * Objective() / count();
   set_mu(std::max(last, kCentering * mu()));
 }
 
 int64_t BarrierPath::NumActive() const {
   int64_t count = 0;
   for (const ProjectedError& error : errors_) {
-    if (mu() / Slack(error) > kActiveMultiplier) ++count;
+    if (mu() / SlackOf(error) > kActiveMultiplier) ++count;
   }
   return count;
-}
-
-}  // namespace
-
-void FollowBarrierPath(const BundleAdjustmentOptions& options,
-                       const Context& context,
-                       const ceres::Solver::Options& solver_options,
-                       const BarrierProblem& bounded,
-                       BundleAdjustmentSummary* summary) {
-  const Timer timer;
-  BarrierPath path(solver_options, bounded);
-  summary->termination = BundleAdjustmentTermination::kMaxIterations;
-  for (int& n = summary->num_iterations; n < options.max_num_iterations;) {
-    if (context.IsCancelled()) {
-      summary->termination = BundleAdjustmentTermination::kInterrupted;
-      break;
-    }
-    const double step = path.Step();
-    ++n;
-    if (options.callback) {
-      options.callback({n, path.cost(), path.radius(), step > 0, path.mu(),
-                        timer.Seconds()});
-    }
-    if (path.IsGapReached()) {
-      summary->stationarity = path.MeasureStationarity();
-      if (summary->stationarity <= kStationarityTolerance) {
-        summary->termination = BundleAdjustmentTermination::kCapConverged;
-        break;
-      }
-      if (step == 0) {
-        summary->termination = BundleAdjustmentTermination::kStalled;
-        break;
-      }
-    }
-    path.LowerWeight(step > 0 ? step : 1);
-  }
-  summary->stationarity = path.MeasureStationarity();
-  summary->duality_gap = path.gap();
-  summary->num_active = path.NumActive();
 }
 
 }  // namespace krot

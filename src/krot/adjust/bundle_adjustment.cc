@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
-#include <limits>
+#include <cmath>
 #include <memory>
 #include <set>
 #include <utility>
@@ -13,7 +13,7 @@
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/adjustment_problem.h"
 #include "krot/adjust/barrier_cost.h"
-#include "krot/adjust/barrier_path.h"
+#include "krot/adjust/bounded_adjustment.h"
 #include "krot/adjust/iteration_observer.h"
 #include "krot/adjust/optimality.h"
 #include "krot/adjust/projected_errors.h"
@@ -42,10 +42,14 @@ void CheckOptions(const BundleAdjustmentOptions& options) {
            options.max_num_images_direct_dense);
   at_least(0, "max_num_images_direct_sparse",
            options.max_num_images_direct_sparse);
-  if (!options.max_error) return;
-  CheckArgument(*options.max_error > 0, "max_error", *options.max_error, "> 0");
+  if (!options.IsBounded()) return;
+  CheckArgument(options.max_error.value_or(1) > 0, "max_error",
+                *options.max_error, "> 0");
+  CheckArgument(!options.max_error || !options.lower_max_error,
+                "lower_max_error", options.lower_max_error,
+                "false with a max_error");
   CheckArgument(options.loss == RobustLoss::kTrivial, "loss",
-                static_cast<int>(options.loss), "trivial with a max_error");
+                static_cast<int>(options.loss), "trivial with a cap");
 }
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(
@@ -118,14 +122,11 @@ void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
 
 // Half the sum of the squared errors under the loss, if there is one; none
 // where an error is not finite or reaches the cap.
-std::optional<double> RobustCost(const BundleAdjustmentOptions& options,
-                                 const Context& context,
+std::optional<double> RobustCost(const Context& context,
                                  const ceres::LossFunction* loss,
                                  const AdjustmentBlocks& blocks) {
-  const auto errors = ProjectErrors(
-      blocks,
-      options.max_error.value_or(std::numeric_limits<double>::infinity()),
-      context.num_threads);
+  const auto errors =
+      ProjectErrors(blocks, std::sqrt(blocks.cap2), context.num_threads);
   if (!errors) return std::nullopt;
   if (loss == nullptr) return HalfSquaredNorm(*errors);
   double sum = 0;
@@ -173,31 +174,29 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   AdjustmentBlocks blocks = before;
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
-  Barrier barrier;
-  std::vector<double> multipliers;
-  TrialRecorder recorder(&blocks);
+  if (options.max_error) blocks.cap2 = *options.max_error * *options.max_error;
+  BarrierProblem bounded(&blocks);
   ceres::Problem::Options problem_options = AdjustmentProblemOptions();
   CostOfObservation cost_of;
-  if (options.max_error) {
-    barrier.cap2 = *options.max_error * *options.max_error;
-    multipliers.resize(blocks.observations.size());
-    problem_options.evaluation_callback = &recorder;
+  if (options.IsBounded()) {
+    problem_options.evaluation_callback = &bounded.recorder;
     cost_of = [&](size_t i, std::unique_ptr<ceres::CostFunction> projection) {
-      return std::make_unique<BarrierCost>(std::move(projection), &barrier,
-                                           &multipliers[i]);
+      return std::make_unique<BarrierCost>(
+          std::move(projection), &bounded.barrier, &bounded.multipliers[i]);
     };
   }
   ceres::Problem problem(problem_options);
+  bounded.problem = &problem;
   BuildAdjustmentProblem(options, cost_of, loss.get(), &blocks, &problem);
 
   BundleAdjustmentResult result;
   BundleAdjustmentSummary& summary = result.summary;
+  summary.max_error = options.max_error;
   Count(blocks, problem, &summary);
   const ceres::Solver::Options solver_options =
       AdjustmentSolverOptions(options, context, &blocks, problem);
   summary.linear_solver = SolverName(solver_options);
-  const std::optional<double> cost =
-      RobustCost(options, context, loss.get(), blocks);
+  const std::optional<double> cost = RobustCost(context, loss.get(), blocks);
   if (summary.num_parameters == 0) {
     summary.termination = BundleAdjustmentTermination::kNothingToAdjust;
   } else if (!cost) {
@@ -206,15 +205,17 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
     summary.cost_initial = *cost;
     const BundleAdjustmentOptions recorded =
         RecordIterations(options, &summary);
-    if (options.max_error) {
-      FollowBarrierPath(recorded, context, solver_options,
-                        {&problem, &blocks, &barrier, &multipliers, &recorder},
-                        &summary);
+    if (options.IsBounded()) {
+      if (options.lower_max_error) {
+        LowerMaxError(recorded, context, solver_options, &bounded, &summary);
+      }
+      AdjustBelowCap(recorded, context, solver_options, &bounded, &summary);
+      summary.max_error = std::sqrt(blocks.cap2);
     } else {
       Minimize(recorded, context, solver_options, &problem, &summary);
     }
-    summary.cost_final = *RobustCost(options, context, loss.get(), blocks);
-    if (!options.max_error) {
+    summary.cost_final = *RobustCost(context, loss.get(), blocks);
+    if (!options.IsBounded()) {
       summary.stationarity = Stationarity(solver_options.num_threads,
                                           summary.cost_final, &problem);
     }

@@ -24,7 +24,8 @@ struct BundleAdjustmentIteration {
   double cost = 0;
   double radius = 0;  // of the trust region
   bool is_successful = false;
-  std::optional<double> barrier;  // pixels^2; with a max_error
+  std::optional<double> barrier;  // pixels^2; with a cap
+  std::optional<double> cap;      // pixels; with one
   double seconds = 0;             // wall clock, since the start
 };
 
@@ -60,6 +61,13 @@ struct BundleAdjustmentOptions {
   // strictly below it.
   std::optional<double> max_error;
 
+  // First moves to a local minimum of the largest error, nearly, and never one
+  // above the start's; the cap is then (1 + 5e-4) times that. In place of a
+  // max_error; kTrivial only.
+  bool lower_max_error = false;
+
+  bool IsBounded() const { return max_error || lower_max_error; }
+
   // After every iteration; may be empty.
   std::function<void(const BundleAdjustmentIteration&)> callback;
 };
@@ -70,8 +78,8 @@ enum class BundleAdjustmentTermination {
   kConverged,        // Ceres' function, gradient or parameter tolerance
   kCapConverged,     // duality_gap and stationarity below their tolerances
   kMaxIterations,
-  kStalled,          // no step lowers the cost; with a max_error: nor is the
-                     // end a proved one
+  kStalled,          // no step lowers the cost; with a cap: nor is the end a
+                     // proved one
   kInfeasibleStart,  // the start is not strictly below max_error
   kInterrupted,      // the model is the best so far
 };
@@ -97,12 +105,16 @@ struct BundleAdjustmentSummary {
   std::vector<BundleAdjustmentIteration> iterations;  // without the start
   std::string linear_solver;                          // "dense_schur", ...
 
+  std::optional<double> max_error;  // the cap of the end, pixels
+  // With lower_max_error: the local minimum of the largest error, nearly.
+  std::optional<double> lowest_max_error;  // pixels
+
   // At the end: g'D^-1 g / (2 cost), the share of the cost that the unknowns
   // would remove, each moved by itself (g the gradient, D the diagonal of J'J).
-  // With a max_error both are the barrier problem's, whose gradient is that of
+  // With a cap both are the barrier problem's, whose gradient is that of
   // the Lagrangian. 0 at a stationary point.
   std::optional<double> stationarity;
-  // With a max_error: sum of multiplier times slack, relative to the cost. Were
+  // With a cap: sum of multiplier times slack, relative to the cost. Were
   // the problem convex, no feasible point would be lower by more.
   std::optional<double> duality_gap;
   // Observations whose multiplier is above 1e-3: those that the cap holds.
@@ -124,7 +136,7 @@ struct BundleAdjustmentResult {
 // updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a
-// max_error, so is one that takes an error to it. With more than one thread
+// cap, so is one that takes an error to it. With more than one thread
 // Ceres adds up in no fixed order: the last digits differ from run to run then.
 //
 // Requires a valid model (ValidateModel). Throws ModelError for cameras without

@@ -1,5 +1,6 @@
 #include "krot/pipeline/adjust_model.h"
 
+#include <limits>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -21,6 +22,33 @@ std::string PixelText(double error_px) {
   return text.str();
 }
 
+// A cap that is a factor leaves this share of its room to the least squares
+// with fixed rotations; one that is given, all but this of itself.
+constexpr double kStartShare = 0.9;
+constexpr double kStartRoom = 5e-4;
+
+// The start ends at the least squares a little below the cap, so that the
+// adjustment begins near its own end, or at the lowest maximum itself.
+SolveModelOptions StartOptions(const AdjustModelOptions& options) {
+  SolveModelOptions start = options.start;
+  if (options.max_error_factor) {
+    start.finish.slack = kStartShare * (*options.max_error_factor - 1);
+  } else if (options.adjustment.max_error) {
+    start.finish.max_error = (1 - kStartRoom) * *options.adjustment.max_error;
+  } else {
+    start.finish.finish = Finish::kNone;
+  }
+  return start;
+}
+
+// Of all observations; those outside the problem may be above the finish.
+double LowestMaximum(const SolveSummary& start) {
+  const double largest = start.pixel_error_after.max;
+  return start.finish && largest <= start.finish->cap
+             ? start.finish->lowest_cost
+             : largest;
+}
+
 // Where a bounded adjustment starts, and its cap; none if there is no estimate
 // below it.
 std::optional<Model> BoundedStart(const Model& model,
@@ -28,29 +56,31 @@ std::optional<Model> BoundedStart(const Model& model,
                                   const Context& context,
                                   AdjustModelSummary* summary) {
   summary->max_error = options.adjustment.max_error;
-  if (!options.max_error_factor &&
-      IsBelow(summary->pixel_error_before, *summary->max_error)) {
+  const bool is_given = summary->max_error && !options.max_error_factor;
+  if (is_given && IsBelow(summary->pixel_error_before, *summary->max_error)) {
     return model;
   }
-  context.Note(
-      options.max_error_factor
-          ? "the cap refers to the lowest maximum with these rotations: "
-            "solving for it"
-          : "the model's largest error is not below the cap: solving for the "
-            "lowest with these rotations");
-  SolveModelResult start = SolveModel(model, options.start, context);
+  context.Note(!is_given
+                   ? "the cap refers to the lowest maximum with these "
+                     "rotations: solving for it"
+                   : "the model's largest error is not below the cap: solving "
+                     "for the lowest with these rotations");
+  SolveModelResult start = SolveModel(model, StartOptions(options), context);
   summary->pixel_error_start = start.summary.pixel_error_after;
   summary->start = std::move(start.summary);
   if (options.max_error_factor) {
     summary->max_error =
-        *options.max_error_factor * summary->pixel_error_start.max;
+        *options.max_error_factor * LowestMaximum(*summary->start);
   }
   if (context.IsCancelled() ||
-      !IsBelow(summary->pixel_error_start, *summary->max_error)) {
+      !IsBelow(summary->pixel_error_start,
+               summary->max_error.value_or(
+                   std::numeric_limits<double>::infinity()))) {
     return std::nullopt;
   }
   context.Note("largest error " + PixelText(summary->pixel_error_start.max) +
-               ", cap " + PixelText(*summary->max_error));
+               (summary->max_error ? ", cap " + PixelText(*summary->max_error)
+                                   : ", to be lowered with all that moves"));
   return std::move(start.model);
 }
 
@@ -71,7 +101,7 @@ AdjustModelResult AdjustModel(const Model& model,
   summary.pixel_error_after = summary.pixel_error_before;
 
   BundleAdjustmentOptions adjustment = options.adjustment;
-  const bool is_bounded = adjustment.max_error || options.max_error_factor;
+  const bool is_bounded = adjustment.IsBounded() || options.max_error_factor;
   std::optional<Model> start;
   if (is_bounded) {
     start = BoundedStart(model, options, context, &summary);
@@ -82,11 +112,12 @@ AdjustModelResult AdjustModel(const Model& model,
       result.model = model;
       return result;
     }
-    adjustment.max_error = summary.max_error;
+    adjustment.max_error = summary.max_error;  // none if it is to be lowered
   }
   BundleAdjustmentResult adjusted =
       AdjustBundle(start ? *start : model, adjustment, context);
   summary.adjustment = std::move(adjusted.summary);
+  summary.max_error = summary.adjustment.max_error;
   result.model = std::move(adjusted.model);
   const std::vector<double> errors_px =
       PixelErrors(result.model, context.num_threads);

@@ -16,18 +16,20 @@ namespace krot {
 
 struct AdjustModelOptions {
   // With adjustment.max_error, a model whose errors are not all below that is
-  // first brought there by the known rotation problem.
+  // first brought there by the known rotation problem; with lower_max_error it
+  // always is brought to the lowest maximum of that.
   BundleAdjustmentOptions adjustment;
   // Takes the place of adjustment.max_error: the cap is so many times the
-  // largest error of the known rotation problem's solution; > 1.
+  // lowest maximum of the known rotation problem; > 1.
   std::optional<double> max_error_factor;
-  SolveModelOptions start;  // for the known rotation problem
+  // For the known rotation problem; its finish is replaced.
+  SolveModelOptions start;
 };
 
 struct AdjustModelSummary {
   // kInfeasibleStart: no estimate below the cap was found.
   BundleAdjustmentSummary adjustment;
-  std::optional<double> max_error;    // the cap, pixels
+  std::optional<double> max_error;    // the cap of the end, pixels
   std::optional<SolveSummary> start;  // if there was such a solve
   // Over all observations of the model.
   PixelErrorStatistics pixel_error_before;

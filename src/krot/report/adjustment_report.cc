@@ -20,6 +20,7 @@ Json AdjustmentIterationsJson(
     array.push_back({{"cost", iteration.cost},
                      {"is_successful", iteration.is_successful},
                      {"barrier", NumberOrNull(iteration.barrier)},
+                     {"cap", NumberOrNull(iteration.cap)},
                      {"seconds", iteration.seconds}});
   }
   return array;
@@ -84,6 +85,11 @@ double StartSeconds(const SolveSummary& start) {
 std::string CapSentence(const AdjustModelSummary& summary) {
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
   std::ostringstream text;
+  if (adjustment.lowest_max_error) {
+    text << "The lowest maximum found with all that moves is "
+         << FormatNumber(*adjustment.lowest_max_error, 4)
+         << " px: a local minimum, nearly, of which no bound is proved. ";
+  }
   text << "Every error of the adjustment is below the cap of "
        << FormatNumber(*summary.max_error, 4) << " px, which holds "
        << Counted(adjustment.num_active, "observation") << ".";
@@ -197,6 +203,7 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
       {"linear_solver", adjustment.linear_solver},
       {"stationarity", NumberOrNull(adjustment.stationarity)},
       {"max_error", NumberOrNull(summary.max_error)},
+      {"lowest_max_error", NumberOrNull(adjustment.lowest_max_error)},
       {"duality_gap", NumberOrNull(adjustment.duality_gap)},
       {"num_active", adjustment.num_active},
       {"start_lower_bound", start_bound},
