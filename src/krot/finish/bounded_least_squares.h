@@ -31,7 +31,7 @@ struct BoundedOptions {
   Norm norm;       // of the cap: p = 1, 2 or infinity
   double cap = 0;  // pixels; > 0
   ErrorLoss loss;
-  double gap_tolerance = 1e-4;           // > 0, relative to the cost
+  double gap_tolerance = 1e-3;           // > 0, relative to the cost
   double stationarity_tolerance = 1e-6;  // > 0
   int max_iterations = 200;              // >= 1
   // Takes all rows of a problem anew where their points project at an estimate,

@@ -22,7 +22,7 @@ struct FinishOptions {
   Finish finish = Finish::kLeastSquares;
   // eta: every error stays below (1 + slack) times the lowest maximum.
   double slack = 5e-4;  // > 0
-  // Pixels; > 0: the cap instead, if the lowest maximum is below it.
+  // Pixels; > 0: the cap instead; no finish if the lowest maximum is above it.
   std::optional<double> max_error;
   ErrorLoss loss;
   // Told of every iteration; may be empty.

@@ -31,12 +31,10 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   const bool is_lowest_known =
       lower_bound && finish.lowest_cost - *lower_bound <=
                          options.joint.relative_gap * finish.lowest_cost;
-  finish.cap = (1 + options.finish.slack) *
-               (is_lowest_known ? *lower_bound : finish.lowest_cost);
-  if (finish.lowest_cost < options.finish.max_error.value_or(0)) {
-    finish.cap = *options.finish.max_error;
-  }
-  finish.cap = std::min(finish.cap, summary->cost_initial);
+  const double lowest = is_lowest_known ? *lower_bound : finish.lowest_cost;
+  finish.cap = std::min(
+      options.finish.max_error.value_or((1 + options.finish.slack) * lowest),
+      summary->cost_initial);
   if (!(finish.lowest_cost < (1 - kLeastRoom) * finish.cap)) return;
 
   BoundedOptions bounded;
