@@ -14,10 +14,10 @@ namespace krot {
 //
 // as mu falls. An iteration
 //
-//   Factorize       the Newton system at now_
-//   IsConverged     if mu is small enough: whether a Newton step would gain
-//                   next to nothing
-//   FindDirection   a predictor, f = 0, and a corrector [Mehrotra 1992]
+//   Factorize       the Newton system at now_; it ends here if mu is small
+//                   enough and Newton's step would gain next to nothing
+//   FindDirection   a predictor, f = 0, a corrector [Mehrotra 1992], and up to
+//                   two centrality correctors [Gondzio 1996]
 //   TakeStep        the longest, then shorter ones until the barrier cost does
 //                   not rise: trial_ becomes now_; where none is found along
 //                   the corrector's direction, along Newton's

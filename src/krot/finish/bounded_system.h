@@ -45,7 +45,8 @@ class BoundedSystem {
   Vector Slack(const ViewedPoint& viewed) const {
     return T_ * Eigen::Vector3d(cap_ * viewed.depth, viewed.v[0], viewed.v[1]);
   }
-  // -degree/... log of the distances to the cap, at mu = 1; 0 for e = 0.
+  // Of the error alone, at mu = 1: for p = 2 -1/2 log(1 - |e|^2 / cap^2), else
+  // the same sum over the four half lines; 0 for e = 0.
   double Barrier(const ViewedPoint& viewed) const;
 
   // Scales and factorises at an iterate, whose rows are those of
