@@ -127,6 +127,17 @@ TEST_F(Options, ThatContradictEachOtherAreRefused) {
     }
   }
   ExpectRefused("solver",
+                Paths() + Words{"--Solver.finish", "none",
+                                "--Solver.finish_slack", "0.1"},
+                "--Solver.finish_slack has no effect without --Solver.finish "
+                "least_squares");
+  ExpectRefused("solver", Paths() + Words{"--Solver.finish_loss_scale", "2"},
+                "has no effect without --Solver.finish_loss huber or cauchy");
+  ExpectRefused(
+      "solver",
+      Paths() + Words{"--Solver.method", "joint", "--Solver.finish", "sweeps"},
+      "--Solver.finish has no effect but with --Solver.method auto");
+  ExpectRefused("solver",
                 {"--input_path", folder_ / "input", "--output_path",
                  folder_ / "input/../input/"},
                 "--output_path is --input_path; add --overwrite 1");

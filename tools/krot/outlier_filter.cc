@@ -23,7 +23,6 @@ struct OutlierCommand {
   ModelPaths paths;
   std::string conflicts_path;
   std::string outliers_path;
-  std::string method = "conflicts";
   int num_threads = -1;
   OutlierFilterOptions options;
   CommonOptions common;
@@ -42,8 +41,10 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
        "a number > 0, pixels", "", true, [options](const std::string& text) {
          return ParseReal(text, &options->max_error) && options->max_error > 0;
        }});
-  parser->AddChoice(
-      "OutlierFilter.method", &command->method, {"conflicts", "threshold"},
+  parser->AddNamed<OutlierMethod>(
+      "OutlierFilter.method", &options->method,
+      {{"conflicts", OutlierMethod::kConflicts},
+       {"threshold", OutlierMethod::kThreshold}},
       "conflicts: few, by the least sum of excesses, and a proof of how many "
       "must go; threshold: what is above the bound, solve, and again, to "
       "compare with");
@@ -51,25 +52,18 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
                   Above(0.0),
                   "How far the largest error of what is left may be above the "
                   "proved bound, relative to it");
-  int* threads = &command->num_threads;
-  parser->Add({"Solver.num_threads",
-               "Threads, -1 being all; the result is the same, bit by bit",
-               "-1 or an integer in [1, 1024]", "-1", false,
-               [threads](const std::string& text) {
-                 return ParseInteger(text, threads) &&
-                        (*threads == -1 || (*threads >= 1 && *threads <= 1024));
-               }});
+  parser->AddThreads("Solver.num_threads", &command->num_threads,
+                     "the result is the same, bit by bit");
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers",
       &command->common, parser);
 }
 
-void CheckPairs(const OutlierCommand& command) {
-  if (command.options.method == OutlierMethod::kThreshold &&
-      !command.conflicts_path.empty()) {
-    throw OptionError(
-        "--conflicts_path has no effect with --OutlierFilter.method threshold, "
-        "which proves nothing");
+void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
+  if (command.options.method == OutlierMethod::kThreshold) {
+    parser.Refuse(
+        "conflicts_path",
+        "with --OutlierFilter.method threshold, which proves nothing");
   }
 }
 
@@ -164,10 +158,7 @@ int RunOutlierFilter(const std::vector<std::string>& arguments) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;
   }
-  command.options.method = command.method == "threshold"
-                               ? OutlierMethod::kThreshold
-                               : OutlierMethod::kConflicts;
-  CheckPairs(command);
+  CheckPairs(command, parser);
   return Run(command);
 }
 

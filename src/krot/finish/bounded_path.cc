@@ -12,6 +12,7 @@ namespace {
 // The first mu, as a share of the cost by pair. The start is near the boundary:
 // with a weight of 1, door_colmap took 23 iterations, with 10 to 100 it and the
 // other models take 9 to 11.
+// (to a gap of 1e-4).
 constexpr double kStartWeight = 30;
 // A step goes so far of the way to the boundary,
 constexpr double kDamping = 0.99;
@@ -26,9 +27,9 @@ constexpr double kLeastProduct = 1e-3;
 constexpr double kLargestProduct = 1e3;
 // After a step shorter than this, the next one only centres.
 constexpr double kShortStep = 0.1;
-// With a gap this near to that asked for, in such gaps, so many short steps in a
-// row that gain less of the cost end it: lenses near their fold follow no linear
-// row far.
+// With a gap this near to that asked for, in such gaps, so many short steps in
+// a row that gain less of the cost end it: lenses near their fold follow no
+// linear row far.
 constexpr double kNearGap = 10;
 constexpr double kLeastGain = 0.1;
 constexpr int kPatience = 3;

@@ -85,7 +85,7 @@ class BoundedPath {
   State now_;
   State trial_;
   std::vector<Vector> z_;
-  double step_ = 1;  // that led to now_
+  double step_ = 1;   // that led to now_
   int num_idle_ = 0;  // steps in a row
 };
 

@@ -24,7 +24,7 @@ namespace krot {
 //
 // The last term makes up for w in the barrier of the cone: together they are
 // the barrier of e alone, which knows neither the scale of a component nor the
-// length of a ray. So neither needs a gauge, and mu f = 1 / lambda is Newton's
+// length of a ray. So neither needs a gauge, and f = mu / lambda gives Newton's
 // direction for 1/2 sum rho + mu sum Barrier.
 //
 // An observation's five rows (six with half lines) act on its x_cam alone: they
@@ -67,7 +67,6 @@ class BoundedSystem {
   const ObservationLoop& loop() const { return loop_; }
   double mu() const { return mu_; }  // mean of the pairs
   const std::vector<Vector>& lambda() const { return lambda_; }
-
   const std::vector<Vector>& target() const { return target_; }  // the last f
 
   // Where the last Solve leads; ds and dz are scaled.

@@ -90,18 +90,6 @@ void FinishBySweeps(const Reprojection& reprojection,
 
 }  // namespace
 
-const char* FinishName(Finish finish) {
-  switch (finish) {
-    case Finish::kSweeps:
-      return "sweeps";
-    case Finish::kLeastSquares:
-      return "least_squares";
-    case Finish::kNone:
-      break;
-  }
-  return "none";
-}
-
 void RunFinish(const Model& model, const SolveModelOptions& options,
                std::optional<double> lower_bound, const Context& context,
                const Timer& timer, BuiltProblem* built, Estimate* estimate,

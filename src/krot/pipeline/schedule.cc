@@ -10,7 +10,7 @@ namespace krot {
 namespace {
 
 // Of the gap asked for, what the rows' own proof may leave: the rest is for the
-// lenses, finishing sweeps and the gauge.
+// lenses and the gauge.
 constexpr double kShareOfGap = 0.9;
 
 SolveTermination FromResInt(ResIntTermination termination) {

@@ -1,0 +1,84 @@
+// The finish through full cameras, beside Ceres, which shares no solver with
+// it.
+
+#include "krot/pipeline/run_finish.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "krot/adjust/bundle_adjustment.h"
+#include "krot/analysis/pixel_errors.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+Model NoisyModel(int camera_model_id) {
+  SceneOptions options;
+  options.camera_model_id = camera_model_id;
+  options.num_frames = 8;
+  options.num_points = 150;
+  options.track_length = 5;
+  options.pixel_noise = 0.7;
+  options.start_translation_noise = 0.005;
+  options.start_point_noise = 0.005;
+  return SynthesizeScene(options).model;
+}
+
+SolveModelOptions With(Finish finish) {
+  SolveModelOptions options;
+  options.finish.finish = finish;
+  return options;
+}
+
+class RunFinishOf : public testing::TestWithParam<int> {};
+
+TEST_P(RunFinishOf, EndsWhereCeresEndsBelowTheSameCap) {
+  const Model model = NoisyModel(GetParam());
+  const SolveModelResult finished =
+      SolveModel(model, With(Finish::kLeastSquares));
+  ASSERT_TRUE(finished.summary.finish.has_value());
+  const double cap = finished.summary.finish->cap;
+  EXPECT_LE(finished.summary.pixel_error_after.max, cap);
+
+  BundleAdjustmentOptions ceres;
+  ceres.max_error = cap;
+  ceres.constant_rig_from_world_rotation = true;
+  ceres.refine_sensor_from_rig = false;
+  ceres.refine_focal_length = false;
+  ceres.refine_extra_params = false;
+  const SolveModelResult lowest = SolveModel(model, With(Finish::kNone));
+  const BundleAdjustmentResult adjusted = AdjustBundle(lowest.model, ceres, {});
+  ASSERT_EQ(adjusted.summary.termination,
+            BundleAdjustmentTermination::kCapConverged);
+  const double rms = Summarize(PixelErrors(adjusted.model)).rms;
+  EXPECT_NEAR(finished.summary.pixel_error_after.rms, rms, 1e-3 * rms);
+  EXPECT_LT(rms, 0.99 * lowest.summary.pixel_error_after.rms);
+}
+
+// SIMPLE_PINHOLE, OPENCV, OPENCV_FISHEYE: rows that stay, and rows that do not.
+INSTANTIATE_TEST_SUITE_P(Cameras, RunFinishOf, testing::Values(0, 4, 5));
+
+// Its own slack may not make the second result worse than the first.
+TEST(RunFinish, LeavesAModelThatItMadeNoWorse) {
+  const SolveModelResult once = SolveModel(NoisyModel(4), {});
+  const SolveModelResult twice = SolveModel(once.model, {});
+  EXPECT_FALSE(twice.summary.is_given_back);
+  EXPECT_LE(twice.summary.pixel_error_after.max,
+            (1 + 1e-9) * once.summary.pixel_error_after.max);
+  EXPECT_NEAR(twice.summary.pixel_error_after.rms,
+              once.summary.pixel_error_after.rms,
+              1e-3 * once.summary.pixel_error_after.rms);
+}
+
+TEST(RunFinish, LeavesOutWhatACapBelowTheLowestMaximumForbids) {
+  SolveModelOptions options;
+  options.finish.max_error = 1e-3;
+  const SolveSummary summary = SolveModel(NoisyModel(4), options).summary;
+  EXPECT_FALSE(summary.finish.has_value());
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
+}
+
+}  // namespace
+}  // namespace krot
