@@ -24,6 +24,16 @@ TEST(RotationOf, IsThatOfAxisAndAngleWhateverTheNormAndSign) {
   }
 }
 
+TEST(NormalizedQuaternion, KeepsTheBitsOfOneThatIsNormalised) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  for (int n = 0; n < 1000; ++n) {
+    const QuaternionWxyz once = ToWxyz(NormalizedQuaternion(
+        {normal(random), normal(random), normal(random), normal(random)}));
+    EXPECT_EQ(ToWxyz(NormalizedQuaternion(once)), once);
+  }
+}
+
 TEST(ToWxyz, KeepsTheCoefficients) {
   EXPECT_EQ(ToWxyz(Eigen::Quaterniond(1, 2, 3, 4)),
             (QuaternionWxyz{1, 2, 3, 4}));

@@ -276,6 +276,22 @@ TEST(SolveModel, GivesTheSameBitsAtAnyNumberOfThreads) {
   }
 }
 
+// The same records, last first; tracks keep their order.
+Model Reversed(Model model) {
+  std::reverse(model.cameras.begin(), model.cameras.end());
+  std::reverse(model.rigs.begin(), model.rigs.end());
+  std::reverse(model.frames.begin(), model.frames.end());
+  std::reverse(model.images.begin(), model.images.end());
+  std::reverse(model.points3D.begin(), model.points3D.end());
+  return model;
+}
+
+TEST(SolveModel, GivesTheSameBitsWhateverTheOrderOfTheRecords) {
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  EXPECT_THAT(Reversed(SolveModel(Reversed(model), {}).model),
+              IsModel(SolveModel(model, {}).model));
+}
+
 TEST(SolveModel, ReturnsTheModelUnchangedIfThereIsNothingToSolve) {
   const Model model = SynthesizeScene(NoisyScene()).model;
   SolveModelOptions options;

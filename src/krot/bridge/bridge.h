@@ -34,8 +34,9 @@ struct BuildProblemOptions {
   bool ignore_translations = false;
 };
 
-// The problem, its start, and where each unknown lives in the model. All
-// indices ascend with those of the model.
+// The problem, its start, and where each unknown lives in the model. All stand
+// in the order of their ids, observations in that of their tracks: the same
+// whatever order the records of the model have.
 struct BuiltProblem {
   KnownRotationProblem problem;
   // The model's own translations and points, with the points re-triangulated
@@ -63,8 +64,8 @@ struct BuiltProblem {
 // project (RowAtProjection).
 //
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for bad
-// options. A problem without observations is no error. O(observations); 100
-// bytes each.
+// options. A problem without observations is no error. O(observations
+// + points log points); 100 bytes each.
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -34,9 +35,23 @@ struct Sources {
 
 // What becomes of one point of the model.
 struct PointOutcome {
+  int32_t index = 0;   // in the model
+  uint64_t slots = 0;  // where its own begin
   RepairedPoint point;
   int num_kept = 0;
 };
+
+// Indices of the records by their ids, which differ: the order in which a file
+// happens to hold them makes no difference to a result.
+template <typename Record>
+std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
+  std::vector<int32_t> order(records.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int32_t a, int32_t b) {
+    return records[a].id < records[b].id;
+  });
+  return order;
+}
 
 // Where a point's usable observations are written, in the track's order. As
 // many places as the track has elements; `view` is the index of the image and
@@ -134,37 +149,35 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
   return num_kept;
 }
 
-PointOutcome ProcessPoint(const Sources& sources, int32_t point,
-                          const BuildProblemOptions& options, Slots slots,
-                          LeftOutCounts* left_out) {
+void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
+                  Slots slots, PointOutcome* outcome, LeftOutCounts* left_out) {
+  const int32_t point = outcome->index;
   const int num_rays =
       CollectRows(sources, point, options.ignore_translations, slots, left_out);
   const Vector3d& xyz = sources.model.points3D[point].xyz;
-  PointOutcome outcome;
   if (options.ignore_translations) {
-    outcome.point.xyz = xyz;
-    outcome.num_kept = num_rays;
+    outcome->point.xyz = xyz;
+    outcome->num_kept = num_rays;
   } else {
     const auto is_seen = [&](int i, const Vector3d& position) {
       return RowAtPoint(sources, sources.geometries[slots.observations[i].view],
                         slots.pixels[i], position)
           .has_value();
     };
-    outcome.point = RepairPoint(sources.geometries, slots.observations,
-                                num_rays, xyz, is_seen);
-    outcome.num_kept =
-        RemoveBehind(sources, outcome.point.xyz, num_rays, slots);
+    outcome->point = RepairPoint(sources.geometries, slots.observations,
+                                 num_rays, xyz, is_seen);
+    outcome->num_kept =
+        RemoveBehind(sources, outcome->point.xyz, num_rays, slots);
     (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
-        num_rays - outcome.num_kept;
+        num_rays - outcome->num_kept;
   }
-  if (outcome.num_kept < options.min_track_length) {
-    (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome.num_kept;
-    outcome.num_kept = 0;
+  if (outcome->num_kept < options.min_track_length) {
+    (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome->num_kept;
+    outcome->num_kept = 0;
   }
-  return outcome;
 }
 
-// Processes all points in parallel, each in the slots of its track.
+// Processes all points in parallel, each in slots of its own.
 std::vector<PointOutcome> ProcessPoints(const Sources& sources,
                                         const BuildProblemOptions& options,
                                         BuiltProblem* built) {
@@ -173,20 +186,26 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
   built->point2D_of.resize(model.track_elements.size());
   built->pixels.resize(model.track_elements.size());
 
-  const int64_t count = static_cast<int64_t>(model.points3D.size());
-  std::vector<PointOutcome> outcomes(count);
+  std::vector<PointOutcome> outcomes;
+  outcomes.reserve(model.points3D.size());
+  uint64_t num_slots = 0;
+  for (const int32_t k : OrderOfIds(model.points3D)) {
+    outcomes.push_back({k, num_slots, {}, 0});
+    num_slots += model.points3D[k].track_end - model.points3D[k].track_begin;
+  }
+  const int64_t count = static_cast<int64_t>(outcomes.size());
   std::vector<LeftOutCounts> chunk_left_out(NumChunks(count, kPointsPerChunk),
                                             LeftOutCounts{});
   ParallelFor(count, kPointsPerChunk, options.num_threads,
               [&](int64_t begin, int64_t end, int) {
-                for (int64_t k = begin; k < end; ++k) {
-                  const uint64_t first = model.points3D[k].track_begin;
-                  outcomes[k] =
-                      ProcessPoint(sources, static_cast<int32_t>(k), options,
-                                   {built->problem.observations.data() + first,
-                                    built->point2D_of.data() + first,
-                                    built->pixels.data() + first},
-                                   &chunk_left_out[begin / kPointsPerChunk]);
+                for (int64_t n = begin; n < end; ++n) {
+                  const uint64_t first = outcomes[n].slots;
+                  ProcessPoint(sources, options,
+                               {built->problem.observations.data() + first,
+                                built->point2D_of.data() + first,
+                                built->pixels.data() + first},
+                               &outcomes[n],
+                               &chunk_left_out[begin / kPointsPerChunk]);
                 }
               });
   for (const LeftOutCounts& counts : chunk_left_out) {
@@ -197,19 +216,18 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
 }
 
 // Moves the kept observations together and numbers the points that have any.
-void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
-             BuiltProblem* built) {
+void Compact(const std::vector<PointOutcome>& outcomes, BuiltProblem* built) {
   std::vector<Observation>& observations = built->problem.observations;
   size_t num_kept = 0;
-  for (size_t k = 0; k < outcomes.size(); ++k) {
-    if (outcomes[k].num_kept == 0) continue;
+  for (const PointOutcome& outcome : outcomes) {
+    if (outcome.num_kept == 0) continue;
     const int32_t point = static_cast<int32_t>(built->point_of.size());
-    built->point_of.push_back(static_cast<int32_t>(k));
-    built->start.points.push_back(outcomes[k].point.xyz);
-    built->num_retriangulated_points += outcomes[k].point.is_retriangulated;
+    built->point_of.push_back(outcome.index);
+    built->start.points.push_back(outcome.point.xyz);
+    built->num_retriangulated_points += outcome.point.is_retriangulated;
 
-    const size_t first = model.points3D[k].track_begin;
-    for (size_t i = first; i < first + outcomes[k].num_kept; ++i, ++num_kept) {
+    const size_t end = outcome.slots + outcome.num_kept;
+    for (size_t i = outcome.slots; i < end; ++i, ++num_kept) {
       observations[num_kept] = observations[i];
       observations[num_kept].point = point;
       built->point2D_of[num_kept] = built->point2D_of[i];
@@ -226,24 +244,23 @@ void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
 void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
   const std::vector<ImageGeometry>& geometries = sources.geometries;
   KnownRotationProblem& problem = built->problem;
-  const size_t num_model_frames = sources.model.frames.size();
-  std::vector<int32_t> frame_index(num_model_frames, -1);
+  std::vector<int32_t> frame_index(sources.model.frames.size(), -1);
   for (const Observation& observation : problem.observations) {
     frame_index[geometries[observation.view].frame] = 0;
   }
-  for (size_t f = 0; f < num_model_frames; ++f) {
+  for (const int32_t f : OrderOfIds(sources.model.frames)) {
     if (frame_index[f] < 0) continue;
     frame_index[f] = problem.num_frames++;
-    built->frame_of.push_back(static_cast<int32_t>(f));
+    built->frame_of.push_back(f);
   }
   built->start.translations.resize(problem.num_frames);
 
   std::vector<int32_t> view_index(geometries.size(), -1);
-  for (size_t n = 0; n < geometries.size(); ++n) {
+  for (const int32_t n : OrderOfIds(sources.model.images)) {
     const ImageGeometry& image = geometries[n];
     if (!image.has_pose || frame_index[image.frame] < 0) continue;
     view_index[n] = static_cast<int32_t>(problem.views.size());
-    built->image_of.push_back(static_cast<int32_t>(n));
+    built->image_of.push_back(n);
     const int32_t frame = frame_index[image.frame];
     problem.views.push_back({image.cam_from_world.rotation,
                              image.cam_from_rig.rotation,
@@ -265,22 +282,6 @@ void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
 
 }  // namespace
 
-const char* LeftOutName(LeftOut reason) {
-  switch (reason) {
-    case LeftOut::kBehind:
-      return "behind";
-    case LeftOut::kUndistortion:
-      return "undistortion";
-    case LeftOut::kOffAxis:
-      return "off_axis";
-    case LeftOut::kShortTrack:
-      return "short_track";
-    case LeftOut::kNoPose:
-      return "no_pose";
-  }
-  return "unknown";
-}
-
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options) {
   CheckArgument(options.min_track_length >= 1, "options.min_track_length",
@@ -288,7 +289,7 @@ BuiltProblem BuildProblem(const Model& model,
   Sources sources{model, ImageGeometries(model), ImageIndices(model)};
   if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;
-  Compact(model, ProcessPoints(sources, options, &built), &built);
+  Compact(ProcessPoints(sources, options, &built), &built);
   AddFramesAndViews(sources, &built);
   IndexObservations(&built.problem);
   return built;

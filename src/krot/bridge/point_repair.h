@@ -13,7 +13,7 @@ namespace krot {
 // Points that their images see, or brought there.
 
 struct RepairedPoint {
-  Eigen::Vector3d xyz;
+  Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
   bool is_retriangulated = false;
 };
 

@@ -1,5 +1,8 @@
 #include "krot/geometry/rotation.h"
 
+#include <cmath>
+#include <limits>
+
 #include <Eigen/SVD>
 
 namespace krot {
@@ -12,11 +15,15 @@ using Eigen::Vector3d;
 // The nearest rotation is unique if the two least singular values, the last
 // one signed, do not cancel; relative to the largest.
 constexpr double kNotUnique = 1e-9;
+// A normalised quaternion's squared norm is 1 up to this: four squares and a
+// division, half a unit in the last place each.
+constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
 Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz) {
-  return Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized();
+  const Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+  return std::abs(q.squaredNorm() - 1) <= kRounding ? q : q.normalized();
 }
 
 QuaternionWxyz ToWxyz(const Quaterniond& q) {

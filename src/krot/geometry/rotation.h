@@ -12,6 +12,7 @@ namespace krot {
 using QuaternionWxyz = std::array<double, 4>;
 
 // Of unit norm, whatever norm the coefficients have; they must not all be zero.
+// Normalising what has been normalised changes no bit.
 Eigen::Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz);
 
 // The coefficients, as they are.
