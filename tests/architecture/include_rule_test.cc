@@ -35,6 +35,7 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"bridge", {"model", "proof"}},
       {"pipeline", {"bridge", "joint", "finish", "analysis", "adjust"}},
       {"outliers", {"pipeline"}},
+      {"options", {"outliers"}},
       {"report", {"outliers", "pipeline", "analysis"}},
   };
   return kDependencies;

@@ -79,6 +79,8 @@ int Main(const std::vector<std::string>& arguments) {
     return exit_code;
   } catch (const CommandError& error) {
     return Fail(error.what(), error.exit_code());
+  } catch (const OptionError& error) {
+    return Fail(error.what(), kExitOptions);
   } catch (const ModelError& error) {
     return Fail(error.what(), kExitModel);
   } catch (const WriteError& error) {

@@ -4,11 +4,11 @@
 
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
+#include "krot/options/adjustment_options.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/adjustment_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
-#include "tools/krot/adjustment_options.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"

@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "krot/options/option_error.h"
+
 namespace krot {
 
 // What `krot` returns; the table stands in docs/cli.md and in `krot help`.
@@ -29,13 +31,6 @@ class CommandError : public std::runtime_error {
 
  private:
   ExitCode exit_code_;
-};
-
-// A command line that cannot be obeyed.
-class OptionError : public CommandError {
- public:
-  explicit OptionError(const std::string& message)
-      : CommandError(kExitOptions, message) {}
 };
 
 }  // namespace krot

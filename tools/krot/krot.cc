@@ -10,9 +10,10 @@
 #include "krot/adjust/ceres_log.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
+#include "krot/options/option_error.h"
+#include "krot/options/option_value.h"
 #include "tools/krot/command.h"
 #include "tools/krot/command_error.h"
-#include "tools/krot/option_value.h"
 
 namespace krot {
 namespace {
@@ -130,6 +131,8 @@ int Main(const std::vector<std::string>& arguments) {
     return exit_code;
   } catch (const CommandError& error) {
     return Fail(who, error.what(), error.exit_code());
+  } catch (const OptionError& error) {
+    return Fail(who, error.what(), kExitOptions);
   } catch (const ModelError& error) {
     return Fail(who, error.what(), kExitModel);
   } catch (const WriteError& error) {

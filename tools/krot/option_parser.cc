@@ -25,21 +25,6 @@ po::options_description Describe(const std::vector<Option>& options) {
   return description;
 }
 
-// `text` broken at spaces into lines of at most 80 columns, each indented.
-std::string Wrap(const std::string& text, const std::string& indent) {
-  std::istringstream words(text);
-  std::string wrapped;
-  std::string line = indent;
-  for (std::string word; words >> word;) {
-    if (line.size() > indent.size() && line.size() + 1 + word.size() > 80) {
-      wrapped += line + '\n';
-      line = indent;
-    }
-    line += (line.size() > indent.size() ? " " : "") + word;
-  }
-  return wrapped + line + '\n';
-}
-
 OptionAssignment ToAssignment(const po::option& option) {
   const std::string text = option.value.empty() ? "" : option.value.front();
   if (option.position_key >= 0) {
@@ -57,9 +42,7 @@ OptionAssignment ToAssignment(const po::option& option) {
 
 OptionParser::OptionParser(const std::string& command, std::string summary,
                            const std::string& program)
-    : command_(program + " " + command), summary_(std::move(summary)) {}
-
-void OptionParser::Add(Option option) { options_.push_back(std::move(option)); }
+    : OptionTable(program + " " + command, std::move(summary)) {}
 
 void OptionParser::AddPath(const std::string& name, std::string* value,
                            bool required, const std::string& range,
@@ -78,57 +61,6 @@ void OptionParser::AddOutputFile(const std::string& name, std::string* value,
   paths_.back().is_output_file = true;
 }
 
-void OptionParser::AddBool(const std::string& name, bool* value,
-                           const std::string& description) {
-  Add({name, description, "{0, 1}", *value ? "1" : "0", false,
-       [value](const std::string& text) { return ParseBool(text, value); }});
-}
-
-void OptionParser::AddInteger(const std::string& name, int* value,
-                              const Range<int>& range,
-                              const std::string& description) {
-  Add({name, description, "an integer " + range.text, std::to_string(*value),
-       false, [value, contains = range.contains](const std::string& text) {
-         return ParseInteger(text, value) && contains(*value);
-       }});
-}
-
-void OptionParser::AddReal(const std::string& name, double* value,
-                           const Range<double>& range,
-                           const std::string& description) {
-  Add({name, description, "a number " + range.text, NumberText(*value), false,
-       [value, contains = range.contains](const std::string& text) {
-         return ParseReal(text, value) && contains(*value);
-       }});
-}
-
-void OptionParser::AddChoice(const std::string& name, std::string* value,
-                             const std::vector<std::string>& choices,
-                             const std::string& description) {
-  Add({name, description, "one of " + ChoiceText(choices), *value, false,
-       [value, choices](const std::string& text) {
-         *value = text;
-         return std::find(choices.begin(), choices.end(), text) !=
-                choices.end();
-       }});
-}
-
-void OptionParser::AddThreads(const std::string& name, int* value,
-                              const std::string& remark) {
-  Add({name, "Threads, -1 being all; " + remark,
-       "-1 or an integer in [1, 1024]", "-1", false,
-       [value](const std::string& text) {
-         return ParseInteger(text, value) &&
-                (*value == -1 || (*value >= 1 && *value <= 1024));
-       }});
-}
-
-void OptionParser::Refuse(const std::string& name,
-                          const std::string& why) const {
-  if (!IsGiven(name)) return;
-  throw OptionError("--" + name + " has no effect " + why);
-}
-
 bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   for (const std::string& argument : arguments) {
     if (argument == "-h" || argument == "--help") return false;
@@ -140,12 +72,7 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
       Assign(ReadProjectFile(assignment.text));
     }
   }
-  for (const Option& option : options_) {
-    if (option.required && !IsGiven(option.name)) {
-      throw OptionError("--" + option.name + " is required (" + command_ +
-                        " -h lists the options)");
-    }
-  }
+  RequireAll();
   CheckOutputFiles();
   return true;
 }
@@ -165,7 +92,7 @@ void OptionParser::CheckOutputFiles() const {
 
 std::vector<OptionAssignment> OptionParser::ReadArguments(
     const std::vector<std::string>& arguments) const {
-  const po::options_description description = Describe(options_);
+  const po::options_description description = Describe(options());
   std::vector<OptionAssignment> assignments;
   try {
     const po::parsed_options parsed =
@@ -194,7 +121,7 @@ std::vector<OptionAssignment> OptionParser::ReadProjectFile(
     throw OptionError("--project_path = " + path +
                       ", must be a file that can be read");
   }
-  const po::options_description description = Describe(options_);
+  const po::options_description description = Describe(options());
   std::vector<OptionAssignment> assignments;
   try {
     const po::parsed_options parsed =
@@ -208,59 +135,6 @@ std::vector<OptionAssignment> OptionParser::ReadProjectFile(
     throw OptionError(path + ": " + error.what());
   }
   return assignments;
-}
-
-void OptionParser::Assign(const std::vector<OptionAssignment>& assignments) {
-  std::set<std::string> names;
-  for (const OptionAssignment& assignment : assignments) {
-    const Option& option = Find(assignment);
-    if (!names.insert(option.name).second && !option.repeatable) {
-      throw OptionError(assignment.source + " is given twice");
-    }
-    if (IsGiven(option.name)) continue;  // an explicit flag wins
-    if (!option.parse(assignment.text)) {
-      throw OptionError(assignment.source + " = " +
-                        (assignment.text.empty() ? "''" : assignment.text) +
-                        ", must be " + option.range);
-    }
-  }
-  given_.insert(names.begin(), names.end());
-}
-
-bool OptionParser::IsGiven(const std::string& name) const {
-  return given_.count(name) > 0;
-}
-
-const Option& OptionParser::Find(const OptionAssignment& assignment) const {
-  std::vector<std::string> names;
-  for (const Option& option : options_) {
-    if (option.name == assignment.name) return option;
-    names.push_back(option.name);
-  }
-  const std::string nearest = NearestName(assignment.name, names);
-  throw OptionError(assignment.source + " is no option of " + command_ +
-                    (nearest.empty() ? " (" + command_ + " -h lists them)"
-                                     : "; did you mean --" + nearest + "?"));
-}
-
-std::string OptionParser::Help() const {
-  std::string text =
-      Wrap(command_ + ": " + summary_, "") + "\nUsage:\n  " + command_;
-  for (const Option& option : options_) {
-    if (option.required) text += " --" + option.name + " VALUE";
-  }
-  text += " [options]\n\nOptions:\n";
-  for (const Option& option : options_) {
-    text += "  --" + option.name + '\n';
-    text += Wrap(option.description + ".", "      ");
-    std::string value = "Value: " + option.range + ".";
-    if (option.required) value += " Required.";
-    if (!option.default_text.empty()) {
-      value += " Default: " + option.default_text + ".";
-    }
-    text += Wrap(value, "      ");
-  }
-  return text + "  -h, --help\n      Print this text\n";
 }
 
 }  // namespace krot

@@ -1,9 +1,9 @@
 #include <string>
 #include <vector>
 
+#include "krot/options/solve_options.h"
 #include "tools/krot/command.h"
 #include "tools/krot/solve_command.h"
-#include "tools/krot/solve_options.h"
 
 namespace krot {
 namespace {

@@ -2,19 +2,19 @@
 
 #include <string>
 
+#include "krot/options/option_table.h"
 #include "krot/pipeline/solve_model.h"
-#include "tools/krot/option_parser.h"
 
 namespace krot {
 
 // The options that `solver` and `point_triangulator` share, in their groups
 // Solver, FastDescent and Problem.
 void AddSolveOptions(SolveModelOptions* options, Context* context,
-                     OptionParser* parser);
+                     OptionTable* table);
 
 // Throws OptionError for pairs of options that contradict each other. To be
-// called after Parse.
+// called once they are set.
 void CheckSolveOptions(const SolveModelOptions& options,
-                       const OptionParser& parser);
+                       const OptionTable& table);
 
 }  // namespace krot

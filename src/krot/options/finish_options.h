@@ -1,17 +1,17 @@
 #pragma once
 
+#include "krot/options/option_table.h"
 #include "krot/pipeline/solve_model.h"
-#include "tools/krot/option_parser.h"
 
 namespace krot {
 
 // What follows the lowest maximum, of `solver` alone: Solver.finish and its
 // like, Solver.polish.
-void AddFinishOptions(SolveModelOptions* options, OptionParser* parser);
+void AddFinishOptions(SolveModelOptions* options, OptionTable* table);
 
 // Throws OptionError for those that would have no effect. To be called after
-// Parse.
+// they are set.
 void CheckFinishOptions(const SolveModelOptions& options,
-                        const OptionParser& parser);
+                        const OptionTable& table);
 
 }  // namespace krot

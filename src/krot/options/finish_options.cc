@@ -1,10 +1,10 @@
-#include "tools/krot/finish_options.h"
+#include "krot/options/finish_options.h"
 
 namespace krot {
 
-void AddFinishOptions(SolveModelOptions* options, OptionParser* parser) {
+void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
   FinishOptions* finish = &options->finish;
-  parser->AddNamed<Finish>(
+  table->AddNamed<Finish>(
       "Solver.finish", &finish->finish,
       {{FinishName(Finish::kLeastSquares), Finish::kLeastSquares},
        {FinishName(Finish::kSweeps), Finish::kSweeps},
@@ -13,21 +13,21 @@ void AddFinishOptions(SolveModelOptions* options, OptionParser* parser) {
       "least_squares: the least squares of all estimates within finish_slack "
       "of it; sweeps: every point's and every frame's own maximum is lowered; "
       "none: nothing");
-  parser->AddReal("Solver.finish_slack", &finish->slack,
-                  Above(0.0, "relative to the lowest maximum"),
-                  "With finish least_squares: how far above the lowest maximum "
-                  "an error may be");
-  parser->AddNamed<ErrorLoss::Kind>(
+  table->AddReal("Solver.finish_slack", &finish->slack,
+                 Above(0.0, "relative to the lowest maximum"),
+                 "With finish least_squares: how far above the lowest maximum "
+                 "an error may be");
+  table->AddNamed<ErrorLoss::Kind>(
       "Solver.finish_loss", &finish->loss.kind,
       {{LossName(ErrorLoss::Kind::kTrivial), ErrorLoss::Kind::kTrivial},
        {LossName(ErrorLoss::Kind::kHuber), ErrorLoss::Kind::kHuber},
        {LossName(ErrorLoss::Kind::kCauchy), ErrorLoss::Kind::kCauchy}},
       "With finish least_squares: what is summed of the squared errors; huber "
       "and cauchy count large ones less");
-  parser->AddReal("Solver.finish_loss_scale", &finish->loss.scale,
-                  Above(0.0, "pixels"),
-                  "With finish_loss huber or cauchy: which errors are large");
-  parser->AddNamed<Polish>(
+  table->AddReal("Solver.finish_loss_scale", &finish->loss.scale,
+                 Above(0.0, "pixels"),
+                 "With finish_loss huber or cauchy: which errors are large");
+  table->AddNamed<Polish>(
       "Solver.polish", &options->polish,
       {{PolishName(Polish::kNone), Polish::kNone},
        {PolishName(Polish::kRotationsFixed), Polish::kRotationsFixed},
@@ -38,22 +38,22 @@ void AddFinishOptions(SolveModelOptions* options, OptionParser* parser) {
 }
 
 void CheckFinishOptions(const SolveModelOptions& options,
-                        const OptionParser& parser) {
+                        const OptionTable& table) {
   const bool has_least_squares = options.finish.finish == Finish::kLeastSquares;
   for (const char* name : {"Solver.finish_slack", "Solver.finish_loss",
                            "Solver.finish_loss_scale"}) {
     if (!has_least_squares) {
-      parser.Refuse(name, "without --Solver.finish least_squares");
+      table.Refuse(name, "without --Solver.finish least_squares");
     }
   }
   if (options.finish.loss.kind == ErrorLoss::Kind::kTrivial) {
-    parser.Refuse("Solver.finish_loss_scale",
-                  "without --Solver.finish_loss huber or cauchy");
+    table.Refuse("Solver.finish_loss_scale",
+                 "without --Solver.finish_loss huber or cauchy");
   }
   if (EffectiveMethod(options) == SolveMethod::kAuto) return;
   for (const char* name : {"Solver.finish", "Solver.finish_slack",
                            "Solver.finish_loss", "Solver.finish_loss_scale"}) {
-    parser.Refuse(name, "but with --Solver.method auto");
+    table.Refuse(name, "but with --Solver.method auto");
   }
 }
 

@@ -1,4 +1,4 @@
-#include "tools/krot/option_value.h"
+#include "krot/options/option_value.h"
 
 #include <algorithm>
 #include <cctype>

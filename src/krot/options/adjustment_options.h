@@ -1,24 +1,24 @@
 #pragma once
 
+#include "krot/options/option_table.h"
 #include "krot/pipeline/adjust_model.h"
-#include "tools/krot/option_parser.h"
 
 namespace krot {
 
 // The options of `bundle_adjuster`, under COLMAP 4's names, and under 3.8's.
 class AdjustmentOptions {
  public:
-  void AddTo(OptionParser* parser);
+  void AddTo(OptionTable* table);
 
   // What they say. Throws OptionError for pairs that contradict each other. To
-  // be called after Parse.
-  AdjustModelOptions Resolve(const OptionParser& parser) const;
+  // be called once they are set.
+  AdjustModelOptions Resolve(const OptionTable& table) const;
   int num_threads() const { return num_threads_; }
 
  private:
-  void AddRefined(OptionParser* parser);
-  void AddCeres(OptionParser* parser);
-  void AddCap(OptionParser* parser);
+  void AddRefined(OptionTable* table);
+  void AddCeres(OptionTable* table);
+  void AddCap(OptionTable* table);
 
   BundleAdjustmentOptions adjustment_;
   int num_threads_ = -1;

@@ -1,0 +1,145 @@
+#include "krot/options/option_table.h"
+
+#include <algorithm>
+#include <sstream>
+#include <utility>
+
+namespace krot {
+namespace {
+
+// `text` broken at spaces into lines of at most 80 columns, each indented.
+std::string Wrap(const std::string& text, const std::string& indent) {
+  std::istringstream words(text);
+  std::string wrapped;
+  std::string line = indent;
+  for (std::string word; words >> word;) {
+    if (line.size() > indent.size() && line.size() + 1 + word.size() > 80) {
+      wrapped += line + '\n';
+      line = indent;
+    }
+    line += (line.size() > indent.size() ? " " : "") + word;
+  }
+  return wrapped + line + '\n';
+}
+
+}  // namespace
+
+OptionTable::OptionTable(std::string command, std::string summary)
+    : command_(std::move(command)), summary_(std::move(summary)) {}
+
+void OptionTable::Add(Option option) { options_.push_back(std::move(option)); }
+
+void OptionTable::AddBool(const std::string& name, bool* value,
+                          const std::string& description) {
+  Add({name, description, "{0, 1}", *value ? "1" : "0", false,
+       [value](const std::string& text) { return ParseBool(text, value); }});
+}
+
+void OptionTable::AddInteger(const std::string& name, int* value,
+                             const Range<int>& range,
+                             const std::string& description) {
+  Add({name, description, "an integer " + range.text, std::to_string(*value),
+       false, [value, contains = range.contains](const std::string& text) {
+         return ParseInteger(text, value) && contains(*value);
+       }});
+}
+
+void OptionTable::AddReal(const std::string& name, double* value,
+                          const Range<double>& range,
+                          const std::string& description) {
+  Add({name, description, "a number " + range.text, NumberText(*value), false,
+       [value, contains = range.contains](const std::string& text) {
+         return ParseReal(text, value) && contains(*value);
+       }});
+}
+
+void OptionTable::AddChoice(const std::string& name, std::string* value,
+                            const std::vector<std::string>& choices,
+                            const std::string& description) {
+  Add({name, description, "one of " + ChoiceText(choices), *value, false,
+       [value, choices](const std::string& text) {
+         *value = text;
+         return std::find(choices.begin(), choices.end(), text) !=
+                choices.end();
+       }});
+}
+
+void OptionTable::AddThreads(const std::string& name, int* value,
+                             const std::string& remark) {
+  Add({name, "Threads, -1 being all; " + remark,
+       "-1 or an integer in [1, 1024]", "-1", false,
+       [value](const std::string& text) {
+         return ParseInteger(text, value) &&
+                (*value == -1 || (*value >= 1 && *value <= 1024));
+       }});
+}
+
+void OptionTable::Refuse(const std::string& name,
+                         const std::string& why) const {
+  if (!IsGiven(name)) return;
+  throw OptionError("--" + name + " has no effect " + why);
+}
+
+void OptionTable::Assign(const std::vector<OptionAssignment>& assignments) {
+  std::set<std::string> names;
+  for (const OptionAssignment& assignment : assignments) {
+    const Option& option = Find(assignment);
+    if (!names.insert(option.name).second && !option.repeatable) {
+      throw OptionError(assignment.source + " is given twice");
+    }
+    if (IsGiven(option.name)) continue;  // an explicit flag wins
+    if (!option.parse(assignment.text)) {
+      throw OptionError(assignment.source + " = " +
+                        (assignment.text.empty() ? "''" : assignment.text) +
+                        ", must be " + option.range);
+    }
+  }
+  given_.insert(names.begin(), names.end());
+}
+
+void OptionTable::RequireAll() const {
+  for (const Option& option : options_) {
+    if (option.required && !IsGiven(option.name)) {
+      throw OptionError("--" + option.name + " is required (" + command_ +
+                        " -h lists the options)");
+    }
+  }
+}
+
+bool OptionTable::IsGiven(const std::string& name) const {
+  return given_.count(name) > 0;
+}
+
+const Option& OptionTable::Find(const OptionAssignment& assignment) const {
+  std::vector<std::string> names;
+  for (const Option& option : options_) {
+    if (option.name == assignment.name) return option;
+    names.push_back(option.name);
+  }
+  const std::string nearest = NearestName(assignment.name, names);
+  throw OptionError(assignment.source + " is no option of " + command_ +
+                    (nearest.empty() ? " (" + command_ + " -h lists them)"
+                                     : "; did you mean --" + nearest + "?"));
+}
+
+std::string OptionTable::Help() const {
+  std::string text =
+      Wrap(command_ + ": " + summary_, "") + "\nUsage:\n  " + command_;
+  for (const Option& option : options_) {
+    if (option.required) text += " --" + option.name + " VALUE";
+  }
+  text += " [options]\n\nOptions:\n";
+  for (const Option& option : options_) {
+    text += "  --" + option.name + '\n';
+    text += Wrap(option.description + ".", "      ");
+    std::string value = "Value: " + option.range + ".";
+    if (option.required) value += " Required.";
+    if (!option.default_text.empty()) {
+      value += " Default: " + option.default_text + ".";
+    }
+    text += Wrap(value, "      ");
+  }
+  return text + "  -h, --help\n      Print this text\n";
+}
+
+}  // namespace krot
