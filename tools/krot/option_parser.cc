@@ -42,7 +42,8 @@ OptionAssignment ToAssignment(const po::option& option) {
 
 OptionParser::OptionParser(const std::string& command, std::string summary,
                            const std::string& program)
-    : OptionTable(program + " " + command, std::move(summary)) {}
+    : OptionTable(program + " " + command, std::move(summary),
+                  program + " " + command + " -h") {}
 
 void OptionParser::AddPath(const std::string& name, std::string* value,
                            bool required, const std::string& range,

@@ -5,6 +5,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
+#include "krot/options/outlier_filter_options.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/outlier_report.h"
 #include "krot/report/peak_memory.h"
@@ -23,7 +24,7 @@ struct OutlierCommand {
   ModelPaths paths;
   std::string conflicts_path;
   std::string outliers_path;
-  int num_threads = -1;
+  Context context;
   OutlierFilterOptions options;
   CommonOptions common;
 };
@@ -35,25 +36,7 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
                         "many must go; see certificate_checker");
   parser->AddOutputFile("outliers_path", &command->outliers_path,
                         "Where the list of removed observations goes, as CSV");
-  OutlierFilterOptions* options = &command->options;
-  parser->Add(
-      {"OutlierFilter.max_error", "The bound that all errors are to be within",
-       "a number > 0, pixels", "", true, [options](const std::string& text) {
-         return ParseReal(text, &options->max_error) && options->max_error > 0;
-       }});
-  parser->AddNamed<OutlierMethod>(
-      "OutlierFilter.method", &options->method,
-      {{"conflicts", OutlierMethod::kConflicts},
-       {"threshold", OutlierMethod::kThreshold}},
-      "conflicts: few, by the least sum of excesses, and a proof of how many "
-      "must go; threshold: what is above the bound, solve, and again, to "
-      "compare with");
-  parser->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
-                  Above(0.0),
-                  "How far the largest error of what is left may be above the "
-                  "proved bound, relative to it");
-  parser->AddThreads("Solver.num_threads", &command->num_threads,
-                     "the result is the same, bit by bit");
+  AddOutlierFilterOptions(&command->options, &command->context, parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers",
       &command->common, parser);
@@ -71,8 +54,7 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
                            const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   OutlierFilterOptions options = command.options;
-  Context context;
-  context.num_threads = command.num_threads;
+  Context context = command.context;
   context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
   progress.Follow(&options.solve, &context);
@@ -112,7 +94,7 @@ int Run(const OutlierCommand& command) {
   CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
   OutlierReport report;
   report.run.version = KROT_VERSION;
-  report.run.threads = ResolveNumThreads(command.num_threads);
+  report.run.threads = ResolveNumThreads(command.context.num_threads);
   report.run.seed = command.common.random_seed;
 
   const Timer read_timer;
@@ -137,7 +119,7 @@ int Run(const OutlierCommand& command) {
   WriteSideFiles(command, report);
   const std::string report_json = OutlierJson(report);
   WriteReports(paths.report_path, paths.html_path, report_json, model,
-               result.model, command.num_threads, log);
+               result.model, command.context.num_threads, log);
   PrintTable(log, OutlierTable(report));
   if (!report.summary.is_within) {
     LogLine(log, 0, "warning: not all errors are within the bound");

@@ -24,8 +24,11 @@ std::string Wrap(const std::string& text, const std::string& indent) {
 
 }  // namespace
 
-OptionTable::OptionTable(std::string command, std::string summary)
-    : command_(std::move(command)), summary_(std::move(summary)) {}
+OptionTable::OptionTable(std::string command, std::string summary,
+                         std::string list)
+    : command_(std::move(command)),
+      summary_(std::move(summary)),
+      list_(std::move(list)) {}
 
 void OptionTable::Add(Option option) { options_.push_back(std::move(option)); }
 
@@ -100,8 +103,8 @@ void OptionTable::Assign(const std::vector<OptionAssignment>& assignments) {
 void OptionTable::RequireAll() const {
   for (const Option& option : options_) {
     if (option.required && !IsGiven(option.name)) {
-      throw OptionError("--" + option.name + " is required (" + command_ +
-                        " -h lists the options)");
+      throw OptionError("--" + option.name + " is required (" + list_ +
+                        " lists the options)");
     }
   }
 }
@@ -118,7 +121,7 @@ const Option& OptionTable::Find(const OptionAssignment& assignment) const {
   }
   const std::string nearest = NearestName(assignment.name, names);
   throw OptionError(assignment.source + " is no option of " + command_ +
-                    (nearest.empty() ? " (" + command_ + " -h lists them)"
+                    (nearest.empty() ? " (" + list_ + " lists them)"
                                      : "; did you mean --" + nearest + "?"));
 }
 

@@ -34,8 +34,9 @@ struct OptionAssignment {
 // texts.
 class OptionTable {
  public:
-  // `command`, "krot solver", as messages and help call it.
-  OptionTable(std::string command, std::string summary);
+  // `command`, "krot solver", as messages and help call it; "krot solver -h",
+  // or wherever else its options are listed.
+  OptionTable(std::string command, std::string summary, std::string list);
 
   void Add(Option option);
   void AddBool(const std::string& name, bool* value,
@@ -82,6 +83,7 @@ class OptionTable {
  private:
   std::string command_;
   std::string summary_;
+  std::string list_;
   std::vector<Option> options_;
   std::set<std::string> given_;
 };

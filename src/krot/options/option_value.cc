@@ -136,8 +136,8 @@ std::string NearestName(const std::string& name,
   for (const std::string& candidate : candidates) {
     const std::string whole = LowerCase(candidate);
     const std::string behind_group = whole.substr(whole.find('.') + 1);
-    const size_t distance =
-        wanted == behind_group ? 0 : EditDistance(wanted, whole);
+    const size_t distance = std::min(EditDistance(wanted, behind_group),
+                                     EditDistance(wanted, whole));
     if (distance < nearest_distance) {
       nearest_distance = distance;
       nearest = candidate;

@@ -39,9 +39,9 @@ std::string NumberText(double value);
 // "{a, b, c}"
 std::string ChoiceText(const std::vector<std::string>& choices);
 
-// The candidate that looks most like `name`, or "" if none looks like it at
-// all: at most one edit per three characters, upper and lower case being
-// alike, or the candidate's part behind its group is `name`.
+// The candidate that looks most like `name`, whole or behind its group, or "" if
+// none looks like it at all: at most one edit per three characters, upper and
+// lower case being alike.
 std::string NearestName(const std::string& name,
                         const std::vector<std::string>& candidates);
 

@@ -1,0 +1,29 @@
+#include "krot/options/outlier_filter_options.h"
+
+#include <string>
+
+namespace krot {
+
+void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
+                             OptionTable* table) {
+  table->Add(
+      {"OutlierFilter.max_error", "The bound that all errors are to be within",
+       "a number > 0, pixels", "", true, [options](const std::string& text) {
+         return ParseReal(text, &options->max_error) && options->max_error > 0;
+       }});
+  table->AddNamed<OutlierMethod>(
+      "OutlierFilter.method", &options->method,
+      {{"conflicts", OutlierMethod::kConflicts},
+       {"threshold", OutlierMethod::kThreshold}},
+      "conflicts: few, by the least sum of excesses, and a proof of how many "
+      "must go; threshold: what is above the bound, solve, and again, to "
+      "compare with");
+  table->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
+                 Above(0.0),
+                 "How far the largest error of what is left may be above the "
+                 "proved bound, relative to it");
+  table->AddThreads("Solver.num_threads", &context->num_threads,
+                    "the result is the same, bit by bit");
+}
+
+}  // namespace krot

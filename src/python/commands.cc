@@ -1,0 +1,246 @@
+// The commands: each takes a Model and keywords under the command line's names,
+// and gives the new Model with the command's report as JSON.
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <pybind11/functional.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "krot/analysis/model_comparison.h"
+#include "krot/base/parallel_for.h"
+#include "krot/base/timer.h"
+#include "krot/bridge/certificate_verdict.h"
+#include "krot/bridge/conflict_verdict.h"
+#include "krot/options/adjustment_options.h"
+#include "krot/options/outlier_filter_options.h"
+#include "krot/options/solve_options.h"
+#include "krot/options/solver_options.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/pipeline/adjust_model.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/report/adjustment_report.h"
+#include "krot/report/comparison_report.h"
+#include "krot/report/outlier_report.h"
+#include "krot/report/peak_memory.h"
+#include "krot/report/solve_report.h"
+#include "python/bindings.h"
+#include "python/keywords.h"
+#include "python/run.h"
+
+namespace krot {
+namespace {
+
+namespace py = pybind11;
+
+using ModelPointer = std::shared_ptr<Model>;
+
+// stage, largest error or None, lower bound or None.
+using Progress = std::function<void(const std::string&, std::optional<double>,
+                                    std::optional<double>)>;
+
+// What a command gives back; Python makes objects of the JSON texts.
+struct Outcome {
+  ModelPointer model;
+  std::string report;
+  std::optional<std::string> certificate;
+};
+
+OptionTable TableOf(const std::string& function) {
+  return {function, "", "docs/cli.md"};
+}
+
+RunRecord Describe(const Timer& timer, int num_threads) {
+  RunRecord run;
+  run.version = KROT_VERSION;
+  run.threads = ResolveNumThreads(num_threads);
+  run.seconds_total = timer.Seconds();
+  run.peak_memory_bytes = PeakMemoryBytes();
+  return run;
+}
+
+// The callbacks take the GIL, which the call itself has released.
+void Follow(const Progress& progress, SolveModelOptions* options) {
+  if (!progress) return;
+  options->res_int.callback = [progress](int, const Sweep& state) {
+    const py::gil_scoped_acquire acquire;
+    progress("sweeps", state.cost, std::nullopt);
+  };
+  options->joint.callback = [progress](int, const JointIteration& state) {
+    const py::gil_scoped_acquire acquire;
+    progress(state.target ? "start" : "joint", state.cost, state.lower_bound);
+  };
+  options->finish.callback = [progress](const BoundedIterate&) {
+    const py::gil_scoped_acquire acquire;
+    progress("finish", std::nullopt, std::nullopt);
+  };
+}
+
+using Solve = SolveModelResult (*)(const Model&, const SolveModelOptions&,
+                                   const Context&);
+
+Outcome RunSolve(const ModelPointer& model, SolveModelOptions options,
+                 Context context, const Progress& progress,
+                 const std::string& command, Solve solve) {
+  const Timer timer;
+  Follow(progress, &options);
+  options.describe_certificate = true;
+  SolveModelResult result;
+  RunInterruptibly([&](const CancelFlag& cancel) {
+    context.cancel = &cancel;
+    result = solve(*model, options, context);
+  });
+  SolveReport report;
+  report.run = Describe(timer, context.num_threads);
+  report.command = command;
+  report.method = MethodName(result.summary.method);
+  report.summary = std::move(result.summary);
+  Outcome outcome{std::make_shared<Model>(std::move(result.model)),
+                  SolveJson(report), std::nullopt};
+  if (report.summary.certificate) {
+    outcome.certificate = CertificateJson(*report.summary.certificate);
+  }
+  return outcome;
+}
+
+Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
+                     const py::dict& keywords) {
+  SolveModelOptions options;
+  Context context;
+  OptionTable table = TableOf("pykrot.solve");
+  AddSolverOptions(&options, &context, &table);
+  AssignKeywords(keywords, &table);
+  ResolveSolverOptions(table, &options);
+  return RunSolve(model, options, context, progress, "solver", &SolveModel);
+}
+
+Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
+                           const py::dict& keywords) {
+  SolveModelOptions options;
+  Context context;
+  OptionTable table = TableOf("pykrot.triangulate");
+  AddSolveOptions(&options, &context, &table);
+  AssignKeywords(keywords, &table);
+  CheckSolveOptions(options, table);
+  return RunSolve(model, PointsOnly(options), context, progress,
+                  "point_triangulator", &SolveModel);
+}
+
+Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
+                      const py::dict& keywords) {
+  const Timer timer;
+  OutlierFilterOptions options;
+  Context context;
+  OptionTable table = TableOf("pykrot.filter");
+  AddOutlierFilterOptions(&options, &context, &table);
+  AssignKeywords(keywords, &table);
+  Follow(progress, &options.solve);
+  OutlierFilterResult result;
+  RunInterruptibly([&](const CancelFlag& cancel) {
+    context.cancel = &cancel;
+    result = FilterOutliers(*model, options, context);
+  });
+  OutlierReport report;
+  report.run = Describe(timer, context.num_threads);
+  report.summary = std::move(result.summary);
+  Outcome outcome{std::make_shared<Model>(std::move(result.model)),
+                  OutlierJson(report), std::nullopt};
+  if (report.summary.conflicts) {
+    outcome.certificate = ConflictJson(*report.summary.conflicts);
+  }
+  return outcome;
+}
+
+Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
+                      const py::dict& keywords) {
+  const Timer timer;
+  AdjustmentOptions given;
+  OptionTable table = TableOf("pykrot.bundle_adjust");
+  given.AddTo(&table);
+  AssignKeywords(keywords, &table);
+  AdjustModelOptions options = given.Resolve(table);
+  Follow(progress, &options.start);
+  AdjustModelResult result;
+  RunInterruptibly([&](const CancelFlag& cancel) {
+    result = AdjustModel(*model, options, {given.num_threads(), &cancel});
+  });
+  AdjustmentReport report;
+  report.run = Describe(timer, given.num_threads());
+  report.summary = std::move(result.summary);
+  return {std::make_shared<Model>(std::move(result.model)),
+          AdjustmentJson(report), std::nullopt};
+}
+
+// None where the models share too little to be aligned.
+std::optional<std::string> CompareCommand(const ModelPointer& model1,
+                                          const ModelPointer& model2,
+                                          const std::string& alignment,
+                                          int num_worst) {
+  CompareModelsOptions options;
+  OptionTable table = TableOf("pykrot.compare");
+  table.AddNamed<AlignmentKind>("alignment", &options.alignment,
+                                {{"frame", AlignmentKind::kFrame},
+                                 {"similarity", AlignmentKind::kSimilarity},
+                                 {"none", AlignmentKind::kNone}},
+                                "");
+  table.AddInteger("num_worst", &options.num_worst, AtLeast(0), "");
+  table.Assign({{"alignment", alignment, "alignment"},
+                {"num_worst", std::to_string(num_worst), "num_worst"}});
+  std::optional<ComparisonSummary> summary;
+  RunInterruptibly([&](const CancelFlag&) {
+    const ModelCorrespondence shared = FindCorrespondence(*model1, *model2);
+    if (shared.images.empty()) return;
+    summary = CompareModels(*model1, *model2, shared, options);
+  });
+  if (!summary) return std::nullopt;
+  ComparisonReport report;
+  report.version = KROT_VERSION;
+  report.summary = std::move(*summary);
+  return ComparisonJson(report);
+}
+
+// (is accepted, refusal, proved pixels or None, proved removals or None).
+py::tuple CheckCommand(const ModelPointer& model, const std::string& json) {
+  if (HoldsConflicts(json)) {
+    ConflictVerdict verdict;
+    const ConflictFile file = ParseConflicts(json, "the conflicts");
+    RunInterruptibly(
+        [&](const CancelFlag&) { verdict = VerifyConflictFile(*model, file); });
+    return py::make_tuple(verdict.is_accepted, verdict.refusal,
+                          verdict.max_error, verdict.num_conflicts);
+  }
+  CertificateVerdict verdict;
+  const CertificateFile file = ParseCertificate(json, "the certificate");
+  RunInterruptibly([&](const CancelFlag&) {
+    verdict = VerifyCertificateFile(*model, file);
+  });
+  return py::make_tuple(verdict.is_accepted, verdict.refusal,
+                        verdict.lower_bound, py::none());
+}
+
+}  // namespace
+
+void BindCommands(py::module_* module) {
+  py::class_<Outcome>(*module, "Outcome")
+      .def_readonly("model", &Outcome::model)
+      .def_readonly("report", &Outcome::report)
+      .def_readonly("certificate", &Outcome::certificate);
+  const auto define = [&](const char* name, const auto& command) {
+    module->def(name, command, py::arg("model"), py::arg("progress"),
+                py::arg("options"));
+  };
+  define("solve", &SolveCommand);
+  define("triangulate", &TriangulateCommand);
+  define("filter", &FilterCommand);
+  define("bundle_adjust", &AdjustCommand);
+  module->def("compare", &CompareCommand, py::arg("model1"), py::arg("model2"),
+              py::arg("alignment"), py::arg("num_worst"));
+  module->def("check_certificate", &CheckCommand, py::arg("model"),
+              py::arg("certificate"));
+}
+
+}  // namespace krot

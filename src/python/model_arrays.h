@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <pybind11/numpy.h>
+
+#include "krot/model/model.h"
+
+namespace krot {
+
+template <typename T>
+using CArray =
+    pybind11::array_t<T, pybind11::array::c_style | pybind11::array::forcecast>;
+
+// A camera as Python gives it: model's name, width, height, parameters.
+using CameraTuple =
+    std::tuple<std::string, uint64_t, uint64_t, std::vector<double>>;
+
+// A model of observations as numpy arrays have them: one frame per image; ids
+// are indices plus one. `rotations` (images, 3, 3) and `translations` (images,
+// 3), NaN where unknown, are camera from world. O(observations), which are
+// copied once. Throws ModelError and std::invalid_argument for arrays that do
+// not fit together.
+std::shared_ptr<Model> ModelFromArrays(const CArray<double>& observations,
+                                       const CArray<int64_t>& image_indices,
+                                       const CArray<int64_t>& point_indices,
+                                       const CArray<double>& rotations,
+                                       const CArray<double>& translations,
+                                       const CArray<double>& points,
+                                       const std::vector<CameraTuple>& cameras,
+                                       const CArray<int64_t>& camera_indices,
+                                       const std::vector<std::string>& names);
+
+}  // namespace krot

@@ -1,0 +1,205 @@
+// pykrot.Model.
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <pybind11/eigen.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/geometry/rigid_transform.h"
+#include "krot/model/contradictions.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/model_error.h"
+#include "krot/model/model_io.h"
+#include "krot/model/validate.h"
+#include "krot/options/option_error.h"
+#include "python/bindings.h"
+#include "python/model_arrays.h"
+
+namespace krot {
+namespace {
+
+namespace py = pybind11;
+
+std::shared_ptr<Model> Read(const std::filesystem::path& path,
+                            const std::string& on_contradiction) {
+  auto model = std::make_shared<Model>();
+  *model = ReadModel(path, DetectModelFormat(path));
+  const Contradictions contradictions = FindContradictions(*model);
+  if (on_contradiction == "follow_images") {
+    FollowImages(model.get());
+  } else if (on_contradiction != "follow_tracks" &&
+             on_contradiction != "refuse") {
+    throw OptionError("on_contradiction = " + on_contradiction +
+                      ", must be one of {follow_tracks, follow_images, "
+                      "refuse}");
+  }
+  ValidateModel(*model);
+  if (contradictions.Any() && on_contradiction == "refuse") {
+    throw ModelError(contradictions.first);
+  }
+  return model;
+}
+
+void Write(const Model& model, const std::filesystem::path& path,
+           const std::string& output_type, bool overwrite) {
+  if (output_type != "BIN" && output_type != "TXT") {
+    throw OptionError("output_type = " + output_type +
+                      ", must be one of {BIN, TXT}");
+  }
+  WriteModelOptions options;
+  options.format =
+      output_type == "TXT" ? ModelFormat::kText : ModelFormat::kBinary;
+  options.overwrite = overwrite;
+  WriteModel(model, path, options);
+}
+
+// A view of one member of all records: no copy; writing into it changes the
+// model, which lives as long as the view does.
+template <typename Record, typename T>
+py::array_t<T> View(std::vector<Record>& records, T* first, int64_t columns,
+                    const py::object& owner) {
+  const int64_t count = static_cast<int64_t>(records.size());
+  if (count == 0) return py::array_t<T>(std::vector<int64_t>{0, columns});
+  return py::array_t<T>(
+      std::vector<int64_t>{count, columns},
+      std::vector<int64_t>{static_cast<int64_t>(sizeof(Record)),
+                           static_cast<int64_t>(sizeof(T))},
+      first, owner);
+}
+
+Model& Get(const py::object& self) { return self.cast<Model&>(); }
+
+py::array_t<double> Points(const py::object& self) {
+  std::vector<Point3D>& points = Get(self).points3D;
+  return View(points, points.empty() ? nullptr : points[0].xyz.data(), 3, self);
+}
+
+py::array_t<uint8_t> Colors(const py::object& self) {
+  std::vector<Point3D>& points = Get(self).points3D;
+  return View(points, points.empty() ? nullptr : points[0].color.data(), 3,
+              self);
+}
+
+// Copies of what is small or composed.
+template <typename Records, typename Of>
+auto Collect(const Records& records, const Of& of) {
+  using T = decltype(of(records.front()));
+  py::array_t<T> array(static_cast<int64_t>(records.size()));
+  T* out = array.mutable_data();
+  for (const auto& record : records) *out++ = of(record);
+  return array;
+}
+
+py::array_t<double> Rotations(const Model& model) {
+  py::array_t<double> array(
+      {static_cast<int64_t>(model.images.size()), int64_t{3}, int64_t{3}});
+  double* out = array.mutable_data();
+  for (const ImageGeometry& image : ImageGeometries(model)) {
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> to(out);
+    to = image.cam_from_world.rotation;
+    out += 9;
+  }
+  return array;
+}
+
+template <typename Of>
+py::array_t<double> OfImages(const Model& model, const Of& of) {
+  py::array_t<double> array(
+      {static_cast<int64_t>(model.images.size()), int64_t{3}});
+  double* out = array.mutable_data();
+  for (const ImageGeometry& image : ImageGeometries(model)) {
+    Eigen::Map<Eigen::Vector3d> to(out);
+    to = of(image.cam_from_world);
+    out += 3;
+  }
+  return array;
+}
+
+py::array_t<double> Translations(const Model& model) {
+  return OfImages(
+      model, [](const RigidTransform& transform) -> const Eigen::Vector3d& {
+        return transform.translation;
+      });
+}
+
+py::array_t<double> Centers(const Model& model) {
+  return OfImages(model, [](const RigidTransform& transform) {
+    return Eigen::Vector3d(Center(transform));
+  });
+}
+
+std::vector<std::string> Names(const Model& model) {
+  std::vector<std::string> names;
+  for (const Image& image : model.images) names.push_back(image.name);
+  return names;
+}
+
+// Columns of what a track element stands for: indices of its point and image,
+// and its pixel.
+py::tuple Observations(const Model& model) {
+  const int64_t count = static_cast<int64_t>(model.track_elements.size());
+  py::array_t<double> pixels({count, int64_t{2}});
+  py::array_t<int64_t> images(count);
+  py::array_t<int64_t> points(count);
+  const auto index_of = ImageIndices(model);
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      const int32_t image = index_of.at(element.image_id);
+      const Point2D& point2D =
+          model.images[image].points2D[element.point2D_idx];
+      pixels.mutable_data()[2 * e] = point2D.x;
+      pixels.mutable_data()[2 * e + 1] = point2D.y;
+      images.mutable_data()[e] = image;
+      points.mutable_data()[e] = static_cast<int64_t>(k);
+    }
+  }
+  return py::make_tuple(pixels, images, points);
+}
+
+}  // namespace
+
+void BindModel(py::module_* module) {
+  py::class_<Model, std::shared_ptr<Model>>(*module, "Model")
+      .def_static("read", &Read, py::arg("path"), py::kw_only(),
+                  py::arg("on_contradiction") = "follow_tracks")
+      .def_static("from_arrays", &ModelFromArrays, py::arg("observations"),
+                  py::arg("image_indices"), py::arg("point_indices"),
+                  py::arg("rotations"), py::arg("translations"),
+                  py::arg("points"), py::arg("cameras"),
+                  py::arg("camera_indices"), py::arg("names"))
+      .def("write", &Write, py::arg("path"), py::kw_only(),
+           py::arg("output_type") = "BIN", py::arg("overwrite") = false)
+      .def_property_readonly("points", &Points)
+      .def_property_readonly("colors", &Colors)
+      .def_property_readonly("point_ids",
+                             [](const Model& model) {
+                               return Collect(
+                                   model.points3D,
+                                   [](const Point3D& p) { return p.id; });
+                             })
+      .def_property_readonly(
+          "image_ids",
+          [](const Model& model) {
+            return Collect(model.images, [](const Image& i) { return i.id; });
+          })
+      .def_property_readonly("image_names", &Names)
+      .def_property_readonly("rotations", &Rotations)
+      .def_property_readonly("translations", &Translations)
+      .def_property_readonly("centers", &Centers)
+      .def("observations", &Observations)
+      .def("pixel_errors", [](const Model& model) {
+        const std::vector<double> errors = PixelErrors(model);
+        return Collect(errors, [](double error) { return error; });
+      });
+}
+
+}  // namespace krot

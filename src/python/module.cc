@@ -1,0 +1,22 @@
+// pykrot._core: KROT's commands for Python, without files in between.
+
+#include <pybind11/pybind11.h>
+
+#include "krot/adjust/ceres_log.h"
+#include "krot/base/write_file.h"
+#include "krot/model/model_error.h"
+#include "krot/options/option_error.h"
+#include "python/bindings.h"
+
+PYBIND11_MODULE(_core, module) {
+  namespace py = pybind11;
+  krot::SilenceCeres();
+  module.attr("__version__") = KROT_VERSION;
+  py::register_exception<krot::ModelError>(module, "ModelError",
+                                           PyExc_ValueError);
+  py::register_exception<krot::OptionError>(module, "OptionError",
+                                            PyExc_ValueError);
+  py::register_exception<krot::WriteError>(module, "WriteError", PyExc_OSError);
+  krot::BindModel(&module);
+  krot::BindCommands(&module);
+}

@@ -1,0 +1,133 @@
+"""KROT for Python: the known rotation problem on COLMAP models.
+
+Every function takes a Model (or a Problem of numpy arrays) and the options of
+the krot command of the same purpose, under the command line's names without
+their group: --Solver.relative_gap is relative_gap=1e-4. A name that two groups
+share is spelled out: options={"Solver.num_threads": 2}. docs/cli.md lists all.
+
+    import pykrot
+
+    result = pykrot.solve(pykrot.Model.read("sparse/0"))
+    print(result.max_error, "px, none below", result.lower_bound)
+    result.model.write("sparse/linf")
+"""
+
+import json
+from dataclasses import dataclass
+from typing import Optional
+
+from pykrot import _core
+from pykrot._core import Model, ModelError, OptionError, WriteError
+from pykrot.problem import Problem
+from pykrot.through_memory import from_pycolmap, to_pycolmap
+
+__version__ = _core.__version__
+__all__ = [
+    "Model", "ModelError", "NoSolutionError", "OptionError", "Problem",
+    "Result", "Verdict", "WriteError", "bundle_adjust", "check_certificate",
+    "compare", "filter", "from_pycolmap", "solve", "to_pycolmap",
+    "triangulate"
+]
+
+_WITHOUT_RESULT = ("nothing_to_solve", "nothing_to_adjust", "infeasible",
+                   "infeasible_start", "no_start")
+
+
+class NoSolutionError(RuntimeError):
+    """There is no new model; `report` says why, `certificate` may prove it."""
+
+    def __init__(self, result):
+        super().__init__(f"no solution: {result.report['termination']}")
+        self.report = result.report
+        self.certificate = result.certificate
+
+
+@dataclass
+class Result:
+    """A new model, and what its command would write into report.json."""
+    model: Model
+    report: dict
+    certificate: Optional[str]  # JSON: of the bound, or the conflicts
+
+    @property
+    def max_error(self):
+        """The largest pixel error of the new model."""
+        return self.report["pixel_error"]["after"]["max"]
+
+    @property
+    def lower_bound(self):
+        """Pixels that no translations and points are below, proved; or None."""
+        return self.report.get("lower_bound")
+
+    @property
+    def translations(self):
+        """Camera from world, by image: (images, 3)."""
+        return self.model.translations
+
+    @property
+    def points(self):
+        """(points, 3)."""
+        return self.model.points
+
+
+@dataclass
+class Verdict:
+    """What a certificate or a file of conflicts proves about a model."""
+    is_accepted: bool
+    refusal: str
+    lower_bound: float  # pixels; of conflicts: the bound that they refute
+    num_conflicts: Optional[int]  # so many observations at least must go
+
+
+def _run(command, model, progress, options, keywords):
+    if isinstance(model, Problem):
+        model = model.to_model()
+    outcome = command(model, progress, {**(options or {}), **keywords})
+    result = Result(outcome.model, json.loads(outcome.report),
+                    outcome.certificate)
+    if result.report.get("termination") in _WITHOUT_RESULT:
+        raise NoSolutionError(result)
+    return result
+
+
+def solve(model, *, progress=None, options=None, **keywords):
+    """The lowest largest error, proved; of all such, the least squares.
+
+    progress(stage, max_error, lower_bound) is called as it goes; both may be
+    None. Raises OptionError, NoSolutionError, KeyboardInterrupt.
+    """
+    return _run(_core.solve, model, progress, options, keywords)
+
+
+def triangulate(model, *, progress=None, options=None, **keywords):
+    """Every point anew, its track's largest error the lowest; frames stay."""
+    return _run(_core.triangulate, model, progress, options, keywords)
+
+
+def filter(model, max_error, *, progress=None, options=None, **keywords):
+    """Removes few observations so that all others are within `max_error` px.
+
+    report["num_must_go"] says how many had to go; `certificate` proves it.
+    """
+    return _run(_core.filter, model, progress, options,
+                {"max_error": max_error, **keywords})
+
+
+def bundle_adjust(model, *, progress=None, options=None, **keywords):
+    """Least squares over everything, below a cap if max_error is given."""
+    return _run(_core.bundle_adjust, model, progress, options, keywords)
+
+
+def compare(model1, model2, *, alignment="frame", num_worst=10):
+    """How two models of the same images differ: model_comparer's JSON."""
+    report = _core.compare(model1, model2, alignment, num_worst)
+    if report is None:
+        raise ValueError("the models share too few images to be aligned")
+    return json.loads(report)
+
+
+def check_certificate(model, certificate):
+    """Judges a certificate's or conflicts' JSON from the model alone."""
+    if isinstance(model, Problem):
+        model = model.to_model()
+    return Verdict(*_core.check_certificate(model, certificate))

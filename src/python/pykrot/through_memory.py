@@ -1,0 +1,27 @@
+"""To and from pycolmap, whose objects give no access to a model's arrays as a
+whole: through files in memory (/dev/shm where there is one)."""
+
+import os
+import tempfile
+
+from pykrot._core import Model
+
+
+def _folder():
+    return tempfile.TemporaryDirectory(
+        dir="/dev/shm" if os.path.isdir("/dev/shm") else None)
+
+
+def from_pycolmap(reconstruction):
+    """A Model of a pycolmap.Reconstruction."""
+    with _folder() as folder:
+        reconstruction.write(folder)
+        return Model.read(folder)
+
+
+def to_pycolmap(model, reconstruction):
+    """Reads the Model into an (empty) pycolmap.Reconstruction; returns that."""
+    with _folder() as folder:
+        model.write(folder)
+        reconstruction.read(folder)
+    return reconstruction

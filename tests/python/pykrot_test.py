@@ -1,0 +1,242 @@
+"""What pykrot promises: the command line's results, its sentences, and arrays."""
+
+import filecmp
+import gc
+import os
+import signal
+import subprocess
+import threading
+
+import numpy as np
+import pykrot
+import pytest
+
+KROT = os.environ["KROT_EXECUTABLE"]
+SAMPLE = os.environ["KROT_SAMPLE"]
+FILES = ("cameras.bin", "images.bin", "points3D.bin")
+
+
+def krot(*arguments):
+    return subprocess.run([KROT, *map(str, arguments)], capture_output=True,
+                          text=True, check=False)
+
+
+def run_krot(*arguments):
+    run = krot(*arguments)
+    assert run.returncode == 0, run.stderr
+    return run
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory):
+    """20 frames, 0.5 px of noise, from a rough start."""
+    path = tmp_path_factory.mktemp("scene") / "model"
+    run_krot("model_synthesizer", "--output_path", path,
+             "--Scene.pixel_noise", "0.5",
+             "--Scene.start_translation_noise", "0.005",
+             "--Scene.start_point_noise", "0.005")
+    return path
+
+
+def assert_same_files(folder1, folder2):
+    for name in FILES:
+        assert filecmp.cmp(folder1 / name, folder2 / name, shallow=False), name
+
+
+@pytest.mark.parametrize("command, function, options, keywords", [
+    ("solver", pykrot.solve, [], {}),
+    ("solver", pykrot.solve, ["--Solver.finish", "none", "--Solver.norm", "1"],
+     {"finish": "none", "norm": 1}),
+    ("point_triangulator", pykrot.triangulate, [], {}),
+    ("outlier_filter", pykrot.filter, ["--OutlierFilter.max_error", "1.2"],
+     {"max_error": 1.2}),
+    ("bundle_adjuster", pykrot.bundle_adjust,
+     ["--BundleAdjustmentCeres.num_threads", "1"],
+     {"options": {"BundleAdjustmentCeres.num_threads": 1}}),
+])
+def test_gives_the_bits_of_the_command(scene, tmp_path, command, function,
+                                       options, keywords):
+    run_krot(command, "--input_path", scene, "--output_path",
+             tmp_path / "command", *options)
+    result = function(pykrot.Model.read(scene), **keywords)
+    result.model.write(tmp_path / "python")
+    assert_same_files(tmp_path / "command", tmp_path / "python")
+
+
+def test_the_sample_ends_where_the_command_ends(tmp_path):
+    run_krot("solver", "--input_path", SAMPLE, "--output_path",
+             tmp_path / "command", "--output_type", "BIN")
+    pykrot.solve(pykrot.Model.read(SAMPLE)).model.write(tmp_path / "python")
+    assert_same_files(tmp_path / "command", tmp_path / "python")
+
+
+def random_problem(num_images=6, num_points=80, noise=0.3):
+    """Pinholes around a cloud; returns the problem and its true centres."""
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-1, 1, (num_points, 3))
+    angles = np.linspace(0, 2, num_images)
+    rotations = np.array([[[np.cos(a), 0, np.sin(a)], [0, 1, 0],
+                           [-np.sin(a), 0, np.cos(a)]] for a in angles])
+    translations = np.tile([0.0, 0.0, 5.0], (num_images, 1))
+    rows = []
+    for n in range(num_images):
+        for k in range(num_points):
+            x = rotations[n] @ points[k] + translations[n]
+            pixel = 800 * x[:2] / x[2] + 500 + rng.uniform(-noise, noise, 2)
+            rows.append((pixel, n, k))
+    rng.shuffle(rows)
+    problem = pykrot.Problem(
+        np.array([row[0] for row in rows]), np.array([row[1] for row in rows]),
+        np.array([row[2] for row in rows]), rotations,
+        [("PINHOLE", 1000, 1000, [800, 800, 500, 500])])
+    return problem, -np.einsum("nji,nj->ni", rotations, translations)
+
+
+def test_arrays_have_a_certified_result_from_nothing_in_three_lines():
+    problem, centers = random_problem()
+    result = pykrot.solve(problem)
+    assert result.lower_bound <= result.max_error < 0.3 * np.sqrt(2)
+    assert pykrot.check_certificate(problem, result.certificate).is_accepted
+
+    found = result.model.centers - result.model.centers.mean(axis=0)
+    wanted = centers - centers.mean(axis=0)
+    found *= np.linalg.norm(wanted) / np.linalg.norm(found)
+    assert np.abs(found - wanted).max() < 0.01
+    assert result.translations.shape == (6, 3)
+    assert result.points.shape == (80, 3)
+
+
+def test_errors_are_those_of_an_own_projection():
+    problem, _ = random_problem()
+    model = pykrot.solve(problem).model
+    pixels, images, points = model.observations()
+    x = np.einsum("nij,nj->ni", model.rotations[images],
+                  model.points[points]) + model.translations[images]
+    projected = 800 * x[:, :2] / x[:, 2:] + 500
+    expected = np.linalg.norm(projected - pixels, axis=1)
+    np.testing.assert_allclose(model.pixel_errors(), expected, atol=1e-9)
+
+
+def test_a_certificate_of_another_model_is_refused(scene):
+    problem, _ = random_problem()
+    certificate = pykrot.solve(problem).certificate
+    verdict = pykrot.check_certificate(pykrot.Model.read(scene), certificate)
+    assert not verdict.is_accepted
+    assert verdict.refusal
+
+
+def test_conflicts_prove_how_many_must_go(scene):
+    model = pykrot.Model.read(scene)
+    result = pykrot.filter(model, 1.2)
+    verdict = pykrot.check_certificate(model, result.certificate)
+    assert verdict.is_accepted
+    assert verdict.num_conflicts == result.report["num_must_go"]
+    assert result.max_error <= 1.2
+
+
+def test_points_are_a_view_that_outlives_its_model(scene):
+    model = pykrot.Model.read(scene)
+    points = model.points
+    points[0] = [1, 2, 3]
+    assert model.points[0].tolist() == [1, 2, 3]
+    del model
+    gc.collect()
+    assert points[0].tolist() == [1, 2, 3]
+
+
+def test_wrong_options_have_the_sentence_of_the_command(scene, tmp_path):
+    run = krot("solver", "--input_path", scene, "--output_path", tmp_path / "o",
+               "--Solver.relative_gap", "-1")
+    with pytest.raises(pykrot.OptionError) as error:
+        pykrot.solve(pykrot.Model.read(scene), relative_gap=-1)
+    assert run.stderr.strip() == f"krot solver: --{error.value}"
+
+
+@pytest.mark.parametrize("keywords, sentence", [
+    ({"relative_gop": 1}, "did you mean --Solver.relative_gap?"),
+    ({"max_iterations": 1}, "give the whole name"),
+    ({"method": "joint", "settings": "paper"}, "has no effect"),
+])
+def test_refuses_options_that_mean_nothing(scene, keywords, sentence):
+    with pytest.raises(pykrot.OptionError, match=sentence.replace("?", r"\?")):
+        pykrot.solve(pykrot.Model.read(scene), **keywords)
+
+
+@pytest.mark.parametrize("change, sentence", [
+    ({"observations": np.zeros((3, 3))}, r"observations has the shape \(3, 3\)"),
+    ({"point_indices": np.full(480, -1)}, r"point_indices\[0\] = -1"),
+    ({"rotations": np.zeros((6, 3, 3))}, r"rotations\[0\] is no rotation"),
+    ({"cameras": [("PINHOLY", 1, 1, [])]}, "PINHOLY is unknown"),
+    ({"cameras": [("PINHOLE", 1, 1, [1])]}, "parameter"),
+])
+def test_refuses_arrays_that_do_not_fit(change, sentence):
+    problem, _ = random_problem()
+    for name, value in change.items():
+        setattr(problem, name, value)
+    with pytest.raises(ValueError, match=sentence):
+        pykrot.solve(problem)
+
+
+def test_a_missing_model_is_named(tmp_path):
+    with pytest.raises(pykrot.ModelError, match=str(tmp_path)):
+        pykrot.Model.read(tmp_path)
+
+
+def test_says_that_nothing_is_below_an_impossible_bound():
+    problem, _ = random_problem()
+    with pytest.raises(pykrot.NoSolutionError, match="infeasible") as error:
+        pykrot.solve(problem, init="feasible", init_max_error=0.01)
+    assert error.value.report["lower_bound"] >= 0.01
+
+
+def test_tells_of_its_progress(scene):
+    seen = []
+    pykrot.solve(pykrot.Model.read(scene),
+                 progress=lambda *state: seen.append(state))
+    assert {"joint", "finish"} <= {stage for stage, _, _ in seen}
+
+
+def test_an_exception_of_the_callback_comes_out(scene):
+    def fail(*_):
+        raise RuntimeError("enough")
+    with pytest.raises(RuntimeError, match="enough"):
+        pykrot.solve(pykrot.Model.read(scene), progress=fail)
+
+
+def test_ctrl_c_ends_a_solve(scene):
+    def interrupt_soon(*_):
+        # The solve waits here until the signal has been looked at.
+        if not timer.is_alive() and not timer.finished.is_set():
+            timer.start()
+            timer.join()
+            threading.Event().wait(0.3)
+    timer = threading.Timer(
+        0.01, lambda: signal.pthread_kill(threading.main_thread().ident,
+                                          signal.SIGINT))
+    with pytest.raises(KeyboardInterrupt):
+        pykrot.solve(pykrot.Model.read(scene), progress=interrupt_soon)
+
+
+def test_compares_two_models(scene):
+    model = pykrot.Model.read(scene)
+    report = pykrot.compare(model, pykrot.solve(model).model)
+    assert report["num_shared_poses"] == len(model.image_names)
+
+
+def test_goes_to_and_from_what_can_only_read_and_write_files(scene, tmp_path):
+    class Reconstruction:
+        """As much of pycolmap's as is needed."""
+        def __init__(self, path=None):
+            self.model = pykrot.Model.read(path) if path else None
+
+        def read(self, path):
+            self.model = pykrot.Model.read(path)
+
+        def write(self, path):
+            self.model.write(path, overwrite=True)
+
+    model = pykrot.from_pycolmap(Reconstruction(scene))
+    back = pykrot.to_pycolmap(model, Reconstruction())
+    back.write(tmp_path / "back")
+    model.write(tmp_path / "model")
+    assert_same_files(tmp_path / "back", tmp_path / "model")
