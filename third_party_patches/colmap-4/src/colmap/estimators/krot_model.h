@@ -1,0 +1,22 @@
+// Copyright (c) KROT contributors.
+// SPDX-License-Identifier: BSD-3-Clause
+
+#pragma once
+
+#include "colmap/scene/reconstruction.h"
+
+#include <krot/model/model.h>
+
+namespace colmap {
+
+// The registered frames of a reconstruction, with their rigs, cameras and
+// images, and all 3D points, as KROT has models; records in the order of their
+// ids.
+krot::Model ToKrotModel(const Reconstruction& reconstruction);
+
+// Takes over translations, points, errors, and which observations there are, of
+// a model that was made of this reconstruction.
+void UpdateFromKrotModel(const krot::Model& model,
+                         Reconstruction& reconstruction);
+
+}  // namespace colmap
