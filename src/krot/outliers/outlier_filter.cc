@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <utility>
 
 #include "krot/base/check.h"
@@ -13,7 +14,9 @@
 #include "krot/outliers/element_index.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
+#include "krot/outliers/robust_start.h"
 #include "krot/outliers/suspects.h"
+#include "krot/pipeline/start.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
@@ -23,6 +26,11 @@ namespace {
 // What rounding may add to an error on its way into a model, relative.
 constexpr double kWithin = 1e-9;
 constexpr int kMaxThresholdSolves = 50;
+// From nothing, pixels: what is an error is known only afterwards.
+constexpr double kLevelOfStart = 2;
+// Of a bound that is chosen: of the median error, and in pixels.
+constexpr double kBoundPerMedian = 10;
+constexpr double kLeastBound = 1e-3;
 constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
 
 class OutlierFilter {
@@ -32,6 +40,7 @@ class OutlierFilter {
       : model_(model),
         options_(options),
         context_(context),
+        max_error_(options.max_error),
         errors_before_(PixelErrors(model, context.num_threads)),
         is_removed_(model.track_elements.size(), 0),
         conflict_of_(model.track_elements.size(), -1) {}
@@ -39,10 +48,12 @@ class OutlierFilter {
   OutlierFilterResult Run();
 
  private:
-  ErrorBound Bound() const { return {options_.solve.norm, options_.max_error}; }
+  ErrorBound Bound() const { return {options_.solve.norm, max_error_}; }
   bool IsWithin(double error) const {
-    return error <= (1 + kWithin) * options_.max_error;
+    return error <= (1 + kWithin) * max_error_;
   }
+  BuiltProblem Build();
+  void PlaceFromTracks(BuiltProblem* built);
   void FilterByConflicts();
   void FilterByThreshold();
   void Pack(const BuiltProblem& built, const Removal& removal,
@@ -56,6 +67,7 @@ class OutlierFilter {
   const Model& model_;
   const OutlierFilterOptions& options_;
   const Context& context_;
+  double max_error_;                         // the bound, pixels
   const std::vector<double> errors_before_;  // per track element
   std::vector<char> is_removed_;
   std::vector<int64_t> conflict_of_;
@@ -98,8 +110,8 @@ void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
     summary_.num_irreducible += conflict.is_irreducible;
     proofs.push_back(std::move(conflict.proof));
   }
-  summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
-                                         options_.max_error, proofs);
+  summary_.conflicts =
+      DescribeConflicts(model_, built, options_.solve.norm, max_error_, proofs);
   summary_.seconds_conflicts = timer.Seconds();
 }
 
@@ -111,7 +123,9 @@ void OutlierFilter::Solve(Model moved) {
   if (!kept_.model.track_elements.empty()) {
     // Where all that is left can be within the bound, the least squares there.
     SolveModelOptions options = options_.solve;
-    options.finish.max_error = options_.max_error;
+    options.init = SolveInit::kModel;
+    options.polish = Polish::kNone;
+    options.finish.max_error = max_error_;
     SolveModelResult solved = SolveModel(kept_.model, options, context_);
     kept_.model = std::move(solved.model);
     summary_.solve = std::move(solved.summary);
@@ -133,17 +147,47 @@ bool OutlierFilter::RemoveAbove() {
   return is_any;
 }
 
-void OutlierFilter::FilterByConflicts() {
-  const Timer timer;
+// With a start for all observations that are in it.
+BuiltProblem OutlierFilter::Build() {
   BuildProblemOptions build = options_.solve.problem;
   build.num_threads = context_.num_threads;
-  const BuiltProblem built = BuildProblem(model_, build);
+  build.ignore_translations = options_.solve.init == SolveInit::kFeasible;
+  BuiltProblem built = BuildProblem(model_, build);
+  if (!build.ignore_translations && !HasOwnStart(built)) {
+    build.ignore_translations = true;
+    built = BuildProblem(model_, build);
+  }
+  if (build.ignore_translations) PlaceFromTracks(&built);
+  return built;
+}
+
+void OutlierFilter::PlaceFromTracks(BuiltProblem* built) {
+  summary_.init = SolveInit::kFeasible;
+  const Norm norm = options_.solve.norm;
+  const double level = options_.choose_max_error
+                           ? kLevelOfStart
+                           : std::min(kLevelOfStart, max_error_);
+  built->start = FindRobustStart(built->problem, norm, level, context_);
+  const double median = MedianError(built->problem, built->start, norm);
+  if (options_.choose_max_error) {
+    max_error_ = std::max(kBoundPerMedian * median, kLeastBound);
+  }
+  std::ostringstream words;
+  words.precision(3);
+  words << "positions from rotations and tracks: median error " << median
+        << " px; what does not fit within " << max_error_ << " px is left out";
+  context_.Note(words.str());
+}
+
+void OutlierFilter::FilterByConflicts() {
+  const Timer timer;
+  const BuiltProblem built = Build();
   const std::vector<uint64_t> elements = ElementsOf(model_, built);
   const Removal removal = FindRemoval(model_, built, Bound(), context_);
   for (const int64_t i : removal.observations) is_removed_[elements[i]] = 1;
   summary_.seconds_removal = timer.Seconds();
   if (context_.IsCancelled()) return;
-  Pack(built, removal, elements);
+  if (options_.find_conflicts) Pack(built, removal, elements);
   if (options_.on_removed) {
     options_.on_removed(static_cast<int64_t>(removal.observations.size()));
   }
@@ -224,7 +268,6 @@ void OutlierFilter::ListRemoved() {
 
 OutlierFilterResult OutlierFilter::Run() {
   summary_.method = options_.method;
-  summary_.max_error = options_.max_error;
   summary_.norm = options_.solve.norm;
   summary_.num_observations =
       static_cast<int64_t>(model_.track_elements.size());
@@ -235,6 +278,7 @@ OutlierFilterResult OutlierFilter::Run() {
   } else {
     FilterByThreshold();
   }
+  summary_.max_error = max_error_;
   if (context_.IsCancelled()) return {model_, std::move(summary_)};
   const std::vector<double> errors =
       PixelErrors(kept_.model, context_.num_threads);
@@ -247,6 +291,11 @@ OutlierFilterResult OutlierFilter::Run() {
   summary_.num_points_removed = kept_.num_points;
   ListRemoved();
   RankSuspects(model_, is_removed_, conflict_of_, &summary_);
+  if (options_.solve.polish != Polish::kNone && summary_.solve) {
+    summary_.solve->polish =
+        PolishModel(options_.solve.polish, options_.solve.finish.loss, context_,
+                    &kept_.model);
+  }
   return {std::move(kept_.model), std::move(summary_)};
 }
 
@@ -255,7 +304,8 @@ OutlierFilterResult OutlierFilter::Run() {
 OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context) {
-  CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
+  CheckArgument(options.max_error > 0 || options.choose_max_error, "max_error",
+                options.max_error, "> 0");
   CheckArgument(options.solve.norm.p == 2, "norm.p", options.solve.norm.p,
                 "2, that of pixel errors");
   return OutlierFilter(model, options, context).Run();

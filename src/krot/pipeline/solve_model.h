@@ -107,7 +107,8 @@ struct SolveSummary {
   // The finish by least squares, if there was one: it gives up (cost_final -
   // finish->lowest_cost) of the maximum.
   std::optional<FinishSummary> finish;
-  // The largest error that was reached, pixels: what the gap asked for is about.
+  // The largest error that was reached, pixels: what the gap asked for is
+  // about.
   double LowestCost() const {
     return finish ? finish->lowest_cost : cost_final;
   }
