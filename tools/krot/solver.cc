@@ -1,3 +1,4 @@
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,19 @@ void AddScheduleOptions(SolveModelOptions* options, OptionParser* parser) {
       "stop in any case");
 }
 
+void AddMaxError(std::optional<double>* max_error, OptionParser* parser) {
+  parser->Add({"Solver.max_error",
+               "The error that no observation may have: few are removed, as by "
+               "outlier_filter, so that all others are within it",
+               "a number > 0, pixels", "none is removed", false,
+               [max_error](const std::string& text) {
+                 double value = 0;
+                 if (!ParseReal(text, &value) || !(value > 0)) return false;
+                 *max_error = value;
+                 return true;
+               }});
+}
+
 void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
                       OptionParser* parser) {
   parser->Add({"ResInt.max_sweeps",
@@ -66,6 +80,18 @@ void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
 // What a method does not look at is refused.
 void CheckPairs(const SolveModelOptions& options, const OptionParser& parser) {
   const SolveMethod method = EffectiveMethod(options);
+  if (method != SolveMethod::kAuto || options.norm.p != 2) {
+    parser.Refuse("Solver.max_error",
+                  "but with --Solver.method auto and --Solver.norm 2");
+  }
+  if (parser.IsGiven("Solver.max_error")) {
+    const char* why = "with --Solver.max_error, which the finish keeps to";
+    parser.Refuse("Solver.finish_slack", why);
+    parser.Refuse("Problem.init_max_error",
+                  "with --Solver.max_error, which needs no such start");
+  } else {
+    parser.Refuse("conflicts_path", "without --Solver.max_error");
+  }
   const bool has_joint_norm =
       options.norm.p == 2 || options.norm.IsPolyhedral();
   if (!has_joint_norm && options.method == SolveMethod::kJoint) {
@@ -133,7 +159,12 @@ int RunSolver(const std::vector<std::string>& arguments) {
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
+  parser.AddOutputFile("conflicts_path", &command.conflicts_path,
+                       "With Solver.max_error: where the proof goes of how "
+                       "many observations must be left out, as JSON; it takes "
+                       "most of the time");
   AddScheduleOptions(&command.options, &parser);
+  AddMaxError(&command.max_error, &parser);
   AddFinishOptions(&command.options, &parser);
   AddSolveOptions(&command.options, &command.context, &parser);
   AddResIntOptions(SolveModelOptions(), &command.options.res_int, &parser);

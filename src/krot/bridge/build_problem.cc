@@ -8,7 +8,9 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/frames_and_views.h"
 #include "krot/bridge/point_repair.h"
+#include "krot/bridge/same_image.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
@@ -36,6 +38,7 @@ struct Sources {
 struct PointOutcome {
   RepairedPoint point;
   int num_kept = 0;
+  bool has_image_twice = false;
 };
 
 // Where a point's usable observations are written, in the track's order. As
@@ -45,6 +48,12 @@ struct Slots {
   Observation* observations;
   int32_t* point2D;
   Eigen::Vector2d* pixels;
+
+  void Move(int from, int to) const {
+    observations[to] = observations[from];
+    point2D[to] = point2D[from];
+    pixels[to] = pixels[from];
+  }
 };
 
 // The row where the point projects, at a depth that is not rounding alone.
@@ -126,12 +135,23 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
     const auto row = RowAtPoint(sources, sources.geometries[observation.view],
                                 slots.pixels[i], xyz);
     if (!row) continue;
-    slots.point2D[num_kept] = slots.point2D[i];
-    slots.pixels[num_kept] = slots.pixels[i];
-    slots.observations[num_kept] = observation;
+    slots.Move(i, num_kept);
     slots.observations[num_kept++].E = *row;
   }
   return num_kept;
+}
+
+// Of several observations of an image only the one closest to the point stays.
+void KeepClosest(const Sources& sources, const Vector3d& xyz, Slots slots,
+                 int* count, LeftOutCounts* left_out) {
+  const std::vector<char> is_closest =
+      ClosestOfImages(sources.geometries, slots.observations, *count, xyz);
+  int num_kept = 0;
+  for (int i = 0; i < *count; ++i) {
+    if (is_closest[i]) slots.Move(i, num_kept++);
+  }
+  (*left_out)[static_cast<size_t>(LeftOut::kSameImage)] += *count - num_kept;
+  *count = num_kept;
 }
 
 PointOutcome ProcessPoint(const Sources& sources, int32_t point,
@@ -141,6 +161,7 @@ PointOutcome ProcessPoint(const Sources& sources, int32_t point,
       CollectRows(sources, point, options.ignore_translations, slots, left_out);
   const Vector3d& xyz = sources.model.points3D[point].xyz;
   PointOutcome outcome;
+  outcome.has_image_twice = HasImageTwice(slots.observations, num_rays);
   if (options.ignore_translations) {
     outcome.point.xyz = xyz;
     outcome.num_kept = num_rays;
@@ -156,6 +177,10 @@ PointOutcome ProcessPoint(const Sources& sources, int32_t point,
         RemoveBehind(sources, outcome.point.xyz, num_rays, slots);
     (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
         num_rays - outcome.num_kept;
+    if (outcome.has_image_twice && options.same_image == SameImage::kClosest) {
+      KeepClosest(sources, outcome.point.xyz, slots, &outcome.num_kept,
+                  left_out);
+    }
   }
   if (outcome.num_kept < options.min_track_length) {
     (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome.num_kept;
@@ -202,6 +227,7 @@ void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
   std::vector<Observation>& observations = built->problem.observations;
   size_t num_kept = 0;
   for (size_t k = 0; k < outcomes.size(); ++k) {
+    built->num_same_image_tracks += outcomes[k].has_image_twice;
     if (outcomes[k].num_kept == 0) continue;
     const int32_t point = static_cast<int32_t>(built->point_of.size());
     built->point_of.push_back(static_cast<int32_t>(k));
@@ -222,39 +248,6 @@ void Compact(const Model& model, const std::vector<PointOutcome>& outcomes,
   built->problem.num_points = static_cast<int32_t>(built->point_of.size());
 }
 
-// Numbers the frames that have observations, and their images as views.
-void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
-  const std::vector<ImageGeometry>& geometries = sources.geometries;
-  KnownRotationProblem& problem = built->problem;
-  const size_t num_model_frames = sources.model.frames.size();
-  std::vector<int32_t> frame_index(num_model_frames, -1);
-  for (const Observation& observation : problem.observations) {
-    frame_index[geometries[observation.view].frame] = 0;
-  }
-  for (size_t f = 0; f < num_model_frames; ++f) {
-    if (frame_index[f] < 0) continue;
-    frame_index[f] = problem.num_frames++;
-    built->frame_of.push_back(static_cast<int32_t>(f));
-  }
-  built->start.translations.resize(problem.num_frames);
-
-  std::vector<int32_t> view_index(geometries.size(), -1);
-  for (size_t n = 0; n < geometries.size(); ++n) {
-    const ImageGeometry& image = geometries[n];
-    if (!image.has_pose || frame_index[image.frame] < 0) continue;
-    view_index[n] = static_cast<int32_t>(problem.views.size());
-    built->image_of.push_back(static_cast<int32_t>(n));
-    const int32_t frame = frame_index[image.frame];
-    problem.views.push_back({image.cam_from_world.rotation,
-                             image.cam_from_rig.rotation,
-                             image.cam_from_rig.translation, frame});
-    built->start.translations[frame] = image.rig_from_world.translation;
-  }
-  for (Observation& observation : problem.observations) {
-    observation.view = view_index[observation.view];
-  }
-}
-
 // An image has a pose if its rotation and its place in the rig are known.
 void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
   for (ImageGeometry& image : *geometries) {
@@ -265,22 +258,6 @@ void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
 
 }  // namespace
 
-const char* LeftOutName(LeftOut reason) {
-  switch (reason) {
-    case LeftOut::kBehind:
-      return "behind";
-    case LeftOut::kUndistortion:
-      return "undistortion";
-    case LeftOut::kOffAxis:
-      return "off_axis";
-    case LeftOut::kShortTrack:
-      return "short_track";
-    case LeftOut::kNoPose:
-      return "no_pose";
-  }
-  return "unknown";
-}
-
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options) {
   CheckArgument(options.min_track_length >= 1, "options.min_track_length",
@@ -289,7 +266,7 @@ BuiltProblem BuildProblem(const Model& model,
   if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;
   Compact(model, ProcessPoints(sources, options, &built), &built);
-  AddFramesAndViews(sources, &built);
+  AddFramesAndViews(model, sources.geometries, &built);
   IndexObservations(&built.problem);
   return built;
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "krot/base/check.h"
@@ -14,9 +13,8 @@
 #include "krot/outliers/element_index.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
-#include "krot/outliers/robust_start.h"
+#include "krot/outliers/removal_start.h"
 #include "krot/outliers/suspects.h"
-#include "krot/pipeline/start.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
@@ -26,11 +24,6 @@ namespace {
 // What rounding may add to an error on its way into a model, relative.
 constexpr double kWithin = 1e-9;
 constexpr int kMaxThresholdSolves = 50;
-// From nothing, pixels: what is an error is known only afterwards.
-constexpr double kLevelOfStart = 2;
-// Of a bound that is chosen: of the median error, and in pixels.
-constexpr double kBoundPerMedian = 10;
-constexpr double kLeastBound = 1e-3;
 constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
 
 class OutlierFilter {
@@ -52,8 +45,6 @@ class OutlierFilter {
   bool IsWithin(double error) const {
     return error <= (1 + kWithin) * max_error_;
   }
-  BuiltProblem Build();
-  void PlaceFromTracks(BuiltProblem* built);
   void FilterByConflicts();
   void FilterByThreshold();
   void Pack(const BuiltProblem& built, const Removal& removal,
@@ -147,41 +138,12 @@ bool OutlierFilter::RemoveAbove() {
   return is_any;
 }
 
-// With a start for all observations that are in it.
-BuiltProblem OutlierFilter::Build() {
-  BuildProblemOptions build = options_.solve.problem;
-  build.num_threads = context_.num_threads;
-  build.ignore_translations = options_.solve.init == SolveInit::kFeasible;
-  BuiltProblem built = BuildProblem(model_, build);
-  if (!build.ignore_translations && !HasOwnStart(built)) {
-    build.ignore_translations = true;
-    built = BuildProblem(model_, build);
-  }
-  if (build.ignore_translations) PlaceFromTracks(&built);
-  return built;
-}
-
-void OutlierFilter::PlaceFromTracks(BuiltProblem* built) {
-  summary_.init = SolveInit::kFeasible;
-  const Norm norm = options_.solve.norm;
-  const double level = options_.choose_max_error
-                           ? kLevelOfStart
-                           : std::min(kLevelOfStart, max_error_);
-  built->start = FindRobustStart(built->problem, norm, level, context_);
-  const double median = MedianError(built->problem, built->start, norm);
-  if (options_.choose_max_error) {
-    max_error_ = std::max(kBoundPerMedian * median, kLeastBound);
-  }
-  std::ostringstream words;
-  words.precision(3);
-  words << "positions from rotations and tracks: median error " << median
-        << " px; what does not fit within " << max_error_ << " px is left out";
-  context_.Note(words.str());
-}
-
 void OutlierFilter::FilterByConflicts() {
   const Timer timer;
-  const BuiltProblem built = Build();
+  const RemovalStart start = FindRemovalStart(model_, options_, context_);
+  const BuiltProblem& built = start.built;
+  summary_.init = start.init;
+  max_error_ = start.max_error;
   const std::vector<uint64_t> elements = ElementsOf(model_, built);
   const Removal removal = FindRemoval(model_, built, Bound(), context_);
   for (const int64_t i : removal.observations) is_removed_[elements[i]] = 1;

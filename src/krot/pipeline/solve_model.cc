@@ -51,6 +51,7 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->num_components = FindComponents(problem).count;
   summary->left_out = built.left_out;
   summary->num_retriangulated_points = built.num_retriangulated_points;
+  summary->num_same_image_tracks = built.num_same_image_tracks;
   const SolveMemory memory = EstimateSolveMemory(model, built, *summary);
   summary->likely_bytes = memory.likely;
   summary->largest_bytes = memory.at_most;

@@ -76,6 +76,7 @@ struct SolveSummary {
   int32_t num_components = 0;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
+  int64_t num_same_image_tracks = 0;  // that hold an image more than once
 
   // The largest true error of the observations in the optimisation, pixels;
   // initial: of the start, after re-triangulation; final: of the model written
