@@ -18,6 +18,8 @@ namespace {
 // Of the bound: what the interior point leaves open.
 constexpr double kInside = 1e-3;
 constexpr int kMaxReweightings = 4;
+// Of the bound, where their interior point ends.
+constexpr double kRemovalMu = 1e-3;
 // In units of the bound: what an error at the start counts for at most.
 constexpr double kLargestExcess = 100;
 // Observations with less of a multiplier have no say.
@@ -83,6 +85,7 @@ void RemovalSearch::Excess(const std::vector<int64_t>& component,
   const ProblemSubset part(rows_, component);
   ExcessOptions options;
   options.norm = bound_.norm;
+  options.smallest_mu = kRemovalMu;
   for (const int64_t i : component) options.weights.push_back(weights_[i]);
   Estimate own = part.Restrict(*estimate);
   const double level = (1 - kInside) * bound_.max_error;
