@@ -112,7 +112,8 @@ Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
   SolveModelOptions options;
   Context context;
   OptionTable table = TableOf("pykrot.solve");
-  AddSolverOptions(&options, &context, &table);
+  std::optional<double> max_error;
+  AddSolverOptions(&options, &max_error, &context, &table);
   AssignKeywords(keywords, &table);
   ResolveSolverOptions(table, &options);
   return RunSolve(model, options, context, progress, "solver", &SolveModel);

@@ -82,7 +82,7 @@ TEST(LeftOutName, IsTheKeyOfTheReport) {
     names.push_back(LeftOutName(static_cast<LeftOut>(r)));
   }
   EXPECT_THAT(names, ElementsAre("behind", "undistortion", "off_axis",
-                                 "short_track", "no_pose"));
+                                 "short_track", "no_pose", "same_image"));
 }
 
 TEST(LeftOut, NothingDependsOnTranslationsThatAreIgnored) {

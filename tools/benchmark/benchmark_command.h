@@ -13,6 +13,7 @@ int RunKnownRotationBenchmark(const std::vector<std::string>& arguments);
 int RunSweepBenchmark(const std::vector<std::string>& arguments);
 int RunScalingBenchmark(const std::vector<std::string>& arguments);
 int RunJointBenchmark(const std::vector<std::string>& arguments);
+int RunPositioningBenchmark(const std::vector<std::string>& arguments);
 int RunSummaryBenchmark(const std::vector<std::string>& arguments);
 
 }  // namespace krot

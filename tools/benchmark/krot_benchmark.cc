@@ -32,6 +32,8 @@ constexpr Command kCommands[] = {
      &RunSweepBenchmark},
     {"scaling", "cost per observation as models grow", &RunScalingBenchmark},
     {"joint", "krot solver against colmap bundle_adjuster", &RunJointBenchmark},
+    {"positioning", "a rival's positions from rotations and tracks",
+     &RunPositioningBenchmark},
     {"summary", "what was asked, and what the reports of all these say",
      &RunSummaryBenchmark},
 };

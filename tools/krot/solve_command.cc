@@ -6,6 +6,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
+#include "krot/outliers/outlier_filter.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -43,10 +44,43 @@ std::string MemoryWords(const SolveSummary& summary) {
               : std::string());
 }
 
+// Whether nothing came of a model without positions for want of a start that
+// has them all.
+bool NeedsRemoval(const SolveCommand& command, const SolveSummary& summary) {
+  return summary.termination == SolveTermination::kNothingToSolve &&
+         EffectiveMethod(command.options) == SolveMethod::kAuto &&
+         command.options.norm.p == 2;
+}
+
+// Without what does not fit within command.max_error, or a bound that is
+// chosen.
+Model SolveWithoutOutliers(const SolveCommand& command, const Model& model,
+                           const SolveModelOptions& solve,
+                           const Context& context, SolveReport* report) {
+  OutlierFilterOptions options;
+  options.choose_max_error = !command.max_error;
+  options.max_error = command.max_error.value_or(0);
+  options.find_conflicts = !command.conflicts_path.empty();
+  options.solve = solve;
+  OutlierFilterResult result = FilterOutliers(model, options, context);
+  if (result.model.track_elements.empty() && !context.IsCancelled()) {
+    throw CommandError(kExitNothingToSolve,
+                       "nothing to solve: no track keeps two observations");
+  }
+  if (result.summary.solve) {
+    report->summary = *std::exchange(result.summary.solve, std::nullopt);
+    report->summary.init = result.summary.init;
+    report->summary.pixel_error_before = result.summary.pixel_error_before;
+    report->summary.pixel_error_after = result.summary.pixel_error_after;
+  }
+  report->outliers = std::move(result.summary);
+  return std::move(result.model);
+}
+
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
-SolveModelResult Solve(const SolveCommand& command, const Model& model,
-                       const CancelFlag& cancel) {
+Model Solve(const SolveCommand& command, const Model& model,
+            const CancelFlag& cancel, SolveReport* report) {
   const LogOptions& log = command.common.log;
   SolveModelOptions options = command.options;
   Context context = command.context;
@@ -61,10 +95,26 @@ SolveModelResult Solve(const SolveCommand& command, const Model& model,
     }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
-  SolveModelResult result = SolveModel(model, options, context);
+  Model solved;
+  if (!command.max_error) {
+    SolveModelResult result = SolveModel(model, options, context);
+    solved = std::move(result.model);
+    report->summary = std::move(result.summary);
+  }
+  if (command.max_error || NeedsRemoval(command, report->summary)) {
+    options.on_built = nullptr;
+    solved = SolveWithoutOutliers(command, model, options, context, report);
+  }
   progress.Finish();
   ThrowIfInterrupted();
-  return result;
+  return solved;
+}
+
+void WriteConflicts(const SolveCommand& command, const SolveReport& report) {
+  if (command.conflicts_path.empty() || !report.outliers->conflicts) return;
+  LogLine(command.common.log, 2, "writing " + command.conflicts_path);
+  WriteFileAtomically(command.conflicts_path,
+                      ConflictJson(*report.outliers->conflicts));
 }
 
 void WriteCertificate(const SolveCommand& command,
@@ -92,7 +142,8 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveSummary& summary) {
                    "least " +
                        FormatNumber(*summary.lower_bound, 6) + " px, above "
                  : std::string("no estimate is below ")) +
-            "Problem.init_max_error = " + bound);
+            "Problem.init_max_error = " + bound +
+            "; --Solver.max_error leaves out what does not fit");
   }
   if (summary.termination == SolveTermination::kNoStart) {
     throw CommandError(kExitNoStart,
@@ -136,6 +187,7 @@ int RunSolveCommand(const SolveCommand& command) {
   const WriteModelOptions write_options = CheckModelPaths(paths);
   CheckSidePath("certificate_path", command.certificate_path,
                 paths.output_path);
+  CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
   const Timer read_timer;
@@ -145,25 +197,25 @@ int RunSolveCommand(const SolveCommand& command) {
   report.run.seconds_read = read_timer.Seconds();
   ThrowIfInterrupted();
 
-  SolveModelResult result = Solve(command, model, cancel);
-  report.summary = std::move(result.summary);
+  const Model solved = Solve(command, model, cancel, &report);
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);
   }
   ThrowIfNoStart(command, report.summary);
 
   if (write_options.format == ModelFormat::kText) {
-    WarnOfWhiteSpace(log, result.model);
+    WarnOfWhiteSpace(log, solved);
   }
   LogLine(log, 2, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModel(result.model, paths.output_path, write_options);
+  WriteModel(solved, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
   report.run.seconds_total = total_timer.Seconds();
   report.run.peak_memory_bytes = PeakMemoryBytes();
   WriteCertificate(command, report.summary);
+  WriteConflicts(command, report);
   WriteReports(paths.report_path, paths.html_path, SolveJson(report), model,
-               result.model, command.context.num_threads, log);
+               solved, command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
   WarnOfMissedGap(command, report.summary);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "krot/pipeline/solve_model.h"
@@ -16,6 +17,10 @@ struct SolveCommand {
   std::string method_name;  // for the report; "": that of the solve
   ModelPaths paths;
   std::string certificate_path;  // "": not wanted
+  // What does not fit within so many pixels is left out; none: nothing is, as
+  // long as there is a start for all.
+  std::optional<double> max_error;
+  std::string conflicts_path;  // "": not wanted
   CommonOptions common;
   SolveModelOptions options;  // its callbacks are set by the run
   Context context;            // likewise, and the flag

@@ -1,3 +1,4 @@
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,12 @@ int RunSolver(const std::vector<std::string>& arguments) {
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
-  AddSolverOptions(&command.options, &command.context, &parser);
+  parser.AddOutputFile("conflicts_path", &command.conflicts_path,
+                       "With Solver.max_error: where the proof goes of how "
+                       "many observations must be left out, as JSON; it takes "
+                       "most of the time");
+  AddSolverOptions(&command.options, &command.max_error, &command.context,
+                   &parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "
       "numbers",

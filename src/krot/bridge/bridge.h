@@ -18,15 +18,24 @@ enum class LeftOut {
   kOffAxis,       // never any more; reports keep the name
   kShortTrack,    // fewer than min_track_length usable observations
   kNoPose,        // the image has no frame or no finite translation
+  kSameImage,     // its track has a closer one of the same image
 };
-inline constexpr int kNumLeftOutReasons = 5;
-// "behind", "undistortion", "off_axis", "short_track", "no_pose".
+inline constexpr int kNumLeftOutReasons = 6;
+// "behind", "undistortion", "off_axis", "short_track", "no_pose", "same_image".
 const char* LeftOutName(LeftOut reason);
+
+// What becomes of several observations of one image in the same track, of
+// which one at most is right.
+enum class SameImage {
+  kKeep,
+  kClosest,  // the one with the smallest error at the model's own point stays
+};
 
 struct BuildProblemOptions {
   // Usable observations that a point needs to be optimised; >= 1. Two of one
   // image are two.
   int min_track_length = 2;
+  SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
   int num_threads = -1;  // -1: all; the result does not depend on it
   // Takes nothing from the model but rotations, rigs and rays: no observation
   // is left out as `behind`, and as `no_pose` only where rotation or rig are
@@ -50,6 +59,9 @@ struct BuiltProblem {
   std::vector<Eigen::Vector2d> pixels;  // of the observations
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
+  // Tracks with several usable observations of one image, whatever becomes of
+  // them.
+  int64_t num_same_image_tracks = 0;
 };
 
 // The problem of all observations that can be used: the unknowns are the
@@ -60,7 +72,8 @@ struct BuiltProblem {
 // pose; its point does not project and its pixel has no trustworthy ray
 // (PixelBearing); it does not see its point, and re-triangulating that from all
 // its rays does not bring it into sight of all (then the fewest are left out);
-// its point has too few usable observations. Rows are taken where the points
+// options.same_image prefers another of its image and track; its point has too
+// few usable observations. Rows are taken where the points
 // project (RowAtProjection).
 //
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for bad

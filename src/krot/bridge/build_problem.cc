@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdint>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -9,7 +8,10 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/frames_and_views.h"
+#include "krot/bridge/order_of_ids.h"
 #include "krot/bridge/point_repair.h"
+#include "krot/bridge/same_image.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
@@ -39,19 +41,8 @@ struct PointOutcome {
   uint64_t slots = 0;  // where its own begin
   RepairedPoint point;
   int num_kept = 0;
+  bool has_image_twice = false;
 };
-
-// Indices of the records by their ids, which differ: the order in which a file
-// happens to hold them makes no difference to a result.
-template <typename Record>
-std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
-  std::vector<int32_t> order(records.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::sort(order.begin(), order.end(), [&](int32_t a, int32_t b) {
-    return records[a].id < records[b].id;
-  });
-  return order;
-}
 
 // Where a point's usable observations are written, in the track's order. As
 // many places as the track has elements; `view` is the index of the image and
@@ -60,6 +51,12 @@ struct Slots {
   Observation* observations;
   int32_t* point2D;
   Eigen::Vector2d* pixels;
+
+  void Move(int from, int to) const {
+    observations[to] = observations[from];
+    point2D[to] = point2D[from];
+    pixels[to] = pixels[from];
+  }
 };
 
 // The row where the point projects, at a depth that is not rounding alone.
@@ -141,12 +138,23 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
     const auto row = RowAtPoint(sources, sources.geometries[observation.view],
                                 slots.pixels[i], xyz);
     if (!row) continue;
-    slots.point2D[num_kept] = slots.point2D[i];
-    slots.pixels[num_kept] = slots.pixels[i];
-    slots.observations[num_kept] = observation;
+    slots.Move(i, num_kept);
     slots.observations[num_kept++].E = *row;
   }
   return num_kept;
+}
+
+// Of several observations of an image only the one closest to the point stays.
+void KeepClosest(const Sources& sources, const Vector3d& xyz, Slots slots,
+                 int* count, LeftOutCounts* left_out) {
+  const std::vector<char> is_closest =
+      ClosestOfImages(sources.geometries, slots.observations, *count, xyz);
+  int num_kept = 0;
+  for (int i = 0; i < *count; ++i) {
+    if (is_closest[i]) slots.Move(i, num_kept++);
+  }
+  (*left_out)[static_cast<size_t>(LeftOut::kSameImage)] += *count - num_kept;
+  *count = num_kept;
 }
 
 void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
@@ -155,6 +163,7 @@ void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
   const int num_rays =
       CollectRows(sources, point, options.ignore_translations, slots, left_out);
   const Vector3d& xyz = sources.model.points3D[point].xyz;
+  outcome->has_image_twice = HasImageTwice(slots.observations, num_rays);
   if (options.ignore_translations) {
     outcome->point.xyz = xyz;
     outcome->num_kept = num_rays;
@@ -170,6 +179,10 @@ void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
         RemoveBehind(sources, outcome->point.xyz, num_rays, slots);
     (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
         num_rays - outcome->num_kept;
+    if (outcome->has_image_twice && options.same_image == SameImage::kClosest) {
+      KeepClosest(sources, outcome->point.xyz, slots, &outcome->num_kept,
+                  left_out);
+    }
   }
   if (outcome->num_kept < options.min_track_length) {
     (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome->num_kept;
@@ -190,7 +203,7 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
   outcomes.reserve(model.points3D.size());
   uint64_t num_slots = 0;
   for (const int32_t k : OrderOfIds(model.points3D)) {
-    outcomes.push_back({k, num_slots, {}, 0});
+    outcomes.push_back({k, num_slots, {}, 0, false});
     num_slots += model.points3D[k].track_end - model.points3D[k].track_begin;
   }
   const int64_t count = static_cast<int64_t>(outcomes.size());
@@ -220,6 +233,7 @@ void Compact(const std::vector<PointOutcome>& outcomes, BuiltProblem* built) {
   std::vector<Observation>& observations = built->problem.observations;
   size_t num_kept = 0;
   for (const PointOutcome& outcome : outcomes) {
+    built->num_same_image_tracks += outcome.has_image_twice;
     if (outcome.num_kept == 0) continue;
     const int32_t point = static_cast<int32_t>(built->point_of.size());
     built->point_of.push_back(outcome.index);
@@ -240,38 +254,6 @@ void Compact(const std::vector<PointOutcome>& outcomes, BuiltProblem* built) {
   built->problem.num_points = static_cast<int32_t>(built->point_of.size());
 }
 
-// Numbers the frames that have observations, and their images as views.
-void AddFramesAndViews(const Sources& sources, BuiltProblem* built) {
-  const std::vector<ImageGeometry>& geometries = sources.geometries;
-  KnownRotationProblem& problem = built->problem;
-  std::vector<int32_t> frame_index(sources.model.frames.size(), -1);
-  for (const Observation& observation : problem.observations) {
-    frame_index[geometries[observation.view].frame] = 0;
-  }
-  for (const int32_t f : OrderOfIds(sources.model.frames)) {
-    if (frame_index[f] < 0) continue;
-    frame_index[f] = problem.num_frames++;
-    built->frame_of.push_back(f);
-  }
-  built->start.translations.resize(problem.num_frames);
-
-  std::vector<int32_t> view_index(geometries.size(), -1);
-  for (const int32_t n : OrderOfIds(sources.model.images)) {
-    const ImageGeometry& image = geometries[n];
-    if (!image.has_pose || frame_index[image.frame] < 0) continue;
-    view_index[n] = static_cast<int32_t>(problem.views.size());
-    built->image_of.push_back(n);
-    const int32_t frame = frame_index[image.frame];
-    problem.views.push_back({image.cam_from_world.rotation,
-                             image.cam_from_rig.rotation,
-                             image.cam_from_rig.translation, frame});
-    built->start.translations[frame] = image.rig_from_world.translation;
-  }
-  for (Observation& observation : problem.observations) {
-    observation.view = view_index[observation.view];
-  }
-}
-
 // An image has a pose if its rotation and its place in the rig are known.
 void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
   for (ImageGeometry& image : *geometries) {
@@ -290,7 +272,7 @@ BuiltProblem BuildProblem(const Model& model,
   if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;
   Compact(ProcessPoints(sources, options, &built), &built);
-  AddFramesAndViews(sources, &built);
+  AddFramesAndViews(model, sources.geometries, &built);
   IndexObservations(&built.problem);
   return built;
 }

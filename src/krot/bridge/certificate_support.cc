@@ -2,9 +2,20 @@
 
 #include <algorithm>
 
+#include "krot/bridge/same_image.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
+namespace {
+
+bool HasImageTwice(const KnownRotationProblem& problem, int32_t point) {
+  const int64_t begin = problem.point_begin[point];
+  return HasImageTwice(
+      &problem.observations[begin],
+      static_cast<int>(problem.point_begin[point + 1] - begin));
+}
+
+}  // namespace
 
 std::vector<SupportObservation> ListSupport(const Model& model,
                                             const BuiltProblem& built,
@@ -22,7 +33,8 @@ std::vector<SupportObservation> ListSupport(const Model& model,
         {image.id, image.name,
          static_cast<uint32_t>(built.point2D_of[o.observation]),
          model.points3D[built.point_of[observation.point]].id, o.lambda / sum,
-         ResidualOf(ViewPoint(built.problem, observation, estimate), norm)});
+         ResidualOf(ViewPoint(built.problem, observation, estimate), norm),
+         HasImageTwice(built.problem, observation.point)});
   }
   std::stable_sort(
       support.begin(), support.end(),

@@ -21,6 +21,7 @@ struct SupportObservation {
   // That of the problem's row, pixels: the true error where the row was taken
   // at the estimate. Infinite behind the camera.
   double error_px = 0;
+  bool has_image_twice = false;  // its track, in the problem
 };
 
 // The support of a certificate of built.problem, worst first.

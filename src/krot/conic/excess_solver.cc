@@ -37,9 +37,9 @@ ExcessSolver<Cone>::ExcessSolver(const KnownRotationProblem& problem,
       costs_(CostsOf(options, depths)),
       min_depth_(has_depths ? 0 : kMinDepthFromNothing),
       system_(problem, options.norm, bound, costs_, depths, min_depth_,
-              context.num_threads) {
+              has_depths ? &start : nullptr, context.num_threads) {
   Start(start);
-  mean_depth_ = has_depths ? system_.MeanDepth(start) : 1;
+  size_ = has_depths ? system_.Size(start) : 1;
 }
 
 template <typename Cone>
@@ -193,7 +193,7 @@ ExcessSolution ExcessSolver<Cone>::Run(Estimate* estimate) {
       solution.termination = Termination::kInterrupted;
       break;
     }
-    if (!system_.Factorize(now_, mean_depth_ - system_.MeanDepth(now_.x))) {
+    if (!system_.Factorize(now_, size_ - system_.Size(now_.x))) {
       solution.termination = Termination::kSingular;
       break;
     }

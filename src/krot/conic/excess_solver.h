@@ -10,8 +10,8 @@
 namespace krot {
 
 // One run of the interior point on the excess programme, as in conic_solver.h
-// on the others. `depths` are those that are 1 in the gauge, and `has_depths`
-// whether the start has any.
+// on the others. `depths` are those at the start, and `has_depths` whether it
+// has any.
 template <typename Cone>
 class ExcessSolver {
  public:
@@ -59,7 +59,7 @@ class ExcessSolver {
   const std::vector<double> costs_;
   const double min_depth_;
   ExcessSystem<Cone> system_;
-  double mean_depth_ = 1;
+  double size_ = 1;  // e'x
   Iterate now_, trial_;
 };
 

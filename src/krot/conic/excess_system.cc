@@ -11,7 +11,8 @@ template <typename Cone>
 ExcessSystem<Cone>::ExcessSystem(const KnownRotationProblem& problem, Norm norm,
                                  double bound, std::vector<double> costs,
                                  const std::vector<double>& depths,
-                                 double min_depth, int num_threads)
+                                 double min_depth, const Estimate* start,
+                                 int num_threads)
     : problem_(problem),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       has_free_scale_(!HasBaseline(problem)),
@@ -28,13 +29,15 @@ ExcessSystem<Cone>::ExcessSystem(const KnownRotationProblem& problem, Norm norm,
   direction_.dz.resize(problem.observations.size());
   direction_.dsigma.resize(problem.observations.size());
   direction_.dzeta.resize(problem.observations.size());
-  FindGauge(depths);
+  gauge_.SetZero(problem_.num_points, problem_.num_frames);
+  if (start == nullptr || !has_free_scale_ || !GaugeCentres(*start)) {
+    GaugeDepths(depths);
+  }
 }
 
 // e'x is the mean of w_i / depths_i.
 template <typename Cone>
-void ExcessSystem<Cone>::FindGauge(const std::vector<double>& depths) {
-  gauge_.SetZero(problem_.num_points, problem_.num_frames);
+void ExcessSystem<Cone>::GaugeDepths(const std::vector<double>& depths) {
   for (int64_t i = 0; i < loop_.count(); ++i) {
     const Observation& o = problem_.observations[i];
     const View& view = problem_.views[o.view];
@@ -46,8 +49,35 @@ void ExcessSystem<Cone>::FindGauge(const std::vector<double>& depths) {
   }
 }
 
+// e'x = sum_f C_f'(C_f^0 - mean C^0) over the same of the start, with
+// C = -R_rw' t. False if all its centres are in one place.
 template <typename Cone>
-double ExcessSystem<Cone>::MeanDepth(const Estimate& x) const {
+bool ExcessSystem<Cone>::GaugeCentres(const Estimate& start) {
+  std::vector<Eigen::Matrix3d> rotations(problem_.num_frames);
+  for (const View& view : problem_.views) {
+    rotations[view.frame] =
+        view.cam_from_rig_rotation.transpose() * view.cam_from_world_rotation;
+  }
+  std::vector<Eigen::Vector3d> centres;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (int32_t f = 0; f < problem_.num_frames; ++f) {
+    centres.push_back(-rotations[f].transpose() * start.translations[f]);
+    mean += centres.back() / static_cast<double>(problem_.num_frames);
+  }
+  double size = 0;
+  for (const Eigen::Vector3d& centre : centres) {
+    size += (centre - mean).squaredNorm();
+  }
+  if (!(size > 0)) return false;
+  for (int32_t f = 0; f < problem_.num_frames; ++f) {
+    if (structure_.frame_is_fixed[f]) continue;
+    gauge_.frames[f] = -rotations[f] * (centres[f] - mean) / size;
+  }
+  return true;
+}
+
+template <typename Cone>
+double ExcessSystem<Cone>::Size(const Estimate& x) const {
   return gauge_.Dot({x.points, x.translations});
 }
 

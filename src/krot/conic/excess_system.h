@@ -56,13 +56,14 @@ class ExcessSystem {
     std::vector<double> dsigma, dzeta;
   };
 
-  // `costs` are the c_i, and `depths` those that are 1 in the gauge.
+  // `costs` are the c_i, and `depths` those that are 1 in the gauge; or that is
+  // about the centres of `start`, if there is one.
   ExcessSystem(const KnownRotationProblem& problem, Norm norm, double bound,
                std::vector<double> costs, const std::vector<double>& depths,
-               double min_depth, int num_threads);
+               double min_depth, const Estimate* start, int num_threads);
 
   // e'x, but for what the frame that stays put adds.
-  double MeanDepth(const Estimate& x) const;
+  double Size(const Estimate& x) const;
 
   Vector Slack(const ViewedPoint& viewed, double sigma) const {
     return T_ * Eigen::Vector3d(bound_ * (viewed.depth - min_depth_) + sigma,
@@ -105,7 +106,8 @@ class ExcessSystem {
     double kappa = 0;
   };
 
-  void FindGauge(const std::vector<double>& depths);
+  void GaugeDepths(const std::vector<double>& depths);
+  bool GaugeCentres(const Estimate& start);
   Vector ScaledChange(const BlockVector& dx, int64_t i) const;
   void AddSaturatedForces(BlockVector* forces) const;
   void SolveForTarget(double sigma);

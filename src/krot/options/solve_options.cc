@@ -70,6 +70,12 @@ void AddSolveOptions(SolveModelOptions* options, Context* context,
                     AtLeast(1, "observations"),
                     "Leave out points with fewer usable observations; they "
                     "stay in the model");
+  table->AddNamed<SameImage>(
+      "Problem.same_image", &options->problem.same_image,
+      {{"keep", SameImage::kKeep}, {"closest", SameImage::kClosest}},
+      "Of an image's observations in the same track: keep all, or leave out "
+      "all but the one closest to the model's own point; they stay in the "
+      "model");
 }
 
 void CheckSolveOptions(const SolveModelOptions& options,

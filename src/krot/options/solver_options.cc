@@ -1,5 +1,6 @@
 #include "krot/options/solver_options.h"
 
+#include <optional>
 #include <string>
 
 #include "krot/options/finish_options.h"
@@ -38,6 +39,19 @@ void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
       "stop in any case");
 }
 
+void AddMaxError(std::optional<double>* max_error, OptionTable* table) {
+  table->Add({"Solver.max_error",
+              "The error that no observation may have: few are removed, as by "
+              "outlier_filter, so that all others are within it",
+              "a number > 0, pixels", "none is removed", false,
+              [max_error](const std::string& text) {
+                double value = 0;
+                if (!ParseReal(text, &value) || !(value > 0)) return false;
+                *max_error = value;
+                return true;
+              }});
+}
+
 void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
                       OptionTable* table) {
   table->Add({"ResInt.max_sweeps",
@@ -65,6 +79,18 @@ void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
 // What a method does not look at is refused.
 void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   const SolveMethod method = EffectiveMethod(options);
+  if (method != SolveMethod::kAuto || options.norm.p != 2) {
+    table.Refuse("Solver.max_error",
+                 "but with --Solver.method auto and --Solver.norm 2");
+  }
+  if (table.IsGiven("Solver.max_error")) {
+    const char* why = "with --Solver.max_error, which the finish keeps to";
+    table.Refuse("Solver.finish_slack", why);
+    table.Refuse("Problem.init_max_error",
+                 "with --Solver.max_error, which needs no such start");
+  } else {
+    table.Refuse("conflicts_path", "without --Solver.max_error");
+  }
   const bool has_joint_norm =
       options.norm.p == 2 || options.norm.IsPolyhedral();
   if (!has_joint_norm && options.method == SolveMethod::kJoint) {
@@ -109,9 +135,11 @@ void ChooseSweeps(const OptionTable& table, SolveModelOptions* options) {
 
 }  // namespace
 
-void AddSolverOptions(SolveModelOptions* options, Context* context,
+void AddSolverOptions(SolveModelOptions* options,
+                      std::optional<double>* max_error, Context* context,
                       OptionTable* table) {
   AddScheduleOptions(options, table);
+  AddMaxError(max_error, table);
   AddFinishOptions(options, table);
   AddSolveOptions(options, context, table);
   AddResIntOptions(SolveModelOptions(), &options->res_int, table);

@@ -1,12 +1,16 @@
 #pragma once
 
+#include <optional>
+
 #include "krot/options/option_table.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {
 
-// The options of `solver`, without its paths.
-void AddSolverOptions(SolveModelOptions* options, Context* context,
+// The options of `solver`, without its paths. `max_error`: what does not fit
+// within so many pixels is left out; none: nothing is.
+void AddSolverOptions(SolveModelOptions* options,
+                      std::optional<double>* max_error, Context* context,
                       OptionTable* table);
 
 // Defaults that depend on others. Throws OptionError for pairs of options that

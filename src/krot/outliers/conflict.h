@@ -25,9 +25,8 @@ struct Conflict {
 
 // A conflict among observations of `built` (ascending) that hang together, made
 // irreducible by deletion: as long as what is left without one is refuted, too,
-// it goes. None if they go together, or if that is not proved otherwise. All
-// depths of built.start are positive. Takes as many solves of the support as it
-// has observations.
+// it goes. None if they go together, or if that is not proved otherwise. Takes
+// as many solves of the support as it has observations.
 std::optional<Conflict> FindConflict(const Model& model,
                                      const BuiltProblem& built,
                                      const ErrorBound& bound,

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "krot/bridge/reprojection.h"
+#include "krot/joint/initializer.h"
 #include "krot/joint/joint.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/problem/cost.h"
@@ -13,6 +14,8 @@ namespace {
 // Of the rows, round by round, as long as nothing is decided: optima as near
 // to the bound as the last stay undecided.
 constexpr double kDecisionGaps[] = {1e-2, 1e-3, 1e-5, 1e-6};
+// What a start from nothing has to be below, in bounds.
+constexpr double kRoughStart = 1000;
 // What true errors may be above those of the rows.
 constexpr double kRoomForLenses = 1e-6;
 // Of the rows of a refutation that is to be proved.
@@ -20,6 +23,17 @@ constexpr double kProofGap = 1e-6;
 constexpr double kJustAbove = 1e-9;
 // Rows whose bound is nearer to it have no room to be widened.
 constexpr double kWorthWidening = 1e-2;
+
+// Whether all depths of `*start` are positive, or of one that is found instead.
+bool HaveStart(const KnownRotationProblem& problem, const ErrorBound& bound,
+               const Context& context, Estimate* start) {
+  if (AllDepthsPositive(problem, *start, context.num_threads)) return true;
+  InitializerOptions options;
+  options.norm = bound.norm;
+  options.max_error = kRoughStart * bound.max_error;
+  return FindStart(problem, options, context, start).termination ==
+         InitializerTermination::kFeasible;
+}
 
 }  // namespace
 
@@ -32,6 +46,9 @@ Decision Decide(const Model& model, const BuiltProblem& given,
   JointOptions options;
   options.norm = bound.norm;
   options.sufficient_cost = (1 - kRoomForLenses) * bound.max_error;
+  if (!HaveStart(part.problem, bound, context, &decision.estimate)) {
+    return decision;
+  }
   for (const double gap : kDecisionGaps) {
     options.relative_gap = gap;
     reprojection.TakeRows(decision.estimate, context.num_threads,

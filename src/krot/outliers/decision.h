@@ -28,8 +28,8 @@ struct Decision {
 };
 
 // Decides on all observations of `part`, which hang together, from its start,
-// whose depths must be positive, in a few rounds: solves the linear rows, and
-// takes them anew at the solution.
+// or one from nothing where a depth is not positive, in a few rounds: solves
+// the linear rows, and takes them anew at the solution.
 Decision Decide(const Model& model, const BuiltProblem& part,
                 const ErrorBound& bound, const Context& context);
 

@@ -13,6 +13,7 @@
 #include "krot/outliers/element_index.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
+#include "krot/outliers/removal_start.h"
 #include "krot/outliers/suspects.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
@@ -32,6 +33,7 @@ class OutlierFilter {
       : model_(model),
         options_(options),
         context_(context),
+        max_error_(options.max_error),
         errors_before_(PixelErrors(model, context.num_threads)),
         is_removed_(model.track_elements.size(), 0),
         conflict_of_(model.track_elements.size(), -1) {}
@@ -39,9 +41,9 @@ class OutlierFilter {
   OutlierFilterResult Run();
 
  private:
-  ErrorBound Bound() const { return {options_.solve.norm, options_.max_error}; }
+  ErrorBound Bound() const { return {options_.solve.norm, max_error_}; }
   bool IsWithin(double error) const {
-    return error <= (1 + kWithin) * options_.max_error;
+    return error <= (1 + kWithin) * max_error_;
   }
   void FilterByConflicts();
   void FilterByThreshold();
@@ -56,6 +58,7 @@ class OutlierFilter {
   const Model& model_;
   const OutlierFilterOptions& options_;
   const Context& context_;
+  double max_error_;                         // the bound, pixels
   const std::vector<double> errors_before_;  // per track element
   std::vector<char> is_removed_;
   std::vector<int64_t> conflict_of_;
@@ -98,8 +101,8 @@ void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
     summary_.num_irreducible += conflict.is_irreducible;
     proofs.push_back(std::move(conflict.proof));
   }
-  summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
-                                         options_.max_error, proofs);
+  summary_.conflicts =
+      DescribeConflicts(model_, built, options_.solve.norm, max_error_, proofs);
   summary_.seconds_conflicts = timer.Seconds();
 }
 
@@ -111,7 +114,9 @@ void OutlierFilter::Solve(Model moved) {
   if (!kept_.model.track_elements.empty()) {
     // Where all that is left can be within the bound, the least squares there.
     SolveModelOptions options = options_.solve;
-    options.finish.max_error = options_.max_error;
+    options.init = SolveInit::kModel;
+    options.polish = Polish::kNone;
+    options.finish.max_error = max_error_;
     SolveModelResult solved = SolveModel(kept_.model, options, context_);
     kept_.model = std::move(solved.model);
     summary_.solve = std::move(solved.summary);
@@ -135,15 +140,16 @@ bool OutlierFilter::RemoveAbove() {
 
 void OutlierFilter::FilterByConflicts() {
   const Timer timer;
-  BuildProblemOptions build = options_.solve.problem;
-  build.num_threads = context_.num_threads;
-  const BuiltProblem built = BuildProblem(model_, build);
+  const RemovalStart start = FindRemovalStart(model_, options_, context_);
+  const BuiltProblem& built = start.built;
+  summary_.init = start.init;
+  max_error_ = start.max_error;
   const std::vector<uint64_t> elements = ElementsOf(model_, built);
   const Removal removal = FindRemoval(model_, built, Bound(), context_);
   for (const int64_t i : removal.observations) is_removed_[elements[i]] = 1;
   summary_.seconds_removal = timer.Seconds();
   if (context_.IsCancelled()) return;
-  Pack(built, removal, elements);
+  if (options_.find_conflicts) Pack(built, removal, elements);
   if (options_.on_removed) {
     options_.on_removed(static_cast<int64_t>(removal.observations.size()));
   }
@@ -224,7 +230,6 @@ void OutlierFilter::ListRemoved() {
 
 OutlierFilterResult OutlierFilter::Run() {
   summary_.method = options_.method;
-  summary_.max_error = options_.max_error;
   summary_.norm = options_.solve.norm;
   summary_.num_observations =
       static_cast<int64_t>(model_.track_elements.size());
@@ -235,6 +240,7 @@ OutlierFilterResult OutlierFilter::Run() {
   } else {
     FilterByThreshold();
   }
+  summary_.max_error = max_error_;
   if (context_.IsCancelled()) return {model_, std::move(summary_)};
   const std::vector<double> errors =
       PixelErrors(kept_.model, context_.num_threads);
@@ -247,6 +253,11 @@ OutlierFilterResult OutlierFilter::Run() {
   summary_.num_points_removed = kept_.num_points;
   ListRemoved();
   RankSuspects(model_, is_removed_, conflict_of_, &summary_);
+  if (options_.solve.polish != Polish::kNone && summary_.solve) {
+    summary_.solve->polish =
+        PolishModel(options_.solve.polish, options_.solve.finish.loss, context_,
+                    &kept_.model);
+  }
   return {std::move(kept_.model), std::move(summary_)};
 }
 
@@ -255,7 +266,8 @@ OutlierFilterResult OutlierFilter::Run() {
 OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context) {
-  CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
+  CheckArgument(options.max_error > 0 || options.choose_max_error, "max_error",
+                options.max_error, "> 0");
   CheckArgument(options.solve.norm.p == 2, "norm.p", options.solve.norm.p,
                 "2, that of pixel errors");
   return OutlierFilter(model, options, context).Run();

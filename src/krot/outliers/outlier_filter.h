@@ -15,7 +15,8 @@
 namespace krot {
 
 // Removes observations until all others are within a bound, and proves how many
-// had to go: what `krot outlier_filter` does between reading and writing.
+// had to go: what `krot outlier_filter`, and `krot solver` where not everything
+// is to stay, do between reading and writing.
 
 enum class OutlierMethod {
   kConflicts,  // few, and a proof of how many at least
@@ -24,8 +25,15 @@ enum class OutlierMethod {
 
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
-  double max_error = 0;     // the bound, true pixels; > 0
-  SolveModelOptions solve;  // of what is left; its norm is the errors'
+  double max_error = 0;  // the bound, true pixels; > 0
+  // In place of max_error, from nothing: ten times the median error of the
+  // start.
+  bool choose_max_error = false;
+  bool find_conflicts = true;  // kConflicts: the proof, most of the time
+  // Of what is left; its norm is the errors'. Its init kFeasible is from
+  // nothing but rotations and tracks, and so is any model whose cameras have no
+  // place or all the same.
+  SolveModelOptions solve;
 
   // Called before the last solve, of what is left; may be empty.
   std::function<void(int64_t num_removed)> on_removed;
@@ -56,6 +64,7 @@ struct OutlierFilterSummary {
   OutlierMethod method = OutlierMethod::kConflicts;
   double max_error = 0;  // true pixels
   Norm norm;
+  SolveInit init = SolveInit::kModel;  // that was used
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;

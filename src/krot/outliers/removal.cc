@@ -7,6 +7,7 @@
 #include "krot/bridge/built_part.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/conic/excess_program.h"
+#include "krot/outliers/reweighting.h"
 #include "krot/problem/components.h"
 #include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
@@ -17,9 +18,10 @@ namespace {
 // Of the bound: what the interior point leaves open.
 constexpr double kInside = 1e-3;
 constexpr int kMaxReweightings = 4;
-// In units of the bound: an excess much below it costs ten times as much as one
-// of the bound.
-constexpr double kDearExcess = 0.1;
+// Of the bound, where their interior point ends.
+constexpr double kRemovalMu = 1e-3;
+// In units of the bound: what an error at the start counts for at most.
+constexpr double kLargestExcess = 100;
 // Observations with less of a multiplier have no say.
 constexpr double kSmallPrice = 1e-2;
 
@@ -40,6 +42,7 @@ class RemovalSearch {
     return reprojection_.Error(estimate, bound_.norm, i);
   }
   std::vector<int64_t> Above(const Estimate& estimate) const;
+  std::vector<double> WeightsAtStart() const;
   void Excess(const std::vector<int64_t>& component, Estimate* estimate);
   void Offer(const Estimate& estimate);
   bool TakeBack();
@@ -65,6 +68,16 @@ std::vector<int64_t> RemovalSearch::Above(const Estimate& estimate) const {
   return above;
 }
 
+std::vector<double> RemovalSearch::WeightsAtStart() const {
+  std::vector<double> excess;
+  for (size_t i = 0; i < rows_.observations.size(); ++i) {
+    const double error = Error(built_.start, static_cast<int64_t>(i));
+    excess.push_back(std::clamp(error - bound_.max_error, 0.0,
+                                kLargestExcess * bound_.max_error));
+  }
+  return WeightsAgainst(excess, bound_.max_error);
+}
+
 // Solves a component's programme, with rows as they are, and sets the weights
 // of the next.
 void RemovalSearch::Excess(const std::vector<int64_t>& component,
@@ -72,16 +85,17 @@ void RemovalSearch::Excess(const std::vector<int64_t>& component,
   const ProblemSubset part(rows_, component);
   ExcessOptions options;
   options.norm = bound_.norm;
+  options.smallest_mu = kRemovalMu;
   for (const int64_t i : component) options.weights.push_back(weights_[i]);
   Estimate own = part.Restrict(*estimate);
   const double level = (1 - kInside) * bound_.max_error;
   const ExcessSolution solution =
       MinimizeExcess(part.problem(), level, options, context_, &own);
   part.Replace(own, estimate);
+  const std::vector<double> weights = WeightsAgainst(solution.excess, level);
   for (size_t n = 0; n < component.size(); ++n) {
     if (solution.price[n] > kSmallPrice) is_tight_[component[n]] = 1;
-    weights_[component[n]] =
-        kDearExcess / (kDearExcess + solution.excess[n] / level);
+    weights_[component[n]] = weights[n];
   }
 }
 
@@ -146,7 +160,7 @@ bool RemovalSearch::TakeBack() {
 Removal RemovalSearch::Run() {
   best_.estimate = built_.start;
   best_.observations = Above(built_.start);
-  weights_.assign(rows_.observations.size(), 1);
+  weights_ = WeightsAtStart();
   is_tight_.assign(rows_.observations.size(), 0);
   Estimate estimate = built_.start;
   const std::vector<std::vector<int64_t>> components =

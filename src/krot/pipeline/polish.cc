@@ -6,8 +6,22 @@
 namespace krot {
 namespace {
 
-BundleAdjustmentOptions PolishOptions(Polish polish) {
+RobustLoss LossOf(ErrorLoss::Kind kind) {
+  switch (kind) {
+    case ErrorLoss::Kind::kHuber:
+      return RobustLoss::kHuber;
+    case ErrorLoss::Kind::kCauchy:
+      return RobustLoss::kCauchy;
+    case ErrorLoss::Kind::kTrivial:
+      break;
+  }
+  return RobustLoss::kTrivial;
+}
+
+BundleAdjustmentOptions PolishOptions(Polish polish, const ErrorLoss& loss) {
   BundleAdjustmentOptions options;
+  options.loss = LossOf(loss.kind);
+  options.loss_scale = loss.scale;
   if (polish == Polish::kFull) return options;
   options.constant_rig_from_world_rotation = true;
   options.refine_sensor_from_rig = false;
@@ -18,9 +32,10 @@ BundleAdjustmentOptions PolishOptions(Polish polish) {
 
 }  // namespace
 
-PolishSummary PolishModel(Polish polish, const Context& context, Model* model) {
+PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
+                          const Context& context, Model* model) {
   BundleAdjustmentResult adjusted =
-      AdjustBundle(*model, PolishOptions(polish), context);
+      AdjustBundle(*model, PolishOptions(polish, loss), context);
   const std::vector<double> errors_px =
       PixelErrors(adjusted.model, context.num_threads);
   UpdatePointErrors(errors_px, &adjusted.model);

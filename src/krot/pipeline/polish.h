@@ -3,6 +3,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
+#include "krot/finish/error_loss.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -21,9 +22,10 @@ struct PolishSummary {
   PixelErrorStatistics pixel_error;  // over all observations, afterwards
 };
 
-// Adjusts the model in place and updates its stored point errors. `polish` must
-// not be kNone.
-PolishSummary PolishModel(Polish polish, const Context& context, Model* model);
+// Adjusts the model in place, by least squares or the least of a robust loss,
+// and updates its stored point errors. `polish` must not be kNone.
+PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
+                          const Context& context, Model* model);
 
 // As --Solver.polish takes it: "none", "rotations_fixed", "full".
 const char* PolishName(Polish polish);

@@ -51,6 +51,7 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->num_components = FindComponents(problem).count;
   summary->left_out = built.left_out;
   summary->num_retriangulated_points = built.num_retriangulated_points;
+  summary->num_same_image_tracks = built.num_same_image_tracks;
   const SolveMemory memory = EstimateSolveMemory(model, built, *summary);
   summary->likely_bytes = memory.likely;
   summary->largest_bytes = memory.at_most;
@@ -222,10 +223,10 @@ SolveModelResult SolveModel(const Model& model,
                     &start.built, &estimate, &summary);
   if (summary.method == SolveMethod::kAuto &&
       summary.termination != SolveTermination::kInterrupted) {
-    RunFinish(model, options,
-              certificate ? std::optional(certificate->lower_bound)
-                          : std::nullopt,
-              context, solve_timer, &start.built, &estimate, &summary);
+    RunFinish(
+        model, options,
+        certificate ? std::optional(certificate->lower_bound) : std::nullopt,
+        context, solve_timer, &start.built, &estimate, &summary);
   }
   if (options.res_int.update_frames) {
     RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
@@ -257,7 +258,8 @@ SolveModelResult SolveModel(const Model& model,
   Certify(model, start, estimate, options, context, certificate, &summary);
   MeasureGap(options.joint.relative_gap, &summary);
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
-    summary.polish = PolishModel(options.polish, context, &result.model);
+    summary.polish = PolishModel(options.polish, options.finish.loss, context,
+                                 &result.model);
   }
   return result;
 }

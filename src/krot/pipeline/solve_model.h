@@ -76,6 +76,7 @@ struct SolveSummary {
   int32_t num_components = 0;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
+  int64_t num_same_image_tracks = 0;  // that hold an image more than once
 
   // The largest true error of the observations in the optimisation, pixels;
   // initial: of the start, after re-triangulation; final: of the model written
@@ -107,7 +108,8 @@ struct SolveSummary {
   // The finish by least squares, if there was one: it gives up (cost_final -
   // finish->lowest_cost) of the maximum.
   std::optional<FinishSummary> finish;
-  // The largest error that was reached, pixels: what the gap asked for is about.
+  // The largest error that was reached, pixels: what the gap asked for is
+  // about.
   double LowestCost() const {
     return finish ? finish->lowest_cost : cost_final;
   }

@@ -46,6 +46,10 @@ BuiltProblem Build(const Model& model, const SolveModelOptions& options,
 
 }  // namespace
 
+bool HasOwnStart(const BuiltProblem& own) {
+  return !own.problem.observations.empty() && !CentresCoincide(own);
+}
+
 Start OwnStart(const Model& model, const SolveModelOptions& options,
                const Context& context) {
   return {Build(model, options, context, /*ignore_translations=*/false),

@@ -20,6 +20,10 @@ struct Start {
 Start ChooseStart(const Model& model, const SolveModelOptions& options,
                   SolveMethod method, const Context& context);
 
+// Whether a model's own translations are a start at all: there are observations
+// that they serve, and not all cameras stand in one place.
+bool HasOwnStart(const BuiltProblem& own);
+
 // The model's own start; observations that it cannot serve are left out.
 Start OwnStart(const Model& model, const SolveModelOptions& options,
                const Context& context);

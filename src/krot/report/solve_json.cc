@@ -122,6 +122,23 @@ Json FinishJson(const std::optional<FinishSummary>& finish) {
           {"seconds", finish->seconds}};
 }
 
+Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
+  if (!outliers) return {};
+  return {{"max_error", outliers->max_error},
+          {"is_within", outliers->is_within},
+          {"num_observations", outliers->num_observations},
+          {"num_points", outliers->num_points},
+          {"num_removed", outliers->removed.size()},
+          {"num_left_alone", outliers->num_left_alone},
+          {"num_points_removed", outliers->num_points_removed},
+          {"num_must_go",
+           outliers->conflicts ? Json(outliers->num_proved) : Json()},
+          {"seconds",
+           {{"removal", outliers->seconds_removal},
+            {"conflicts", outliers->seconds_conflicts},
+            {"solve", outliers->seconds_solve}}}};
+}
+
 }  // namespace
 
 std::string SolveJson(const SolveReport& report) {
@@ -151,6 +168,10 @@ std::string SolveJson(const SolveReport& report) {
                                    ? Json(*summary.num_working_observations)
                                    : Json()},
       {"left_out", left_out},
+      {"same_image",
+       {{"num_tracks", summary.num_same_image_tracks},
+        {"support_point3D_ids", SameImageInSupport(summary)}}},
+      {"outliers", OutliersJson(report.outliers)},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},

@@ -1,5 +1,6 @@
 #include "krot/report/solve_report.h"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -19,6 +20,17 @@ LeftOutCounts LeftOutByReason(const SolveSummary& summary) {
 
 std::string NothingToSolveSentence(const SolveSummary& summary) {
   return NothingToDoSentence("solve", LeftOutByReason(summary));
+}
+
+std::vector<Point3DId> SameImageInSupport(const SolveSummary& summary) {
+  std::vector<Point3DId> points;
+  for (const SupportObservation& o : summary.support) {
+    if (!o.has_image_twice) continue;
+    if (std::find(points.begin(), points.end(), o.point3D_id) == points.end()) {
+      points.push_back(o.point3D_id);
+    }
+  }
+  return points;
 }
 
 std::string MissedGapSentence(const SolveSummary& summary) {

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/report/problem_words.h"
 #include "krot/report/run_record.h"
@@ -15,6 +16,8 @@ struct SolveReport {
   std::string command;
   std::string method;
   SolveSummary summary;
+  // Where not everything was to stay; its own solve is the summary above.
+  std::optional<OutlierFilterSummary> outliers;
 };
 
 // For the terminal: errors before and after, what was left out, why it ended,
@@ -29,6 +32,9 @@ LeftOutCounts LeftOutByReason(const SolveSummary& summary);
 // "nothing to solve: 1000 observations left out (short_track 1000)". Requires
 // the termination kNothingToSolve.
 std::string NothingToSolveSentence(const SolveSummary& summary);
+
+// The points in whose tracks an image occurs more than once, of the support.
+std::vector<Point3DId> SameImageInSupport(const SolveSummary& summary);
 
 // "the gap asked for is not reached after 300 iterations, as many as ...".
 std::string MissedGapSentence(const SolveSummary& summary);

@@ -6,6 +6,7 @@
 #include "krot/problem/cost.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/error_rows.h"
+#include "krot/report/outlier_report.h"
 #include "krot/report/solve_error_table.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -15,6 +16,7 @@ namespace {
 
 // How many observations of the support the terminal shows.
 constexpr int kListedSupport = 10;
+constexpr size_t kListedPoints = 5;
 // From which share of the true gap on the rows' own is no other number.
 constexpr double kNoticeablySmaller = 0.5;
 
@@ -169,13 +171,46 @@ std::string SolveCountsSentence(const SolveSummary& summary) {
               : ".");
 }
 
+// One of an image's observations in a track is wrong, at least; where those are
+// that set the maximum.
+std::string SameImageSentence(const SolveSummary& summary) {
+  if (summary.num_same_image_tracks == 0) return "";
+  std::string sentence = Counted(summary.num_same_image_tracks, "track") +
+                         " with an image more than once";
+  const std::vector<Point3DId> points = SameImageInSupport(summary);
+  for (size_t n = 0; n < std::min(points.size(), kListedPoints); ++n) {
+    sentence += (n == 0 ? "; in the support: point3D_id " : ", ") +
+                std::to_string(points[n]);
+  }
+  if (points.size() > kListedPoints) sentence += ", ...";
+  if (!points.empty()) {
+    sentence += " (--Problem.same_image closest leaves one of each)";
+  }
+  return sentence + ".\n";
+}
+
+// What was left out so that all else is within a bound.
+std::string BracketOf(const SolveReport& report) {
+  if (!report.outliers) return "";
+  const OutlierFilterSummary& outliers = *report.outliers;
+  return "Within " + FormatNumber(outliers.max_error, 4) +
+         " px: " + BracketSentence(outliers) +
+         (outliers.num_points_removed > 0
+              ? "; with them went " +
+                    Counted(outliers.num_points_removed, "track")
+              : std::string()) +
+         ".\n";
+}
+
 }  // namespace
 
 std::string SolveTable(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   std::ostringstream text;
   text << "\nReprojection errors, pixels\n"
-       << SolveErrorTable(summary) << SolveCountsSentence(summary) << '\n'
+       << SolveErrorTable(summary) << BracketOf(report)
+       << SolveCountsSentence(summary) << '\n'
+       << SameImageSentence(summary)
        << NotFiniteSentence(summary.pixel_error_after);
   if (summary.num_components > 1) {
     text << "The problem falls into "

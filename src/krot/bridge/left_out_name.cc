@@ -14,6 +14,8 @@ const char* LeftOutName(LeftOut reason) {
       return "short_track";
     case LeftOut::kNoPose:
       return "no_pose";
+    case LeftOut::kSameImage:
+      return "same_image";
   }
   return "unknown";
 }

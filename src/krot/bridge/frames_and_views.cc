@@ -1,0 +1,39 @@
+#include "krot/bridge/frames_and_views.h"
+
+#include "krot/bridge/order_of_ids.h"
+
+namespace krot {
+
+void AddFramesAndViews(const Model& model,
+                       const std::vector<ImageGeometry>& geometries,
+                       BuiltProblem* built) {
+  KnownRotationProblem& problem = built->problem;
+  std::vector<int32_t> frame_index(model.frames.size(), -1);
+  for (const Observation& observation : problem.observations) {
+    frame_index[geometries[observation.view].frame] = 0;
+  }
+  for (const int32_t f : OrderOfIds(model.frames)) {
+    if (frame_index[f] < 0) continue;
+    frame_index[f] = problem.num_frames++;
+    built->frame_of.push_back(f);
+  }
+  built->start.translations.resize(problem.num_frames);
+
+  std::vector<int32_t> view_index(geometries.size(), -1);
+  for (const int32_t n : OrderOfIds(model.images)) {
+    const ImageGeometry& image = geometries[n];
+    if (!image.has_pose || frame_index[image.frame] < 0) continue;
+    view_index[n] = static_cast<int32_t>(problem.views.size());
+    built->image_of.push_back(n);
+    const int32_t frame = frame_index[image.frame];
+    problem.views.push_back({image.cam_from_world.rotation,
+                             image.cam_from_rig.rotation,
+                             image.cam_from_rig.translation, frame});
+    built->start.translations[frame] = image.rig_from_world.translation;
+  }
+  for (Observation& observation : problem.observations) {
+    observation.view = view_index[observation.view];
+  }
+}
+
+}  // namespace krot

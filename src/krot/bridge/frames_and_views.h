@@ -1,0 +1,17 @@
+#pragma once
+
+#include <vector>
+
+#include "krot/bridge/bridge.h"
+#include "krot/model/image_geometry.h"
+
+namespace krot {
+
+// Numbers the frames that have observations, and their images as views, of a
+// problem whose observations name their image as `view`; they name the view
+// from now on.
+void AddFramesAndViews(const Model& model,
+                       const std::vector<ImageGeometry>& geometries,
+                       BuiltProblem* built);
+
+}  // namespace krot

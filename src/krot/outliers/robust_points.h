@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// Places points where most of their tracks agree, the frames fixed: of the
+// midpoints of pairs of rays, and of the rays that agree with the best of
+// them, the one with the least sum of errors, none counted for more than
+// `cap`, pixels. A point that no pair puts in front of both cameras goes to the
+// median depth along its first ray. `points` ascend; the others stay, and the
+// median is theirs. O(observations), with a large constant.
+void PlacePointsRobustly(const KnownRotationProblem& problem,
+                         const std::vector<int32_t>& points, Norm norm,
+                         double cap, const Context& context,
+                         Estimate* estimate);
+
+}  // namespace krot

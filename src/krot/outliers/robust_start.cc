@@ -1,0 +1,131 @@
+#include "krot/outliers/robust_start.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "krot/conic/excess_program.h"
+#include "krot/outliers/reweighting.h"
+#include "krot/outliers/robust_points.h"
+#include "krot/problem/components.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/gauge.h"
+#include "krot/problem/subset.h"
+
+namespace krot {
+namespace {
+
+// Doubled until the tracks hang together.
+constexpr int64_t kObservationsPerFrame = 100;
+// Programmes after the first, with weights.
+constexpr int kStartReweightings = 2;
+// A start needs no more; of the level.
+constexpr double kStartMu = 1e-3;
+// In levels: what disagrees with a point is no farther off than that.
+constexpr double kCapOfPoints = 4;
+
+int32_t FrameOf(const KnownRotationProblem& problem, int64_t i) {
+  return problem.views[problem.observations[i].view].frame;
+}
+
+// The longest tracks first, each that sees a frame which has too few so far.
+// Ascending.
+std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
+                                    int64_t observations_per_frame) {
+  const auto length = [&](int32_t k) {
+    return problem.point_begin[k + 1] - problem.point_begin[k];
+  };
+  std::vector<int32_t> longest_first(problem.num_points);
+  std::iota(longest_first.begin(), longest_first.end(), 0);
+  std::stable_sort(longest_first.begin(), longest_first.end(),
+                   [&](int32_t a, int32_t b) { return length(a) > length(b); });
+  std::vector<int64_t> num_seen(problem.num_frames, 0);
+  std::vector<int64_t> covering;
+  for (const int32_t k : longest_first) {
+    bool is_needed = false;
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      is_needed =
+          is_needed || num_seen[FrameOf(problem, i)] < observations_per_frame;
+    }
+    if (!is_needed) continue;
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      ++num_seen[FrameOf(problem, i)];
+      covering.push_back(i);
+    }
+  }
+  std::sort(covering.begin(), covering.end());
+  return covering;
+}
+
+// The same with as many per frame as it takes for all to hang together.
+std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
+  for (int64_t per_frame = kObservationsPerFrame;; per_frame *= 2) {
+    std::vector<int64_t> tracks = CoveringTracks(problem, per_frame);
+    if (tracks.size() == problem.observations.size() ||
+        SplitIntoComponents(problem, tracks).size() == 1) {
+      return tracks;
+    }
+  }
+}
+
+Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
+                          double level, const Context& context) {
+  Estimate estimate;
+  estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
+  estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
+  const std::vector<int64_t> tracks = ConnectedTracks(problem);
+  const ProblemSubset part(problem, tracks);
+  Estimate own = part.Restrict(estimate);
+  ExcessOptions options;
+  options.norm = norm;
+  options.smallest_mu = kStartMu;
+  for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
+    const ExcessSolution solution =
+        MinimizeExcess(part.problem(), level, options, context, &own);
+    options.weights = WeightsAgainst(solution.excess, level);
+  }
+  part.Replace(own, &estimate);
+  std::vector<char> is_placed(problem.num_points, 0);
+  for (const int64_t i : tracks) is_placed[problem.observations[i].point] = 1;
+  std::vector<int32_t> others;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    if (!is_placed[k]) others.push_back(k);
+  }
+  PlacePointsRobustly(problem, others, norm, kCapOfPoints * level, context,
+                      &estimate);
+  if (!HasBaseline(problem)) NormalizeScale(problem, &estimate);
+  return estimate;
+}
+
+}  // namespace
+
+Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
+                         double level, const Context& context) {
+  Estimate estimate;
+  estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
+  estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
+  for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
+    const ProblemSubset part(problem, std::move(component));
+    part.Replace(StartOfComponent(part.problem(), norm, level, context),
+                 &estimate);
+  }
+  return estimate;
+}
+
+double MedianError(const KnownRotationProblem& problem,
+                   const Estimate& estimate, Norm norm) {
+  std::vector<double> errors;
+  for (const Observation& o : problem.observations) {
+    errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), norm));
+  }
+  if (errors.empty()) return 0;
+  const auto middle =
+      errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return *middle;
+}
+
+}  // namespace krot

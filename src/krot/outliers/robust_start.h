@@ -1,0 +1,28 @@
+#pragma once
+
+#include "krot/base/context.h"
+#include "krot/minimax/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot {
+
+// Positions from rotations and raw tracks: an estimate of all frames and points
+// from nothing, whatever outliers there are. For each connected component,
+//
+//   1. the longest tracks, so many that every frame has a hundred observations
+//      among them and all hang together;
+//   2. their excess programme from nothing (conic/excess_program.h), and again
+//      with weights that let large errors count less;
+//   3. the other points where most of their rays agree.
+//
+// What exceeds `level`, pixels, counts as an error there. Depths are positive
+// but for those of outliers, and their median is one where the scale is free.
+Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
+                         double level, const Context& context);
+
+// The median error of an estimate, pixels; that of a point behind its camera is
+// infinite. 0 without observations. O(observations).
+double MedianError(const KnownRotationProblem& problem,
+                   const Estimate& estimate, Norm norm);
+
+}  // namespace krot
