@@ -24,8 +24,11 @@ enum class OutlierMethod {
 
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
-  double max_error = 0;     // the bound, true pixels; > 0
-  SolveModelOptions solve;  // of what is left; its norm is the errors'
+  // The bound, true pixels; > 0. With a profile it may be missing: then it is
+  // the largest error of the profile's elbow, or of its last level.
+  std::optional<double> max_error;
+  bool make_profile = false;  // kConflicts: fill OutlierFilterSummary::profile
+  SolveModelOptions solve;    // of what is left; its norm is the errors'
 
   // Called before the last solve, of what is left; may be empty.
   std::function<void(int64_t num_removed)> on_removed;
@@ -52,6 +55,20 @@ struct Suspect {
   int64_t num_conflicts = 0;  // that it takes part in
 };
 
+// error_profile.h, in numbers.
+struct ErrorProfileSummary {
+  struct Level {
+    int64_t num_removed = 0;
+    double max_error = 0;  // of all others, true pixels
+    std::optional<double> lower_bound;
+    int64_t num_proved = 0;
+  };
+
+  std::vector<Level> levels;
+  std::optional<size_t> elbow;
+  double seconds = 0;  // wall clock
+};
+
 struct OutlierFilterSummary {
   OutlierMethod method = OutlierMethod::kConflicts;
   double max_error = 0;  // true pixels
@@ -75,6 +92,7 @@ struct OutlierFilterSummary {
   PixelErrorStatistics pixel_error_after;
   // Whether all errors of the result are within the bound.
   bool is_within = false;
+  std::optional<ErrorProfileSummary> profile;  // if asked for
   std::optional<SolveSummary> solve;  // of what is left; none if nothing is
   int num_solves = 0;
 
