@@ -24,6 +24,7 @@ struct OutlierCommand {
   ModelPaths paths;
   std::string conflicts_path;
   std::string outliers_path;
+  std::string profile_path;
   Context context;
   OutlierFilterOptions options;
   CommonOptions common;
@@ -37,6 +38,11 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   parser->AddOutputFile("outliers_path", &command->outliers_path,
                         "Where the list of removed observations goes, as CSV");
   AddOutlierFilterOptions(&command->options, &command->context, parser);
+  parser->AddOutputFile(
+      "OutlierFilter.profile_path", &command->profile_path,
+      "Where the error profile goes, as JSON: the largest error against the "
+      "number removed, down to max_error or half of the first; also on the "
+      "page");
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers",
       &command->common, parser);
@@ -44,9 +50,15 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
 
 void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
   if (command.options.method == OutlierMethod::kThreshold) {
-    parser.Refuse(
-        "conflicts_path",
-        "with --OutlierFilter.method threshold, which proves nothing");
+    for (const char* name : {"conflicts_path", "OutlierFilter.profile_path"}) {
+      parser.Refuse(
+          name, "with --OutlierFilter.method threshold, which proves nothing");
+    }
+  }
+  if (!command.options.max_error && command.profile_path.empty()) {
+    throw OptionError(
+        "--OutlierFilter.max_error is required without "
+        "--OutlierFilter.profile_path");
   }
 }
 
@@ -54,6 +66,7 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
                            const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   OutlierFilterOptions options = command.options;
+  options.make_profile = !command.profile_path.empty();
   Context context = command.context;
   context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
@@ -79,6 +92,7 @@ void WriteSideFiles(const OutlierCommand& command,
   if (!command.conflicts_path.empty() && report.summary.conflicts) {
     write(command.conflicts_path, ConflictJson(*report.summary.conflicts));
   }
+  if (report.summary.profile) write(command.profile_path, ProfileJson(report));
   if (!command.outliers_path.empty()) {
     write(command.outliers_path, OutlierCsv(report.summary));
   }
@@ -92,6 +106,8 @@ int Run(const OutlierCommand& command) {
   const WriteModelOptions write_options = CheckModelPaths(paths);
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
+  CheckSidePath("OutlierFilter.profile_path", command.profile_path,
+                paths.output_path);
   OutlierReport report;
   report.run.version = KROT_VERSION;
   report.run.threads = ResolveNumThreads(command.context.num_threads);

@@ -6,11 +6,16 @@ namespace krot {
 
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
-  table->Add(
-      {"OutlierFilter.max_error", "The bound that all errors are to be within",
-       "a number > 0, pixels", "", true, [options](const std::string& text) {
-         return ParseReal(text, &options->max_error) && options->max_error > 0;
-       }});
+  table->Add({"OutlierFilter.max_error",
+              "The bound that all errors are to be within; may be missing "
+              "with profile_path only, whose elbow it then is",
+              "a number > 0, pixels", "", false,
+              [options](const std::string& text) {
+                double value = 0;
+                if (!ParseReal(text, &value) || !(value > 0)) return false;
+                options->max_error = value;
+                return true;
+              }});
   table->AddNamed<OutlierMethod>(
       "OutlierFilter.method", &options->method,
       {{"conflicts", OutlierMethod::kConflicts},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <string>
 
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/start.h"
@@ -15,26 +16,21 @@ constexpr double kLevelOfStart = 2;
 constexpr double kBoundPerMedian = 10;
 constexpr double kLeastBound = 1e-3;
 
-void PlaceFromTracks(const OutlierFilterOptions& options,
-                     const Context& context, RemovalStart* start) {
-  start->init = SolveInit::kFeasible;
-  const KnownRotationProblem& problem = start->built.problem;
-  const Norm norm = options.solve.norm;
-  const double level = options.choose_max_error
-                           ? kLevelOfStart
-                           : std::min(kLevelOfStart, start->max_error);
-  start->built.start = FindRobustStart(problem, norm, level, context);
-  const double median = MedianError(problem, start->built.start, norm);
+std::string Pixels(double value) {
   std::ostringstream words;
   words.precision(3);
-  words << "positions from rotations and tracks: the median error is " << median
-        << " px; leaving out what does not fit within ";
-  if (options.choose_max_error) {
-    start->max_error = std::max(kBoundPerMedian * median, kLeastBound);
-    words << kBoundPerMedian << " times that, ";
-  }
-  words << start->max_error << " px";
-  context.Note(words.str());
+  words << value << " px";
+  return words.str();
+}
+
+// From nothing; an error is what is above `level`.
+void PlaceFromTracks(Norm norm, double level, const Context& context,
+                     RemovalStart* start) {
+  start->init = SolveInit::kFeasible;
+  const KnownRotationProblem& problem = start->built.problem;
+  start->built.start = FindRobustStart(problem, norm, level, context);
+  context.Note("positions from rotations and tracks: the median error is " +
+               Pixels(MedianError(problem, start->built.start, norm)));
 }
 
 }  // namespace
@@ -46,13 +42,26 @@ RemovalStart FindRemovalStart(const Model& model,
   build.num_threads = context.num_threads;
   build.ignore_translations = options.solve.init == SolveInit::kFeasible;
   RemovalStart start;
-  start.max_error = options.max_error;
+  start.max_error = options.max_error.value_or(0);
   start.built = BuildProblem(model, build);
   if (!build.ignore_translations && !HasOwnStart(start.built)) {
     build.ignore_translations = true;
     start.built = BuildProblem(model, build);
   }
-  if (build.ignore_translations) PlaceFromTracks(options, context, &start);
+  const Norm norm = options.solve.norm;
+  if (build.ignore_translations) {
+    const double level = options.max_error.value_or(kLevelOfStart);
+    PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
+  }
+  if (!options.max_error && !options.make_profile) {
+    const double median =
+        MedianError(start.built.problem, start.built.start, norm);
+    start.max_error = std::max(kBoundPerMedian * median, kLeastBound);
+    context.Note(
+        "leaving out what does not fit within ten times the median "
+        "error, " +
+        Pixels(start.max_error));
+  }
   return start;
 }
 
