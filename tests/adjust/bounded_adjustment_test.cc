@@ -1,9 +1,15 @@
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <vector>
 
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
 #include <gtest/gtest.h>
 
+#include "krot/adjust/adjustment_problem.h"
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/pipeline/solve_model.h"
@@ -12,7 +18,6 @@
 namespace krot {
 namespace {
 
-// With more of them the last digits of Ceres differ from run to run.
 const Context kOneThread{1};
 
 // The lowest maximum of a noisy scene, where least squares cannot stay.
@@ -56,6 +61,75 @@ TEST(BoundedAdjustment, KeepsEveryErrorBelowTheCapAndTheRmsFallsAsItRises) {
       EXPECT_LE(errors.rms, last_rms * (1 + 1e-4));
       last_rms = errors.rms;
     }
+  }
+}
+
+// |r|^2 / 2 - mu log(1 - |r|^2 / cap^2), as Ceres has it; the cap is a wall.
+class BarrierLoss final : public ceres::LossFunction {
+ public:
+  BarrierLoss(double mu, double cap) : mu_(mu), cap2_(cap * cap) {}
+
+  void Evaluate(double s, double rho[3]) const override {
+    const double left = cap2_ - s;
+    rho[0] = left > 0 ? s - 2 * mu_ * std::log(left / cap2_)
+                      : std::numeric_limits<double>::quiet_NaN();
+    rho[1] = 1 + 2 * mu_ / left;
+    rho[2] = 2 * mu_ / (left * left);
+  }
+
+ private:
+  const double mu_, cap2_;
+};
+
+// What Ceres' own steps, which know nothing of ours, lower the barrier cost to,
+// with weights that fall to mu.
+double BarrierCostByCeres(const Model& start, double first_mu, double mu,
+                          double cap) {
+  AdjustmentBlocks blocks = MakeAdjustmentBlocks(start, 2);
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_SCHUR;
+  options.max_num_iterations = 200;
+  options.function_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  for (double weight = first_mu;; weight = std::max(mu, 0.3 * weight)) {
+    BarrierLoss loss(weight, cap);
+    ceres::Problem problem(AdjustmentProblemOptions());
+    BuildAdjustmentProblem({}, &loss, &blocks, &problem);
+    ceres::Solve(options, &problem, &summary);
+    if (weight == mu) return summary.final_cost;
+  }
+}
+
+TEST(BoundedAdjustment, EndsWhereCeresDoesOnTheSameBarrier) {
+  for (const int sensors_per_rig : {1, 2}) {
+    const Model model = NoisyScene(sensors_per_rig);
+    const double cap = 1.05 * ErrorsOf(model).max;
+    const BundleAdjustmentResult result =
+        AdjustBundle(model, WithCap(cap), kOneThread);
+    const BundleAdjustmentSummary& summary = result.summary;
+    const double mu = *summary.duality_gap * summary.cost_final /
+                      static_cast<double>(summary.num_observations);
+    double end = 0;
+    for (const double error_px : PixelErrors(result.model, 1)) {
+      const double squared = error_px * error_px;
+      end += squared / 2 - mu * std::log1p(-squared / (cap * cap));
+    }
+    EXPECT_NEAR(BarrierCostByCeres(result.model, mu, mu, cap), end, 1e-6 * end);
+    EXPECT_NEAR(BarrierCostByCeres(model, 10, mu, cap), end, 1e-6 * end);
+  }
+}
+
+TEST(BoundedAdjustment, HasTheSameBitsAtAnyNumberOfThreads) {
+  const Model model = NoisyScene(2);
+  const BundleAdjustmentOptions options = WithCap(1.02 * ErrorsOf(model).max);
+  const Model expected = AdjustBundle(model, options, kOneThread).model;
+  for (const int num_threads : {2, 3, 8}) {
+    const Model result = AdjustBundle(model, options, {num_threads}).model;
+    for (size_t k = 0; k < model.points3D.size(); ++k) {
+      EXPECT_EQ(result.points3D[k].xyz, expected.points3D[k].xyz);
+    }
+    EXPECT_EQ(result.cameras[0].params, expected.cameras[0].params);
   }
 }
 

@@ -15,7 +15,6 @@
 namespace krot {
 namespace {
 
-// With more of them the last digits of Ceres differ from run to run.
 const Context kOneThread{1};
 
 SceneOptions NoisyScene() {

@@ -132,31 +132,6 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
   return blocks;
 }
 
-void Interpolate(const AdjustmentBlocks& from, const AdjustmentBlocks& to,
-                 double step, AdjustmentBlocks* blocks) {
-  const auto mix = [step](const auto& a, const auto& b, auto* result) {
-    for (size_t i = 0; i < a.size(); ++i) {
-      (*result)[i] = a[i] + step * (b[i] - a[i]);
-    }
-  };
-  const auto mix_poses = [&](const std::vector<PoseBlock>& a,
-                             const std::vector<PoseBlock>& b,
-                             std::vector<PoseBlock>* result) {
-    for (size_t i = 0; i < a.size(); ++i) {
-      if (a[i] == b[i]) continue;
-      mix(a[i], b[i], &(*result)[i]);
-      Eigen::Map<Eigen::Vector4d>((*result)[i].data()).normalize();
-    }
-  };
-  mix_poses(from.frames, to.frames, &blocks->frames);
-  mix_poses(from.sensors, to.sensors, &blocks->sensors);
-  for (size_t c = 0; c < from.cameras.size(); ++c) {
-    mix(from.cameras[c], to.cameras[c], &blocks->cameras[c]);
-  }
-  mix(from.points, to.points, &blocks->points);
-  blocks->cap2 = from.cap2 + step * (to.cap2 - from.cap2);
-}
-
 Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
                   const AdjustmentBlocks& after) {
   Model result = model;

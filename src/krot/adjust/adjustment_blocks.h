@@ -54,11 +54,6 @@ struct AdjustmentBlocks {
 // point uses. O(observations).
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length);
 
-// Sets `*blocks` to from + step (to - from), quaternions of unit norm. What is
-// the same in both keeps its bits. All three are of the same model.
-void Interpolate(const AdjustmentBlocks& from, const AdjustmentBlocks& to,
-                 double step, AdjustmentBlocks* blocks);
-
 // A copy of the model with the blocks in place of what they were made from.
 // Records whose blocks are those of `before` keep their bits; the poses of
 // images follow their frames.

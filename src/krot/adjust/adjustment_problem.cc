@@ -1,5 +1,6 @@
 #include "krot/adjust/adjustment_problem.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -7,9 +8,9 @@
 #include <ceres/manifold.h>
 #include <ceres/product_manifold.h>
 
+#include "krot/adjust/adjustment_columns.h"
 #include "krot/adjust/reprojection_cost.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/camera_model.h"
 #include "krot/camera/models.h"
 
 namespace krot {
@@ -35,20 +36,6 @@ std::unique_ptr<ceres::CostFunction> MakeProjection(
         return std::make_unique<ReprojectionCost<Camera, true>>(
             observation.pixel);
       });
-}
-
-// Those that stay, in COLMAP's order: focal length(s), principal point, others.
-std::vector<int> ConstantParams(const CameraModelInfo& info,
-                                const BundleAdjustmentOptions& options) {
-  const int num_focal = info.param_names.substr(0, 2) == "fx" ? 2 : 1;
-  std::vector<int> constant;
-  for (int i = 0; i < info.num_params; ++i) {
-    const bool is_refined = i < num_focal       ? options.refine_focal_length
-                            : i < num_focal + 2 ? options.refine_principal_point
-                                                : options.refine_extra_params;
-    if (!is_refined) constant.push_back(i);
-  }
-  return constant;
 }
 
 // Holds still the coordinates in `constant` of a block of `size`.
@@ -84,14 +71,9 @@ ceres::Problem::Options AdjustmentProblemOptions() {
 }
 
 void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
-                            const CostOfObservation& cost_of,
                             ceres::LossFunction* loss, AdjustmentBlocks* blocks,
                             ceres::Problem* problem) {
-  for (size_t i = 0; i < blocks->observations.size(); ++i) {
-    const AdjustmentObservation& observation = blocks->observations[i];
-    std::unique_ptr<ceres::CostFunction> cost =
-        MakeProjection(observation, blocks->camera_models[observation.camera]);
-    if (cost_of) cost = cost_of(i, std::move(cost));
+  for (const AdjustmentObservation& observation : blocks->observations) {
     std::vector<double*> parameters = {
         blocks->points[observation.point].data(),
         blocks->frames[observation.frame].data()};
@@ -99,8 +81,10 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
       parameters.push_back(blocks->sensors[observation.sensor].data());
     }
     parameters.push_back(blocks->cameras[observation.camera].data());
-    if (cost_of) parameters.push_back(&blocks->cap2);
-    problem->AddResidualBlock(cost.release(), loss, parameters);
+    problem->AddResidualBlock(
+        MakeProjection(observation, blocks->camera_models[observation.camera])
+            .release(),
+        loss, parameters);
   }
   for (PoseBlock& frame : blocks->frames) {
     ParameterizePose(options.refine_rig_from_world,
@@ -111,12 +95,16 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
     ParameterizePose(options.refine_sensor_from_rig, true, &sensor, problem);
   }
   for (size_t c = 0; c < blocks->cameras.size(); ++c) {
-    const CameraModelInfo& info = *FindCameraModel(blocks->camera_models[c]);
-    HoldStill(blocks->cameras[c].data(), info.num_params,
-              ConstantParams(info, options), problem);
-  }
-  if (problem->HasParameterBlock(&blocks->cap2)) {
-    problem->SetParameterBlockConstant(&blocks->cap2);
+    const std::vector<int> refined =
+        RefinedParams(blocks->camera_models[c], options);
+    std::vector<int> constant;
+    const auto size = static_cast<int>(blocks->cameras[c].size());
+    for (int i = 0; i < size; ++i) {
+      if (std::find(refined.begin(), refined.end(), i) == refined.end()) {
+        constant.push_back(i);
+      }
+    }
+    HoldStill(blocks->cameras[c].data(), size, constant, problem);
   }
   if (options.refine_points3D) return;
   for (Eigen::Vector3d& point : blocks->points) {
@@ -165,7 +153,6 @@ ceres::Solver::Options AdjustmentSolverOptions(
   for (std::vector<double>& camera : blocks->cameras) {
     add(camera.data(), group++);
   }
-  add(&blocks->cap2, group);
   solver.linear_solver_ordering = std::move(ordering);
   return solver;
 }

@@ -2,78 +2,30 @@
 
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
-#include <ceres/evaluation_callback.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
-
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/adjust/barrier_cost.h"
+#include "krot/adjust/adjustment_columns.h"
+#include "krot/adjust/barrier_system.h"
 #include "krot/adjust/projected_errors.h"
 
 namespace krot {
 
-// Keeps the last point at which Ceres asked for errors without derivatives:
-// where its step leads, whether it then takes the step or not.
-class TrialRecorder final : public ceres::EvaluationCallback {
- public:
-  explicit TrialRecorder(const AdjustmentBlocks* blocks) : blocks_(*blocks) {}
-
-  void PrepareForEvaluation(bool evaluate_jacobians,
-                            bool new_evaluation_point) override {
-    if (!is_recording_ || evaluate_jacobians || !new_evaluation_point) return;
-    trial_ = blocks_;
-  }
-
-  void Start() {
-    is_recording_ = true;
-    trial_.reset();
-  }
-  // None if there was no step.
-  std::optional<AdjustmentBlocks> Stop() {
-    is_recording_ = false;
-    return std::move(trial_);
-  }
-
- private:
-  const AdjustmentBlocks& blocks_;
-  bool is_recording_ = false;
-  std::optional<AdjustmentBlocks> trial_;
-};
-
-// What a bounded adjustment works on: a problem of BarrierCosts that refer to
-// `barrier` and `multipliers`, one per observation in their order, and whose
-// evaluation callback is `recorder`; where the cap moves, with a CapCost.
-struct BarrierProblem {
-  explicit BarrierProblem(AdjustmentBlocks* all_blocks)
-      : blocks(all_blocks),
-        multipliers(all_blocks->observations.size()),
-        recorder(all_blocks) {}
-
-  AdjustmentBlocks* blocks;
-  ceres::Problem* problem = nullptr;
-  Barrier barrier;
-  CapSlope cap_slope;
-  std::vector<double> multipliers;
-  TrialRecorder recorder;
-};
-
 // Steps of a primal-dual interior point method towards the minima of the
-// barrier problem as its weight falls: Ceres finds the direction of every step,
-// which is then cut short of the cap and until the barrier cost falls. Every
-// iterate is feasible. The cap moves where it has a weight.
+// barrier problem of barrier_system.h as its weight mu falls: along Newton's
+// direction, cut short of the cap and until the barrier cost falls. Every
+// iterate is feasible. The cap moves where it has columns.
 class BarrierPath {
  public:
-  // Requires errors below the cap.
-  BarrierPath(const ceres::Solver::Options& solver_options,
-              BarrierProblem* bounded);
+  // Requires errors of `start` below its cap. Keeps a reference to `columns`.
+  BarrierPath(const AdjustmentColumns& columns, const AdjustmentBlocks& start,
+              int num_threads);
 
   // Begins with this weight, and with the multipliers that its minimum has.
-  void Begin(double mu);
-  // That for which the cap has no slope.
-  double WeightOfCap() const;
+  // Half of cap_weight is the price of the cap's square, where that moves.
+  void Begin(double mu, double cap_weight = 0);
+  // The weight for which such a cap has no slope.
+  double CentralWeight(double cap_weight) const;
 
   // Takes a step, and says how much of it; 0: none that lowers the barrier
   // cost was found.
@@ -85,54 +37,55 @@ class BarrierPath {
   // minimised, the cap with its weight included.
   double gap() const;
   bool IsGapReached() const;
+  // g' D^-1 g / 2, relative to what is minimised: BarrierSystem::SingleGains.
+  std::optional<double> MeasureStationarity();
 
-  double mu() const { return bounded_.barrier.mu; }
+  const AdjustmentBlocks& blocks() const { return now_; }
+  double mu() const { return mu_; }
   double count() const { return static_cast<double>(errors_.size()); }
   double cost() const { return cost_; }  // half the sum of squared errors
   double radius() const { return radius_; }
-  double LargestError() const;
-  double cap2() const { return bounded_.blocks->cap2; }
-  std::optional<double> MeasureStationarity();
+  double cap2() const { return now_.cap2; }
+  double LargestError() const { return krot::LargestError(errors_); }
   int64_t NumActive() const;
+  // As bundle adjustment's summary has it.
+  const char* SolverName() const {
+    return system_.is_dense() ? "dense_schur" : "sparse_schur";
+  }
 
  private:
   using Errors = std::vector<ProjectedError>;
 
-  void set_mu(double mu) { bounded_.barrier.mu = mu; }
-  std::vector<double>& multipliers() const { return bounded_.multipliers; }
-  double cap_weight() const { return bounded_.barrier.cap_weight; }
   double SlackOf(const ProjectedError& error) const {
     return Slack(cap2(), error.r.squaredNorm());
   }
+  double Objective() const { return cost_ + cap_weight_ * cap2() / 2; }
+  double BarrierCost(const Errors& errors, double cap2) const;
 
-  double Objective() const { return cost_ + cap_weight() * cap2() / 2; }
-  double BarrierCost(const Errors& errors) const;
-  // None where an error reaches the cap.
-  std::optional<Errors> ProjectBlocks() const;
-  std::optional<Errors> ProjectAt(const AdjustmentBlocks& from,
-                                  const AdjustmentBlocks& to,
-                                  double step) const;
-
-  // Where Newton's step leads.
-  std::optional<AdjustmentBlocks> FindTrial();
-  void FindCapSlope();
-  // The derivatives of errors and depths on the way to the trial.
-  std::optional<Errors> FindSlopes(const AdjustmentBlocks& from,
-                                   const AdjustmentBlocks& trial) const;
-  // The longest step at most 1 that the linearised errors allow; `cap2_slope`
-  // is the derivative of cap2.
-  double LongestStep(const Errors& slopes, double cap2_slope) const;
+  // Newton's direction, if there is one.
+  bool FindDirection();
+  // The derivative of a slack along it, as that of w h by w.
+  double SlackSlope(size_t i) const;
+  // The longest step at most 1 that the linearised errors allow.
+  double LongestStep() const;
+  // Moves that far if it may.
+  bool TryStep(double step, double highest_cost);
   void CentreMultipliers();
-  void UpdateMultipliers(const Errors& slopes, double cap2_slope,
-                         const Errors& stepped, double cap2_before);
+  void UpdateMultipliers(const Errors& stepped, double stepped_cap2);
   // After a step that was this share of the longest.
   void UpdateRadius(double share);
 
-  ceres::Solver::Options solver_options_;
-  BarrierProblem& bounded_;
-  Errors errors_;    // at the blocks
+  const AdjustmentColumns& columns_;
+  BarrierSystem system_;
+  AdjustmentBlocks now_, trial_;
+  Errors errors_;    // now
   double cost_ = 0;  // half their squared norm
-  double radius_;
+  std::vector<double> multipliers_;
+  double mu_ = 0;          // pixels^2
+  double cap_weight_ = 0;  // 0 where the cap stays as it is
+  double radius_;          // of the trust region
+  // That the system is factorised with; none if it is not that of now.
+  std::optional<double> factor_radius_;
 };
 
 }  // namespace krot

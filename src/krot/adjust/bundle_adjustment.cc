@@ -11,8 +11,8 @@
 #include <ceres/solver.h>
 
 #include "krot/adjust/adjustment_blocks.h"
+#include "krot/adjust/adjustment_columns.h"
 #include "krot/adjust/adjustment_problem.h"
-#include "krot/adjust/barrier_cost.h"
 #include "krot/adjust/bounded_adjustment.h"
 #include "krot/adjust/iteration_observer.h"
 #include "krot/adjust/optimality.h"
@@ -91,19 +91,7 @@ std::string SolverName(const ceres::Solver::Options& options) {
   return name;
 }
 
-// Free coordinates of a problem.
-int64_t NumFreeParameters(const ceres::Problem& problem) {
-  std::vector<double*> blocks;
-  problem.GetParameterBlocks(&blocks);
-  int64_t count = 0;
-  for (const double* block : blocks) {
-    if (problem.IsParameterBlockConstant(block)) continue;
-    count += problem.ParameterBlockTangentSize(block);
-  }
-  return count;
-}
-
-void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
+void Count(const AdjustmentBlocks& blocks, const AdjustmentColumns& columns,
            BundleAdjustmentSummary* summary) {
   std::set<int32_t> frames, points;
   for (const AdjustmentObservation& observation : blocks.observations) {
@@ -117,7 +105,7 @@ void Count(const AdjustmentBlocks& blocks, const ceres::Problem& problem,
   summary->num_no_pose = blocks.num_no_pose;
   summary->num_behind = blocks.num_behind;
   summary->num_short_track = blocks.num_short_track;
-  summary->num_parameters = NumFreeParameters(problem);
+  summary->num_parameters = columns.num_unknowns;
 }
 
 // Half the sum of the squared errors under the loss, if there is one; none
@@ -152,14 +140,34 @@ BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
 
 // Solves a problem without a cap.
 void Minimize(const BundleAdjustmentOptions& options, const Context& context,
-              ceres::Solver::Options solver_options, ceres::Problem* problem,
+              ceres::LossFunction* loss, AdjustmentBlocks* blocks,
               BundleAdjustmentSummary* summary) {
+  ceres::Problem problem(AdjustmentProblemOptions());
+  BuildAdjustmentProblem(options, loss, blocks, &problem);
+  ceres::Solver::Options solver_options =
+      AdjustmentSolverOptions(options, context, blocks, problem);
+  summary->linear_solver = SolverName(solver_options);
   IterationObserver observer(options.callback, context);
   solver_options.callbacks.push_back(&observer);
   ceres::Solver::Summary solve;
-  ceres::Solve(solver_options, problem, &solve);
+  ceres::Solve(solver_options, &problem, &solve);
   summary->termination = FromCeres(solve.termination_type);
   summary->num_iterations = observer.num_iterations();
+  summary->stationarity =
+      Stationarity(solver_options.num_threads,
+                   *RobustCost(context, loss, *blocks), &problem);
+}
+
+// The same below a cap, which is lowered first if that is asked for.
+void MinimizeBelowCap(const BundleAdjustmentOptions& options,
+                      const Context& context, const AdjustmentColumns& columns,
+                      AdjustmentBlocks* blocks,
+                      BundleAdjustmentSummary* summary) {
+  if (options.lower_max_error) {
+    LowerMaxError(options, context, columns, blocks, summary);
+  }
+  AdjustBelowCap(options, context, columns, blocks, summary);
+  summary->max_error = std::sqrt(blocks->cap2);
 }
 
 }  // namespace
@@ -175,27 +183,12 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
   if (options.max_error) blocks.cap2 = *options.max_error * *options.max_error;
-  BarrierProblem bounded(&blocks);
-  ceres::Problem::Options problem_options = AdjustmentProblemOptions();
-  CostOfObservation cost_of;
-  if (options.IsBounded()) {
-    problem_options.evaluation_callback = &bounded.recorder;
-    cost_of = [&](size_t i, std::unique_ptr<ceres::CostFunction> projection) {
-      return std::make_unique<BarrierCost>(
-          std::move(projection), &bounded.barrier, &bounded.multipliers[i]);
-    };
-  }
-  ceres::Problem problem(problem_options);
-  bounded.problem = &problem;
-  BuildAdjustmentProblem(options, cost_of, loss.get(), &blocks, &problem);
+  const AdjustmentColumns columns(options, blocks);
 
   BundleAdjustmentResult result;
   BundleAdjustmentSummary& summary = result.summary;
   summary.max_error = options.max_error;
-  Count(blocks, problem, &summary);
-  const ceres::Solver::Options solver_options =
-      AdjustmentSolverOptions(options, context, &blocks, problem);
-  summary.linear_solver = SolverName(solver_options);
+  Count(blocks, columns, &summary);
   const std::optional<double> cost = RobustCost(context, loss.get(), blocks);
   if (summary.num_parameters == 0) {
     summary.termination = BundleAdjustmentTermination::kNothingToAdjust;
@@ -206,19 +199,11 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
     const BundleAdjustmentOptions recorded =
         RecordIterations(options, &summary);
     if (options.IsBounded()) {
-      if (options.lower_max_error) {
-        LowerMaxError(recorded, context, solver_options, &bounded, &summary);
-      }
-      AdjustBelowCap(recorded, context, solver_options, &bounded, &summary);
-      summary.max_error = std::sqrt(blocks.cap2);
+      MinimizeBelowCap(recorded, context, columns, &blocks, &summary);
     } else {
-      Minimize(recorded, context, solver_options, &problem, &summary);
+      Minimize(recorded, context, loss.get(), &blocks, &summary);
     }
     summary.cost_final = *RobustCost(context, loss.get(), blocks);
-    if (!options.IsBounded()) {
-      summary.stationarity = Stationarity(solver_options.num_threads,
-                                          summary.cost_final, &problem);
-    }
     RestoreSimilarity(options, before, &blocks);
   }
   result.model = ApplyBlocks(model, before, blocks);

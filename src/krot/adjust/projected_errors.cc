@@ -1,6 +1,8 @@
 #include "krot/adjust/projected_errors.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
@@ -55,6 +57,14 @@ double HalfSquaredNorm(const std::vector<ProjectedError>& errors) {
   double sum = 0;
   for (const ProjectedError& error : errors) sum += error.r.squaredNorm();
   return sum / 2;
+}
+
+double LargestError(const std::vector<ProjectedError>& errors) {
+  double largest2 = 0;
+  for (const ProjectedError& error : errors) {
+    largest2 = std::max(largest2, error.r.squaredNorm());
+  }
+  return std::sqrt(largest2);
 }
 
 }  // namespace krot

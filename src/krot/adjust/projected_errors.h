@@ -23,4 +23,7 @@ std::optional<std::vector<ProjectedError>> ProjectErrors(
 // Half the sum of the squared errors.
 double HalfSquaredNorm(const std::vector<ProjectedError>& errors);
 
+// The norm of the largest; 0 if there are none.
+double LargestError(const std::vector<ProjectedError>& errors);
+
 }  // namespace krot

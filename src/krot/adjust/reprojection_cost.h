@@ -1,10 +1,10 @@
 #pragma once
 
-#include <ceres/jet.h>
 #include <ceres/sized_cost_function.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "krot/adjust/differentiated_pixel.h"
 #include "krot/geometry/rigid_transform.h"
 
 namespace krot {
@@ -50,47 +50,6 @@ void StoreJacobian(const Eigen::Matrix<double, 2, kCols>& jacobian,
   Eigen::Map<Eigen::Matrix<double, 2, kCols, Eigen::RowMajor>> block(to);
   block = jacobian;
 }
-
-// The pixel of a ray (u, v, 1) with its derivatives by the ray and by the
-// camera's parameters, by forward differentiation through the model.
-template <typename Camera>
-struct DifferentiatedPixel {
-  static constexpr int kNumParams = Camera::kNumParams;
-
-  DifferentiatedPixel(const double* params, const Eigen::Vector2d& ray,
-                      bool wants_params) {
-    if (wants_params) {
-      Differentiate<2 + kNumParams>(params, ray);
-    } else {
-      Differentiate<2>(params, ray);
-    }
-  }
-
-  Eigen::Vector2d pixel;
-  Eigen::Matrix2d J_ray;
-  Eigen::Matrix<double, 2, kNumParams> J_params;  // if wanted
-
- private:
-  template <int kNumDerivatives>
-  void Differentiate(const double* params, const Eigen::Vector2d& ray) {
-    using Jet = ceres::Jet<double, kNumDerivatives>;
-    const Jet u(ray.x(), 0);
-    const Jet v(ray.y(), 1);
-    Jet x, y;
-    if constexpr (kNumDerivatives > 2) {
-      Jet jets[kNumParams];
-      for (int i = 0; i < kNumParams; ++i) jets[i] = Jet(params[i], 2 + i);
-      Camera::Project(jets, u, v, &x, &y);
-      J_params.row(0) = x.v.template tail<kNumParams>();
-      J_params.row(1) = y.v.template tail<kNumParams>();
-    } else {
-      Camera::Project(params, u, v, &x, &y);
-    }
-    pixel << x.a, y.a;
-    J_ray.row(0) = x.v.template head<2>();
-    J_ray.row(1) = y.v.template head<2>();
-  }
-};
 
 // Reprojection error, projected minus measured, in pixels. Blocks: point (3),
 // rig_from_world (7), sensor_from_rig (7; only if kHasSensor), camera.

@@ -23,6 +23,12 @@ constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;
 
+// Of a column, what stands in blocks of the lower triangle: nothing else is
+// written.
+auto LowerBlocks(int64_t column, Eigen::MatrixXd* matrix) {
+  return matrix->col(column).tail(matrix->rows() - column / 3 * 3);
+}
+
 }  // namespace
 
 FrameSystem::FrameSystem(const BlockStructure& structure)
@@ -94,7 +100,10 @@ FrameSystem::Block FrameSystem::BlockOf(int part, int32_t a, int32_t b) {
 }
 
 void FrameSystem::SetZero() {
-  for (Eigen::MatrixXd& part : dense_) part.setZero(num_columns_, num_columns_);
+  for (Eigen::MatrixXd& part : dense_) {
+    part.resize(num_columns_, num_columns_);
+    for (int64_t c = 0; c < num_columns_; ++c) LowerBlocks(c, &part).setZero();
+  }
   for (std::vector<double>& part : values_) {
     part.assign(9 * block_row_.size(), 0.0);
   }
@@ -140,13 +149,14 @@ void FrameSystem::SubtractSquare(int part, const std::vector<int32_t>& frames,
 
 bool FrameSystem::Factorize(int num_threads) {
   if (is_dense_) {
-    ParallelFor(num_columns_, 64, num_threads,
-                [&](int64_t begin, int64_t end, int) {
-                  for (int part = 1; part < num_parts_; ++part) {
-                    dense_[0].middleCols(begin, end - begin) +=
-                        dense_[part].middleCols(begin, end - begin);
-                  }
-                });
+    ParallelFor(
+        num_columns_, 64, num_threads, [&](int64_t begin, int64_t end, int) {
+          for (int part = 1; part < num_parts_; ++part) {
+            for (int64_t c = begin; c < end; ++c) {
+              LowerBlocks(c, &dense_[0]) += LowerBlocks(c, &dense_[part]);
+            }
+          }
+        });
   } else {
     using Index = Eigen::SparseMatrix<double>::StorageIndex;
     sparse_.resize(num_columns_, num_columns_);

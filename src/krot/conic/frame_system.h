@@ -12,7 +12,8 @@
 
 namespace krot {
 
-// The normal equations of the frames once the points are eliminated: 3x3
+// The normal equations of the frames once the points are eliminated, or of
+// whatever else comes in threes of columns (adjust/barrier_system.h): 3x3
 // blocks, symmetric, positive definite up to rounding. Dense for up to a few
 // thousand frames or where most frames share points; beyond, sparse with a
 // fill-reducing order.
@@ -24,6 +25,7 @@ class FrameSystem {
  public:
   explicit FrameSystem(const BlockStructure& structure);
 
+  bool is_dense() const { return is_dense_; }
   int num_parts() const { return num_parts_; }
   int64_t num_columns() const { return num_columns_; }
   // The first column of a frame; -1 if it is fixed.

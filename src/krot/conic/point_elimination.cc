@@ -35,6 +35,7 @@ PointElimination<kRows>::PointElimination(const BlockStructure& structure,
       num_threads_(
           structure.num_observations() < kFewObservations ? 1 : num_threads),
       frame_system_(structure),
+      parts_(structure.point_begin, frame_system_.num_parts()),
       point_rows_(structure.num_observations() * kBlock),
       frame_rows_(structure.num_observations() * kBlock),
       Q_(structure.num_observations() * kBlock),
@@ -52,36 +53,6 @@ PointElimination<kRows>::PointElimination(const BlockStructure& structure,
       return frame_a != frame_b ? frame_a < frame_b : a < b;
     });
   }
-  // Parts of about equal work, which grows with the square of the track.
-  double total = 0;
-  const auto work = [&](int64_t k) {
-    const double m = static_cast<double>(structure.point_begin[k + 1] -
-                                         structure.point_begin[k]);
-    return m * (m + 10);
-  };
-  for (int64_t k = 0; k < structure.num_points(); ++k) total += work(k);
-  const int num_parts = frame_system_.num_parts();
-  part_begin_.assign(1, 0);
-  double sum = 0;
-  for (int64_t k = 0; k < structure.num_points(); ++k) {
-    if (sum > total * static_cast<double>(part_begin_.size()) / num_parts) {
-      part_begin_.push_back(k);
-    }
-    sum += work(k);
-  }
-  part_begin_.resize(num_parts + 1, structure.num_points());
-}
-
-template <int kRows>
-void PointElimination<kRows>::ForPoints(
-    const std::function<void(int64_t k, int part)>& body) const {
-  ParallelFor(frame_system_.num_parts(), 1, num_threads_,
-              [&](int64_t part, int64_t, int) {
-                for (int64_t k = part_begin_[part]; k < part_begin_[part + 1];
-                     ++k) {
-                  body(k, static_cast<int>(part));
-                }
-              });
 }
 
 template <int kRows>
@@ -189,7 +160,7 @@ void PointElimination<kRows>::AddHighLeverage(int64_t k, int part,
 template <int kRows>
 bool PointElimination<kRows>::Factorize() {
   frame_system_.SetZero();
-  ForPoints([&](int64_t k, int part) {
+  parts_.ForEach(num_threads_, [&](int64_t k, int part) {
     OrthogonalizePoint(k);
     AddPointToFrameSystem(k, part);
   });
@@ -198,7 +169,7 @@ bool PointElimination<kRows>::Factorize() {
 
 template <int kRows>
 void PointElimination<kRows>::Multiply(const BlockVector& x, double* y) const {
-  ForPoints([&](int64_t k, int) {
+  parts_.ForEach(num_threads_, [&](int64_t k, int) {
     for (int64_t i = structure_.point_begin[k];
          i < structure_.point_begin[k + 1]; ++i) {
       Eigen::Map<Rows<kRows>>(y + i * kRows) =
@@ -219,7 +190,7 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
   // top = Q'r + R^-T g_s.
   x->points.resize(structure_.num_points());
   x->frames.assign(structure_.num_frames(), Vector3d::Zero());
-  ForPoints([&](int64_t k, int part) {
+  parts_.ForEach(num_threads_, [&](int64_t k, int part) {
     const int64_t begin = structure_.point_begin[k];
     const int64_t end = structure_.point_begin[k + 1];
     Vector3d top = R_[k].SolveTransposed(g.points[k]);
@@ -250,7 +221,7 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
     if (column >= 0) x->frames[f] = t.segment<3>(column);
   }
   // R s = top - G t.
-  ForPoints([&](int64_t k, int) {
+  parts_.ForEach(num_threads_, [&](int64_t k, int) {
     Vector3d top = x->points[k];
     for (int64_t i = structure_.point_begin[k];
          i < structure_.point_begin[k + 1]; ++i) {

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "krot/conic/block_structure.h"
 #include "krot/conic/frame_system.h"
+#include "krot/conic/point_parts.h"
 #include "krot/conic/thin_qr.h"
 
 namespace krot {
@@ -55,8 +55,8 @@ class PointElimination {
   bool Factorize();
 
   // x = H^-1 (g + A'r); r holds kRows numbers per observation, or is null for
-  // 0. A refinement takes the effect of the frames' regularisation away; each is
-  // another solve.
+  // 0. A refinement takes the effect of the frames' regularisation away; each
+  // is another solve.
   void Solve(const BlockVector& g, const double* r, BlockVector* x,
              int refinements = 1) const;
 
@@ -86,7 +86,6 @@ class PointElimination {
     }
   };
 
-  void ForPoints(const std::function<void(int64_t k, int part)>& body) const;
   void OrthogonalizePoint(int64_t k);
   void FindSightings(int64_t k, Sightings* sightings) const;
   void AddPointToFrameSystem(int64_t k, int part);
@@ -96,12 +95,12 @@ class PointElimination {
   const BlockStructure& structure_;
   const int num_threads_;
   FrameSystem frame_system_;
+  const PointParts parts_;
   std::vector<double> point_rows_;  // A_s
   std::vector<double> frame_rows_;  // A_t
   std::vector<double> Q_;
   std::vector<UpperTriangle> R_;
-  std::vector<int32_t> order_;       // of a point's observations by frame
-  std::vector<int64_t> part_begin_;  // points of each part of the sum
+  std::vector<int32_t> order_;  // of a point's observations by frame
 };
 
 }  // namespace krot

@@ -22,33 +22,6 @@ std::string PixelText(double error_px) {
   return text.str();
 }
 
-// A cap that is a factor leaves this share of its room to the least squares
-// with fixed rotations; one that is given, all but this of itself.
-constexpr double kStartShare = 0.9;
-constexpr double kStartRoom = 5e-4;
-
-// The start ends at the least squares a little below the cap, so that the
-// adjustment begins near its own end, or at the lowest maximum itself.
-SolveModelOptions StartOptions(const AdjustModelOptions& options) {
-  SolveModelOptions start = options.start;
-  if (options.max_error_factor) {
-    start.finish.slack = kStartShare * (*options.max_error_factor - 1);
-  } else if (options.adjustment.max_error) {
-    start.finish.max_error = (1 - kStartRoom) * *options.adjustment.max_error;
-  } else {
-    start.finish.finish = Finish::kNone;
-  }
-  return start;
-}
-
-// Of all observations; those outside the problem may be above the finish.
-double LowestMaximum(const SolveSummary& start) {
-  const double largest = start.pixel_error_after.max;
-  return start.finish && largest <= start.finish->cap
-             ? start.finish->lowest_cost
-             : largest;
-}
-
 // Where a bounded adjustment starts, and its cap; none if there is no estimate
 // below it.
 std::optional<Model> BoundedStart(const Model& model,
@@ -65,12 +38,14 @@ std::optional<Model> BoundedStart(const Model& model,
                      "rotations: solving for it"
                    : "the model's largest error is not below the cap: solving "
                      "for the lowest with these rotations");
-  SolveModelResult start = SolveModel(model, StartOptions(options), context);
+  SolveModelOptions lowest = options.start;
+  lowest.finish.finish = Finish::kNone;
+  SolveModelResult start = SolveModel(model, lowest, context);
   summary->pixel_error_start = start.summary.pixel_error_after;
   summary->start = std::move(start.summary);
   if (options.max_error_factor) {
     summary->max_error =
-        *options.max_error_factor * LowestMaximum(*summary->start);
+        *options.max_error_factor * summary->pixel_error_start.max;
   }
   if (context.IsCancelled() ||
       !IsBelow(summary->pixel_error_start,

@@ -1,0 +1,256 @@
+#include "krot/adjust/barrier_system.h"
+
+#include <cmath>
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Poses of frame and sensor, sixteen parameters, the cap.
+constexpr int kMaxBlocks = 4 + 6 + 1;
+
+// R of H = R'R.
+UpperTriangle CholeskyFactor(const Matrix3d& H) {
+  UpperTriangle R;
+  R.r00 = std::sqrt(H(0, 0));
+  R.r01 = H(1, 0) / R.r00;
+  R.r02 = H(2, 0) / R.r00;
+  R.r11 = std::sqrt(H(1, 1) - R.r01 * R.r01);
+  R.r12 = (H(2, 1) - R.r01 * R.r02) / R.r11;
+  R.r22 = std::sqrt(H(2, 2) - R.r02 * R.r02 - R.r12 * R.r12);
+  return R;
+}
+
+// Adds up the parts in order.
+void AddParts(const std::vector<std::vector<Vector3d>>& parts,
+              std::vector<Vector3d>* sum) {
+  *sum = parts[0];
+  for (size_t part = 1; part < parts.size(); ++part) {
+    for (size_t b = 0; b < sum->size(); ++b) (*sum)[b] += parts[part][b];
+  }
+}
+
+}  // namespace
+
+BarrierSystem::BarrierSystem(const AdjustmentColumns& columns,
+                             const AdjustmentBlocks& blocks, int num_threads)
+    : columns_(columns),
+      loop_(static_cast<int64_t>(blocks.observations.size()), num_threads),
+      jacobians_(columns, blocks),
+      tracks_(jacobians_, blocks, columns.num_blocks),
+      reduced_(tracks_.structure()),
+      parts_(tracks_.structure().point_begin, reduced_.num_parts()),
+      R_(blocks.points.size()),
+      part_diagonal_(reduced_.num_parts()),
+      part_gradient_(reduced_.num_parts()),
+      part_rhs_(reduced_.num_parts()) {}
+
+void BarrierSystem::Linearize(const AdjustmentBlocks& blocks,
+                              const std::vector<ProjectedError>& errors,
+                              const std::vector<double>& multipliers) {
+  errors_ = &errors;
+  multipliers_ = &multipliers;
+  cap2_ = blocks.cap2;
+  jacobians_.Evaluate(blocks, loop_.num_threads());
+}
+
+int BarrierSystem::Rows(int64_t i, Matrix3d* by_point,
+                        Matrix3d* by_block) const {
+  const ProjectedError& error = (*errors_)[i];
+  const double lambda = (*multipliers_)[i];
+  const double h = SlackOf(i);
+  const double curvature = std::sqrt(1 + lambda);
+  const double third = std::sqrt(lambda / h);
+  const Eigen::RowVector3d by_error(third * error.r.x(), third * error.r.y(),
+                                    -third * h / error.w);
+  const auto scale = [&](const Matrix3d& D, Matrix3d* rows) {
+    rows->topRows<2>() = curvature * D.topRows<2>();
+    rows->row(2).noalias() = by_error * D;
+  };
+  scale(jacobians_.by_point(i), by_point);
+  const int num_blocks = jacobians_.num_blocks(i);
+  for (int n = 0; n < num_blocks; ++n) {
+    scale(jacobians_.by_block(i, n), &by_block[n]);
+  }
+  if (MovesCap()) by_block[num_blocks - 1](2, 0) = -third / 2;
+  return num_blocks;
+}
+
+Eigen::Vector4d BarrierSystem::Weigh(int64_t i, const Vector3d& change,
+                                     double cap2_change) const {
+  const ProjectedError& error = (*errors_)[i];
+  const double lambda = (*multipliers_)[i];
+  const double h = SlackOf(i);
+  const Eigen::Vector4d third(error.r.x(), error.r.y(), -h / error.w, -0.5);
+  Eigen::Vector4d weighed =
+      lambda / h * (third.head<3>().dot(change) + third[3] * cap2_change) *
+      third;
+  weighed.head<2>() += (1 + lambda) * change.head<2>();
+  return weighed;
+}
+
+// Adds a point's part of the reduced system: with A by the point and F by the
+// blocks, F'F - E'H^-1 E, E = A'F, H = A'A.
+void BarrierSystem::AddPoint(int64_t k, double damping, int part) {
+  thread_local std::vector<double> G[3];  // R'^-1 E
+  thread_local std::vector<int32_t> blocks;
+  thread_local std::vector<char> is_apart;
+  blocks.assign(tracks_.blocks_begin(k), tracks_.blocks_end(k));
+  is_apart.assign(blocks.size(), 0);
+  for (std::vector<double>& row : G) row.assign(3 * blocks.size(), 0.0);
+  Matrix3d H = Matrix3d::Zero(), A, F[kMaxBlocks];
+  for (int64_t i = tracks_.begin(k); i < tracks_.end(k); ++i) {
+    const int num_blocks = Rows(i, &A, F);
+    const int32_t* slots = tracks_.slots(i);
+    const int32_t* ids = jacobians_.blocks(i);
+    H.noalias() += A.transpose() * A;
+    for (int b = 0; b < num_blocks; ++b) {
+      const Matrix3d E = A.transpose() * F[b];
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) G[r][3 * slots[b] + c] += E(r, c);
+      }
+      for (int c = 0; c <= b; ++c) {
+        const Matrix3d block = F[b].transpose() * F[c];
+        reduced_.AddBlock(part, ids[b], ids[c], block.data());
+        if (b == c) part_diagonal_[part][ids[b]] += block.diagonal();
+      }
+    }
+  }
+  if (!columns_.points_move) return;
+  diagonal_.points[k] = H.diagonal();
+  H.diagonal() *= 1 + damping;
+  const UpperTriangle R = R_[k] = CholeskyFactor(H);
+  for (size_t c = 0; c < G[0].size(); ++c) {
+    const Vector3d column =
+        R.SolveTransposed(Vector3d(G[0][c], G[1][c], G[2][c]));
+    for (int r = 0; r < 3; ++r) G[r][c] = column[r];
+  }
+  const double* const rows[3] = {G[0].data(), G[1].data(), G[2].data()};
+  reduced_.SubtractSquare(part, blocks, is_apart, rows);
+}
+
+bool BarrierSystem::Factorize(double radius) {
+  reduced_.SetZero();
+  diagonal_.SetZero(tracks_.structure().num_points(), columns_.num_blocks);
+  for (std::vector<Vector3d>& part : part_diagonal_) {
+    part.assign(columns_.num_blocks, Vector3d::Zero());
+  }
+  parts_.ForEach(loop_.num_threads(),
+                 [&](int64_t k, int part) { AddPoint(k, 1 / radius, part); });
+  AddParts(part_diagonal_, &diagonal_.frames);
+  for (int32_t b = 0; b < columns_.num_blocks; ++b) {
+    const Matrix3d damping = (diagonal_.frames[b] / radius).asDiagonal();
+    reduced_.AddBlock(0, b, b, damping.data());
+  }
+  return reduced_.Factorize(loop_.num_threads());
+}
+
+// The gradient g and what is left of it without the points, g_b - E'H^-1 g_k.
+void BarrierSystem::ReducePoint(int64_t k, int part) {
+  const int64_t begin = tracks_.begin(k), end = tracks_.end(k);
+  const auto by_error = [&](int64_t i) -> Vector3d {
+    const Eigen::Vector2d pull = (1 + mu_ / SlackOf(i)) * (*errors_)[i].r;
+    return {pull.x(), pull.y(), 0};
+  };
+  Vector3d step = Vector3d::Zero();
+  if (columns_.points_move) {
+    Vector3d& gradient = gradient_.points[k];
+    for (int64_t i = begin; i < end; ++i) {
+      gradient.noalias() += jacobians_.by_point(i).transpose() * by_error(i);
+    }
+    step = -R_[k].Solve(R_[k].SolveTransposed(gradient));
+  }
+  for (int64_t i = begin; i < end; ++i) {
+    const Vector3d pull = by_error(i);
+    const Eigen::Vector4d weighed = Weigh(i, jacobians_.by_point(i) * step, 0);
+    const Vector3d pull_left = pull + weighed.head<3>();
+    for (int b = 0; b < jacobians_.num_blocks(i); ++b) {
+      const int32_t id = jacobians_.blocks(i)[b];
+      const Matrix3d& D = jacobians_.by_block(i, b);
+      part_gradient_[part][id].noalias() += D.transpose() * pull;
+      part_rhs_[part][id].noalias() += D.transpose() * pull_left;
+    }
+    if (MovesCap()) {
+      const double by_cap2 = -mu_ / (2 * SlackOf(i));
+      part_gradient_[part][columns_.cap][0] += by_cap2;
+      part_rhs_[part][columns_.cap][0] += by_cap2 + weighed[3];
+    }
+  }
+}
+
+// Sets the point's direction and its observations' slopes from the blocks'.
+void BarrierSystem::BackSubstitute(int64_t k) {
+  const int64_t begin = tracks_.begin(k), end = tracks_.end(k);
+  Vector3d rest = gradient_.points[k];
+  for (int64_t i = begin; i < end; ++i) {
+    Vector3d& slope = direction_.slopes[i];
+    slope.setZero();
+    for (int b = 0; b < jacobians_.num_blocks(i); ++b) {
+      slope.noalias() += jacobians_.by_block(i, b) *
+                         direction_.unknowns.frames[jacobians_.blocks(i)[b]];
+    }
+    rest.noalias() += jacobians_.by_point(i).transpose() *
+                      Weigh(i, slope, cap2_slope()).head<3>();
+  }
+  if (!columns_.points_move || begin == end) return;
+  Vector3d& step = direction_.unknowns.points[k];
+  step = -R_[k].Solve(R_[k].SolveTransposed(rest));
+  for (int64_t i = begin; i < end; ++i) {
+    direction_.slopes[i].noalias() += jacobians_.by_point(i) * step;
+  }
+}
+
+void BarrierSystem::Solve(double mu, double cap_weight) {
+  mu_ = mu;
+  const auto num_points = static_cast<size_t>(tracks_.structure().num_points());
+  const auto num_blocks = static_cast<size_t>(columns_.num_blocks);
+  gradient_.SetZero(num_points, num_blocks);
+  direction_.unknowns.SetZero(num_points, num_blocks);
+  direction_.slopes.resize(loop_.count());
+  for (auto* parts : {&part_gradient_, &part_rhs_}) {
+    for (auto& part : *parts) part.assign(num_blocks, Vector3d::Zero());
+  }
+  parts_.ForEach(loop_.num_threads(),
+                 [&](int64_t k, int part) { ReducePoint(k, part); });
+  AddParts(part_gradient_, &gradient_.frames);
+  std::vector<Vector3d> rhs;
+  AddParts(part_rhs_, &rhs);
+  if (MovesCap()) {
+    gradient_.frames[columns_.cap][0] += cap_weight / 2;
+    rhs[columns_.cap][0] += cap_weight / 2;
+  }
+  Eigen::Map<const Eigen::VectorXd> stacked(
+      num_blocks > 0 ? rhs[0].data() : nullptr,
+      static_cast<int64_t>(3 * num_blocks));
+  const Eigen::VectorXd solution = reduced_.Solve(stacked);
+  for (size_t b = 0; b < num_blocks; ++b) {
+    direction_.unknowns.frames[b] =
+        -solution.segment<3>(static_cast<int64_t>(3 * b));
+  }
+  parts_.ForEach(loop_.num_threads(),
+                 [&](int64_t k, int) { BackSubstitute(k); });
+}
+
+double BarrierSystem::cap2_slope() const {
+  return MovesCap() ? direction_.unknowns.frames[columns_.cap][0] : 0;
+}
+
+double BarrierSystem::SingleGains() const {
+  double sum = 0;
+  const auto add = [&](const Vector3d& gradient, const Vector3d& diagonal) {
+    for (int c = 0; c < 3; ++c) {
+      if (diagonal[c] > 0) sum += gradient[c] * gradient[c] / diagonal[c];
+    }
+  };
+  for (size_t k = 0; k < gradient_.points.size(); ++k) {
+    add(gradient_.points[k], diagonal_.points[k]);
+  }
+  for (size_t b = 0; b < gradient_.frames.size(); ++b) {
+    add(gradient_.frames[b], diagonal_.frames[b]);
+  }
+  return sum / 2;
+}
+
+}  // namespace krot
