@@ -21,8 +21,8 @@
 #include "krot/options/solve_options.h"
 #include "krot/options/solver_options.h"
 #include "krot/outliers/outlier_filter.h"
+#include "krot/outliers/tolerant_solve.h"
 #include "krot/pipeline/adjust_model.h"
-#include "krot/pipeline/solve_model.h"
 #include "krot/report/adjustment_report.h"
 #include "krot/report/comparison_report.h"
 #include "krot/report/outlier_report.h"
@@ -80,25 +80,23 @@ void Follow(const Progress& progress, SolveModelOptions* options) {
   };
 }
 
-using Solve = SolveModelResult (*)(const Model&, const SolveModelOptions&,
-                                   const Context&);
-
-Outcome RunSolve(const ModelPointer& model, SolveModelOptions options,
+Outcome RunSolve(const ModelPointer& model, TolerantSolveOptions options,
                  Context context, const Progress& progress,
-                 const std::string& command, Solve solve) {
+                 const std::string& command) {
   const Timer timer;
-  Follow(progress, &options);
-  options.describe_certificate = true;
-  SolveModelResult result;
+  Follow(progress, &options.solve);
+  options.solve.describe_certificate = true;
+  TolerantSolveResult result;
   RunInterruptibly([&](const CancelFlag& cancel) {
     context.cancel = &cancel;
-    result = solve(*model, options, context);
+    result = SolveTolerantly(*model, options, context);
   });
   SolveReport report;
   report.run = Describe(timer, context.num_threads);
   report.command = command;
   report.method = MethodName(result.summary.method);
   report.summary = std::move(result.summary);
+  report.outliers = std::move(result.outliers);
   Outcome outcome{std::make_shared<Model>(std::move(result.model)),
                   SolveJson(report), std::nullopt};
   if (report.summary.certificate) {
@@ -109,26 +107,25 @@ Outcome RunSolve(const ModelPointer& model, SolveModelOptions options,
 
 Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
                      const py::dict& keywords) {
-  SolveModelOptions options;
+  TolerantSolveOptions options;
   Context context;
   OptionTable table = TableOf("pykrot.solve");
-  std::optional<double> max_error;
-  AddSolverOptions(&options, &max_error, &context, &table);
+  AddSolverOptions(&options, &context, &table);
   AssignKeywords(keywords, &table);
-  ResolveSolverOptions(table, &options);
-  return RunSolve(model, options, context, progress, "solver", &SolveModel);
+  ResolveSolverOptions(table, &options.solve);
+  return RunSolve(model, options, context, progress, "solver");
 }
 
 Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
                            const py::dict& keywords) {
-  SolveModelOptions options;
+  TolerantSolveOptions options;
   Context context;
   OptionTable table = TableOf("pykrot.triangulate");
-  AddSolveOptions(&options, &context, &table);
+  AddSolveOptions(&options.solve, &context, &table);
   AssignKeywords(keywords, &table);
-  CheckSolveOptions(options, table);
-  return RunSolve(model, PointsOnly(options), context, progress,
-                  "point_triangulator", &SolveModel);
+  CheckSolveOptions(options.solve, table);
+  options.solve = PointsOnly(options.solve);
+  return RunSolve(model, options, context, progress, "point_triangulator");
 }
 
 Outcome FilterCommand(const ModelPointer& model, const Progress& progress,

@@ -32,7 +32,7 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
                       "lowest largest reprojection error of its track; the "
                       "frames stay");
   AddModelPaths(&command.paths, &parser);
-  AddSolveOptions(&command.options, &command.context, &parser);
+  AddSolveOptions(&command.options.solve, &command.context, &parser);
   RefuseDatabase(&parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "
@@ -42,8 +42,8 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;
   }
-  CheckSolveOptions(command.options, parser);
-  command.options = PointsOnly(command.options);
+  CheckSolveOptions(command.options.solve, parser);
+  command.options.solve = PointsOnly(command.options.solve);
   return RunSolveCommand(command);
 }
 

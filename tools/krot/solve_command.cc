@@ -6,7 +6,6 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
-#include "krot/outliers/outlier_filter.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -44,69 +43,31 @@ std::string MemoryWords(const SolveSummary& summary) {
               : std::string());
 }
 
-// Whether nothing came of a model without positions for want of a start that
-// has them all.
-bool NeedsRemoval(const SolveCommand& command, const SolveSummary& summary) {
-  return summary.termination == SolveTermination::kNothingToSolve &&
-         EffectiveMethod(command.options) == SolveMethod::kAuto &&
-         command.options.norm.p == 2;
-}
-
-// Without what does not fit within command.max_error, or a bound that is
-// chosen.
-Model SolveWithoutOutliers(const SolveCommand& command, const Model& model,
-                           const SolveModelOptions& solve,
-                           const Context& context, SolveReport* report) {
-  OutlierFilterOptions options;
-  options.max_error = command.max_error;
-  options.find_conflicts = !command.conflicts_path.empty();
-  options.solve = solve;
-  OutlierFilterResult result = FilterOutliers(model, options, context);
-  if (result.model.track_elements.empty() && !context.IsCancelled()) {
-    throw CommandError(kExitNothingToSolve,
-                       "nothing to solve: no track keeps two observations");
-  }
-  if (result.summary.solve) {
-    report->summary = *std::exchange(result.summary.solve, std::nullopt);
-    report->summary.init = result.summary.init;
-    report->summary.pixel_error_before = result.summary.pixel_error_before;
-    report->summary.pixel_error_after = result.summary.pixel_error_after;
-  }
-  report->outliers = std::move(result.summary);
-  return std::move(result.model);
-}
-
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
 Model Solve(const SolveCommand& command, const Model& model,
             const CancelFlag& cancel, SolveReport* report) {
   const LogOptions& log = command.common.log;
-  SolveModelOptions options = command.options;
+  TolerantSolveOptions options = command.options;
   Context context = command.context;
   context.cancel = &cancel;
-  SolveProgress progress(log, SolveProgress::GoalsOf(options));
-  progress.Follow(&options, &context);
-  options.describe_certificate = !command.certificate_path.empty();
-  options.on_built = [&](const SolveSummary& summary) {
+  SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
+  progress.Follow(&options.solve, &context);
+  options.find_conflicts = !command.conflicts_path.empty();
+  options.solve.describe_certificate = !command.certificate_path.empty();
+  options.solve.on_built = [&](const SolveSummary& summary) {
     ThrowIfInterrupted();
     if (summary.num_observations == 0) {
       throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
     }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
   };
-  Model solved;
-  if (!command.max_error) {
-    SolveModelResult result = SolveModel(model, options, context);
-    solved = std::move(result.model);
-    report->summary = std::move(result.summary);
-  }
-  if (command.max_error || NeedsRemoval(command, report->summary)) {
-    options.on_built = nullptr;
-    solved = SolveWithoutOutliers(command, model, options, context, report);
-  }
+  TolerantSolveResult result = SolveTolerantly(model, options, context);
   progress.Finish();
   ThrowIfInterrupted();
-  return solved;
+  report->summary = std::move(result.summary);
+  report->outliers = std::move(result.outliers);
+  return std::move(result.model);
 }
 
 void WriteConflicts(const SolveCommand& command, const SolveReport& report) {
@@ -125,12 +86,18 @@ void WriteCertificate(const SolveCommand& command,
 }
 
 // Where no model can be written: all that is left is a proof, maybe.
-void ThrowIfNoStart(const SolveCommand& command, const SolveSummary& summary) {
+void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
+  const SolveSummary& summary = report.summary;
+  if (report.outliers &&
+      summary.termination == SolveTermination::kNothingToSolve) {
+    throw CommandError(kExitNothingToSolve,
+                       "nothing to solve: no track keeps two observations");
+  }
   if (summary.termination == SolveTermination::kNothingToSolve) {
     throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
   }
   const std::string bound =
-      FormatNumber(command.options.init_max_error, 6) + " px";
+      FormatNumber(command.options.solve.init_max_error, 6) + " px";
   if (summary.termination == SolveTermination::kInfeasible) {
     WriteCertificate(command, summary);
     throw CommandError(
@@ -200,7 +167,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);
   }
-  ThrowIfNoStart(command, report.summary);
+  ThrowIfNoStart(command, report);
 
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, solved);

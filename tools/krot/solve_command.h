@@ -1,10 +1,9 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 
-#include "krot/pipeline/solve_model.h"
+#include "krot/outliers/tolerant_solve.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
 
@@ -17,13 +16,10 @@ struct SolveCommand {
   std::string method_name;  // for the report; "": that of the solve
   ModelPaths paths;
   std::string certificate_path;  // "": not wanted
-  // What does not fit within so many pixels is left out; none: nothing is, as
-  // long as there is a start for all.
-  std::optional<double> max_error;
-  std::string conflicts_path;  // "": not wanted
+  std::string conflicts_path;    // "": not wanted
   CommonOptions common;
-  SolveModelOptions options;  // its callbacks are set by the run
-  Context context;            // likewise, and the flag
+  TolerantSolveOptions options;  // its callbacks are set by the run
+  Context context;               // likewise, and the flag
 };
 
 // Returns an exit code or throws. Nothing is written before the solve is done:

@@ -11,7 +11,7 @@ namespace {
 
 // Why sweeps alone, where nobody asked for them by name.
 void ExplainMethod(const SolveCommand& command) {
-  const SolveModelOptions& options = command.options;
+  const SolveModelOptions& options = command.options.solve;
   if (options.method == EffectiveMethod(options)) return;
   const bool is_paper =
       options.res_int.fast_descent.settings == FastDescentSettings::kPaper;
@@ -38,8 +38,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "With Solver.max_error: where the proof goes of how "
                        "many observations must be left out, as JSON; it takes "
                        "most of the time");
-  AddSolverOptions(&command.options, &command.max_error, &command.context,
-                   &parser);
+  AddSolverOptions(&command.options, &command.context, &parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "
       "numbers",
@@ -48,7 +47,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;
   }
-  ResolveSolverOptions(parser, &command.options);
+  ResolveSolverOptions(parser, &command.options.solve);
   ExplainMethod(command);
   return RunSolveCommand(command);
 }

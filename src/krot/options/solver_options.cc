@@ -135,14 +135,14 @@ void ChooseSweeps(const OptionTable& table, SolveModelOptions* options) {
 
 }  // namespace
 
-void AddSolverOptions(SolveModelOptions* options,
-                      std::optional<double>* max_error, Context* context,
+void AddSolverOptions(TolerantSolveOptions* options, Context* context,
                       OptionTable* table) {
-  AddScheduleOptions(options, table);
-  AddMaxError(max_error, table);
-  AddFinishOptions(options, table);
-  AddSolveOptions(options, context, table);
-  AddResIntOptions(SolveModelOptions(), &options->res_int, table);
+  SolveModelOptions* solve = &options->solve;
+  AddScheduleOptions(solve, table);
+  AddMaxError(&options->max_error, table);
+  AddFinishOptions(solve, table);
+  AddSolveOptions(solve, context, table);
+  AddResIntOptions(SolveModelOptions(), &solve->res_int, table);
 }
 
 void ResolveSolverOptions(const OptionTable& table,

@@ -1,16 +1,12 @@
 #pragma once
 
-#include <optional>
-
 #include "krot/options/option_table.h"
-#include "krot/pipeline/solve_model.h"
+#include "krot/outliers/tolerant_solve.h"
 
 namespace krot {
 
-// The options of `solver`, without its paths. `max_error`: what does not fit
-// within so many pixels is left out; none: nothing is.
-void AddSolverOptions(SolveModelOptions* options,
-                      std::optional<double>* max_error, Context* context,
+// The options of `solver`, without its paths.
+void AddSolverOptions(TolerantSolveOptions* options, Context* context,
                       OptionTable* table);
 
 // Defaults that depend on others. Throws OptionError for pairs of options that

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+
+#include "krot/base/context.h"
+#include "krot/model/model.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/pipeline/solve_model.h"
+
+namespace krot {
+
+// SolveModel, without what cannot be served: what `krot solver` does between
+// reading and writing.
+
+struct TolerantSolveOptions {
+  SolveModelOptions solve;
+  // Few observations are removed so that all others are within so many pixels,
+  // > 0. None: all stay, unless the model holds no positions and no start
+  // serves all of them; then the bound is FilterOutliers' choice.
+  std::optional<double> max_error;
+  bool find_conflicts = false;  // the proof of how many had to go
+};
+
+struct TolerantSolveResult {
+  // A copy of the input if there is nothing to solve or no start.
+  Model model;
+  SolveSummary summary;
+  // If observations were removed; its own solve is the summary above.
+  std::optional<OutlierFilterSummary> outliers;
+};
+
+// Requires and throws what SolveModel and FilterOutliers do.
+TolerantSolveResult SolveTolerantly(const Model& model,
+                                    const TolerantSolveOptions& options,
+                                    const Context& context = {});
+
+}  // namespace krot
