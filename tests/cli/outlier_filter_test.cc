@@ -101,6 +101,56 @@ TEST_F(OutlierFilterCommand, ProvesNothingByTheThreshold) {
             1);
 }
 
+TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
+  const std::string profile = folder_ / "profile.json";
+  const std::vector<std::string> arguments = {"outlier_filter",
+                                              "--input_path",
+                                              folder_ / "input",
+                                              "--output_path",
+                                              folder_ / "output",
+                                              "--report_path",
+                                              folder_ / "r.json",
+                                              "--conflicts_path",
+                                              folder_ / "c.json",
+                                              "--OutlierFilter.profile_path",
+                                              profile};
+  const KrotResult result = RunKrot(arguments);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json json = Json::parse(ReadBytes(profile));
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(report["profile"]["levels"], json["levels"]);
+  const Json& levels = json["levels"];
+  const Json& chosen = json["elbow"].is_null()
+                           ? levels.back()
+                           : levels[json["elbow"].get<int>()];
+  EXPECT_EQ(report["max_error"], chosen["max_error"]);
+  EXPECT_EQ(report["num_removed"], chosen["num_removed"]);
+  EXPECT_GE(report["num_must_go"], chosen["num_must_go"]);
+  EXPECT_TRUE(report["is_within"]);
+  EXPECT_LE(levels.back()["max_error"].get<double>(),
+            0.5 * levels[0]["max_error"].get<double>());
+  EXPECT_EQ(Check("c.json").exit_code, 0);
+}
+
+TEST_F(OutlierFilterCommand, DrawsItsProfileDownToTheBoundThatIsGiven) {
+  const std::string profile = folder_ / "profile.json";
+  const KrotResult result = Filter({"--OutlierFilter.profile_path", profile});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json levels = Json::parse(ReadBytes(profile))["levels"];
+  EXPECT_LE(levels.back()["max_error"].get<double>(), 3);
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(report["max_error"], 3);
+  EXPECT_EQ(report["num_removed"], levels.back()["num_removed"]);
+}
+
+TEST_F(OutlierFilterCommand, RefusesToFilterWithoutABoundOrAProfile) {
+  const KrotResult result =
+      RunKrot({"outlier_filter", "--input_path", folder_ / "input",
+               "--output_path", folder_ / "output"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("--OutlierFilter.max_error is required"));
+}
+
 TEST_F(OutlierFilterCommand, RefusesABoundThatIsNoPositiveNumber) {
   EXPECT_EQ(RunKrot({"outlier_filter", "--input_path", folder_ / "input",
                      "--output_path", folder_ / "output",

@@ -42,7 +42,7 @@ TEST(FindRemoval, AndWhatIsProvedEncloseTheNumberOfPlantedOutliers) {
     const ErrorBound bound{Norm::L2(), 3};
     const Removal removal = FindRemoval(scene.model, built, bound, {});
     const std::vector<Conflict> conflicts =
-        PackAgainstRemoval(scene.model, built, bound, removal, {});
+        PackAgainstRemoval(scene.model, built, bound, removal, {}, {});
     EXPECT_LE(conflicts.size(), scene.outliers.size());
     EXPECT_LE(conflicts.size(), removal.observations.size());
     EXPECT_GE(2 * conflicts.size(), removal.observations.size());

@@ -23,6 +23,7 @@ struct OutlierCommand {
   ModelPaths paths;
   std::string conflicts_path;
   std::string outliers_path;
+  std::string profile_path;
   int num_threads = -1;
   OutlierFilterOptions options;
   CommonOptions common;
@@ -36,11 +37,21 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   parser->AddOutputFile("outliers_path", &command->outliers_path,
                         "Where the list of removed observations goes, as CSV");
   OutlierFilterOptions* options = &command->options;
-  parser->Add(
-      {"OutlierFilter.max_error", "The bound that all errors are to be within",
-       "a number > 0, pixels", "", true, [options](const std::string& text) {
-         return ParseReal(text, &options->max_error) && options->max_error > 0;
-       }});
+  parser->Add({"OutlierFilter.max_error",
+               "The bound that all errors are to be within; may be missing "
+               "with profile_path only, whose elbow it then is",
+               "a number > 0, pixels", "", false,
+               [options](const std::string& text) {
+                 double value = 0;
+                 if (!ParseReal(text, &value) || !(value > 0)) return false;
+                 options->max_error = value;
+                 return true;
+               }});
+  parser->AddOutputFile(
+      "OutlierFilter.profile_path", &command->profile_path,
+      "Where the error profile goes, as JSON: the largest error against the "
+      "number removed, down to max_error or half of the first; also on the "
+      "page");
   parser->AddNamed<OutlierMethod>(
       "OutlierFilter.method", &options->method,
       {{"conflicts", OutlierMethod::kConflicts},
@@ -61,9 +72,15 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
 
 void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
   if (command.options.method == OutlierMethod::kThreshold) {
-    parser.Refuse(
-        "conflicts_path",
-        "with --OutlierFilter.method threshold, which proves nothing");
+    for (const char* name : {"conflicts_path", "OutlierFilter.profile_path"}) {
+      parser.Refuse(
+          name, "with --OutlierFilter.method threshold, which proves nothing");
+    }
+  }
+  if (!command.options.max_error && command.profile_path.empty()) {
+    throw OptionError(
+        "--OutlierFilter.max_error is required without "
+        "--OutlierFilter.profile_path");
   }
 }
 
@@ -71,6 +88,7 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
                            const CancelFlag& cancel) {
   const LogOptions& log = command.common.log;
   OutlierFilterOptions options = command.options;
+  options.make_profile = !command.profile_path.empty();
   Context context;
   context.num_threads = command.num_threads;
   context.cancel = &cancel;
@@ -97,6 +115,7 @@ void WriteSideFiles(const OutlierCommand& command,
   if (!command.conflicts_path.empty() && report.summary.conflicts) {
     write(command.conflicts_path, ConflictJson(*report.summary.conflicts));
   }
+  if (report.summary.profile) write(command.profile_path, ProfileJson(report));
   if (!command.outliers_path.empty()) {
     write(command.outliers_path, OutlierCsv(report.summary));
   }
@@ -110,6 +129,8 @@ int Run(const OutlierCommand& command) {
   const WriteModelOptions write_options = CheckModelPaths(paths);
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
+  CheckSidePath("OutlierFilter.profile_path", command.profile_path,
+                paths.output_path);
   OutlierReport report;
   report.run.version = KROT_VERSION;
   report.run.threads = ResolveNumThreads(command.num_threads);

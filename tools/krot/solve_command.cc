@@ -58,8 +58,7 @@ Model SolveWithoutOutliers(const SolveCommand& command, const Model& model,
                            const SolveModelOptions& solve,
                            const Context& context, SolveReport* report) {
   OutlierFilterOptions options;
-  options.choose_max_error = !command.max_error;
-  options.max_error = command.max_error.value_or(0);
+  options.max_error = command.max_error;
   options.find_conflicts = !command.conflicts_path.empty();
   options.solve = solve;
   OutlierFilterResult result = FilterOutliers(model, options, context);

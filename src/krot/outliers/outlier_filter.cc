@@ -1,16 +1,14 @@
 #include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
-#include "krot/model/id_index.h"
-#include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
 #include "krot/outliers/element_index.h"
+#include "krot/outliers/error_profile.h"
+#include "krot/outliers/list_removed.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/removal_start.h"
@@ -24,7 +22,6 @@ namespace {
 // What rounding may add to an error on its way into a model, relative.
 constexpr double kWithin = 1e-9;
 constexpr int kMaxThresholdSolves = 50;
-constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
 
 class OutlierFilter {
  public:
@@ -33,7 +30,7 @@ class OutlierFilter {
       : model_(model),
         options_(options),
         context_(context),
-        max_error_(options.max_error),
+        bound_{options.solve.norm, options.max_error.value_or(0)},
         errors_before_(PixelErrors(model, context.num_threads)),
         is_removed_(model.track_elements.size(), 0),
         conflict_of_(model.track_elements.size(), -1) {}
@@ -41,24 +38,23 @@ class OutlierFilter {
   OutlierFilterResult Run();
 
  private:
-  ErrorBound Bound() const { return {options_.solve.norm, max_error_}; }
   bool IsWithin(double error) const {
-    return error <= (1 + kWithin) * max_error_;
+    return error <= (1 + kWithin) * bound_.max_error;
   }
   void FilterByConflicts();
   void FilterByThreshold();
+  Removal RemoveFew(const BuiltProblem& built, std::vector<Conflict>* found);
+  Removal MakeProfile(const BuiltProblem& built, std::vector<Conflict>* found);
   void Pack(const BuiltProblem& built, const Removal& removal,
-            const std::vector<uint64_t>& elements);
+            std::vector<Conflict> found, const std::vector<uint64_t>& elements);
   void PlaceAt(const BuiltProblem& built, const Removal& removal, Model* moved);
   void Solve(Model moved);
   bool RemoveAbove();
-  std::vector<double> ErrorsAfter() const;
-  void ListRemoved();
 
   const Model& model_;
   const OutlierFilterOptions& options_;
   const Context& context_;
-  double max_error_;                         // the bound, pixels
+  ErrorBound bound_;
   const std::vector<double> errors_before_;  // per track element
   std::vector<char> is_removed_;
   std::vector<int64_t> conflict_of_;
@@ -88,12 +84,52 @@ void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
   *moved = ApplyEstimate(model_, built, placed);
 }
 
+// Conflicts that are at hand already go to `found`.
+Removal OutlierFilter::RemoveFew(const BuiltProblem& built,
+                                 std::vector<Conflict>* found) {
+  if (options_.make_profile) return MakeProfile(built, found);
+  const Timer timer;
+  Removal removal = FindRemoval(model_, built, bound_, context_);
+  summary_.seconds_removal = timer.Seconds();
+  return removal;
+}
+
+// The removal of the profile's level that is asked for; sets the bound where
+// that was not given.
+Removal OutlierFilter::MakeProfile(const BuiltProblem& built,
+                                   std::vector<Conflict>* found) {
+  const Timer timer;
+  ErrorProfileOptions options;
+  options.norm = bound_.norm;
+  options.max_error = options_.max_error;
+  ErrorProfile profile = FindErrorProfile(model_, built, options, context_);
+  ErrorProfileSummary& summary = summary_.profile.emplace();
+  for (const ProfileLevel& level : profile.levels) {
+    summary.levels.push_back(
+        {static_cast<int64_t>(level.removal.observations.size()),
+         level.max_error, level.lower_bound, level.num_proved});
+  }
+  summary.elbow = profile.elbow;
+  summary.seconds = timer.Seconds();
+  const size_t last = profile.levels.size() - 1;
+  const size_t chosen =
+      options_.max_error ? last : profile.elbow.value_or(last);
+  if (!options_.max_error) bound_.max_error = profile.levels[chosen].max_error;
+  for (Conflict& conflict : profile.conflicts) {
+    if (conflict.proof.lower_bound > bound_.max_error) {
+      found->push_back(std::move(conflict));
+    }
+  }
+  return std::move(profile.levels[chosen].removal);
+}
+
 void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
+                         std::vector<Conflict> found,
                          const std::vector<uint64_t>& elements) {
   const Timer timer;
   std::vector<PixelCertificate> proofs;
-  for (Conflict& conflict :
-       PackAgainstRemoval(model_, built, Bound(), removal, context_)) {
+  for (Conflict& conflict : PackAgainstRemoval(model_, built, bound_, removal,
+                                               std::move(found), context_)) {
     for (const int64_t i : conflict.observations) {
       conflict_of_[elements[i]] = summary_.num_proved;
     }
@@ -101,8 +137,8 @@ void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
     summary_.num_irreducible += conflict.is_irreducible;
     proofs.push_back(std::move(conflict.proof));
   }
-  summary_.conflicts =
-      DescribeConflicts(model_, built, options_.solve.norm, max_error_, proofs);
+  summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
+                                         bound_.max_error, proofs);
   summary_.seconds_conflicts = timer.Seconds();
 }
 
@@ -116,7 +152,7 @@ void OutlierFilter::Solve(Model moved) {
     SolveModelOptions options = options_.solve;
     options.init = SolveInit::kModel;
     options.polish = Polish::kNone;
-    options.finish.max_error = max_error_;
+    options.finish.max_error = bound_.max_error;
     SolveModelResult solved = SolveModel(kept_.model, options, context_);
     kept_.model = std::move(solved.model);
     summary_.solve = std::move(solved.summary);
@@ -139,17 +175,16 @@ bool OutlierFilter::RemoveAbove() {
 }
 
 void OutlierFilter::FilterByConflicts() {
-  const Timer timer;
   const RemovalStart start = FindRemovalStart(model_, options_, context_);
   const BuiltProblem& built = start.built;
   summary_.init = start.init;
-  max_error_ = start.max_error;
+  bound_.max_error = start.max_error;
   const std::vector<uint64_t> elements = ElementsOf(model_, built);
-  const Removal removal = FindRemoval(model_, built, Bound(), context_);
+  std::vector<Conflict> found;
+  const Removal removal = RemoveFew(built, &found);
   for (const int64_t i : removal.observations) is_removed_[elements[i]] = 1;
-  summary_.seconds_removal = timer.Seconds();
   if (context_.IsCancelled()) return;
-  if (options_.find_conflicts) Pack(built, removal, elements);
+  if (options_.find_conflicts) Pack(built, removal, std::move(found), elements);
   if (options_.on_removed) {
     options_.on_removed(static_cast<int64_t>(removal.observations.size()));
   }
@@ -181,53 +216,6 @@ void OutlierFilter::FilterByThreshold() {
            summary_.num_solves < kMaxThresholdSolves && RemoveAbove());
 }
 
-// The errors that the input's track elements have in the result; NaN where the
-// point went.
-std::vector<double> OutlierFilter::ErrorsAfter() const {
-  Model model = model_;
-  model.frames = kept_.model.frames;
-  for (size_t n = 0; n < model.images.size(); ++n) {
-    model.images[n].cam_from_world = kept_.model.images[n].cam_from_world;
-  }
-  const IdIndex<Point3DId> kept_points(kept_.model.points3D);
-  for (Point3D& point : model.points3D) {
-    const std::optional<int32_t> k = kept_points.Find(point.id);
-    point.xyz =
-        k ? kept_.model.points3D[*k].xyz : Eigen::Vector3d::Constant(kNoError);
-  }
-  return PixelErrors(model, context_.num_threads);
-}
-
-void OutlierFilter::ListRemoved() {
-  const std::vector<double> errors_after = ErrorsAfter();
-  const auto image_of = ImageIndices(model_);
-  for (const Point3D& point : model_.points3D) {
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (!is_removed_[e]) continue;
-      const TrackElement& element = model_.track_elements[e];
-      RemovedObservation removed;
-      removed.image_id = element.image_id;
-      removed.image_name = model_.images[image_of.at(element.image_id)].name;
-      removed.point2D_idx = element.point2D_idx;
-      removed.point3D_id = point.id;
-      removed.error_before_px = errors_before_[e];
-      removed.error_after_px = errors_after[e];
-      if (conflict_of_[e] >= 0) removed.conflict = conflict_of_[e];
-      summary_.removed.push_back(std::move(removed));
-    }
-  }
-  std::stable_sort(
-      summary_.removed.begin(), summary_.removed.end(),
-      [](const RemovedObservation& a, const RemovedObservation& b) {
-        const auto key = [](const RemovedObservation& o) {
-          return std::isnan(o.error_before_px)
-                     ? std::numeric_limits<double>::infinity()
-                     : o.error_before_px;
-        };
-        return key(a) > key(b);
-      });
-}
-
 OutlierFilterResult OutlierFilter::Run() {
   summary_.method = options_.method;
   summary_.norm = options_.solve.norm;
@@ -240,7 +228,7 @@ OutlierFilterResult OutlierFilter::Run() {
   } else {
     FilterByThreshold();
   }
-  summary_.max_error = max_error_;
+  summary_.max_error = bound_.max_error;
   if (context_.IsCancelled()) return {model_, std::move(summary_)};
   const std::vector<double> errors =
       PixelErrors(kept_.model, context_.num_threads);
@@ -251,7 +239,8 @@ OutlierFilterResult OutlierFilter::Run() {
                   [this](double error) { return IsWithin(error); });
   summary_.num_left_alone = kept_.num_left_alone;
   summary_.num_points_removed = kept_.num_points;
-  ListRemoved();
+  summary_.removed = ListRemoved(model_, kept_.model, errors_before_,
+                                 is_removed_, conflict_of_, context_);
   RankSuspects(model_, is_removed_, conflict_of_, &summary_);
   if (options_.solve.polish != Polish::kNone && summary_.solve) {
     summary_.solve->polish =
@@ -266,8 +255,11 @@ OutlierFilterResult OutlierFilter::Run() {
 OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context) {
-  CheckArgument(options.max_error > 0 || options.choose_max_error, "max_error",
-                options.max_error, "> 0");
+  CheckArgument(!options.max_error || *options.max_error > 0, "max_error",
+                options.max_error.value_or(0), "> 0");
+  CheckArgument(
+      !options.make_profile || options.method == OutlierMethod::kConflicts,
+      "make_profile", options.make_profile, "false with this method");
   CheckArgument(options.solve.norm.p == 2, "norm.p", options.solve.norm.p,
                 "2, that of pixel errors");
   return OutlierFilter(model, options, context).Run();

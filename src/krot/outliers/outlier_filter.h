@@ -25,10 +25,11 @@ enum class OutlierMethod {
 
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
-  double max_error = 0;  // the bound, true pixels; > 0
-  // In place of max_error, from nothing: ten times the median error of the
-  // start.
-  bool choose_max_error = false;
+  // The bound, true pixels; > 0. It may be missing: with a profile it is then
+  // the largest error of the profile's elbow, or of its last level; otherwise,
+  // from nothing, ten times the median error of the start.
+  std::optional<double> max_error;
+  bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // kConflicts: the proof, most of the time
   // Of what is left; its norm is the errors'. Its init kFeasible is from
   // nothing but rotations and tracks, and so is any model whose cameras have no
@@ -60,6 +61,20 @@ struct Suspect {
   int64_t num_conflicts = 0;  // that it takes part in
 };
 
+// error_profile.h, in numbers.
+struct ErrorProfileSummary {
+  struct Level {
+    int64_t num_removed = 0;
+    double max_error = 0;  // of all others, true pixels
+    std::optional<double> lower_bound;
+    int64_t num_proved = 0;
+  };
+
+  std::vector<Level> levels;
+  std::optional<size_t> elbow;
+  double seconds = 0;  // wall clock
+};
+
 struct OutlierFilterSummary {
   OutlierMethod method = OutlierMethod::kConflicts;
   double max_error = 0;  // true pixels
@@ -84,6 +99,7 @@ struct OutlierFilterSummary {
   PixelErrorStatistics pixel_error_after;
   // Whether all errors of the result are within the bound.
   bool is_within = false;
+  std::optional<ErrorProfileSummary> profile;  // if asked for
   std::optional<SolveSummary> solve;  // of what is left; none if nothing is
   int num_solves = 0;
 

@@ -25,7 +25,7 @@ class Packing {
  public:
   Packing(const Model& model, const BuiltProblem& built,
           const ErrorBound& bound, const Removal& removal,
-          const Context& context)
+          std::vector<Conflict> found, const Context& context)
       : model_(model),
         built_(built),
         problem_(built.problem),
@@ -38,6 +38,7 @@ class Packing {
     small_context_ = context;
     small_context_.num_threads = 1;
     for (const int64_t i : removal.observations) is_free_[i] = 0;
+    for (Conflict& conflict : found) Take(std::move(conflict));
   }
 
   std::vector<Conflict> Run();
@@ -156,6 +157,7 @@ std::vector<Conflict> Packing::Run() {
   const Reprojection reprojection(model_, built_);
   std::vector<std::pair<double, int64_t>> open;  // -error, observation
   for (const int64_t i : removal_.observations) {
+    if (IsTaken(i)) continue;
     open.emplace_back(-reprojection.Error(removal_.estimate, bound_.norm, i),
                       i);
   }
@@ -191,8 +193,9 @@ std::vector<Conflict> PackAgainstRemoval(const Model& model,
                                          const BuiltProblem& built,
                                          const ErrorBound& bound,
                                          const Removal& removal,
+                                         std::vector<Conflict> found,
                                          const Context& context) {
-  return Packing(model, built, bound, removal, context).Run();
+  return Packing(model, built, bound, removal, std::move(found), context).Run();
 }
 
 }  // namespace krot

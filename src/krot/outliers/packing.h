@@ -21,10 +21,14 @@ namespace krot {
 // first among those that are neither removed nor taken already, so that no
 // other has to share the charge, then with the removed ones that found none.
 // Small conflicts leave more to others.
+//
+// Those that are `found` already, without a common observation, stay, and come
+// first.
 std::vector<Conflict> PackAgainstRemoval(const Model& model,
                                          const BuiltProblem& built,
                                          const ErrorBound& bound,
                                          const Removal& removal,
+                                         std::vector<Conflict> found,
                                          const Context& context);
 
 }  // namespace krot

@@ -5,6 +5,8 @@
 
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/reprojection.h"
+#include "krot/minimax/norm.h"
 #include "krot/model/model.h"
 #include "krot/outliers/decision.h"
 
@@ -21,10 +23,46 @@ struct Removal {
 };
 
 // Few observations to remove, by the excess programme (conic/excess_program.h):
-// solved, and solved again with weights that make those dear that exceed the
-// bound by little, as long as that makes them fewer [Candes, Wakin, Boyd 2008];
-// rows are taken anew each time. Points then take back what they can where the
-// frames stand. Never more than are above the bound at built.start.
+// solved with weights that make those dear that exceed the bound by little at
+// the start, and again with those of the solution, as long as that makes them
+// fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. Points then
+// take back what they can where the frames stand. Never more than are above the
+// bound at built.start.
+//
+// One bound after the other: each begins with the estimate and the weights that
+// the last one ended with.
+class RemovalSearch {
+ public:
+  // Keeps references.
+  RemovalSearch(const Model& model, const BuiltProblem& built, Norm norm,
+                const Context& context);
+
+  // max_error in true pixels, > 0; solves at most so many programmes, >= 1.
+  Removal Find(double max_error, int max_programmes);
+
+ private:
+  double Error(const Estimate& estimate, int64_t i) const {
+    return reprojection_.Error(estimate, norm_, i);
+  }
+  std::vector<int64_t> Above(const Estimate& estimate) const;
+  std::vector<double> WeightsAtStart() const;
+  void Excess(const std::vector<int64_t>& component, double smallest_mu);
+  void Offer(const Estimate& estimate, Removal* best) const;
+  bool TakeBack(Removal* best);
+
+  const BuiltProblem& built_;
+  const Norm norm_;
+  const Context context_;
+  const Reprojection reprojection_;
+  const std::vector<std::vector<int64_t>> components_;
+  double max_error_ = 0;
+  KnownRotationProblem rows_;
+  Estimate estimate_;  // of the last programme
+  std::vector<double> weights_;
+  std::vector<char> is_tight_;
+};
+
+// With a bound alone.
 Removal FindRemoval(const Model& model, const BuiltProblem& built,
                     const ErrorBound& bound, const Context& context);
 

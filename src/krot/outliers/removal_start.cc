@@ -20,16 +20,15 @@ void PlaceFromTracks(const OutlierFilterOptions& options,
   start->init = SolveInit::kFeasible;
   const KnownRotationProblem& problem = start->built.problem;
   const Norm norm = options.solve.norm;
-  const double level = options.choose_max_error
-                           ? kLevelOfStart
-                           : std::min(kLevelOfStart, start->max_error);
+  const double level =
+      std::min(kLevelOfStart, options.max_error.value_or(kLevelOfStart));
   start->built.start = FindRobustStart(problem, norm, level, context);
   const double median = MedianError(problem, start->built.start, norm);
   std::ostringstream words;
   words.precision(3);
   words << "positions from rotations and tracks: the median error is " << median
         << " px; leaving out what does not fit within ";
-  if (options.choose_max_error) {
+  if (!options.max_error && !options.make_profile) {
     start->max_error = std::max(kBoundPerMedian * median, kLeastBound);
     words << kBoundPerMedian << " times that, ";
   }
@@ -46,7 +45,7 @@ RemovalStart FindRemovalStart(const Model& model,
   build.num_threads = context.num_threads;
   build.ignore_translations = options.solve.init == SolveInit::kFeasible;
   RemovalStart start;
-  start.max_error = options.max_error;
+  start.max_error = options.max_error.value_or(0);
   start.built = BuildProblem(model, build);
   if (!build.ignore_translations && !HasOwnStart(start.built)) {
     build.ignore_translations = true;

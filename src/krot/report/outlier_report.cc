@@ -66,6 +66,32 @@ Json SolveOfRestJson(const std::optional<SolveSummary>& solve) {
           {"relative_gap", NumberOrNull(solve->relative_gap)}};
 }
 
+Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
+  Json levels = Json::array();
+  for (const ErrorProfileSummary::Level& level : profile.levels) {
+    levels.push_back({{"num_removed", level.num_removed},
+                      {"max_error", level.max_error},
+                      {"lower_bound", NumberOrNull(level.lower_bound)},
+                      {"num_must_go", level.num_proved}});
+  }
+  return {{"levels", std::move(levels)},
+          {"elbow", profile.elbow ? Json(*profile.elbow) : Json()}};
+}
+
+std::string ProfileTable(const ErrorProfileSummary& profile) {
+  TextTable table;
+  table.AddRow({"removed", "must go", "largest error", "proved"});
+  for (size_t n = 0; n < profile.levels.size(); ++n) {
+    const ErrorProfileSummary::Level& level = profile.levels[n];
+    table.AddRow({Thousands(level.num_removed), Thousands(level.num_proved),
+                  FormatNumber(level.max_error, 4),
+                  level.lower_bound ? FormatNumber(*level.lower_bound, 4) : "",
+                  profile.elbow == n ? "<- elbow" : ""});
+  }
+  return "\nLargest error without some observations, pixels\n" +
+         table.ToString();
+}
+
 std::string SuspectTable(const OutlierFilterSummary& summary) {
   if (summary.images.empty()) return "";
   TextTable table;
@@ -111,8 +137,9 @@ std::string OutlierTable(const OutlierReport& report) {
   errors.AddRow({"", "before", "after"});
   AddErrorColumns({summary.pixel_error_before, summary.pixel_error_after},
                   &errors);
-  text += "\nReprojection errors, pixels\n" + errors.ToString() +
-          SuspectTable(summary) + "\n";
+  text += "\nReprojection errors, pixels\n" + errors.ToString();
+  if (summary.profile) text += ProfileTable(*summary.profile);
+  text += SuspectTable(summary) + "\n";
   return text +
          RunSentence(
              report.run,
@@ -142,6 +169,8 @@ std::string OutlierJson(const OutlierReport& report) {
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"profile",
+       summary.profile ? ProfileLevelsJson(*summary.profile) : Json()},
       {"solve", SolveOfRestJson(summary.solve)},
       {"num_solves", summary.num_solves},
       {"removed", RemovedJson(summary.removed)},
@@ -151,6 +180,7 @@ std::string OutlierJson(const OutlierReport& report) {
         {"cameras", SuspectsJson(summary.cameras, "camera_id")}}},
       {"seconds",
        {{"read", report.run.seconds_read},
+        {"profile", summary.profile ? Json(summary.profile->seconds) : Json()},
         {"removal", summary.seconds_removal},
         {"conflicts", summary.seconds_conflicts},
         {"solve", summary.seconds_solve},
@@ -160,6 +190,17 @@ std::string OutlierJson(const OutlierReport& report) {
       {"threads", report.run.threads},
       {"seed", report.run.seed},
   };
+  return ReportText(json);
+}
+
+std::string ProfileJson(const OutlierReport& report) {
+  const OutlierFilterSummary& summary = report.summary;
+  Json json = {{"version", report.run.version},
+               {"command", "outlier_filter"},
+               {"norm", NormName(summary.norm)},
+               {"num_observations", summary.num_observations}};
+  json.update(ProfileLevelsJson(*summary.profile));
+  json["seconds"] = summary.profile->seconds;
   return ReportText(json);
 }
 

@@ -24,6 +24,9 @@ std::string OutlierTable(const OutlierReport& report);
 // report.json; the keys are listed in docs/cli.md. What is not known is null.
 std::string OutlierJson(const OutlierReport& report);
 
+// The error profile alone (docs/formats.md), which there must be.
+std::string ProfileJson(const OutlierReport& report);
+
 // One line per removed observation, worst first, behind a line of names.
 std::string OutlierCsv(const OutlierFilterSummary& summary);
 

@@ -43,6 +43,11 @@ export function isComparison(report) {
   return report.command === 'model_comparer';
 }
 
+// Whether observations were removed.
+export function isFilter(report) {
+  return report.command === 'outlier_filter';
+}
+
 // Whether the cost is a largest error in pixels, and may have a proof.
 export function isMinimax(report) {
   return 'certified' in report;

@@ -9,6 +9,7 @@ import { errorsTable } from './errors_table.js';
 import { cards, differencesTable, factsTable } from './facts.js';
 import { counted } from './format.js';
 import { imagesTable, pairImages, supportTable } from './lists.js';
+import { profileChart, profileTable } from './profile.js';
 import { scope, verdict } from './verdict.js';
 import { Viewer } from './viewer.js';
 
@@ -46,6 +47,13 @@ function showCourse(report) {
   byId('course').hidden = !chart;
 }
 
+function showProfile({ profile }) {
+  byId('profile-section').hidden = !profile;
+  if (!profile) return;
+  byId('profile-chart').append(profileChart(profile));
+  byId('profile').append(profileTable(profile));
+}
+
 function showDifferences(report) {
   byId('differences-section').hidden = !isComparison(report);
   if (isComparison(report)) {
@@ -66,6 +74,7 @@ function showPage(report, models) {
   byId('curves').append(histogramChart(models, labels),
     tailChart(models, labels));
   byId('facts').append(factsTable(report));
+  showProfile(report);
   showDifferences(report);
   showCourse(report);
   const show = showViewer(

@@ -1,7 +1,7 @@
 import {
-  costIsLargestError, isComparison, isMinimax, modelErrors,
+  costIsLargestError, isComparison, isFilter, isMinimax, modelErrors,
 } from './data.js';
-import { lowerBound } from './format.js';
+import { count, counted, lowerBound } from './format.js';
 
 function movement(before, after, decimals) {
   const from = before.toFixed(decimals);
@@ -17,6 +17,15 @@ function proof(report) {
   return `. The cost, which is the largest error of the observations that ` +
     `took part in the optimisation (p = ${report.norm}), ` +
     `${movement(report.cost_initial, report.cost_final, 4)}; ${bound}.`;
+}
+
+// A bracket for the fewest that do.
+function filterVerdict(report) {
+  const removed = `Without ${count(report.num_removed)} of ${
+    counted(report.num_observations, 'observation')} all others are within ${
+    report.max_error.toFixed(2)} px`;
+  return report.num_must_go === null ? `${removed}.` :
+    `${removed}; at least ${count(report.num_must_go)} must go (proved).`;
 }
 
 // Least squares lower the mean error; the largest may go either way.
@@ -46,6 +55,7 @@ export function verdict(report) {
     return `The largest error of model 1 is ${before.max.toFixed(2)} px, ` +
       `of model 2 ${after.max.toFixed(2)} px.`;
   }
+  if (isFilter(report)) return filterVerdict(report);
   if (!isMinimax(report)) return adjustmentVerdict(report, before, after);
   if (report.is_given_back) {
     return 'No better estimate was found: the model is the one that was read.' +

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/bridge/bridge.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/minimax/norm.h"
+#include "krot/model/model.h"
+#include "krot/outliers/conflict.h"
+#include "krot/outliers/removal.h"
+
+namespace krot {
+
+// How low the largest error can be without some of the observations.
+
+struct ErrorProfileOptions {
+  Norm norm;
+  // The last level's largest error, true pixels; > 0. None: half of the first.
+  std::optional<double> max_error;
+  double relative_gap = 1e-3;  // of every level; > 0
+  int num_levels = 6;          // about, below the first; >= 1
+  // Levels with more observations removed are asked for no conflicts of their
+  // own.
+  size_t max_charged = 50;
+};
+
+struct ProfileLevel {
+  // What is left out, and where all others are within max_error.
+  Removal removal;
+  double max_error = 0;  // true pixels
+  // That no translations and points bring all others below; true pixels, 0
+  // without a proof, which CheckPixelCertificate accepted otherwise.
+  double lower_bound = 0;
+  std::optional<PixelCertificate> proof;  // of the built problem
+  // So many must go at least for all others to be within max_error: the first
+  // so many conflicts of the profile.
+  int64_t num_proved = 0;
+};
+
+struct ErrorProfile {
+  // More removed and a lower maximum from each to the next; nothing is removed
+  // in the first.
+  std::vector<ProfileLevel> levels;
+  std::vector<Conflict> conflicts;  // disjoint
+  // The level farthest below the straight line from the first to the last,
+  // numbers removed and logarithms of the largest errors each in units of what
+  // they change by [Satopaa, Albrecht, Irwin, Raghavan 2011]; none of fewer
+  // than three.
+  std::optional<size_t> elbow;
+};
+
+// From one optimum to the next: observations are removed for a bound below it
+// (RemovalSearch), in equal ratios down to the last, and what is left is solved
+// anew (SolveInRounds). Tracks that keep one observation hold nothing any more
+// and have no part in the errors. Cancelled, it ends with the levels so far.
+// Every level takes about as long as two solves.
+ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
+                              const ErrorProfileOptions& options,
+                              const Context& context);
+
+}  // namespace krot
