@@ -118,7 +118,8 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "lower_bound", "relative_gap", "certified", "pixel_error", "polish",
           "sweeps", "iterations", "support", "seconds", "peak_memory_bytes",
           "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
-          "linear_relative_gap", "is_given_back", "contradictions", "finish"));
+          "linear_relative_gap", "is_given_back", "contradictions", "finish",
+          "same_image", "outliers"));
   EXPECT_THAT(Keys(report["finish"]),
               ::testing::UnorderedElementsAre(
                   "finish", "loss", "termination", "cap", "lowest_cost",
@@ -126,8 +127,8 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
                   "num_active", "num_iterations", "seconds"));
   EXPECT_EQ(
       Keys(report["left_out"]),
-      (std::vector<std::string>{"behind", "no_pose", "off_axis", "short_track",
-                                "single_ray", "undistortion"}));
+      (std::vector<std::string>{"behind", "no_pose", "off_axis", "same_image",
+                                "short_track", "single_ray", "undistortion"}));
   EXPECT_EQ(Keys(report["pixel_error"]),
             (std::vector<std::string>{"after", "before"}));
   EXPECT_EQ(Keys(report["pixel_error"]["after"]),

@@ -184,9 +184,7 @@ void OutlierFilter::FilterByConflicts() {
   const Removal removal = RemoveFew(built, &found);
   for (const int64_t i : removal.observations) is_removed_[elements[i]] = 1;
   if (context_.IsCancelled()) return;
-  if (options_.find_conflicts) {
-    Pack(built, removal, std::move(found), elements);
-  }
+  if (options_.find_conflicts) Pack(built, removal, std::move(found), elements);
   if (options_.on_removed) {
     options_.on_removed(static_cast<int64_t>(removal.observations.size()));
   }
@@ -257,11 +255,8 @@ OutlierFilterResult OutlierFilter::Run() {
 OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context) {
-  CheckArgument(options.max_error.value_or(1) > 0, "max_error",
+  CheckArgument(!options.max_error || *options.max_error > 0, "max_error",
                 options.max_error.value_or(0), "> 0");
-  CheckArgument(
-      options.max_error || options.method == OutlierMethod::kConflicts,
-      "max_error", "none", "given with this method");
   CheckArgument(
       !options.make_profile || options.method == OutlierMethod::kConflicts,
       "make_profile", options.make_profile, "false with this method");

@@ -18,8 +18,9 @@ namespace {
 // Of the bound: what the interior point leaves open.
 constexpr double kInside = 1e-3;
 constexpr int kMaxProgrammes = 4;
-// Of the bound, where their interior point ends.
-constexpr double kRemovalMu = 1e-3;
+// Where the programmes end, of the bound, and where the last one does.
+constexpr double kRoughMu = 1e-3;
+constexpr double kFineMu = 1e-5;
 // In units of the bound: what an error at the start counts for at most.
 constexpr double kLargestExcess = 100;
 // Observations with less of a multiplier have no say.
@@ -60,11 +61,12 @@ std::vector<double> RemovalSearch::WeightsAtStart() const {
 
 // Solves a component's programme, with rows as they are, and sets the weights
 // of the next.
-void RemovalSearch::Excess(const std::vector<int64_t>& component) {
+void RemovalSearch::Excess(const std::vector<int64_t>& component,
+                           double smallest_mu) {
   const ProblemSubset part(rows_, component);
   ExcessOptions options;
   options.norm = norm_;
-  options.smallest_mu = kRemovalMu;
+  options.smallest_mu = smallest_mu;
   for (const int64_t i : component) options.weights.push_back(weights_[i]);
   Estimate own = part.Restrict(estimate_);
   const double level = (1 - kInside) * max_error_;
@@ -142,15 +144,20 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   best.estimate = built_.start;
   best.observations = Above(built_.start);
   Offer(estimate_, &best);
-  if (weights_.empty()) weights_ = WeightsAtStart();
   is_tight_.assign(rows_.observations.size(), 0);
+  if (weights_.empty()) weights_ = WeightsAtStart();
+  bool is_settled = false;
   for (int n = 0; n < max_programmes && !context_.IsCancelled(); ++n) {
     if (best.observations.empty()) break;
+    const bool is_last = is_settled || n + 1 == max_programmes;
     reprojection_.TakeRows(estimate_, context_.num_threads, &rows_);
-    for (const std::vector<int64_t>& component : components_) Excess(component);
+    for (const std::vector<int64_t>& component : components_) {
+      Excess(component, is_last ? kFineMu : kRoughMu);
+    }
     const size_t before = best.observations.size();
     Offer(estimate_, &best);
-    if (n > 0 && best.observations.size() >= before) break;
+    if (is_last) break;
+    is_settled = n > 0 && best.observations.size() >= before;
   }
   while (!context_.IsCancelled() && TakeBack(&best)) {
   }

@@ -23,10 +23,11 @@ struct Removal {
 };
 
 // Few observations to remove, by the excess programme (conic/excess_program.h):
-// solved, and solved again with weights that make those dear that exceed the
-// bound by little, as long as that makes them fewer [Candes, Wakin, Boyd 2008];
-// rows are taken anew each time. Points then take back what they can where the
-// frames stand. Never more than are above the bound at built.start.
+// solved with weights that make those dear that exceed the bound by little at
+// the start, and again with those of the solution, as long as that makes them
+// fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. Points then
+// take back what they can where the frames stand. Never more than are above the
+// bound at built.start.
 //
 // One bound after the other: each begins with the estimate and the weights that
 // the last one ended with.
@@ -45,7 +46,7 @@ class RemovalSearch {
   }
   std::vector<int64_t> Above(const Estimate& estimate) const;
   std::vector<double> WeightsAtStart() const;
-  void Excess(const std::vector<int64_t>& component);
+  void Excess(const std::vector<int64_t>& component, double smallest_mu);
   void Offer(const Estimate& estimate, Removal* best) const;
   bool TakeBack(Removal* best);
 
@@ -56,8 +57,8 @@ class RemovalSearch {
   const std::vector<std::vector<int64_t>> components_;
   double max_error_ = 0;
   KnownRotationProblem rows_;
-  Estimate estimate_;            // of the last programme
-  std::vector<double> weights_;  // of the next; empty before the first
+  Estimate estimate_;  // of the last programme
+  std::vector<double> weights_;
   std::vector<char> is_tight_;
 };
 

@@ -1,0 +1,116 @@
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+// `krot solver` on rotations and tracks alone, outliers among them.
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+using Json = nlohmann::json;
+
+class RawTracks : public ::testing::Test {
+ protected:
+  RawTracks() {
+    SceneOptions options = SmallScene();
+    options.outlier_ratio = 0.05;
+    Model model = WithoutTranslations(SynthesizeScene(options).model);
+    for (Point3D& point : model.points3D) point.xyz.setZero();
+    Save(model, folder_ / "input");
+  }
+
+  KrotResult Solve(const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments = {
+        "solver",           "--input_path",  folder_ / "input", "--output_path",
+        folder_ / "output", "--report_path", folder_ / "r.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  }
+  Json Report() const { return Json::parse(ReadBytes(folder_ / "r.json")); }
+
+  TempFolder folder_;
+};
+
+TEST_F(RawTracks, AreSolvedWithinTheBoundWithAProofOfWhatWasLeftOut) {
+  const KrotResult result =
+      Solve({"--Solver.init", "feasible", "--Solver.max_error", "3",
+             "--conflicts_path", folder_ / "c.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json outliers = Report()["outliers"];
+  const int removed = outliers["num_removed"];
+  const int must_go = outliers["num_must_go"];
+  EXPECT_GT(must_go, 0);
+  EXPECT_LE(must_go, removed);
+  EXPECT_TRUE(outliers["is_within"]);
+  EXPECT_THAT(result.out,
+              HasSubstr("removed " + std::to_string(removed) + " of "));
+  for (const double error : PixelErrors(Load(folder_ / "output"))) {
+    EXPECT_LE(error, 3 * (1 + 1e-9));
+  }
+  const KrotResult check =
+      RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+               "--certificate_path", folder_ / "c.json"});
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+}
+
+TEST_F(RawTracks, AreSolvedWithABoundThatIsChosenAndSaid) {
+  const KrotResult result = Solve({"--Problem.init_max_error", "10"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("leaving out what does not fit within"));
+  const Json report = Report();
+  EXPECT_GT(report["outliers"]["max_error"], 0);
+  EXPECT_TRUE(report["outliers"]["num_must_go"].is_null());
+  EXPECT_GT(report["num_observations"], 0);
+}
+
+TEST_F(RawTracks, ThatAreNotToLoseAnythingEndWithAHint) {
+  const KrotResult result =
+      Solve({"--Solver.init", "feasible", "--Problem.init_max_error", "10"});
+  EXPECT_EQ(result.exit_code, 7);
+  EXPECT_THAT(result.err, HasSubstr("--Solver.max_error leaves out"));
+}
+
+TEST_F(RawTracks, RefuseOptionsThatDoNotGoTogether) {
+  EXPECT_EQ(Solve({"--conflicts_path", folder_ / "c.json"}).exit_code, 1);
+  EXPECT_EQ(
+      Solve({"--Solver.max_error", "3", "--Solver.norm", "inf"}).exit_code, 1);
+  EXPECT_EQ(
+      Solve({"--Solver.max_error", "3", "--Solver.method", "joint"}).exit_code,
+      1);
+}
+
+TEST(SameImageOption, LeavesOneOfAnImageInATrackAndNamesTracksInTheSupport) {
+  const TempFolder folder;
+  SceneOptions options = SmallScene();
+  options.duplicate_ratio = 0.2;
+  Save(SynthesizeScene(options).model, folder / "input");
+  const auto solve = [&](const std::string& same_image) {
+    const KrotResult result =
+        RunKrot({"solver", "--input_path", folder / "input", "--output_path",
+                 folder / "output", "--overwrite", "1", "--report_path",
+                 folder / "r.json", "--Problem.same_image", same_image});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("with an image more than once"));
+    return Json::parse(ReadBytes(folder / "r.json"));
+  };
+  const Json keep = solve("keep");
+  const Json closest = solve("closest");
+  EXPECT_EQ(keep["left_out"]["same_image"], 0);
+  EXPECT_GT(closest["left_out"]["same_image"], 0);
+  EXPECT_EQ(keep["same_image"]["num_tracks"],
+            closest["same_image"]["num_tracks"]);
+  EXPECT_FALSE(keep["same_image"]["support_point3D_ids"].empty());
+  EXPECT_TRUE(closest["same_image"]["support_point3D_ids"].empty());
+  EXPECT_LT(closest["cost_final"], keep["cost_final"]);
+}
+
+}  // namespace
+}  // namespace krot

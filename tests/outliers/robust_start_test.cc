@@ -1,0 +1,129 @@
+#include "krot/outliers/robust_start.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "krot/analysis/alignment.h"
+#include "krot/model/image_geometry.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+SceneOptions Scene(double outlier_ratio, double rotation_noise_deg) {
+  SceneOptions options;
+  options.num_frames = 12;
+  options.num_points = 400;
+  options.track_length = 5;
+  options.camera_model_id = 1;
+  options.pixel_noise = 0.5;
+  options.outlier_ratio = outlier_ratio;
+  options.rotation_noise_deg = rotation_noise_deg;
+  options.random_seed = 5;
+  return options;
+}
+
+// Without any translation or point.
+Model Wiped(Model model) {
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.translation.setConstant(std::nan(""));
+  }
+  for (Image& image : model.images) {
+    image.cam_from_world.translation.setConstant(std::nan(""));
+  }
+  for (Point3D& point : model.points3D) point.xyz.setZero();
+  return model;
+}
+
+// RMS distance of the camera centres, after the similarity that fits them
+// best, by the radius of the truth.
+double CentreError(const Model& truth, const Model& model) {
+  const std::vector<ImageGeometry> of_truth = ImageGeometries(truth);
+  const std::vector<ImageGeometry> of_model = ImageGeometries(model);
+  std::vector<PosePair> poses(of_truth.size());
+  for (size_t n = 0; n < poses.size(); ++n) {
+    poses[n].center1 = Center(of_truth[n].cam_from_world);
+    poses[n].center2 = Center(of_model[n].cam_from_world);
+  }
+  const std::optional<Similarity> fit = AlignCenters(poses);
+  if (!fit) return INFINITY;
+  double sum = 0;
+  for (const PosePair& pose : poses) {
+    sum += (*fit * pose.center2 - pose.center1).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(poses.size())) /
+         SceneRadius(poses);
+}
+
+Model AtRobustStart(const Model& model) {
+  BuildProblemOptions build;
+  build.ignore_translations = true;
+  const BuiltProblem built = BuildProblem(model, build);
+  return ApplyEstimate(model, built,
+                       FindRobustStart(built.problem, Norm::L2(), 2, {}));
+}
+
+TEST(FindRobustStart, PutsTheCamerasNearTheTruthWhateverTheOutliers) {
+  for (const double ratio : {0.0, 0.01, 0.05, 0.1, 0.2}) {
+    const SyntheticScene scene = SynthesizeScene(Scene(ratio, 0));
+    EXPECT_LT(
+        CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
+        0.01)
+        << ratio;
+  }
+}
+
+TEST(FindRobustStart, LosesNoMoreThanTheRotationsAreOff) {
+  for (const double degrees : {0.1, 0.5, 1.0}) {
+    const SyntheticScene scene = SynthesizeScene(Scene(0.05, degrees));
+    EXPECT_LT(
+        CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
+        3 * degrees * M_PI / 180)
+        << degrees;
+  }
+}
+
+TEST(FindRobustStart, KeepsTheBaselinesOfARig) {
+  SceneOptions options = Scene(0.05, 0);
+  options.sensors_per_rig = 2;
+  options.rig_baseline = 0.1;
+  const SyntheticScene scene = SynthesizeScene(options);
+  Model model = Wiped(scene.model);
+  for (Image& image : model.images) {
+    image.cam_from_world.translation.setZero();
+  }
+  EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(model)), 0.02);
+}
+
+TEST(FilterOutliers, PlacesAModelWithoutPositions) {
+  const SyntheticScene scene = SynthesizeScene(Scene(0.05, 0));
+  OutlierFilterOptions options;
+  options.max_error = 3;
+  const OutlierFilterResult result =
+      FilterOutliers(Wiped(scene.model), options, {});
+  const OutlierFilterSummary& summary = result.summary;
+  EXPECT_TRUE(summary.is_within);
+  EXPECT_EQ(summary.init, SolveInit::kFeasible);
+  EXPECT_LT(CentreError(scene.ground_truth, result.model), 0.005);
+  EXPECT_LE(summary.removed.size(), scene.outliers.size());
+  EXPECT_LE(summary.num_proved, static_cast<int64_t>(summary.removed.size()));
+  EXPECT_GT(summary.num_proved, 0);
+}
+
+TEST(FilterOutliers, ChoosesABoundWhereNoneIsGiven) {
+  const SyntheticScene scene = SynthesizeScene(Scene(0.05, 0));
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  const OutlierFilterResult result =
+      FilterOutliers(Wiped(scene.model), options, {});
+  EXPECT_TRUE(result.summary.is_within);
+  EXPECT_GT(result.summary.max_error, 2);
+  EXPECT_LT(result.summary.max_error, 20);
+  EXPECT_FALSE(result.summary.conflicts);
+}
+
+}  // namespace
+}  // namespace krot
