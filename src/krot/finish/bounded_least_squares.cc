@@ -7,11 +7,11 @@
 namespace krot {
 namespace {
 
-template <typename Cone>
+template <typename Cap>
 BoundedSummary Run(const KnownRotationProblem& problem,
                    const BoundedOptions& options, const Context& context,
                    Estimate* estimate) {
-  BoundedPath<Cone> path(problem, options, context, *estimate);
+  BoundedPath<Cap> path(problem, options, context, *estimate);
   const BoundedSummary summary = path.Run();
   *estimate = path.estimate();
   return summary;
@@ -37,16 +37,16 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
       Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(cost < options.cap, "cost of the start", cost, "below the cap");
   return options.norm.p == 2
-             ? Run<SecondOrderCone>(problem, options, context, estimate)
-             : Run<FourHalfLines>(problem, options, context, estimate);
+             ? Run<DiscCap>(problem, options, context, estimate)
+             : Run<PolygonCap>(problem, options, context, estimate);
 }
 
 int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm,
                               bool rows_are_taken_anew) {
-  return norm.p == 2 ? BoundedPath<SecondOrderCone>::MemoryBytes(
-                           problem, rows_are_taken_anew)
-                     : BoundedPath<FourHalfLines>::MemoryBytes(
-                           problem, rows_are_taken_anew);
+  return norm.p == 2
+             ? BoundedPath<DiscCap>::MemoryBytes(problem, rows_are_taken_anew)
+             : BoundedPath<PolygonCap>::MemoryBytes(problem,
+                                                    rows_are_taken_anew);
 }
 
 }  // namespace krot

@@ -4,16 +4,18 @@
 #include <cmath>
 #include <utility>
 
-#include "krot/conic/centrality.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {
 
-// The first mu, as a share of the cost by pair. The start is near the boundary:
-// with a weight of 1, door_colmap took 23 iterations, with 10 to 100 it and the
-// other models take 9 to 11.
-// (to a gap of 1e-4).
+// The first mu, as a share of the cost by pair: the start is near the boundary,
+// and has to leave it first.
 constexpr double kStartWeight = 30;
+// The first multipliers are those of slacks of this share of the cap's at
+// least. Nearer to the boundary they would let the slack grow by no more than
+// itself in a step.
+constexpr double kStartSlack = 0.1;
 // A step goes so far of the way to the boundary,
 constexpr double kDamping = 0.99;
 // and so far of one that does not lower the barrier cost; one shorter than the
@@ -33,8 +35,9 @@ constexpr double kShortStep = 0.1;
 constexpr double kNearGap = 10;
 constexpr double kLeastGain = 0.1;
 constexpr int kPatience = 3;
-// Mehrotra's sigma is no less, whatever the predictor leaves of the gap.
-constexpr double kSmallestSigma = 1e-3;
+// Mehrotra's sigma is no less, whatever the predictor leaves of the gap: with
+// 1e-3, pairs were left behind and door took 28 iterations instead of 19.
+constexpr double kSmallestSigma = 0.03;
 // mu does not fall below this share of what the gap asked for needs.
 constexpr double kLastShare = 0.5;
 // Multipliers above this count as active: an error's own weight is 1.
@@ -52,134 +55,100 @@ void MoveTo(const Estimate& from, const BlockVector& direction, double step,
 
 }  // namespace
 
-template <typename Cone>
-BoundedPath<Cone>::BoundedPath(const KnownRotationProblem& problem,
-                               const BoundedOptions& options,
-                               const Context& context, const Estimate& start)
+template <typename Cap>
+BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
+                              const BoundedOptions& options,
+                              const Context& context, const Estimate& start)
     : problem_(problem),
       options_(options),
       context_(context),
-      system_(problem, options.norm, options.cap, options.loss,
+      system_(problem, Cap(options.norm, options.cap), options.loss,
               context.num_threads),
-      z_(problem.observations.size()) {
+      multipliers_(problem.observations.size()) {
   now_.x = start;
   now_.viewed.resize(problem.observations.size());
   if (options_.take_rows) now_.rows = problem;
   trial_ = now_;
 }
 
-template <typename Cone>
-bool BoundedPath<Cone>::View(State* state) const {
+template <typename Cap>
+bool BoundedPath<Cap>::View(State* state) const {
   if (options_.take_rows && !options_.take_rows(state->x, &state->rows)) {
     return false;
   }
   const std::vector<Observation>& observations = RowsOf(*state).observations;
   const double least = system_.loop().Min([&](int64_t i) {
-    state->viewed[i] = ViewPoint(problem_, observations[i], state->x);
-    if (!(state->viewed[i].depth > 0)) return -1.0;
-    return Cone::SmallestEigenvalue(system_.Slack(state->viewed[i]));
+    const ViewedPoint viewed = ViewPoint(problem_, observations[i], state->x);
+    if (!(viewed.depth > 0)) return -1.0;
+    state->viewed[i] = {viewed.v / viewed.depth, viewed.depth};
+    return system_.cap().Slacks(state->viewed[i].e).minCoeff();
   });
   if (!(least > 0)) return false;
   state->cost = system_.loop().Sum([&](int64_t i) {
-    const ViewedPoint& viewed = state->viewed[i];
-    return options_.loss.Value((viewed.v / viewed.depth).squaredNorm()) / 2;
+    return options_.loss.Value(state->viewed[i].e.squaredNorm()) / 2;
   });
   state->barrier = system_.loop().Sum(
-      [&](int64_t i) { return system_.Barrier(state->viewed[i]); });
+      [&](int64_t i) { return system_.cap().Barrier(state->viewed[i].e); });
   return std::isfinite(state->barrier);
 }
 
-template <typename Cone>
-void BoundedPath<Cone>::CentreMultipliers(double mu) {
+template <typename Cap>
+void BoundedPath<Cap>::CentreMultipliers(double mu, double least_slack) {
+  const Vector least =
+      least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
   system_.loop().ForEach([&](int64_t i) {
-    z_[i] = mu * Cone::Divide(system_.Slack(now_.viewed[i]), Cone::Identity());
+    multipliers_[i] =
+        mu *
+        system_.cap().Slacks(now_.viewed[i].e).cwiseMax(least).cwiseInverse();
   });
+  MeasureGap();
 }
 
-template <typename Cone>
-void BoundedPath<Cone>::RestoreNeighbourhood(double mu) {
-  system_.loop().ForEach([&](int64_t i) {
-    const Vector s = system_.Slack(now_.viewed[i]);
-    if (Cone::SmallestEigenvalue(z_[i]) > 0 &&
-        Cone::SmallestProduct(s, z_[i]) >= kLeastProduct * mu &&
-        s.dot(z_[i]) <= kLargestProduct * mu) {
-      return;
-    }
-    z_[i] = mu * Cone::Divide(s, Cone::Identity());
-  });
-}
-
-template <typename Cone>
-void BoundedPath<Cone>::FindNewtonDirection(double mu) {
-  system_.Solve(
-      [&](int64_t i) -> Vector {
-        return mu * Cone::Divide(system_.lambda()[i], Cone::Identity());
-      },
-      mu);
+template <typename Cap>
+void BoundedPath<Cap>::MeasureGap() {
+  mu_ = system_.loop().Sum([&](int64_t i) {
+    return multipliers_[i].dot(system_.cap().Slacks(now_.viewed[i].e));
+  }) / Count();
 }
 
 // Returns the mu that the direction aims at.
-template <typename Cone>
-double BoundedPath<Cone>::FindDirection() {
-  const double last = kLastShare * options_.gap_tolerance * now_.cost / Count();
+template <typename Cap>
+double BoundedPath<Cap>::FindDirection() {
   if (step_ < kShortStep) {
-    FindNewtonDirection(system_.mu());
-    return system_.mu();
+    system_.Solve(mu_);
+    return mu_;
   }
-  system_.Solve([](int64_t) -> Vector { return Vector::Zero(); }, 0);
-  const double mu = std::max(last, AffineSigma() * system_.mu());
-  system_.Solve(
-      [&](int64_t i) -> Vector {
-        const Vector target =
-            mu * Cone::Identity() -
-            Cone::Product(system_.direction().ds[i], system_.direction().dz[i]);
-        return Cone::Divide(system_.lambda()[i], target);
-      },
-      mu);
-  ImproveCentrality<Cone>(
-      mu, mu,
-      [&] {
-        return std::min(MaxStep(system_.direction().ds, kDamping),
-                        MaxStep(system_.direction().dz, kDamping));
-      },
-      &system_);
+  system_.Solve(0);
+  const double mu =
+      std::max(MuOf(kLastShare * options_.gap_tolerance), AffineSigma() * mu_);
+  system_.Correct(mu);
   return mu;
 }
 
-template <typename Cone>
-double BoundedPath<Cone>::AffineSigma() const {
-  const double primal = MaxStep(system_.direction().ds, 1);
-  const double dual = MaxStep(system_.direction().dz, 1);
+// Mehrotra's choice: the cube of what the predictor leaves of the gap.
+template <typename Cap>
+double BoundedPath<Cap>::AffineSigma() const {
+  const double primal = system_.MaxStep(1);
+  const double dual = system_.MaxDualStep(1);
   const double gap = system_.loop().Sum([&](int64_t i) {
-    const Vector& lambda = system_.lambda()[i];
-    return (lambda + primal * system_.direction().ds[i])
-        .dot(lambda + dual * system_.direction().dz[i]);
+    const auto pairs = system_.StepOf(i);
+    return (pairs.h + primal * pairs.dh).dot(multipliers_[i] + dual * pairs.dl);
   });
-  const double left = std::max(0.0, gap / (Count() * system_.mu()));
+  const double left = std::max(0.0, gap / (Count() * mu_));
   return std::min(1.0, std::max(kSmallestSigma, left * left * left));
 }
 
-template <typename Cone>
-double BoundedPath<Cone>::MaxStep(const std::vector<Vector>& direction,
-                                  double damping) const {
-  return damping * system_.loop().Min([&](int64_t i) {
-    return Cone::MaxStep(system_.lambda()[i], direction[i], 1 / damping);
-  });
-}
-
-template <typename Cone>
-double BoundedPath<Cone>::TakeStep(double mu) {
+template <typename Cap>
+double BoundedPath<Cap>::TakeStep(double mu) {
   const double before = BarrierCost(now_, mu);
   const double highest = before + kCostRounding * (now_.cost + mu * Count());
-  for (double step = MaxStep(system_.direction().ds, kDamping);
-       step >= kSmallestStep; step *= kBacktracking) {
-    MoveTo(now_.x, system_.direction().dx, step, &trial_.x);
+  for (double step = system_.MaxStep(kDamping); step >= kSmallestStep;
+       step *= kBacktracking) {
+    MoveTo(now_.x, system_.dx(), step, &trial_.x);
     if (!View(&trial_) || !(BarrierCost(trial_, mu) <= highest)) continue;
+    MoveMultipliers(mu);
     std::swap(now_, trial_);
-    const double dual = MaxStep(system_.direction().dz, kDamping);
-    system_.loop().ForEach(
-        [&](int64_t i) { z_[i] += dual * system_.UnscaledDz(i); });
-    RestoreNeighbourhood(mu);
+    MeasureGap();
     step_ = step;
     return before - BarrierCost(now_, mu);
   }
@@ -187,18 +156,36 @@ double BoundedPath<Cone>::TakeStep(double mu) {
   return 0;
 }
 
+// To those of trial_.
+template <typename Cap>
+void BoundedPath<Cap>::MoveMultipliers(double mu) {
+  const double step = system_.MaxDualStep(kDamping);
+  system_.loop().ForEach([&](int64_t i) {
+    Vector& l = multipliers_[i];
+    l += step * system_.StepOf(i).dl;
+    const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
+    for (int j = 0; j < Cap::kNum; ++j) {
+      const double product = l[j] * h[j];
+      if (!(product >= kLeastProduct * mu && product <= kLargestProduct * mu)) {
+        l[j] = mu / h[j];
+      }
+    }
+  });
+}
+
 // Why the run ends here, if it does.
-template <typename Cone>
-std::optional<BoundedTermination> BoundedPath<Cone>::Iterate(
+template <typename Cap>
+std::optional<BoundedTermination> BoundedPath<Cap>::Iterate(
     BoundedSummary* summary) {
   if (context_.IsCancelled()) return BoundedTermination::kInterrupted;
-  if (!system_.Factorize(RowsOf(now_).observations, now_.viewed, z_)) {
+  if (!system_.Factorize(RowsOf(now_).observations, now_.viewed,
+                         multipliers_)) {
     return BoundedTermination::kSingular;
   }
   summary->duality_gap = RelativeGap();
-  double mu = system_.mu();
+  double mu = mu_;
   if (*summary->duality_gap <= options_.gap_tolerance) {
-    FindNewtonDirection(mu);
+    system_.Solve(mu);
     summary->stationarity =
         now_.cost > 0 ? system_.Slope() / (2 * now_.cost) : 0;
     if (*summary->stationarity <= options_.stationarity_tolerance) {
@@ -209,10 +196,16 @@ std::optional<BoundedTermination> BoundedPath<Cone>::Iterate(
   }
   double gain = TakeStep(mu);
   if (step_ == 0) {
-    FindNewtonDirection(mu);
+    system_.Solve(mu);
     gain = TakeStep(mu);
   }
-  if (step_ == 0) return BoundedTermination::kNoProgress;
+  if (step_ == 0) {
+    if (is_centred_) return BoundedTermination::kNoProgress;
+    CentreMultipliers(mu, 0);
+    is_centred_ = true;
+    return std::nullopt;
+  }
+  is_centred_ = false;
   ++summary->iterations;
   if (options_.callback) {
     options_.callback({summary->iterations, now_.cost, RelativeGap(), step_});
@@ -226,25 +219,22 @@ std::optional<BoundedTermination> BoundedPath<Cone>::Iterate(
   return std::nullopt;
 }
 
-template <typename Cone>
-int64_t BoundedPath<Cone>::NumActive() const {
-  // Of h = (cap^2 - |e|^2) / 2, or of cap - a'e: z is by the unit of depth.
+template <typename Cap>
+int64_t BoundedPath<Cap>::NumActive() const {
   return static_cast<int64_t>(system_.loop().Sum([&](int64_t i) {
-    const double multiplier =
-        z_[i].maxCoeff() * now_.viewed[i].depth / options_.cap;
-    return multiplier > kActiveMultiplier ? 1.0 : 0.0;
+    return system_.cap().Share(multipliers_[i]) > kActiveMultiplier ? 1.0 : 0.0;
   }));
 }
 
-template <typename Cone>
-BoundedSummary BoundedPath<Cone>::Run() {
+template <typename Cap>
+BoundedSummary BoundedPath<Cap>::Run() {
   BoundedSummary summary;
   if (!View(&now_)) {  // as only rows can make it that are not those of x
     summary.termination = BoundedTermination::kNoProgress;
     return summary;
   }
   summary.cost_initial = now_.cost;
-  CentreMultipliers(kStartWeight * now_.cost / Count());
+  CentreMultipliers(MuOf(kStartWeight), kStartSlack);
   std::optional<BoundedTermination> end;
   while (!end && summary.iterations < options_.max_iterations) {
     end = Iterate(&summary);
@@ -255,19 +245,19 @@ BoundedSummary BoundedPath<Cone>::Run() {
   return summary;
 }
 
-template <typename Cone>
-int64_t BoundedPath<Cone>::MemoryBytes(const KnownRotationProblem& problem,
-                                       bool rows_are_taken_anew) {
+template <typename Cap>
+int64_t BoundedPath<Cap>::MemoryBytes(const KnownRotationProblem& problem,
+                                      bool rows_are_taken_anew) {
   const int64_t per_observation =
-      sizeof(Vector) + 2 * sizeof(ViewedPoint) +
+      sizeof(Vector) + 2 * sizeof(ViewedError) +
       (rows_are_taken_anew ? 2 * (sizeof(Observation) + sizeof(int32_t)) : 0);
   constexpr int64_t kPerUnknown = 2 * sizeof(Eigen::Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * per_observation +
          (problem.num_points + problem.num_frames) * kPerUnknown +
-         BoundedSystem<Cone>::MemoryBytes(problem);
+         BoundedSystem<Cap>::MemoryBytes(problem);
 }
 
-template class BoundedPath<SecondOrderCone>;
-template class BoundedPath<FourHalfLines>;
+template class BoundedPath<DiscCap>;
+template class BoundedPath<PolygonCap>;
 
 }  // namespace krot

@@ -10,14 +10,13 @@ namespace krot {
 
 // One run of bounded least squares along the central path: the minima of
 //
-//   1/2 sum rho + mu sum Barrier,   Barrier of the errors alone,
+//   1/2 sum rho + mu sum Barrier
 //
 // as mu falls. An iteration
 //
 //   Factorize       the Newton system at now_; it ends here if mu is small
 //                   enough and Newton's step would gain next to nothing
-//   FindDirection   a predictor, f = 0, a corrector [Mehrotra 1992], and up to
-//                   two centrality correctors [Gondzio 1996]
+//   FindDirection   a predictor, mu = 0, and a corrector [Mehrotra 1992]
 //   TakeStep        the longest, then shorter ones until the barrier cost does
 //                   not rise: trial_ becomes now_; where none is found along
 //                   the corrector's direction, along Newton's
@@ -26,7 +25,7 @@ namespace krot {
 // neighbourhood of the path are centred anew: the barrier cost alone decides on
 // progress, since that of a problem that is not convex can be trusted no
 // further.
-template <typename Cone>
+template <typename Cap>
 class BoundedPath {
  public:
   BoundedPath(const KnownRotationProblem& problem,
@@ -41,18 +40,18 @@ class BoundedPath {
                              bool rows_are_taken_anew);
 
  private:
-  using Vector = typename Cone::Vector;
+  using Vector = typename Cap::Vector;
 
   struct State {
     Estimate x;
     // With the rows at x, where they depend on it; otherwise unused.
     KnownRotationProblem rows;
-    std::vector<ViewedPoint> viewed;
+    std::vector<ViewedError> viewed;
     double cost = 0;     // 1/2 sum rho
     double barrier = 0;  // sum, at mu = 1
   };
 
-  // Whether every residual is below the cap.
+  // Whether every error is below the cap.
   bool View(State* state) const;
   const KnownRotationProblem& RowsOf(const State& state) const {
     return options_.take_rows ? state.rows : problem_;
@@ -60,33 +59,38 @@ class BoundedPath {
   double BarrierCost(const State& state, double mu) const {
     return state.cost + mu * state.barrier;
   }
-  double Count() const {  // of pairs' eigenvalues
-    return static_cast<double>(system_.loop().count() * Cone::kDegree);
+  double Count() const {  // of pairs
+    return static_cast<double>(system_.loop().count() * Cap::kNum);
+  }
+  double MuOf(double relative_gap) const {
+    return relative_gap * now_.cost / Count();
   }
   double RelativeGap() const {
-    return now_.cost > 0 ? Count() * system_.mu() / now_.cost : 0;
+    return now_.cost > 0 ? Count() * mu_ / now_.cost : 0;
   }
 
-  void CentreMultipliers(double mu);
-  void RestoreNeighbourhood(double mu);
-  void FindNewtonDirection(double mu);
+  // mu / h, with slacks h of no less than this share of the cap's.
+  void CentreMultipliers(double mu, double least_slack);
+  void MeasureGap();
   double FindDirection();
   double AffineSigma() const;
-  double MaxStep(const std::vector<Vector>& direction, double damping) const;
   // Sets step_, 0 if none is found, and returns what it takes off the cost.
   double TakeStep(double mu);
+  void MoveMultipliers(double mu);
   std::optional<BoundedTermination> Iterate(BoundedSummary* summary);
   int64_t NumActive() const;
 
   const KnownRotationProblem& problem_;
   const BoundedOptions options_;
   const Context context_;
-  BoundedSystem<Cone> system_;
+  BoundedSystem<Cap> system_;
   State now_;
   State trial_;
-  std::vector<Vector> z_;
-  double step_ = 1;   // that led to now_
-  int num_idle_ = 0;  // steps in a row
+  std::vector<Vector> multipliers_;
+  double mu_ = 0;            // mean of the pairs at now_
+  double step_ = 1;          // that led to now_
+  int num_idle_ = 0;         // steps in a row
+  bool is_centred_ = false;  // all pairs are, since no step was found
 };
 
 }  // namespace krot

@@ -1,176 +1,196 @@
 #include "krot/finish/bounded_system.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace krot {
-namespace {
 
-using Eigen::Matrix3d;
+using Eigen::Vector2d;
 using Eigen::Vector3d;
-using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-constexpr int64_t kBlocksPerChunk = 512;
-
-// J of e = v / w.
-Matrix23 ErrorRows(const Observation& observation, const ViewedPoint& viewed) {
-  const Eigen::Vector2d e = viewed.v / viewed.depth;
-  return (observation.E.bottomRows<2>() - e * observation.E.row(0)) /
-         viewed.depth;
-}
-
-// R of A = Q R by modified Gram-Schmidt, which finds it as accurately as
-// reflections do.
-template <int kRows>
-Matrix3d Triangle(Eigen::Matrix<double, kRows, 3> A) {
-  Matrix3d R = Matrix3d::Zero();
-  for (int c = 0; c < 3; ++c) {
-    R(c, c) = A.col(c).norm();
-    A.col(c) /= R(c, c);
-    for (int d = c + 1; d < 3; ++d) {
-      R(c, d) = A.col(c).dot(A.col(d));
-      A.col(d) -= R(c, d) * A.col(c);
-    }
-  }
-  return R;
-}
-
-}  // namespace
-
-template <typename Cone>
-BoundedSystem<Cone>::BoundedSystem(const KnownRotationProblem& problem,
-                                   Norm norm, double cap, const ErrorLoss& loss,
-                                   int num_threads)
+template <typename Cap>
+BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
+                                  const Cap& cap, const ErrorLoss& loss,
+                                  int num_threads)
     : problem_(problem),
       cap_(cap),
       loss_(loss),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       structure_(AnchoredStructure(problem)),
-      T_(ConeMap<Cone::kDim>(norm)),
       elimination_(structure_, num_threads),
-      scaling_(problem.observations.size()),
-      lambda_(problem.observations.size()),
-      target_(problem.observations.size()),
-      pull_(problem.observations.size()) {
-  direction_.ds.resize(problem.observations.size());
-  direction_.dz.resize(problem.observations.size());
+      root_(problem.observations.size()),
+      correction_(problem.observations.size()),
+      rhs_(problem.observations.size()),
+      d_(problem.observations.size()) {
+  zero_.SetZero(problem.num_points, problem.num_frames);
 }
 
-template <typename Cone>
-double BoundedSystem<Cone>::Barrier(const ViewedPoint& viewed) const {
-  const Vector share = Slack(viewed) / (cap_ * viewed.depth);
-  if constexpr (Cone::kDim == 3) {
-    return -std::log(Cone::Determinant(share)) / 2;
-  } else {
-    return -share.array().log().sum();
+// The determinant as a sum of what is not negative: near the cap the normals'
+// part is many orders of magnitude above the rest.
+template <typename Cap>
+typename BoundedSystem<Cap>::Root BoundedSystem<Cap>::RootOf(int64_t i) const {
+  const Vector2d& e = (*viewed_)[i].e;
+  const Vector& l = (*multipliers_)[i];
+  const Vector stiffness = l.cwiseQuotient(cap_.Slacks(e));
+  const Eigen::Matrix<double, 2, Cap::kNum> n = cap_.Normals(e);
+  const double own = loss_.Weight(e.squaredNorm()) + Cap::kBend * l.sum();
+  const Vector nx2 = n.row(0).cwiseAbs2(), ny2 = n.row(1).cwiseAbs2();
+  const double xx = stiffness.dot(nx2), yy = stiffness.dot(ny2);
+  double xy = 0;
+  double determinant = own * (own + xx + yy);
+  for (int j = 0; j < Cap::kNum; ++j) {
+    xy += stiffness[j] * n(0, j) * n(1, j);
+    for (int k = 0; k < j; ++k) {
+      const double cross = n(0, j) * n(1, k) - n(1, j) * n(0, k);
+      determinant += stiffness[j] * stiffness[k] * cross * cross;
+    }
   }
+  const double a = std::sqrt(own + xx);
+  return {a, xy / a, std::sqrt(determinant) / a};
 }
 
-template <typename Cone>
-bool BoundedSystem<Cone>::Factorize(
-    const std::vector<Observation>& observations,
-    const std::vector<ViewedPoint>& viewed, const std::vector<Vector>& z) {
-  constexpr int kDim = Cone::kDim;
+template <typename Cap>
+bool BoundedSystem<Cap>::Factorize(const std::vector<Observation>& observations,
+                                   const std::vector<ViewedError>& viewed,
+                                   const std::vector<Vector>& multipliers) {
   observations_ = &observations;
   viewed_ = &viewed;
+  multipliers_ = &multipliers;
   loop_.ForEach([&](int64_t i) {
-    scaling_[i] = NtScaling<Cone>(Slack(viewed[i]), z[i]);
-    lambda_[i] = scaling_[i].Apply(z[i]);
     const Observation& o = observations[i];
     const View& view = problem_.views[o.view];
-    Eigen::Matrix<double, kDim + 2, 3> rows;  // of (w; v)
-    for (int c = 0; c < 3; ++c) {
-      rows.col(c).template head<kDim>() = scaling_[i].ApplyInverse(T_.col(c));
-    }
-    rows.col(0).template head<kDim>() *= cap_;
-    const Eigen::Vector2d e = viewed[i].v / viewed[i].depth;
-    const double weight =
-        std::sqrt(loss_.Weight(e.squaredNorm())) / viewed[i].depth;
-    rows.template bottomRows<2>() << -weight * e,
-        weight * Eigen::Matrix2d::Identity();
-    const Matrix3d R = Triangle<kDim + 2>(rows) * o.E;
-    Eigen::Map<RowMajor3>(elimination_.point_rows(i)).noalias() =
+    const ViewedError& at = viewed[i];
+    root_[i] = RootOf(i);
+    const double scale = 1 / at.depth;
+    const Vector3d Jx = scale * (o.E.row(1) - at.e[0] * o.E.row(0));
+    const Vector3d Jy = scale * (o.E.row(2) - at.e[1] * o.E.row(0));
+    Matrix3 R;
+    R.row(0) = root_[i].a * Jx + root_[i].b * Jy;
+    R.row(1) = root_[i].c * Jy;
+    R.row(2) =
+        std::sqrt(multipliers[i].dot(cap_.Slacks(at.e))) * scale * o.E.row(0);
+    Eigen::Map<Matrix3>(elimination_.point_rows(i)).noalias() =
         R * view.cam_from_world_rotation;
-    Eigen::Map<RowMajor3>(elimination_.frame_rows(i)).noalias() =
+    Eigen::Map<Matrix3>(elimination_.frame_rows(i)).noalias() =
         R * view.cam_from_rig_rotation;
   });
-  mu_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); }) /
-        static_cast<double>(loop_.count() * Cone::kDegree);
   return elimination_.Factorize();
 }
 
-// A'f - J'rho' e - degree mu c / w, of points and frames: in their order, so
-// with the same bits at any number of threads.
-template <typename Cone>
-void BoundedSystem<Cone>::FindGradient(double mu) {
-  loop_.ForEach([&](int64_t i) {
-    const Observation& o = (*observations_)[i];
-    const ViewedPoint& viewed = (*viewed_)[i];
-    const Eigen::Vector2d e = viewed.v / viewed.depth;
-    const Vector3d f = T_.transpose() * scaling_[i].ApplyInverse(target_[i]);
-    Vector3d wv(cap_ * f[0] - Cone::kDegree * mu / viewed.depth, f[1], f[2]);
-    pull_[i] = o.E.transpose() * wv - ErrorRows(o, viewed).transpose() *
-                                          (loss_.Weight(e.squaredNorm()) * e);
-  });
-  gradient_.SetZero(problem_.num_points, problem_.num_frames);
-  ParallelFor(problem_.num_points, kBlocksPerChunk, loop_.num_threads(),
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t k = begin; k < end; ++k) {
-                  for (int64_t i = problem_.point_begin[k];
-                       i < problem_.point_begin[k + 1]; ++i) {
-                    const View& view =
-                        problem_.views[problem_.observations[i].view];
-                    gradient_.points[k].noalias() +=
-                        view.cam_from_world_rotation.transpose() * pull_[i];
-                  }
-                }
-              });
-  ParallelFor(problem_.num_frames, 1, loop_.num_threads(),
-              [&](int64_t f, int64_t, int) {
-                if (structure_.frame_is_fixed[f]) return;
-                for (int64_t n = problem_.frame_begin[f];
-                     n < problem_.frame_begin[f + 1]; ++n) {
-                  const int64_t i = problem_.frame_observations[n];
-                  const View& view =
-                      problem_.views[problem_.observations[i].view];
-                  gradient_.frames[f].noalias() +=
-                      view.cam_from_rig_rotation.transpose() * pull_[i];
-                }
-              });
+// The gradient of an observation's part of the barrier problem, by its error.
+template <typename Cap>
+Vector2d BoundedSystem<Cap>::PullOf(int64_t i) const {
+  const Vector2d& e = (*viewed_)[i].e;
+  const Correction& c = correction_[i];
+  const Vector target =
+      Vector::Constant(mu_) - c.product + c.slack * (*multipliers_)[i];
+  return loss_.Weight(e.squaredNorm()) * e +
+         cap_.Normals(e) * target.cwiseQuotient(cap_.Slacks(e));
 }
 
-template <typename Cone>
-void BoundedSystem<Cone>::SolveForTarget(double mu) {
-  FindGradient(mu);
-  Direction& d = direction_;
-  elimination_.Solve(gradient_, nullptr, &d.dx, /*refinements=*/0);
-  slope_ = gradient_.Dot(d.dx);
+template <typename Cap>
+void BoundedSystem<Cap>::SolveForTarget() {
+  loop_.ForEach([&](int64_t i) {
+    const Vector2d pull = PullOf(i);
+    const Root& U = root_[i];
+    const double x = -pull[0] / U.a;
+    rhs_[i] << x, (-pull[1] - U.b * x) / U.c, 0;
+  });
+  elimination_.Solve(zero_, rhs_.data()->data(), &dx_, /*refinements=*/0);
   loop_.ForEach([&](int64_t i) {
     const Observation& o = (*observations_)[i];
     const View& view = problem_.views[o.view];
-    const Vector3d dwv =
-        o.E * (view.cam_from_world_rotation * d.dx.points[o.point] +
-               view.cam_from_rig_rotation * d.dx.frames[view.frame]);
-    d.ds[i] =
-        scaling_[i].ApplyInverse(T_ * Vector3d(cap_ * dwv[0], dwv[1], dwv[2]));
-    d.dz[i] = target_[i] - lambda_[i] - d.ds[i];
+    const ViewedError& at = (*viewed_)[i];
+    const Vector3d dwv = o.E *
+                         (view.cam_from_world_rotation * dx_.points[o.point] +
+                          view.cam_from_rig_rotation * dx_.frames[view.frame]) /
+                         at.depth;
+    d_[i] = {dwv.tail<2>() - dwv[0] * at.e, dwv[0]};
   });
 }
 
-template <typename Cone>
-int64_t BoundedSystem<Cone>::MemoryBytes(const KnownRotationProblem& problem) {
+template <typename Cap>
+void BoundedSystem<Cap>::Solve(double mu) {
+  mu_ = mu;
+  std::fill(correction_.begin(), correction_.end(), Correction());
+  SolveForTarget();
+}
+
+template <typename Cap>
+void BoundedSystem<Cap>::Correct(double mu) {
+  loop_.ForEach([&](int64_t i) {
+    const PairStep step = StepOf(i);
+    correction_[i] = {step.dh.cwiseProduct(step.dl),
+                      Cap::kBend * d_[i].e.squaredNorm() / 2};
+  });
+  mu_ = mu;
+  SolveForTarget();
+}
+
+template <typename Cap>
+typename BoundedSystem<Cap>::PairStep BoundedSystem<Cap>::StepOf(
+    int64_t i) const {
+  const Vector2d& e = (*viewed_)[i].e;
+  const Vector& l = (*multipliers_)[i];
+  const Correction& c = correction_[i];
+  PairStep step;
+  step.h = cap_.Slacks(e);
+  step.dh =
+      -(cap_.Normals(e).transpose() * d_[i].e) - Vector::Constant(c.slack);
+  step.dl = (Vector::Constant(mu_) - c.product - l.cwiseProduct(step.dh))
+                .cwiseQuotient(step.h) -
+            l;
+  return step;
+}
+
+// A step t takes the depth to w + t dw and the error along de by
+// a = t / (1 + t dw / w): to all of a >= 0 if the depth vanishes on the way.
+template <typename Cap>
+double BoundedSystem<Cap>::MaxStep(double damping) const {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  return damping * loop_.Min([&](int64_t i) {
+    const double dw = d_[i].depth;
+    const double ahead = 1 / damping;
+    const double limit = 1 + ahead * dw > 0 ? ahead : -1 / dw;
+    const double furthest =
+        limit == ahead ? ahead / (1 + ahead * dw) : kInfinity;
+    const double a = cap_.MaxStep((*viewed_)[i].e, d_[i].e, furthest);
+    return a < furthest ? a / (1 - a * dw) : limit;
+  });
+}
+
+template <typename Cap>
+double BoundedSystem<Cap>::MaxDualStep(double damping) const {
+  return damping * loop_.Min([&](int64_t i) {
+    const Vector dl = StepOf(i).dl;
+    double limit = 1 / damping;
+    for (int j = 0; j < Cap::kNum; ++j) {
+      const double l = (*multipliers_)[i][j];
+      if (-dl[j] * limit > l) limit = -l / dl[j];
+    }
+    return limit;
+  });
+}
+
+template <typename Cap>
+double BoundedSystem<Cap>::Slope() const {
+  return loop_.Sum([&](int64_t i) { return -PullOf(i).dot(d_[i].e); });
+}
+
+template <typename Cap>
+int64_t BoundedSystem<Cap>::MemoryBytes(const KnownRotationProblem& problem) {
   constexpr int64_t kPerObservation =
-      sizeof(NtScaling<Cone>) + 4 * sizeof(Vector) + sizeof(Vector3d) +
-      3 * sizeof(double) +      // refinement
-      3 * 9 * sizeof(double) +  // A_s, A_t, Q
-      2 * sizeof(int32_t);      // structure and order
-  constexpr int64_t kPerUnknown = 5 * sizeof(Vector3d);
+      sizeof(Root) + sizeof(Correction) + sizeof(Vector3d) +
+      sizeof(ViewedError) + 3 * 9 * sizeof(double) +  // A_s, A_t, Q
+      2 * sizeof(int32_t);                            // structure and order
+  constexpr int64_t kPerUnknown = 4 * sizeof(Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
          (problem.num_points + problem.num_frames) * kPerUnknown +
          FrameSystem(AnchoredStructure(problem)).MemoryBytes();
 }
 
-template class BoundedSystem<SecondOrderCone>;
-template class BoundedSystem<FourHalfLines>;
+template class BoundedSystem<DiscCap>;
+template class BoundedSystem<PolygonCap>;
 
 }  // namespace krot

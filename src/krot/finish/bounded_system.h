@@ -1,112 +1,108 @@
 #pragma once
 
-#include <utility>
 #include <vector>
 
-#include "krot/conic/cones.h"
-#include "krot/conic/nt_scaling.h"
 #include "krot/conic/observation_loop.h"
 #include "krot/conic/point_elimination.h"
+#include "krot/finish/error_cap.h"
 #include "krot/finish/error_loss.h"
-#include "krot/minimax/norm.h"
-#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 
-// The Newton system of bounded least squares at an iterate. With s = T (cap w;
-// v) in the cone, z its multiplier and W their scaling, as in newton_system.h,
-// a direction dx minimises, summed over all observations,
+// An observation's error e = v / w, pixels, and its depth w.
+struct ViewedError {
+  Eigen::Vector2d e;
+  double depth;
+};
+
+// The Newton system of bounded least squares at an iterate, in pixels. With
+// slacks h_j(e), multipliers l_j and J = de/dx_cam = (E_v - e E_w) / w, a
+// direction solves, to first order,
 //
-//   1/2 rho' |e + J dx|^2 + 1/2 |W^-1 ds - f|^2 + degree mu dw / w,
+//   sum J'(rho' (e + de) + sum_j (l_j + dl_j) n_j(e + de)) = 0,   de = J dx,
+//   (h_j + dh_j)(l_j + dl_j) = mu,   dh_j = -n_j'de.
 //
-//   ds = T (cap dw; dv),   J = (dv - e dw) / w,   degree that of the cone.
+// dl eliminated, an observation's rows are
 //
-// The last term makes up for w in the barrier of the cone: together they are
-// the barrier of e alone, which knows neither the scale of a component nor the
-// length of a ray. So neither needs a gauge, and f = mu / lambda gives Newton's
-// direction for 1/2 sum rho + mu sum Barrier.
+//   [        U J         ]    U'U = (rho' + kBend sum_j l_j) I
+//   [ sqrt(h'l) E_w / w  ]          + sum_j l_j / h_j n_j n_j'
 //
-// An observation's five rows (six with half lines) act on its x_cam alone: they
-// are reduced to three, R, before the points are eliminated.
-//
-//   [ W^-1 T diag(cap, 1, 1)    ]
-//   [ sqrt(rho') / w  (-e | I2) ] E  =  Q R E
-template <typename Cone>
+// the last of which holds back points whose depths the errors hardly tell, as
+// the barrier of the cone of (cap w; v) would; it vanishes with mu. The
+// right-hand side, -(rho' e + sum_j mu / h_j n_j), is minus the gradient of the
+// barrier problem: any l > 0 gives a descent direction.
+template <typename Cap>
 class BoundedSystem {
  public:
-  using Vector = typename Cone::Vector;
+  using Vector = typename Cap::Vector;
 
   // Keeps a reference to `problem`, but for its observations' rows.
-  BoundedSystem(const KnownRotationProblem& problem, Norm norm, double cap,
+  BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
                 const ErrorLoss& loss, int num_threads);
 
-  // s = T (cap w; v); inside the cone where the residual is below the cap.
-  Vector Slack(const ViewedPoint& viewed) const {
-    return T_ * Eigen::Vector3d(cap_ * viewed.depth, viewed.v[0], viewed.v[1]);
-  }
-  // Of the error alone, at mu = 1: for p = 2 -1/2 log(1 - |e|^2 / cap^2), else
-  // the same sum over the four half lines; 0 for e = 0.
-  double Barrier(const ViewedPoint& viewed) const;
-
-  // Scales and factorises at an iterate, whose rows are those of
-  // `observations`, which must outlive the calls of Solve; false if there is no
-  // factor.
+  // The system at an iterate, whose rows are those of `observations`; all of it
+  // must outlive the calls below. False if there is no factor.
   bool Factorize(const std::vector<Observation>& observations,
-                 const std::vector<ViewedPoint>& viewed,
-                 const std::vector<Vector>& z);
+                 const std::vector<ViewedError>& viewed,
+                 const std::vector<Vector>& multipliers);
 
-  // The direction for the targets f = target(i), which may depend on the last
-  // direction, and for mu.
-  template <typename Target>
-  void Solve(const Target& target, double mu) {
-    loop_.ForEach([&](int64_t i) { target_[i] = target(i); });
-    SolveForTarget(mu);
-  }
+  // Newton's direction for the barrier problem of this mu.
+  void Solve(double mu);
+  // The same with the second order of the products and slacks along the last
+  // direction [Mehrotra 1992].
+  void Correct(double mu);
+
+  const BlockVector& dx() const { return dx_; }
+  // Where the last direction leads the slacks and multipliers of observation i.
+  struct PairStep {
+    Vector h, dh, dl;
+  };
+  PairStep StepOf(int64_t i) const;
+  // The longest step <= 1 along dx that keeps all errors below the cap where
+  // rows stay, and the longest along dl, both times `damping`.
+  double MaxStep(double damping) const;
+  double MaxDualStep(double damping) const;
+  // What a full step gains of the quadratic model, twice; squared pixels.
+  double Slope() const;
 
   const ObservationLoop& loop() const { return loop_; }
-  double mu() const { return mu_; }  // mean of the pairs
-  const std::vector<Vector>& lambda() const { return lambda_; }
-  const std::vector<Vector>& target() const { return target_; }  // the last f
-
-  // Where the last Solve leads; ds and dz are scaled.
-  struct Direction {
-    BlockVector dx;
-    std::vector<Vector> ds, dz;
-  };
-  const Direction& direction() const { return direction_; }
-  void Restore(Direction direction) { direction_ = std::move(direction); }
-  // The multipliers' direction without its scaling.
-  Vector UnscaledDz(int64_t i) const {
-    return scaling_[i].ApplyInverse(direction_.dz[i]);
-  }
-  // What a full step along dx gains of the quadratic model, twice: the slope of
-  // the barrier problem along it, squared pixels.
-  double Slope() const { return slope_; }
+  const Cap& cap() const { return cap_; }
 
   static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
  private:
-  void FindGradient(double mu);
-  void SolveForTarget(double mu);
+  using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+  // U = [a b; 0 c].
+  struct Root {
+    double a, b, c;
+  };
+  // Second order along the last direction: of h_j l_j, and of each h_j.
+  struct Correction {
+    Vector product = Vector::Zero();
+    double slack = 0;
+  };
+
+  Root RootOf(int64_t i) const;
+  Eigen::Vector2d PullOf(int64_t i) const;
+  void SolveForTarget();
 
   const KnownRotationProblem& problem_;
-  const double cap_;
+  const Cap cap_;
   const ErrorLoss loss_;
   const ObservationLoop loop_;
   const BlockStructure structure_;
-  const Eigen::Matrix<double, Cone::kDim, 3> T_;
   PointElimination<3> elimination_;
   const std::vector<Observation>* observations_ = nullptr;
-  const std::vector<ViewedPoint>* viewed_ = nullptr;
+  const std::vector<ViewedError>* viewed_ = nullptr;
+  const std::vector<Vector>* multipliers_ = nullptr;
   double mu_ = 0;
-  double slope_ = 0;
-  std::vector<NtScaling<Cone>> scaling_;
-  std::vector<Vector> lambda_;
-  std::vector<Vector> target_;
-  std::vector<Eigen::Vector3d> pull_;  // of each observation on its x_cam
-  BlockVector gradient_;               // of all
-  Direction direction_;
+  std::vector<Root> root_;
+  std::vector<Correction> correction_;
+  std::vector<Eigen::Vector3d> rhs_;  // of the rows
+  BlockVector zero_, dx_;
+  std::vector<ViewedError> d_;  // de and dw / w
 };
 
 }  // namespace krot
