@@ -121,8 +121,8 @@ void AdjustmentOptions::AddCeres(OptionParser* parser) {
       "Up to so many images it is sparse; beyond them conjugate gradients "
       "solve it");
   parser->AddThreads("BundleAdjustmentCeres.num_threads", &num_threads_,
-                     "with more than one the last digits differ from run to "
-                     "run");
+                     "without a cap the last digits differ from run to run with "
+                     "more than one");
 }
 
 AdjustModelOptions AdjustmentOptions::Resolve(
