@@ -31,7 +31,7 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"model", {"camera", "geometry"}},
       {"analysis", {"model", "minimax"}},
       {"synthetic", {"model"}},
-      {"adjust", {"model"}},
+      {"adjust", {"model", "conic"}},
       {"bridge", {"model", "proof"}},
       {"pipeline", {"bridge", "joint", "finish", "analysis", "adjust"}},
       {"outliers", {"pipeline"}},

@@ -15,11 +15,9 @@ constexpr double kBoundaryShare = 0.01;
 constexpr double kMultiplierRange = 100;
 // The weight falls by this factor after a step at least this long: after
 // shorter ones its minimum is still far, and slacks that fall behind the weight
-// make all further steps short. After a whole step, which nothing held, it
-// falls by more.
+// make all further steps short.
 constexpr double kCentering = 0.2;
 constexpr double kFallingStep = 0.5;
-constexpr double kFreeCentering = 0.05;
 // A step that leads too far is shortened by this factor.
 constexpr double kShortening = 0.7;
 constexpr double kShortestStep = 1e-6;
@@ -187,7 +185,7 @@ void BarrierPath::UpdateRadius(double share) {
 void BarrierPath::LowerWeight(double step) {
   if (step < kFallingStep) return;
   const double last = 0.5 * kGapTolerance * Objective() / count();
-  mu_ = std::max(last, (step < 1 ? kCentering : kFreeCentering) * mu_);
+  mu_ = std::max(last, kCentering * mu_);
 }
 
 int64_t BarrierPath::NumActive() const {

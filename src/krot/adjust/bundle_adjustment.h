@@ -12,7 +12,7 @@
 namespace krot {
 
 // Least squares over everything that a COLMAP model holds: poses, points and
-// intrinsics, on Ceres. Names and defaults are those of COLMAP 4.1 where it has
+// intrinsics; on Ceres, or below a cap on a Newton system of our own. Names and defaults are those of COLMAP 4.1 where it has
 // the option, and differ where a comment says so.
 
 enum class RobustLoss { kTrivial, kSoftL1, kCauchy, kHuber };
@@ -47,13 +47,14 @@ struct BundleAdjustmentOptions {
   double loss_scale = 1;  // > 0; pixels
 
   int max_num_iterations = 100;            // >= 0
+  // Without a cap, which has an end of its own (kCapConverged):
   int max_linear_solver_iterations = 200;  // >= 1; iterative solver only
   double function_tolerance = 1e-6;        // relative; >= 0; COLMAP's is 0
   double gradient_tolerance = 1e-4;        // >= 0
   double parameter_tolerance = 0;          // relative; >= 0
 
   // Up to so many images the reduced camera system is dense, sparse, and
-  // beyond them solved by conjugate gradients.
+  // beyond them solved by conjugate gradients. Without a cap.
   int max_num_images_direct_dense = 50;     // >= 0
   int max_num_images_direct_sparse = 1000;  // >= 0
 
@@ -136,8 +137,9 @@ struct BundleAdjustmentResult {
 // updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a
-// cap, so is one that takes an error to it. With more than one thread
-// Ceres adds up in no fixed order: the last digits differ from run to run then.
+// cap, so is one that takes an error to it. With a cap the result has the same
+// bits at any number of threads; without one, Ceres adds up in no fixed order
+// on more than one, and the last digits differ from run to run then.
 //
 // Requires a valid model (ValidateModel). Throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range.

@@ -120,8 +120,8 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
       "Up to so many images it is sparse; beyond them conjugate gradients "
       "solve it");
   table->AddThreads("BundleAdjustmentCeres.num_threads", &num_threads_,
-                    "with more than one the last digits differ from run to "
-                    "run");
+                    "without a cap the last digits differ from run to run with "
+                    "more than one");
 }
 
 AdjustModelOptions AdjustmentOptions::Resolve(const OptionTable& table) const {

@@ -22,7 +22,7 @@ struct AdjustModelOptions {
   // Takes the place of adjustment.max_error: the cap is so many times the
   // lowest maximum of the known rotation problem; > 1.
   std::optional<double> max_error_factor;
-  // For the known rotation problem; its finish is replaced.
+  // For the known rotation problem, which goes without its finish.
   SolveModelOptions start;
 };
 
