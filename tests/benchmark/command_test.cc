@@ -18,8 +18,9 @@ int ExitCodeOf(std::vector<std::string> arguments) {
 
 TEST(BenchmarkCommand, HelpsWithEveryCommand) {
   EXPECT_EQ(ExitCodeOf({}), 0);
-  for (const char* command : {"triangulation", "blocks", "known_rotation",
-                              "sweep", "scaling", "joint", "summary"}) {
+  for (const char* command :
+       {"triangulation", "blocks", "known_rotation", "sweep", "scaling",
+        "joint", "positioning", "summary"}) {
     EXPECT_EQ(ExitCodeOf({command, "--help"}), 0) << command;
   }
 }

@@ -20,7 +20,7 @@ OutlierFilterOptions Within(double max_error) {
 }
 
 TEST(FilterOutliers, FindsPlantedOutliersAboveFourTimesTheBound) {
-  for (const uint64_t seed : {1u, 2u}) {
+  for (const uint64_t seed : {1u, 2u, 3u}) {
     const SyntheticScene scene = MakeOutlierScene(seed, 0.05, 200);
     const double bound = 3;
     const OutlierFilterResult result =
@@ -38,7 +38,7 @@ TEST(FilterOutliers, FindsPlantedOutliersAboveFourTimesTheBound) {
       ++num_large;
       num_found += removed.count({element.image_id, element.point2D_idx}) > 0;
     }
-    EXPECT_GE(num_found, 0.9 * num_large) << "of " << num_large;
+    EXPECT_GE(num_found, 0.99 * num_large) << "of " << num_large;
     EXPECT_LE(result.summary.num_proved,
               static_cast<int64_t>(scene.outliers.size()));
   }

@@ -35,12 +35,12 @@ struct BuildProblemOptions {
   // Usable observations that a point needs to be optimised; >= 1. Two of one
   // image are two.
   int min_track_length = 2;
-  SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
   int num_threads = -1;  // -1: all; the result does not depend on it
   // Takes nothing from the model but rotations, rigs and rays: no observation
   // is left out as `behind`, and as `no_pose` only where rotation or rig are
   // unknown. No start then: `start` is what the model says, whatever that is.
   bool ignore_translations = false;
+  SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
 };
 
 // The problem, its start, and where each unknown lives in the model. All stand
