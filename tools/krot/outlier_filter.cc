@@ -15,6 +15,7 @@
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
+#include "tools/krot/suspect_crops.h"
 
 namespace krot {
 namespace {
@@ -24,6 +25,7 @@ struct OutlierCommand {
   std::string conflicts_path;
   std::string outliers_path;
   std::string profile_path;
+  std::string image_path;
   int num_threads = -1;
   OutlierFilterOptions options;
   CommonOptions common;
@@ -36,6 +38,9 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
                         "many must go; see certificate_checker");
   parser->AddOutputFile("outliers_path", &command->outliers_path,
                         "Where the list of removed observations goes, as CSV");
+  parser->AddPath("image_path", &command->image_path, false, "a folder",
+                  "The photos: the page then shows the worst of what was "
+                  "removed in them");
   OutlierFilterOptions* options = &command->options;
   parser->Add({"OutlierFilter.max_error",
                "The bound that all errors are to be within; may be missing "
@@ -76,6 +81,9 @@ void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
       parser.Refuse(
           name, "with --OutlierFilter.method threshold, which proves nothing");
     }
+  }
+  if (command.paths.html_path.empty()) {
+    parser.Refuse("image_path", "without --html_path");
   }
   if (!command.options.max_error && command.profile_path.empty()) {
     throw OptionError(
@@ -157,8 +165,13 @@ int Run(const OutlierCommand& command) {
   report.run.peak_memory_bytes = PeakMemoryBytes();
   WriteSideFiles(command, report);
   const std::string report_json = OutlierJson(report);
+  const std::string crops =
+      command.image_path.empty()
+          ? "[]"
+          : SuspectCropsJson(command.image_path, model, result.model,
+                             report.summary, log);
   WriteReports(paths.report_path, paths.html_path, report_json, model,
-               result.model, command.num_threads, log);
+               result.model, command.num_threads, log, crops);
   PrintTable(log, OutlierTable(report));
   if (!report.summary.is_within) {
     LogLine(log, 0, "warning: not all errors are within the bound");
