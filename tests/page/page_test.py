@@ -7,11 +7,14 @@ import itertools
 import json
 import math
 import pathlib
+import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import zlib
 
 import webdriver
 
@@ -57,6 +60,18 @@ for (let i = 0; i < data.length; i += 4) {
                Math.floor(i / 4 / width - height / 2)]);
 }
 return places;
+"""
+
+# The colour of every photo on the page where its point was observed.
+READ_CROPS = """
+return [...document.querySelectorAll('#suspects img')].map((image, i) => {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = image.naturalWidth;
+  const context = canvas.getContext('2d');
+  context.drawImage(image, 0, 0);
+  const [x, y] = arguments[0][i].crop.observed.map(Math.floor);
+  return [...context.getImageData(x, y, 1, 1).data];
+});
 """
 
 
@@ -343,6 +358,110 @@ class OtherCommandsTest(unittest.TestCase):
         for text, key in zip(shown, ("rotation_deg", "center", "point")):
             self.assertAlmostEqual(float(text), report[key]["max"],
                                    delta=1e-3 * report[key]["max"])
+
+
+def write_png(path, width, height, color):
+    """color(x, y) -> (red, green, blue)"""
+    def chunk(kind, data):
+        return (struct.pack(">I", len(data)) + kind + data +
+                struct.pack(">I", zlib.crc32(kind + data)))
+    rows = b"".join(
+        b"\0" + bytes(itertools.chain.from_iterable(
+            color(x, y) for x in range(width))) for y in range(height))
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n" +
+        chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
+        chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
+
+
+class FilterTest(unittest.TestCase):
+    """A scene with planted outliers, and photos whose colours say where they
+    are: red is a quarter of x, green of y."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        root = pathlib.Path(folder.name)
+        run_krot("model_synthesizer", "--output_path", root / "input",
+                 "--Scene.num_frames", 6, "--Scene.num_points", 100,
+                 "--Scene.pixel_noise", 0.5, "--Scene.outlier_ratio", 0.02,
+                 "--output_type", "TXT")
+        cls.pixels = {}
+        lines = [line for line in (root / "input" / "images.txt").read_text()
+                 .splitlines() if not line.startswith("#")]
+        (root / "photos").mkdir()
+        first = None
+        for header, points in zip(lines[::2], lines[1::2]):
+            name = header.split(maxsplit=9)[9]
+            values = points.split()
+            cls.pixels[name] = [
+                (float(values[i]), float(values[i + 1]))
+                for i in range(0, len(values), 3)]
+            photo = root / "photos" / name
+            photo.parent.mkdir(parents=True, exist_ok=True)
+            if first is None:
+                first = photo
+                write_png(photo, 1024, 768,
+                          lambda x, y: (x // 4, y // 4, 128))
+            else:
+                shutil.copy(first, photo)
+        run_krot("outlier_filter", "--input_path", root / "input",
+                 "--output_path", root / "output", "--image_path",
+                 root / "photos", "--OutlierFilter.profile_path",
+                 root / "profile.json", "--report_path", root / "report.json",
+                 "--html_path", root / "page.html")
+        cls.report = json.loads((root / "report.json").read_text())
+        cls.page = (root / "page.html").as_uri()
+        cls.browser = cls.enterClassContext(webdriver.Browser((1200, 1300)))
+
+    def setUp(self):
+        self.browser.open(self.page)
+
+    def tearDown(self):
+        self.assertEqual(self.browser.console(), [])
+
+    def test_verdict_is_the_bracket(self):
+        verdict = self.browser.text("#verdict")
+        self.assertIn("Without %d of " % self.report["num_removed"], verdict)
+        self.assertIn("at least %d must go (proved)" %
+                      self.report["num_must_go"], verdict)
+
+    def test_profile_shows_every_level(self):
+        levels = self.report["profile"]["levels"]
+        self.assertEqual(
+            self.browser.texts("#profile tbody td:nth-child(3)"),
+            [pixels(level["max_error"]) for level in levels])
+        self.assertEqual(self.browser.run(
+            "return document.querySelectorAll('#profile-chart "
+            "circle.after.step').length"), len(levels))
+        heights = self.browser.run("""
+            return [...document.querySelectorAll(
+                '#profile-chart circle.after.step')].map(
+                    (step) => Number(step.getAttribute('cy')))""")
+        self.assertEqual(heights, sorted(heights))
+
+    def test_crops_show_the_place_of_the_observation(self):
+        crops = json.loads(self.browser.text("#krot-crops"))
+        self.assertEqual(
+            [crop["point3D_id"] for crop in crops],
+            list(dict.fromkeys(seen["point3D_id"]
+                               for seen in self.report["removed"]))[:20])
+        views = [view for crop in crops for view in crop["views"]]
+        colors = self.browser.run(READ_CROPS, views)
+        self.assertEqual(len(colors), len(views))
+        for view, color in zip(views, colors):
+            x, y = self.pixels[view["image_name"]][view["point2D_idx"]]
+            self.assertAlmostEqual(4 * color[0], x, delta=12)
+            self.assertAlmostEqual(4 * color[1], y, delta=12)
+
+    def test_choice_of_a_suspect_shows_its_camera_and_point(self):
+        self.browser.run(
+            "document.querySelector('#suspects button').click()")
+        worst = self.report["removed"][0]
+        self.assertEqual(
+            self.browser.texts(".info h3"),
+            [worst["image_name"], "Point %d" % worst["point3D_id"]])
 
 
 class PathTest(unittest.TestCase):

@@ -1,6 +1,6 @@
 """Pictures of a report page; see screenshots.sh.
 
-Usage: screenshots.py PAGE.html FOLDER
+Usage: screenshots.py PAGE.html FILTERED.html FOLDER
 """
 
 import pathlib
@@ -19,11 +19,18 @@ def show_worst(browser):
 
 def main():
     page = pathlib.Path(sys.argv[1]).resolve().as_uri()
-    folder = pathlib.Path(sys.argv[2])
+    filtered = pathlib.Path(sys.argv[2]).resolve().as_uri()
+    folder = pathlib.Path(sys.argv[3])
     # The height includes what a window has around the page.
     with Browser((1100, 1180)) as browser:
         browser.open(page)
         (folder / "page_desk.png").write_bytes(browser.screenshot())
+    with Browser((1000, 760)) as browser:
+        browser.open(filtered)
+        browser.run(
+            "document.getElementById('profile-section').scrollIntoView()")
+        time.sleep(1)
+        (folder / "page_profile.png").write_bytes(browser.screenshot())
     with Browser((400, 860), dark=True, touch=True) as browser:
         browser.open(page)
         show_worst(browser)

@@ -16,6 +16,7 @@
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
+#include "tools/krot/suspect_crops.h"
 
 namespace krot {
 namespace {
@@ -25,6 +26,7 @@ struct OutlierCommand {
   std::string conflicts_path;
   std::string outliers_path;
   std::string profile_path;
+  std::string image_path;
   Context context;
   OutlierFilterOptions options;
   CommonOptions common;
@@ -37,6 +39,9 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
                         "many must go; see certificate_checker");
   parser->AddOutputFile("outliers_path", &command->outliers_path,
                         "Where the list of removed observations goes, as CSV");
+  parser->AddPath("image_path", &command->image_path, false, "a folder",
+                  "The photos: the page then shows the worst of what was "
+                  "removed in them");
   AddOutlierFilterOptions(&command->options, &command->context, parser);
   parser->AddOutputFile(
       "OutlierFilter.profile_path", &command->profile_path,
@@ -54,6 +59,9 @@ void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
       parser.Refuse(
           name, "with --OutlierFilter.method threshold, which proves nothing");
     }
+  }
+  if (command.paths.html_path.empty()) {
+    parser.Refuse("image_path", "without --html_path");
   }
   if (!command.options.max_error && command.profile_path.empty()) {
     throw OptionError(
@@ -134,8 +142,13 @@ int Run(const OutlierCommand& command) {
   report.run.peak_memory_bytes = PeakMemoryBytes();
   WriteSideFiles(command, report);
   const std::string report_json = OutlierJson(report);
+  const std::string crops =
+      command.image_path.empty()
+          ? "[]"
+          : SuspectCropsJson(command.image_path, model, result.model,
+                             report.summary, log);
   WriteReports(paths.report_path, paths.html_path, report_json, model,
-               result.model, command.context.num_threads, log);
+               result.model, command.context.num_threads, log, crops);
   PrintTable(log, OutlierTable(report));
   if (!report.summary.is_within) {
     LogLine(log, 0, "warning: not all errors are within the bound");

@@ -14,15 +14,16 @@ void AddHtmlPath(std::string* html_path, OptionParser* parser) {
 
 void WriteReports(const std::string& report_path, const std::string& html_path,
                   const std::string& report_json, const Model& before,
-                  const Model& after, int num_threads, const LogOptions& log) {
+                  const Model& after, int num_threads, const LogOptions& log,
+                  const std::string& crops_json) {
   if (!report_path.empty()) {
     LogLine(log, 2, "writing " + report_path);
     WriteFileAtomically(report_path, report_json);
   }
   if (!html_path.empty()) {
     LogLine(log, 2, "writing " + html_path);
-    WriteFileAtomically(html_path,
-                        HtmlPage(report_json, before, after, num_threads));
+    WriteFileAtomically(html_path, HtmlPage(report_json, before, after,
+                                            num_threads, crops_json));
   }
 }
 

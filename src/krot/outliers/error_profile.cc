@@ -2,17 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <numeric>
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/base/timer.h"
-#include "krot/bridge/built_part.h"
-#include "krot/bridge/reprojection.h"
+#include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
-#include "krot/pipeline/rounds.h"
-#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -29,10 +23,7 @@ class Profiler {
         built_(built),
         options_(options),
         context_(context),
-        search_(model, built, options.norm, context) {
-    solve_.norm = options.norm;
-    solve_.joint.relative_gap = options.relative_gap;
-  }
+        search_(model, built, options.norm, context) {}
 
   ErrorProfile Run();
 
@@ -45,39 +36,21 @@ class Profiler {
   const BuiltProblem& built_;
   const ErrorProfileOptions& options_;
   const Context& context_;
-  SolveModelOptions solve_;
   RemovalSearch search_;
   ErrorProfile profile_;
 };
 
 // The optimum of what a removal leaves.
 ProfileLevel Profiler::Solve(Removal removal) const {
-  std::vector<int64_t> all(built_.pixels.size());
-  std::iota(all.begin(), all.end(), 0);
-  std::vector<int64_t> kept;
-  std::set_difference(all.begin(), all.end(), removal.observations.begin(),
-                      removal.observations.end(), std::back_inserter(kept));
-  const ProblemSubset subset(built_.problem,
-                             PruneUnconstrained(built_.problem, kept));
+  OptimumWithout optimum =
+      SolveWithout(model_, built_, removal.observations, removal.estimate,
+                   options_.norm, options_.relative_gap, context_);
   ProfileLevel level;
   level.removal = std::move(removal);
-  BuiltProblem part = BuiltPart(built_, subset, level.removal.estimate);
-  if (part.pixels.empty()) return level;
-  const Reprojection reprojection(model_, part);
-  Estimate estimate = part.start;
-  reprojection.TakeRows(estimate, context_.num_threads, &part.problem);
-  SolveSummary summary;
-  level.proof = SolveInRounds(model_, solve_, SolveMethod::kJoint, context_,
-                              Timer(), &part, &estimate, &summary);
-  level.max_error =
-      reprojection.TrueCost(estimate, options_.norm, context_.num_threads);
-  if (level.proof) {
-    const PixelCertificateCheck check = CheckPixelCertificate(
-        model_, part, options_.norm, *level.proof, context_);
-    level.lower_bound = check.lower_bound;
-    level.proof->rows = InWhole(subset, std::move(level.proof->rows));
-  }
-  subset.Replace(estimate, &level.removal.estimate);
+  level.removal.estimate = std::move(optimum.estimate);
+  level.max_error = optimum.max_error;
+  level.lower_bound = optimum.lower_bound;
+  level.proof = std::move(optimum.proof);
   return level;
 }
 

@@ -127,9 +127,13 @@ void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
                          std::vector<Conflict> found,
                          const std::vector<uint64_t>& elements) {
   const Timer timer;
+  std::vector<Conflict> conflicts = PackAgainstRemoval(
+      model_, built, bound_, removal, std::move(found), context_);
+  if (context_.IsCancelled()) return;
+  summary_.rotation_suspect =
+      FindRotationSuspect(model_, built, bound_, conflicts, removal, context_);
   std::vector<PixelCertificate> proofs;
-  for (Conflict& conflict : PackAgainstRemoval(model_, built, bound_, removal,
-                                               std::move(found), context_)) {
+  for (Conflict& conflict : conflicts) {
     for (const int64_t i : conflict.observations) {
       conflict_of_[elements[i]] = summary_.num_proved;
     }

@@ -10,6 +10,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/conflict_file.h"
 #include "krot/model/model.h"
+#include "krot/outliers/rotation_suspect.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {
@@ -94,6 +95,7 @@ struct OutlierFilterSummary {
   std::optional<ConflictFile> conflicts;  // kConflicts
   // Most removed observations first; those without are left out.
   std::vector<Suspect> tracks, images, cameras;
+  std::optional<RotationSuspect> rotation_suspect;
 
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;

@@ -45,7 +45,8 @@ std::string FillTemplate(
 }  // namespace
 
 std::string HtmlPage(const std::string& report_json, const Model& before,
-                     const Model& after, int num_threads) {
+                     const Model& after, int num_threads,
+                     const std::string& crops_json) {
   const Eigen::Vector3d origin = SceneOrigin(before);
   const auto view = [&](const Model& model) {
     return ModelViewJson(model, origin, kMaxShownPoints, num_threads);
@@ -53,6 +54,7 @@ std::string HtmlPage(const std::string& report_json, const Model& before,
   return FillTemplate(
       kHtmlPageTemplate,
       {{"report", EscapeForScript(report_json)},
+       {"crops", EscapeForScript(crops_json)},
        {"models", EscapeForScript("{\"before\":" + view(before) +
                                   ",\"after\":" + view(after) + "}")}});
 }

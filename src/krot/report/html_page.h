@@ -15,9 +15,13 @@ namespace krot {
 // most kMaxShownPoints points each, and the distribution of all true pixel
 // errors. Byte sequences that are not UTF-8 are replaced.
 //
+// `crops_json` goes into #krot-crops: photos of suspects (docs/formats.md), []
+// without.
+//
 // Requires valid models (ValidateModel). O(observations log observations); the
 // same text at any number of threads.
 std::string HtmlPage(const std::string& report_json, const Model& before,
-                     const Model& after, int num_threads = -1);
+                     const Model& after, int num_threads = -1,
+                     const std::string& crops_json = "[]");
 
 }  // namespace krot

@@ -6,7 +6,7 @@
 cmake_minimum_required(VERSION 3.22)
 
 set(modules dom format data errors_table verdict facts lists axes curves
-    convergence profile vectors frusta colors framing orbit shaders renderer layers
+    convergence profile suspects vectors frusta colors framing orbit shaders renderer layers
     picking selection viewer controls main)
 
 set(script "")

@@ -10,6 +10,7 @@ import { cards, differencesTable, factsTable } from './facts.js';
 import { counted } from './format.js';
 import { imagesTable, pairImages, supportTable } from './lists.js';
 import { profileChart, profileTable } from './profile.js';
+import { suspectRows } from './suspects.js';
 import { scope, verdict } from './verdict.js';
 import { Viewer } from './viewer.js';
 
@@ -39,6 +40,11 @@ function showSupport(support, show) {
   byId('support').append(supportTable(support, (observation) => show({
     imageName: observation.image_name, pointId: observation.point3D_id,
   })));
+}
+
+function showSuspects(suspects, show) {
+  byId('suspects-section').hidden = suspects.length === 0;
+  byId('suspects').append(...suspectRows(suspects, show));
 }
 
 function showCourse(report) {
@@ -80,6 +86,7 @@ function showPage(report, models) {
   const show = showViewer(
     { models, labels, support, sharesPoints: !isComparison(report) });
   showSupport(support, show);
+  showSuspects(readJson('krot-crops'), show);
   const showImage = (imageName) => show({ imageName });
   byId('image-chart').append(
     imagesChart(pairImages(models), labels, showImage));

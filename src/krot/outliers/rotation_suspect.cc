@@ -1,0 +1,225 @@
+#include "krot/outliers/rotation_suspect.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "krot/bridge/reprojection.h"
+#include "krot/camera/projection_row.h"
+#include "krot/minimax/residual.h"
+#include "krot/outliers/optimum_without.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+constexpr int64_t kFewestConflicts = 3;
+constexpr double kMost = 0.5;  // of all conflicts
+constexpr double kGapOfSuspect = 1e-3;
+constexpr size_t kFewestSightings = 6;
+constexpr int kTurnIterations = 50;
+constexpr double kSmallestTurn = 1e-12;  // rad
+constexpr double kTurnDamping = 1e-9;    // relative
+constexpr double kDegrees = 180 / 3.14159265358979323846;
+
+// An observation of the image, and its point where its camera stands now.
+struct Sighting {
+  Vector2d pixel;
+  Vector3d x_cam;
+};
+
+// x_cam -> rotation * x_cam + translation.
+struct Turn {
+  Matrix3d rotation = Matrix3d::Identity();
+  Vector3d translation = Vector3d::Zero();
+};
+
+class TurnFit {
+ public:
+  TurnFit(const Reprojection::Source& source, const ErrorBound& bound,
+          std::vector<Sighting> sightings)
+      : source_(source), bound_(bound), sightings_(std::move(sightings)) {}
+
+  // With the position alone, or the rotation, too.
+  Turn Fit(bool with_rotation) const;
+  int64_t NumAbove(const Turn& turn) const;
+
+ private:
+  Vector6d Step(const Turn& turn, bool with_rotation) const;
+
+  const Reprojection::Source source_;
+  const ErrorBound bound_;
+  const std::vector<Sighting> sightings_;
+};
+
+// Gauss and Newton's, by rows at the projection: e = v / w.
+Vector6d TurnFit::Step(const Turn& turn, bool with_rotation) const {
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  for (const Sighting& sighting : sightings_) {
+    const Vector3d turned = turn.rotation * sighting.x_cam;
+    const Vector3d x = turned + turn.translation;
+    const std::optional<Matrix3d> row =
+        RowAtProjection(source_.model_id, source_.params, sighting.pixel, x);
+    if (!row) continue;
+    const Vector3d wv = *row * x;
+    const Vector2d e = wv.tail<2>() / wv[0];
+    const Eigen::Matrix<double, 2, 3> by_x =
+        (row->bottomRows<2>() - e * row->row(0)) / wv[0];
+    Eigen::Matrix<double, 2, 6> J;
+    J.rightCols<3>() = by_x;
+    J.leftCols<3>().setZero();
+    if (with_rotation) {
+      for (int k = 0; k < 3; ++k) {
+        J.col(k) = by_x * Vector3d::Unit(k).cross(turned);
+      }
+    }
+    const double weight =
+        1 / (1 + e.squaredNorm() / (bound_.max_error * bound_.max_error));
+    normal += weight * J.transpose() * J;
+    gradient += weight * J.transpose() * e;
+  }
+  for (int k = 0; k < 6; ++k) {
+    normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + kTurnDamping) : 1;
+  }
+  return -normal.ldlt().solve(gradient);
+}
+
+Turn TurnFit::Fit(bool with_rotation) const {
+  Turn turn;
+  for (int n = 0; n < kTurnIterations; ++n) {
+    const Vector6d step = Step(turn, with_rotation);
+    if (!step.allFinite()) break;
+    const Vector3d omega = step.head<3>();
+    const double angle = omega.norm();
+    if (angle > 0) {
+      turn.rotation =
+          Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix() *
+          turn.rotation;
+    }
+    turn.translation += step.tail<3>();
+    if (with_rotation && angle < kSmallestTurn) break;
+  }
+  return turn;
+}
+
+int64_t TurnFit::NumAbove(const Turn& turn) const {
+  return std::count_if(
+      sightings_.begin(), sightings_.end(), [&](const Sighting& sighting) {
+        const std::optional<Vector2d> e =
+            ProjectionError(source_.model_id, source_.params, sighting.pixel,
+                            turn.rotation * sighting.x_cam + turn.translation);
+        return !e || !(NormOf(*e, bound_.norm) <= bound_.max_error);
+      });
+}
+
+// The view that most conflicts have an observation of, and how many do.
+std::pair<int32_t, int64_t> ViewOfMost(const KnownRotationProblem& problem,
+                                       const std::vector<Conflict>& conflicts) {
+  std::vector<int64_t> counts(problem.views.size(), 0);
+  for (const Conflict& conflict : conflicts) {
+    std::vector<int32_t> views;
+    for (const int64_t i : conflict.observations) {
+      views.push_back(problem.observations[i].view);
+    }
+    std::sort(views.begin(), views.end());
+    views.erase(std::unique(views.begin(), views.end()), views.end());
+    for (const int32_t v : views) ++counts[v];
+  }
+  const auto most = std::max_element(counts.begin(), counts.end());
+  if (most == counts.end()) return {-1, 0};
+  return {static_cast<int32_t>(most - counts.begin()), *most};
+}
+
+std::vector<int64_t> ObservationsOf(const KnownRotationProblem& problem,
+                                    int32_t view) {
+  std::vector<int64_t> observations;
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    if (problem.observations[i].view == view) {
+      observations.push_back(static_cast<int64_t>(i));
+    }
+  }
+  return observations;
+}
+
+// The observations of a view whose points two other views hold.
+std::vector<Sighting> SightingsOf(const BuiltProblem& built,
+                                  const Reprojection& reprojection,
+                                  const std::vector<int64_t>& observations,
+                                  const Estimate& estimate) {
+  const KnownRotationProblem& problem = built.problem;
+  std::vector<Sighting> sightings;
+  for (const int64_t i : observations) {
+    const int32_t k = problem.observations[i].point;
+    int64_t num_others = 0;
+    for (int64_t j = problem.point_begin[k]; j < problem.point_begin[k + 1];
+         ++j) {
+      num_others +=
+          problem.observations[j].view != problem.observations[i].view;
+    }
+    if (num_others < 2) continue;
+    sightings.push_back({built.pixels[i], reprojection.InCamera(estimate, i)});
+  }
+  return sightings;
+}
+
+}  // namespace
+
+std::optional<RotationSuspect> FindRotationSuspect(
+    const Model& model, const BuiltProblem& built, const ErrorBound& bound,
+    const std::vector<Conflict>& conflicts, const Removal& removal,
+    const Context& context) {
+  const auto [view, count] = ViewOfMost(built.problem, conflicts);
+  if (count < kFewestConflicts ||
+      static_cast<double>(count) <
+          kMost * static_cast<double>(conflicts.size())) {
+    return std::nullopt;
+  }
+  const std::vector<int64_t> observations = ObservationsOf(built.problem, view);
+  std::vector<int64_t> observations_and_removed;
+  std::set_union(observations.begin(), observations.end(),
+                 removal.observations.begin(), removal.observations.end(),
+                 std::back_inserter(observations_and_removed));
+  const auto solve = [&](const std::vector<int64_t>& removed,
+                         const Estimate& start) {
+    return SolveWithout(model, built, removed, start, bound.norm, kGapOfSuspect,
+                        context);
+  };
+  const OptimumWithout with = solve({}, built.start);
+  const OptimumWithout without = solve(observations, built.start);
+  const OptimumWithout placed =
+      solve(observations_and_removed, removal.estimate);
+  const Reprojection reprojection(model, built);
+  std::vector<Sighting> sightings =
+      SightingsOf(built, reprojection, observations, placed.estimate);
+  if (context.IsCancelled() || sightings.size() < kFewestSightings) {
+    return std::nullopt;
+  }
+  RotationSuspect suspect;
+  const Image& image = model.images[built.image_of[view]];
+  suspect.image_id = image.id;
+  suspect.image_name = image.name;
+  suspect.num_conflicts = count;
+  suspect.lower_bound_with = with.lower_bound;
+  suspect.max_error_without = without.max_error;
+  suspect.num_observations = static_cast<int64_t>(sightings.size());
+  const TurnFit fit(reprojection.SourceOf(observations[0]), bound,
+                    std::move(sightings));
+  const Turn turn = fit.Fit(/*with_rotation=*/true);
+  suspect.num_above = fit.NumAbove(fit.Fit(/*with_rotation=*/false));
+  suspect.num_above_turned = fit.NumAbove(turn);
+  const Eigen::AngleAxisd angle_axis(turn.rotation);
+  suspect.angle_deg = angle_axis.angle() * kDegrees;
+  suspect.axis_in_cam = angle_axis.axis();
+  return suspect;
+}
+
+}  // namespace krot

@@ -1,0 +1,88 @@
+#include "krot/outliers/rotation_suspect.h"
+
+#include <gtest/gtest.h>
+
+#include "krot/bridge/reprojection.h"
+#include "krot/model/image_geometry.h"
+#include "krot/outliers/outlier_filter.h"
+#include "tests/outliers/outlier_scenes.h"
+
+namespace krot {
+namespace {
+
+constexpr size_t kTurnedFrame = 2;
+constexpr double kBound = 2;
+constexpr double kRadians = 3.14159265358979323846 / 180;
+
+// A scene with half a pixel of noise in which one camera is turned where it
+// stands.
+Model SceneWithATurnedCamera(double angle_deg, const Eigen::Vector3d& axis,
+                             double outlier_ratio = 0) {
+  Model model = MakeOutlierScene(11, outlier_ratio, 150).model;
+  const RigidTransform turn{
+      Eigen::AngleAxisd(angle_deg * kRadians, axis.normalized())
+          .toRotationMatrix(),
+      Eigen::Vector3d::Zero()};
+  Pose& pose = model.frames[kTurnedFrame].rig_from_world;
+  pose = ToPose(turn * pose.Transform());
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    const ImageGeometry geometry = ImageGeometries(model)[n];
+    model.images[n].cam_from_world = ToPose(geometry.cam_from_world);
+  }
+  return model;
+}
+
+ImageId TurnedImage(const Model& model) {
+  return static_cast<ImageId>(model.frames[kTurnedFrame].data[0].data_id);
+}
+
+OutlierFilterSummary Filter(const Model& model) {
+  OutlierFilterOptions options;
+  options.max_error = kBound;
+  return FilterOutliers(model, options, {}).summary;
+}
+
+TEST(RotationSuspect, IsTheImageThatIsTurnedAndItsTurnIsRecovered) {
+  const Eigen::Vector3d axes[] = {{1, 0, 0}, {0, 1, 0}, {1, -2, 3}};
+  for (const Eigen::Vector3d& axis : axes) {
+    const Model model = SceneWithATurnedCamera(1, axis);
+    const OutlierFilterSummary summary = Filter(model);
+    ASSERT_TRUE(summary.rotation_suspect);
+    const RotationSuspect& suspect = *summary.rotation_suspect;
+    EXPECT_EQ(suspect.image_id, TurnedImage(model));
+    EXPECT_EQ(suspect.num_conflicts, summary.num_proved);
+    // The turn back.
+    EXPECT_NEAR(suspect.angle_deg, 1, 0.1);
+    EXPECT_LT(suspect.axis_in_cam.dot(axis.normalized()), -0.98);
+    EXPECT_GT(suspect.num_above, suspect.num_observations / 4);
+    EXPECT_LT(suspect.num_above_turned, suspect.num_above / 4);
+    EXPECT_GT(suspect.lower_bound_with, kBound);
+    EXPECT_LT(suspect.max_error_without, kBound);
+  }
+}
+
+TEST(RotationSuspect, IsFoundAmongOutliersOfOtherImages) {
+  const Model model = SceneWithATurnedCamera(1, {0, 1, 0}, 0.01);
+  const OutlierFilterSummary summary = Filter(model);
+  ASSERT_TRUE(summary.rotation_suspect);
+  EXPECT_EQ(summary.rotation_suspect->image_id, TurnedImage(model));
+  EXPECT_NEAR(summary.rotation_suspect->angle_deg, 1, 0.1);
+}
+
+TEST(RotationSuspect, WithoutTheImageAllIsWithinAsABruteSolveSays) {
+  Model model = SceneWithATurnedCamera(1, {0, 1, 0});
+  const RotationSuspect suspect = *Filter(model).rotation_suspect;
+  SolveModelOptions options;
+  options.finish.finish = Finish::kNone;
+  const SolveModelResult with = SolveModel(model, options);
+  EXPECT_NEAR(suspect.lower_bound_with, with.summary.cost_final,
+              2e-3 * with.summary.cost_final);
+}
+
+TEST(RotationSuspect, IsNoneWhereOutliersAreAllOver) {
+  const SyntheticScene scene = MakeOutlierScene(12, 0.02, 150);
+  EXPECT_FALSE(Filter(scene.model).rotation_suspect);
+}
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,142 @@
+#include "tools/krot/photo.h"
+
+#include <csetjmp>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+
+#include <jpeglib.h>
+#include <png.h>
+
+namespace krot {
+namespace {
+
+constexpr uint8_t kOutside = 128;
+constexpr int kJpegQuality = 88;
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using File = std::unique_ptr<std::FILE, CloseFile>;
+
+// libjpeg reports errors by a call that must not return.
+struct JpegErrors {
+  jpeg_error_mgr manager;
+  std::jmp_buf jump;
+};
+
+void LeaveJpeg(j_common_ptr info) {
+  std::longjmp(reinterpret_cast<JpegErrors*>(info->err)->jump, 1);
+}
+
+void SayNothing(j_common_ptr) {}
+
+// Nothing with a destructor lives between setjmp and longjmp but `photo`, which
+// is the caller's.
+bool ReadJpeg(std::FILE* file, Photo* photo) {
+  jpeg_decompress_struct info;
+  JpegErrors errors;
+  info.err = jpeg_std_error(&errors.manager);
+  errors.manager.error_exit = LeaveJpeg;
+  errors.manager.output_message = SayNothing;
+  if (setjmp(errors.jump) != 0) {
+    jpeg_destroy_decompress(&info);
+    return false;
+  }
+  jpeg_create_decompress(&info);
+  jpeg_stdio_src(&info, file);
+  jpeg_read_header(&info, TRUE);
+  info.out_color_space = JCS_RGB;
+  jpeg_start_decompress(&info);
+  photo->width = static_cast<int>(info.output_width);
+  photo->height = static_cast<int>(info.output_height);
+  photo->rgb.resize(size_t{3} * info.output_width * info.output_height);
+  while (info.output_scanline < info.output_height) {
+    JSAMPROW row = photo->rgb.data() +
+                   size_t{3} * info.output_width * info.output_scanline;
+    jpeg_read_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_decompress(&info);
+  jpeg_destroy_decompress(&info);
+  return true;
+}
+
+bool ReadPng(std::FILE* file, Photo* photo) {
+  png_image image;
+  std::memset(&image, 0, sizeof(image));
+  image.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_stdio(&image, file) == 0) return false;
+  image.format = PNG_FORMAT_RGB;
+  photo->width = static_cast<int>(image.width);
+  photo->height = static_cast<int>(image.height);
+  photo->rgb.resize(PNG_IMAGE_SIZE(image));
+  const png_color behind = {255, 255, 255};
+  const bool is_read = png_image_finish_read(&image, &behind, photo->rgb.data(),
+                                             0, nullptr) != 0;
+  png_image_free(&image);
+  return is_read;
+}
+
+}  // namespace
+
+std::optional<Photo> ReadPhoto(const std::string& path) {
+  const File file(std::fopen(path.c_str(), "rb"));
+  if (!file) return std::nullopt;
+  unsigned char head[8] = {};
+  const size_t count = std::fread(head, 1, sizeof(head), file.get());
+  std::rewind(file.get());
+  Photo photo;
+  const bool is_png = count == sizeof(head) && png_sig_cmp(head, 0, count) == 0;
+  if (is_png ? ReadPng(file.get(), &photo) : ReadJpeg(file.get(), &photo)) {
+    return photo;
+  }
+  return std::nullopt;
+}
+
+Photo CropPhoto(const Photo& photo, int left, int top, int size) {
+  Photo crop{size, size,
+             std::vector<uint8_t>(size_t{3} * size * size, kOutside)};
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const int64_t from_x = int64_t{left} + x;
+      const int64_t from_y = int64_t{top} + y;
+      if (from_x < 0 || from_x >= photo.width || from_y < 0 ||
+          from_y >= photo.height) {
+        continue;
+      }
+      std::memcpy(&crop.rgb[3 * (size_t{1} * y * size + x)],
+                  &photo.rgb[3 * (from_y * photo.width + from_x)], 3);
+    }
+  }
+  return crop;
+}
+
+std::vector<uint8_t> EncodeJpeg(const Photo& photo) {
+  jpeg_compress_struct info;
+  jpeg_error_mgr errors;
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* buffer = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&info, &buffer, &size);
+  info.image_width = static_cast<JDIMENSION>(photo.width);
+  info.image_height = static_cast<JDIMENSION>(photo.height);
+  info.input_components = 3;
+  info.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, kJpegQuality, TRUE);
+  jpeg_start_compress(&info, TRUE);
+  while (info.next_scanline < info.image_height) {
+    JSAMPROW row = const_cast<uint8_t*>(
+        &photo.rgb[size_t{3} * info.image_width * info.next_scanline]);
+    jpeg_write_scanlines(&info, &row, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  const std::vector<uint8_t> bytes(buffer, buffer + size);
+  std::free(buffer);
+  return bytes;
+}
+
+}  // namespace krot
