@@ -12,8 +12,9 @@
 namespace krot {
 
 // Least squares over everything that a COLMAP model holds: poses, points and
-// intrinsics; on Ceres, or below a cap on a Newton system of our own. Names and defaults are those of COLMAP 4.1 where it has
-// the option, and differ where a comment says so.
+// intrinsics; on Ceres, or below a cap on a Newton system of our own. Names and
+// defaults are those of COLMAP 4.1 where it has the option, and differ where a
+// comment says so.
 
 enum class RobustLoss { kTrivial, kSoftL1, kCauchy, kHuber };
 
@@ -46,7 +47,7 @@ struct BundleAdjustmentOptions {
   RobustLoss loss = RobustLoss::kTrivial;
   double loss_scale = 1;  // > 0; pixels
 
-  int max_num_iterations = 100;            // >= 0
+  int max_num_iterations = 100;  // >= 0
   // Without a cap, which has an end of its own (kCapConverged):
   int max_linear_solver_iterations = 200;  // >= 1; iterative solver only
   double function_tolerance = 1e-6;        // relative; >= 0; COLMAP's is 0
