@@ -20,8 +20,8 @@ namespace krot {
 // c_i sigma_i is in pixels there, and e'x the size of the frames' centres along
 // those at the start, which keeps everything from shrinking where no baseline
 // sets the scale. (The mean depth, which holds from nothing, would go to a few
-// points far away.) The sum stands in for the number of the sigma_i > 0, which is
-// what one would like to know.
+// points far away.) The sum stands in for the number of the sigma_i > 0, which
+// is what one would like to know.
 //
 // The dual is about conflicts: multipliers lambda_i <= c_i whose forces balance
 // (krot/proof/certificate_check.h) but for those of e. An observation without a
