@@ -6,8 +6,9 @@
 # KROT is the executable, MODELS a folder of model folders. Prints per model the
 # largest error of the input, the lowest that was reached and that of the result;
 # mean errors of the input, with --Solver.finish sweeps and with the default; RMS
-# errors of the same and of Ceres with the same unknowns below the same cap
-# (krot bundle_adjuster, from the result of --Solver.finish none); iterations of
+# errors of the same and of the bounded adjustment with the same unknowns below the
+# same cap (krot bundle_adjuster, from the result of --Solver.finish none, by
+# another barrier, on other derivatives and another start); iterations of
 # the finish, its seconds, and those as a share of all before them: medians of
 # KROT_BENCHMARK_RUNS runs. Models without a certified optimum are left out.
 set -euo pipefail
@@ -31,7 +32,7 @@ value() { jq -r "$2 // empty" "$work/$1.json"; }
 median() { sort -g | awk '{ v[NR] = $1 } END { print v[int((NR + 1) / 2)] }'; }
 
 row() { # NAME MODEL
-  local run cap ceres
+  local run cap bounded
   : >"$work/seconds"
   : >"$work/shares"
   for ((run = 0; run < runs; ++run)); do
@@ -44,15 +45,15 @@ row() { # NAME MODEL
   solve "$2" sweeps --Solver.finish sweeps || return 0
   solve "$2" none --Solver.finish none || return 0
   cap=$(value default .finish.cap)
-  ceres=-
+  bounded=-
   if "$krot" bundle_adjuster --input_path "$work/none" \
-    --output_path "$work/ceres" --overwrite 1 --log_level 0 \
-    --report_path "$work/ceres.json" --BundleAdjustment.max_error "$cap" \
+    --output_path "$work/bounded" --overwrite 1 --log_level 0 \
+    --report_path "$work/bounded.json" --BundleAdjustment.max_error "$cap" \
     --BundleAdjustment.constant_rig_from_world_rotation 1 \
     --BundleAdjustment.refine_sensor_from_rig 0 \
     --BundleAdjustment.refine_focal_length 0 \
     --BundleAdjustment.refine_extra_params 0 >"$work/log" 2>&1; then
-    ceres=$(value ceres '.pixel_error.after.rms' | xargs printf '%.4f')
+    bounded=$(value bounded '.pixel_error.after.rms' | xargs printf '%.4f')
   fi
   printf '| %s | %.4f | %.4f | %.4f | %.3f | %.3f | **%.3f** | %.4f | %.4f | %.4f | %s | %d | %.2f | %.2f |\n' \
     "$1" "$(value default .pixel_error.before.max)" \
@@ -63,13 +64,13 @@ row() { # NAME MODEL
     "$(value default .pixel_error.after.mean)" \
     "$(value default .pixel_error.before.rms)" \
     "$(value sweeps .pixel_error.after.rms)" \
-    "$(value default .pixel_error.after.rms)" "$ceres" \
+    "$(value default .pixel_error.after.rms)" "$bounded" \
     "$(value default .finish.num_iterations)" \
     "$(median <"$work/seconds")" "$(median <"$work/shares")"
 }
 
 cat <<'TABLE'
-| model | max before | lowest | after | mean before | sweeps | finish | RMS before | sweeps | finish | Ceres | iterations | s | of the solve |
+| model | max before | lowest | after | mean before | sweeps | finish | RMS before | sweeps | finish | bounded | iterations | s | of the solve |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|---|
 TABLE
 for model in "$models"/*/; do

@@ -33,7 +33,7 @@ constexpr double kShortStep = 0.1;
 // a row that gain less of the cost end it: lenses near their fold follow no
 // linear row far.
 constexpr double kNearGap = 10;
-constexpr double kLeastGain = 0.1;
+constexpr double kLeastGain = 0.01;
 constexpr int kPatience = 3;
 // Mehrotra's sigma is no less, whatever the predictor leaves of the gap: with
 // 1e-3, pairs were left behind and door took 28 iterations instead of 19.
