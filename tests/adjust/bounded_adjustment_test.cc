@@ -65,7 +65,7 @@ TEST(BoundedAdjustment, EndsWhereTheMethodOfMultipliersDoes) {
     const Model model = NoisyScene(sensors_per_rig);
     for (const double factor : {1.02, 1.1}) {
       const double cap = factor * ErrorsOf(model).max;
-      const LagrangianEnd expected = MinimizeByMultipliers(model, {}, cap);
+      const LagrangianEnd expected = MinimizeByMultipliers(model, {}, cap, 20);
       EXPECT_NEAR(expected.max_error, cap, 1e-6 * cap);
       const BundleAdjustmentSummary summary =
           AdjustBundle(model, WithCap(cap), kOneThread).summary;

@@ -35,8 +35,10 @@ class RunFinishOf : public testing::TestWithParam<int> {};
 
 TEST_P(RunFinishOf, EndsWhereTheMethodOfMultipliersEndsBelowTheSameCap) {
   const Model model = NoisyModel(GetParam());
-  const SolveModelResult finished =
-      SolveModel(model, With(Finish::kLeastSquares));
+  SolveModelOptions options = With(Finish::kLeastSquares);
+  // Nearer to the lowest maximum that method hardly converges.
+  options.finish.slack = 0.05;
+  const SolveModelResult finished = SolveModel(model, options);
   ASSERT_TRUE(finished.summary.finish.has_value());
   const double cap = finished.summary.finish->cap;
   EXPECT_LE(finished.summary.pixel_error_after.max, cap);
@@ -48,7 +50,7 @@ TEST_P(RunFinishOf, EndsWhereTheMethodOfMultipliersEndsBelowTheSameCap) {
   what_moves.refine_extra_params = false;
   const SolveModelResult lowest = SolveModel(model, With(Finish::kNone));
   const LagrangianEnd expected =
-      MinimizeByMultipliers(lowest.model, what_moves, cap);
+      MinimizeByMultipliers(lowest.model, what_moves, cap, 200);
   EXPECT_NEAR(expected.max_error, cap, 1e-4 * cap);
   const double rms =
       std::sqrt(2 * expected.cost /

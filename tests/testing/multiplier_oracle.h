@@ -19,24 +19,24 @@ namespace krot {
 // lambda: max(0, lambda + c (s - cap^2) / 2)^2 / c.
 class CapPenalty final : public ceres::LossFunction {
  public:
-  explicit CapPenalty(double cap) : cap2_(cap * cap) {}
+  CapPenalty(double cap, double penalty)
+      : cap2_(cap * cap), penalty_(penalty) {}
 
   void Evaluate(double s, double rho[3]) const override {
     const double t = Multiplier(s);
-    rho[0] = t * t / kPenalty;
+    rho[0] = t * t / penalty_;
     rho[1] = t;
-    rho[2] = t > 0 ? kPenalty / 2 : 0;
+    rho[2] = t > 0 ? penalty_ / 2 : 0;
   }
   void Update(double s) { lambda_ = Multiplier(s); }
 
  private:
-  static constexpr double kPenalty = 20;
-
   double Multiplier(double s) const {
-    return std::max(0.0, lambda_ + kPenalty * (s - cap2_) / 2);
+    return std::max(0.0, lambda_ + penalty_ * (s - cap2_) / 2);
   }
 
   const double cap2_;
+  const double penalty_;
   double lambda_ = 0;
 };
 
@@ -48,13 +48,14 @@ struct LagrangianEnd {
 // The method of multipliers [Hestenes 1969] on Ceres, from outside the cap,
 // which shares neither steps nor barrier with ours.
 inline LagrangianEnd MinimizeByMultipliers(
-    const Model& start, const BundleAdjustmentOptions& what_moves, double cap) {
+    const Model& start, const BundleAdjustmentOptions& what_moves, double cap,
+    double penalty) {
   AdjustmentBlocks blocks = MakeAdjustmentBlocks(start, 2);
   ceres::Problem problem(AdjustmentProblemOptions());
   BuildAdjustmentProblem(what_moves, nullptr, &blocks, &problem);
   std::vector<ceres::ResidualBlockId> ids;
   problem.GetResidualBlocks(&ids);
-  std::vector<CapPenalty> penalties(ids.size(), CapPenalty(cap));
+  std::vector<CapPenalty> penalties(ids.size(), CapPenalty(cap, penalty));
   for (size_t i = 0; i < ids.size(); ++i) {
     std::vector<double*> parameters;
     problem.GetParameterBlocksForResidualBlock(ids[i], &parameters);

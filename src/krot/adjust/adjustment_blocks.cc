@@ -4,6 +4,7 @@
 #include <string>
 
 #include "krot/camera/camera_model.h"
+#include "krot/geometry/rotation.h"
 #include "krot/model/model_error.h"
 
 namespace krot {
@@ -91,8 +92,7 @@ void CollectObservations(const Model& model, int min_track_length,
 }  // namespace
 
 PoseBlock ToBlock(const Pose& pose) {
-  Eigen::Vector4d q(pose.quaternion_wxyz.data());
-  q.normalize();
+  const QuaternionWxyz q = ToWxyz(NormalizedQuaternion(pose.quaternion_wxyz));
   const Vector3d& t = pose.translation;
   return {q[0], q[1], q[2], q[3], t[0], t[1], t[2]};
 }
