@@ -47,8 +47,13 @@ endfunction()
 #
 # What nearly every source includes, parsed once, by the lowest folder that
 # needs Eigen. Not where the compiler is launched by a cache, which would not
-# hold what is compiled so.
+# hold what is compiled so, and not in an executable beside libraries that are
+# compiled for a module: -fPIE and -fPIC do not go together.
 function(krot_precompiled_headers target)
+  get_target_property(type ${target} TYPE)
+  if(CMAKE_POSITION_INDEPENDENT_CODE AND type STREQUAL EXECUTABLE)
+    return()
+  endif()
   if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT KROT_UNITY OR target STREQUAL krot_base)
     return()
   endif()
