@@ -10,7 +10,8 @@
 # same cap (krot bundle_adjuster, from the result of --Solver.finish none, by
 # another barrier, on other derivatives and another start); iterations of
 # the finish, its seconds, and those as a share of all before them: medians of
-# KROT_BENCHMARK_RUNS runs. Models without a certified optimum are left out.
+# KROT_BENCHMARK_RUNS runs. Models without a certified optimum,
+# or from which observations had to be removed, are left out.
 set -euo pipefail
 
 krot=$(realpath "$1")
@@ -38,6 +39,7 @@ row() { # NAME MODEL
   for ((run = 0; run < runs; ++run)); do
     solve "$2" default || return 0
     [[ $(value default .finish.cap) ]] || return 0
+    [[ -z $(value default .outliers.max_error) ]] || return 0
     value default .finish.seconds >>"$work/seconds"
     value default '.finish.seconds / (.seconds.solve - .finish.seconds)' \
       >>"$work/shares"
