@@ -101,4 +101,4 @@ for ((n = 0; n < 5; ++n)); do
   mv "$work/normalised" "$work/input"
 done
 compare solver known_rotation_solver
-compare outlier_filter outlier_filter --OutlierFilter.max_error 0.9
+compare outlier_filter outlier_filter --OutlierFilter.max_error 2.5
