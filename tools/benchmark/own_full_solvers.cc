@@ -10,6 +10,7 @@
 namespace krot {
 namespace {
 
+// The schedule of `krot solver`, without the finish.
 class Schedule : public KnownRotationSolver {
  public:
   Schedule(std::string name, SolveMethod method, int num_threads)
@@ -25,21 +26,10 @@ class Schedule : public KnownRotationSolver {
     const Context context{num_threads_, cancel};
     SolveRows(problem, {}, method_, /*is_first_round=*/true,
               /*have_rows_served=*/{}, context, timer, estimate, &summary);
-    if (method_ == SolveMethod::kAuto) Finish(problem, context, estimate);
     return !IsCancelled(cancel);
   }
 
  private:
-  static void Finish(const KnownRotationProblem& problem,
-                     const Context& context, Estimate* estimate) {
-    constexpr int kFinishingSweeps = 2;  // as many as `krot solver` takes
-    for (int sweep = 0; sweep < kFinishingSweeps; ++sweep) {
-      const double cost =
-          Cost(problem, *estimate, Norm::L2(), context.num_threads);
-      SweepToFinish(problem, {}, context, cost, estimate);
-    }
-  }
-
   std::string name_;
   SolveMethod method_;
   int num_threads_;
