@@ -36,8 +36,8 @@ inside apt-get -qq install --no-install-recommends -y ./krot_*.deb \
 inside krot solver --input_path tools/sample/model --output_path by_command
 inside "test -e /usr/share/man/man1/krot-solver.1.gz"
 inside "source /usr/share/bash-completion/completions/krot; \
-  COMP_WORDS=(krot solver --Solver.norm ''); COMP_CWORD=3; _krot; \
-  test \"\${COMPREPLY[*]}\" = '1 2 inf'"
+  COMP_WORDS=(krot solver --Solver.method ''); COMP_CWORD=3; _krot; \
+  test \"\${COMPREPLY[*]}\" = 'auto res_int joint'"
 
 say "A program of one's own"
 inside apt-get -qq install --no-install-recommends -y ./libkrot-dev_*.deb \
@@ -50,7 +50,7 @@ say "pykrot"
 inside apt-get -qq install --no-install-recommends -y "${build_needs[@]#*:}" \
   pybind11-dev python3-dev python3-numpy python3-pip python3-setuptools \
   python3-wheel ">/dev/null"
-inside pip install --quiet --break-system-packages --no-build-isolation \
+inside CMAKE_ARGS=-DKROT_NATIVE=OFF pip install --quiet --break-system-packages --no-build-isolation \
   --no-deps ./src/python
 inside python3 src/python/examples/three_lines.py tools/sample/model by_python
 
