@@ -70,11 +70,7 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   report.run.threads = ResolveNumThreads(num_threads);
   report.run.seed = common.random_seed;
 
-  const Timer read_timer;
-  const auto [model, contradictions] =
-      ReadValidModel(paths.input_path, paths.on_contradiction, common.log);
-  report.run.contradictions = contradictions;
-  report.run.seconds_read = read_timer.Seconds();
+  const Model model = ReadInput(paths, common.log, &report.run);
   ThrowIfInterrupted();
 
   AdjustModelResult result =

@@ -5,6 +5,7 @@
 #include "krot/model/contradictions.h"
 #include "krot/model/model.h"
 #include "krot/model/model_io.h"
+#include "krot/report/run_record.h"
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
@@ -17,11 +18,14 @@ struct ModelPaths {
   std::string output_type = "auto";
   bool overwrite = false;
   std::string on_contradiction = "follow_tracks";
+  std::string rotations_path;  // "": the model's own
   std::string report_path;
   std::string html_path;
 };
 
 void AddModelPaths(ModelPaths* paths, OptionParser* parser);
+// Of a command that takes other rotations than the model's.
+void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
 
 // Throws OptionError where the paths contradict each other, ModelError where
@@ -51,5 +55,10 @@ struct ValidModel {
 ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log);
+
+// The model to work on: read and validated, with the rotations of
+// paths.rotations_path, if there is one; fills in what `run` says of the
+// input. Throws ModelError.
+Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run);
 
 }  // namespace krot

@@ -157,11 +157,7 @@ int RunSolveCommand(const SolveCommand& command) {
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
-  const Timer read_timer;
-  const auto [model, contradictions] =
-      ReadValidModel(paths.input_path, paths.on_contradiction, log);
-  report.run.contradictions = contradictions;
-  report.run.seconds_read = read_timer.Seconds();
+  const Model model = ReadInput(paths, log, &report.run);
   ThrowIfInterrupted();
 
   const Model solved = Solve(command, model, cancel, &report);

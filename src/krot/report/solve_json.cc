@@ -173,6 +173,7 @@ std::string SolveJson(const SolveReport& report) {
         {"support_point3D_ids", SameImageInSupport(summary)}}},
       {"outliers", OutliersJson(report.outliers)},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"rotations", RotationsJson(report.run.rotations)},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},
