@@ -6,6 +6,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
+#include "krot/model/file_bytes.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -26,13 +27,20 @@ SolveReport DescribeRun(const SolveCommand& command) {
   return report;
 }
 
+std::string FixedWords(const SolveSummary& summary) {
+  if (summary.num_fixed_frames + summary.num_fixed_points == 0) return "";
+  return ", of which " + Counted(summary.num_fixed_frames, "frame") + " and " +
+         Counted(summary.num_fixed_points, "point") + " stay";
+}
+
 std::string ProblemWords(const SolveSummary& summary) {
   return Counted(summary.num_images, "image") + ", " +
          Counted(summary.num_points, "point") + ", " +
          Counted(summary.num_observations, "observation") +
          (summary.num_components > 1
               ? " in " + std::to_string(summary.num_components) + " components"
-              : std::string());
+              : std::string()) +
+         FixedWords(summary);
 }
 
 std::string MemoryWords(const SolveSummary& summary) {
@@ -43,12 +51,25 @@ std::string MemoryWords(const SolveSummary& summary) {
               : std::string());
 }
 
+FixedParts ReadFixed(const SolveCommand& command, const Model& model) {
+  FixedParts fixed;
+  if (!command.fixed_images_path.empty()) {
+    fixed.frames = FixedFrames(ReadFileBytes(command.fixed_images_path), model);
+  }
+  if (!command.fixed_points_path.empty()) {
+    fixed.points3D =
+        FixedPoints3D(ReadFileBytes(command.fixed_points_path), model);
+  }
+  return fixed;
+}
+
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
 Model Solve(const SolveCommand& command, const Model& model,
             const CancelFlag& cancel, SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
+  options.solve.problem.fixed = ReadFixed(command, model);
   Context context = command.context;
   context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));

@@ -39,6 +39,12 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "With Solver.max_error: where the proof goes of how "
                        "many observations must be left out, as JSON; it takes "
                        "most of the time");
+  parser.AddPath("fixed_images_path", &command.fixed_images_path, false,
+                 "a file",
+                 "Images that must not move, by name or id, one per line: "
+                 "place and scale come from what is fixed");
+  parser.AddPath("fixed_points_path", &command.fixed_points_path, false,
+                 "a file", "3D points that must not move, by id, one per line");
   AddSolverOptions(&command.options, &command.context, &parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "

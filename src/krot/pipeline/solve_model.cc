@@ -17,6 +17,7 @@
 #include "krot/pipeline/start.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/fixed.h"
 #include "krot/problem/gauge.h"
 
 namespace krot {
@@ -36,6 +37,9 @@ void CheckOptions(const SolveModelOptions& options) {
   CheckArgument(
       options.init == SolveInit::kModel || HasJointSolver(options.norm),
       "norm.p", options.norm.p, "1, 2 or infinity with this init");
+  CheckArgument(options.polish == Polish::kNone || !options.problem.fixed.Any(),
+                "polish", static_cast<int>(options.polish),
+                "none where anything is fixed");
   CheckArgument(
       options.method != SolveMethod::kJoint || HasJointSolver(options.norm),
       "norm.p", options.norm.p, "1, 2 or infinity with this method");
@@ -49,6 +53,12 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->num_points = problem.num_points;
   summary->num_observations = static_cast<int64_t>(problem.observations.size());
   summary->num_components = FindComponents(problem).count;
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    summary->num_fixed_frames += problem.IsFixedFrame(f);
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    summary->num_fixed_points += problem.IsFixedPoint(k);
+  }
   summary->left_out = built.left_out;
   summary->num_retriangulated_points = built.num_retriangulated_points;
   summary->num_same_image_tracks = built.num_same_image_tracks;
@@ -232,6 +242,7 @@ SolveModelResult SolveModel(const Model& model,
     RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
                            num_threads, &estimate);
   }
+  PutFixed(start.built.problem, &estimate);
   const Reprojection reprojection(model, start.built);
   summary.cost_final =
       reprojection.TrueCost(estimate, options.norm, num_threads);
@@ -239,7 +250,7 @@ SolveModelResult SolveModel(const Model& model,
   const std::vector<double> before_px =
       PixelErrors(model, num_threads, options.norm);
   CarryLeftOutPoints(model, before_px, options.norm, start.built,
-                     summary.cost_final, &result.model);
+                     options.problem.fixed, summary.cost_final, &result.model);
   if (IsWorse(before_px,
               PixelErrors(result.model, num_threads, options.norm))) {
     summary.is_given_back = true;
