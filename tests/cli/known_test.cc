@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -6,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "krot/geometry/rigid_transform.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
@@ -296,6 +298,98 @@ TEST_F(WhatIsFixed, ThatCannotBeMeantAreRefused) {
     options.insert(options.end(), other.begin(), other.end());
     EXPECT_EQ(Solve("input", "output", options).exit_code, 1);
   }
+}
+
+// 100 times as large and `shift` away, as in UTM or ECEF coordinates.
+Model FarAway(const Model& model, const Eigen::Vector3d& shift) {
+  const auto move = [&](Pose* pose) {
+    using Real = long double;
+    pose->translation = (100 * pose->translation.cast<Real>() -
+                         pose->Rotation().cast<Real>() * shift.cast<Real>())
+                            .cast<double>();
+  };
+  Model far = model;
+  for (Frame& frame : far.frames) move(&frame.rig_from_world);
+  for (Image& image : far.images) move(&image.cam_from_world);
+  for (Point3D& point : far.points3D) point.xyz = 100 * point.xyz + shift;
+  return far;
+}
+
+// The largest distance of points and frames of `far` from those of `near`.
+double LargestDistance(const Model& near, const Model& far,
+                       const Eigen::Vector3d& shift) {
+  double largest = 0;
+  for (size_t k = 0; k < near.points3D.size(); ++k) {
+    largest = std::max(
+        largest, (far.points3D[k].xyz - shift - near.points3D[k].xyz).norm());
+  }
+  for (size_t f = 0; f < near.frames.size(); ++f) {
+    largest = std::max(
+        largest, (Center(far.frames[f].rig_from_world.Transform()) - shift -
+                  Center(near.frames[f].rig_from_world.Transform()))
+                     .norm());
+  }
+  return largest;
+}
+
+TEST_F(Known, CoordinatesFarAwayShiftTheResultAndNothingElse) {
+  const Eigen::Vector3d shift(5e6, -3e6, 4e6);
+  const Model model = SmallLegacyModel();
+  const Model near = FarAway(model, Eigen::Vector3d::Zero());
+  Save(near, folder_ / "near");
+  Save(FarAway(model, shift), folder_ / "far");
+  std::ofstream(folder_ / "images.txt") << near.images[1].name << "\n"
+                                        << near.images[4].name << "\n";
+  const std::vector<std::vector<std::string>> commands = {
+      {"solver"},
+      {"solver", "--Solver.method", "res_int"},
+      {"solver", "--Solver.init", "feasible"},
+      {"solver", "--fixed_images_path", folder_ / "images.txt"},
+      {"point_triangulator"},
+      {"outlier_filter", "--OutlierFilter.max_error", "1.2"},
+      {"bundle_adjuster", "--BundleAdjustment.max_error", "2"}};
+  for (std::vector<std::string> command : commands) {
+    SCOPED_TRACE(::testing::PrintToString(command));
+    const bool has_certificate = command[0] == "solver" && command.size() < 3;
+    for (const std::string side : {"near", "far"}) {
+      std::vector<std::string> arguments = command;
+      arguments.insert(arguments.end(),
+                       {"--input_path", folder_ / side, "--output_path",
+                        folder_ / (side + "_out"), "--overwrite", "1"});
+      if (has_certificate) {
+        arguments.insert(
+            arguments.end(),
+            {"--certificate_path", folder_ / (side + "_out_proof.json")});
+      }
+      const KrotResult result = RunKrot(arguments);
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+    }
+    EXPECT_LT(LargestDistance(Load(folder_ / "near_out"),
+                              Load(folder_ / "far_out"), shift),
+              1e-6);
+    if (has_certificate) {
+      EXPECT_EQ(Check("far_out", "far_out").exit_code, 0);
+      EXPECT_EQ(Check("far_out", "near_out").exit_code, 0);
+    }
+  }
+}
+
+TEST_F(WhatIsFixed, FarAwayIsProvedInItsPlace) {
+  const Eigen::Vector3d shift(5e6, -3e6, 4e6);
+  const Model model = FarAway(SmallLegacyModel(), shift);
+  Save(model, folder_ / "far");
+  WriteFiles(model);
+  const KrotResult result = Solve("far", "output", Options());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Report("output")["termination"], "gap_reached");
+  const Model after = Load(folder_ / "output");
+  for (const size_t f : FixedFramesOf(model)) {
+    EXPECT_EQ(after.frames[f].rig_from_world.translation,
+              model.frames[f].rig_from_world.translation);
+  }
+  EXPECT_EQ(after.points3D[0].xyz, model.points3D[0].xyz);
+  const KrotResult check = Check("output", "output");
+  EXPECT_EQ(check.exit_code, 0) << check.err;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
+#include "krot/model/local_frame.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -151,18 +152,22 @@ Translation Translate(const Model& model, const CertificateFile& file,
 
 }  // namespace
 
-CertificateVerdict VerifyCertificateFile(const Model& model,
+CertificateVerdict VerifyCertificateFile(const Model& original,
                                          const CertificateFile& file) {
   CertificateVerdict verdict;
-  if (file.model_sha256 != ModelSha256(model)) {
+  if (file.model_sha256 != ModelSha256(original)) {
     verdict.refusal =
         "it belongs to another model: cameras, rotations or observations "
         "differ";
     return verdict;
   }
-  FixedClaim fixed = FindFixed(model, file);
+  FixedClaim fixed = FindFixed(original, file);
   verdict.refusal = fixed.refusal;
   if (!verdict.refusal.empty()) return verdict;
+  const LocalFrame frame(original, fixed.parts);
+  std::optional<Model> local;
+  if (!frame.IsModels()) local = frame.ToLocal(original);
+  const Model& model = local ? *local : original;
   verdict.num_fixed_images = static_cast<int64_t>(file.fixed_images.size());
   verdict.num_fixed_points = static_cast<int64_t>(file.fixed_points.size());
   BuildProblemOptions build;

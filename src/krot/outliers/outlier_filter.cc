@@ -5,6 +5,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
+#include "krot/model/local_frame.h"
 #include "krot/model/remove_observations.h"
 #include "krot/outliers/element_index.h"
 #include "krot/outliers/error_profile.h"
@@ -266,7 +267,9 @@ OutlierFilterResult FilterOutliers(const Model& model,
       "make_profile", options.make_profile, "false with this method");
   CheckArgument(options.solve.norm.p == 2, "norm.p", options.solve.norm.p,
                 "2, that of pixel errors");
-  return OutlierFilter(model, options, context).Run();
+  return InLocalFrame(model, {}, [&](const Model& local) {
+    return OutlierFilter(local, options, context).Run();
+  });
 }
 
 }  // namespace krot

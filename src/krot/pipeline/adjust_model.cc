@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "krot/base/check.h"
+#include "krot/model/local_frame.h"
 
 namespace krot {
 namespace {
@@ -59,15 +60,10 @@ std::optional<Model> BoundedStart(const Model& model,
   return std::move(start.model);
 }
 
-}  // namespace
-
-AdjustModelResult AdjustModel(const Model& model,
-                              const AdjustModelOptions& options,
-                              const Context& context) {
-  if (options.max_error_factor) {
-    CheckArgument(*options.max_error_factor > 1, "max_error_factor",
-                  *options.max_error_factor, "> 1");
-  }
+// AdjustModel in the coordinates of the model.
+AdjustModelResult AdjustInFrame(const Model& model,
+                                const AdjustModelOptions& options,
+                                const Context& context) {
   AdjustModelResult result;
   AdjustModelSummary& summary = result.summary;
   summary.pixel_error_before =
@@ -99,6 +95,20 @@ AdjustModelResult AdjustModel(const Model& model,
   UpdatePointErrors(errors_px, &result.model);
   summary.pixel_error_after = Summarize(errors_px);
   return result;
+}
+
+}  // namespace
+
+AdjustModelResult AdjustModel(const Model& model,
+                              const AdjustModelOptions& options,
+                              const Context& context) {
+  if (options.max_error_factor) {
+    CheckArgument(*options.max_error_factor > 1, "max_error_factor",
+                  *options.max_error_factor, "> 1");
+  }
+  return InLocalFrame(model, {}, [&](const Model& local) {
+    return AdjustInFrame(local, options, context);
+  });
 }
 
 }  // namespace krot

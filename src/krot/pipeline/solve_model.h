@@ -175,6 +175,10 @@ struct SolveModelResult {
 // where the model has finite ones. What options.problem.fixed marks keeps its
 // bits, and place and scale come from it.
 //
+// Models far from the origin are solved in a local frame
+// (krot/model/local_frame.h); costs and errors are those before the
+// coordinates are rounded to the model's own.
+//
 // kAuto takes a feasible start by itself where the model's own would leave out
 // observations (as behind or without a pose), has all centres in one place, or
 // is still above init_max_error after the leading sweeps; it is kResInt for a p
