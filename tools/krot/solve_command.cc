@@ -6,7 +6,6 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
-#include "krot/model/file_bytes.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -51,25 +50,13 @@ std::string MemoryWords(const SolveSummary& summary) {
               : std::string());
 }
 
-FixedParts ReadFixed(const SolveCommand& command, const Model& model) {
-  FixedParts fixed;
-  if (!command.fixed_images_path.empty()) {
-    fixed.frames = FixedFrames(ReadFileBytes(command.fixed_images_path), model);
-  }
-  if (!command.fixed_points_path.empty()) {
-    fixed.points3D =
-        FixedPoints3D(ReadFileBytes(command.fixed_points_path), model);
-  }
-  return fixed;
-}
-
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
 Model Solve(const SolveCommand& command, const Model& model,
             const CancelFlag& cancel, SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
-  options.solve.problem.fixed = ReadFixed(command, model);
+  options.solve.problem.fixed = ReadFixedParts(command.paths, model);
   Context context = command.context;
   context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));

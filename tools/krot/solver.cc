@@ -32,6 +32,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
                       "coordinate frame stay");
   AddModelPaths(&command.paths, &parser);
   AddRotationsPath(&command.paths, &parser);
+  AddFixedPaths(&command.paths, &parser);
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
@@ -39,12 +40,6 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "With Solver.max_error: where the proof goes of how "
                        "many observations must be left out, as JSON; it takes "
                        "most of the time");
-  parser.AddPath("fixed_images_path", &command.fixed_images_path, false,
-                 "a file",
-                 "Images that must not move, by name or id, one per line: "
-                 "place and scale come from what is fixed");
-  parser.AddPath("fixed_points_path", &command.fixed_points_path, false,
-                 "a file", "3D points that must not move, by id, one per line");
   AddSolverOptions(&command.options, &command.context, &parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random "

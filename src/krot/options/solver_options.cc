@@ -77,9 +77,6 @@ void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
               }});
 }
 
-const std::vector<std::string> kFixedPaths = {"fixed_images_path",
-                                              "fixed_points_path"};
-
 // What a method does not look at is refused.
 void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   const SolveMethod method = EffectiveMethod(options);
@@ -92,16 +89,11 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     table.Refuse("Solver.finish_slack", why);
     table.Refuse("Problem.init_max_error",
                  "with --Solver.max_error, which needs no such start");
-    for (const std::string& name : kFixedPaths) {
+    for (const char* name : {"fixed_images_path", "fixed_points_path"}) {
       table.Refuse(name, "with --Solver.max_error, which moves everything");
     }
   } else {
     table.Refuse("conflicts_path", "without --Solver.max_error");
-  }
-  if (options.polish != Polish::kNone) {
-    for (const std::string& name : kFixedPaths) {
-      table.Refuse(name, "with --Solver.polish, which moves everything");
-    }
   }
   const bool has_joint_norm =
       options.norm.p == 2 || options.norm.IsPolyhedral();

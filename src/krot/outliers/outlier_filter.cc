@@ -249,8 +249,8 @@ OutlierFilterResult OutlierFilter::Run() {
   RankSuspects(model_, is_removed_, conflict_of_, &summary_);
   if (options_.solve.polish != Polish::kNone && summary_.solve) {
     summary_.solve->polish =
-        PolishModel(options_.solve.polish, options_.solve.finish.loss, context_,
-                    &kept_.model);
+        PolishModel(options_.solve.polish, options_.solve.finish.loss,
+                    options_.solve.problem.fixed, context_, &kept_.model);
   }
   return {std::move(kept_.model), std::move(summary_)};
 }

@@ -41,6 +41,7 @@ std::optional<Model> BoundedStart(const Model& model,
                      "for the lowest with these rotations");
   SolveModelOptions lowest = options.start;
   lowest.finish.finish = Finish::kNone;
+  lowest.problem.fixed = options.adjustment.fixed;
   SolveModelResult start = SolveModel(model, lowest, context);
   summary->pixel_error_start = start.summary.pixel_error_after;
   summary->start = std::move(start.summary);
@@ -106,7 +107,7 @@ AdjustModelResult AdjustModel(const Model& model,
     CheckArgument(*options.max_error_factor > 1, "max_error_factor",
                   *options.max_error_factor, "> 1");
   }
-  return InLocalFrame(model, {}, [&](const Model& local) {
+  return InLocalFrame(model, options.adjustment.fixed, [&](const Model& local) {
     return AdjustInFrame(local, options, context);
   });
 }

@@ -35,9 +35,6 @@ void CheckOptions(const SolveModelOptions& options) {
   CheckArgument(
       options.init == SolveInit::kModel || HasJointSolver(options.norm),
       "norm.p", options.norm.p, "1, 2 or infinity with this init");
-  CheckArgument(options.polish == Polish::kNone || !options.problem.fixed.Any(),
-                "polish", static_cast<int>(options.polish),
-                "none where anything is fixed");
   CheckArgument(
       options.method != SolveMethod::kJoint || HasJointSolver(options.norm),
       "norm.p", options.norm.p, "1, 2 or infinity with this method");
@@ -259,8 +256,8 @@ SolveModelResult SolveInFrame(const Model& model,
   Certify(model, start, estimate, options, context, certificate, &summary);
   MeasureGap(options.joint.relative_gap, &summary);
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
-    summary.polish = PolishModel(options.polish, options.finish.loss, context,
-                                 &result.model);
+    summary.polish = PolishModel(options.polish, options.finish.loss,
+                                 options.problem.fixed, context, &result.model);
   }
   return result;
 }
