@@ -10,6 +10,7 @@
 #include "krot/report/outlier_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"

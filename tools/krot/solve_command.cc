@@ -9,6 +9,7 @@
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
+#include "krot/version.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"

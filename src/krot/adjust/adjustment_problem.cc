@@ -11,7 +11,6 @@
 #include "krot/adjust/adjustment_columns.h"
 #include "krot/adjust/reprojection_cost.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/models.h"
 
 namespace krot {
 namespace {
@@ -23,20 +22,6 @@ using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
 // which is the diagonal of J'J divided by the radius: a larger one would leave
 // it to rounding whether they are positive definite.
 constexpr double kLargestTrustRegion = 1e8;
-
-std::unique_ptr<ceres::CostFunction> MakeProjection(
-    const AdjustmentObservation& observation, int camera_model) {
-  return VisitCameraModel(
-      camera_model, [&](auto camera) -> std::unique_ptr<ceres::CostFunction> {
-        using Camera = decltype(camera);
-        if (observation.sensor < 0) {
-          return std::make_unique<ReprojectionCost<Camera, false>>(
-              observation.pixel);
-        }
-        return std::make_unique<ReprojectionCost<Camera, true>>(
-            observation.pixel);
-      });
-}
 
 // Holds still the coordinates in `constant` of a block of `size`.
 void HoldStill(double* block, int size, const std::vector<int>& constant,
@@ -82,8 +67,8 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
     }
     parameters.push_back(blocks->cameras[observation.camera].data());
     problem->AddResidualBlock(
-        MakeProjection(observation, blocks->camera_models[observation.camera])
-            .release(),
+        new ReprojectionCost(blocks->camera_models[observation.camera],
+                             observation.sensor >= 0, observation.pixel),
         loss, parameters);
   }
   for (size_t f = 0; f < blocks->frames.size(); ++f) {
