@@ -73,6 +73,7 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   const Model model = ReadInput(paths, common.log, &report.run);
   ThrowIfInterrupted();
 
+  options.adjustment.fixed = ReadFixedParts(paths, model);
   AdjustModelResult result =
       Adjust(model, std::move(options), context, common.log);
   report.summary = std::move(result.summary);
@@ -100,6 +101,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                       "COLMAP model, below a cap if you want; the coordinate "
                       "frame stays");
   AddModelPaths(&paths, &parser);
+  AddFixedPaths(&paths, &parser);
   options.AddTo(&parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers", &common,

@@ -79,6 +79,16 @@ void AddRotationsPath(ModelPaths* paths, OptionParser* parser) {
                   "image's name and QW QX QY QZ, camera from world");
 }
 
+void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
+  parser->AddPath("fixed_images_path", &paths->fixed_images_path, false,
+                  "a file",
+                  "Images that must not move, by name or id, one per line: "
+                  "place and scale come from what is fixed");
+  parser->AddPath("fixed_points_path", &paths->fixed_points_path, false,
+                  "a file",
+                  "3D points that must not move, by id, one per line");
+}
+
 void AddOverwrite(bool* overwrite, OptionParser* parser) {
   parser->AddBool("overwrite", overwrite,
                   "Replace the model that the output folder holds; other "
@@ -155,6 +165,18 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log,
   }
   run->seconds_read = timer.Seconds();
   return std::move(read.model);
+}
+
+FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model) {
+  FixedParts fixed;
+  if (!paths.fixed_images_path.empty()) {
+    fixed.frames = FixedFrames(ReadFileBytes(paths.fixed_images_path), model);
+  }
+  if (!paths.fixed_points_path.empty()) {
+    fixed.points3D =
+        FixedPoints3D(ReadFileBytes(paths.fixed_points_path), model);
+  }
+  return fixed;
 }
 
 }  // namespace krot

@@ -27,13 +27,20 @@ SolveReport DescribeRun(const SolveCommand& command) {
   return report;
 }
 
+std::string FixedWords(const SolveSummary& summary) {
+  if (summary.num_fixed_frames + summary.num_fixed_points == 0) return "";
+  return ", of which " + Counted(summary.num_fixed_frames, "frame") + " and " +
+         Counted(summary.num_fixed_points, "point") + " stay";
+}
+
 std::string ProblemWords(const SolveSummary& summary) {
   return Counted(summary.num_images, "image") + ", " +
          Counted(summary.num_points, "point") + ", " +
          Counted(summary.num_observations, "observation") +
          (summary.num_components > 1
               ? " in " + std::to_string(summary.num_components) + " components"
-              : std::string());
+              : std::string()) +
+         FixedWords(summary);
 }
 
 std::string MemoryWords(const SolveSummary& summary) {
@@ -50,6 +57,7 @@ Model Solve(const SolveCommand& command, const Model& model,
             const CancelFlag& cancel, SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
+  options.solve.problem.fixed = ReadFixedParts(command.paths, model);
   Context context = command.context;
   context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));

@@ -71,13 +71,15 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
                              observation.sensor >= 0, observation.pixel),
         loss, parameters);
   }
-  for (PoseBlock& frame : blocks->frames) {
-    ParameterizePose(options.refine_rig_from_world,
-                     !options.constant_rig_from_world_rotation, &frame,
-                     problem);
+  for (size_t f = 0; f < blocks->frames.size(); ++f) {
+    ParameterizePose(
+        options.refine_rig_from_world && !blocks->frame_is_fixed[f],
+        !options.constant_rig_from_world_rotation, &blocks->frames[f], problem);
   }
-  for (PoseBlock& sensor : blocks->sensors) {
-    ParameterizePose(options.refine_sensor_from_rig, true, &sensor, problem);
+  for (size_t s = 0; s < blocks->sensors.size(); ++s) {
+    ParameterizePose(
+        options.refine_sensor_from_rig && !blocks->sensor_is_fixed[s], true,
+        &blocks->sensors[s], problem);
   }
   for (size_t c = 0; c < blocks->cameras.size(); ++c) {
     const std::vector<int> refined =
@@ -91,9 +93,9 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
     }
     HoldStill(blocks->cameras[c].data(), size, constant, problem);
   }
-  if (options.refine_points3D) return;
-  for (Eigen::Vector3d& point : blocks->points) {
-    HoldStill(point.data(), 3, {0, 1, 2}, problem);
+  for (size_t k = 0; k < blocks->points.size(); ++k) {
+    if (options.refine_points3D && !blocks->point_is_fixed[k]) continue;
+    HoldStill(blocks->points[k].data(), 3, {0, 1, 2}, problem);
   }
 }
 

@@ -15,17 +15,30 @@ BlockStructure AnchoredStructure(const KnownRotationProblem& problem) {
     return problem.frame_begin[f + 1] - problem.frame_begin[f];
   };
   const Components components = FindComponents(problem);
-  std::vector<int32_t> anchor(components.count, -1);
+  std::vector<char> is_held(components.count, 0);
+  if (!problem.fixed_points.empty()) {
+    structure.point_is_fixed.assign(problem.num_points, 0);
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    if (!problem.IsFixedPoint(k)) continue;
+    structure.point_is_fixed[k] = 1;
+    if (components.of_point[k] >= 0) is_held[components.of_point[k]] = 1;
+  }
   structure.frame_is_fixed.assign(problem.num_frames, 0);
   for (int32_t f = 0; f < problem.num_frames; ++f) {
-    if (components.of_frame[f] < 0) {
-      structure.frame_is_fixed[f] = 1;
-      continue;
-    }
+    if (components.of_frame[f] >= 0 && !problem.IsFixedFrame(f)) continue;
+    structure.frame_is_fixed[f] = 1;
+    if (components.of_frame[f] >= 0) is_held[components.of_frame[f]] = 1;
+  }
+  std::vector<int32_t> anchor(components.count, -1);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    if (components.of_frame[f] < 0 || is_held[components.of_frame[f]]) continue;
     int32_t& best = anchor[components.of_frame[f]];
     if (best < 0 || count(f) > count(best)) best = f;
   }
-  for (const int32_t f : anchor) structure.frame_is_fixed[f] = 1;
+  for (const int32_t f : anchor) {
+    if (f >= 0) structure.frame_is_fixed[f] = 1;
+  }
   return structure;
 }
 

@@ -60,8 +60,12 @@ void PointElimination<kRows>::OrthogonalizePoint(int64_t k) {
   const int64_t begin = structure_.point_begin[k];
   const int64_t end = structure_.point_begin[k + 1];
   double* Q = Q_.data() + begin * kBlock;
-  std::copy(point_rows_.data() + begin * kBlock,
-            point_rows_.data() + end * kBlock, Q);
+  if (structure_.IsFixedPoint(k)) {
+    std::fill(Q, Q + (end - begin) * kBlock, 0.0);  // all free: x is 0
+  } else {
+    std::copy(point_rows_.data() + begin * kBlock,
+              point_rows_.data() + end * kBlock, Q);
+  }
   R_[k] = Orthogonalize((end - begin) * kRows, Q);
 }
 

@@ -1,15 +1,14 @@
 #include "krot/model/rotations_file.h"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <string_view>
-#include <unordered_map>
 #include <vector>
 
 #include <Eigen/Geometry>
 
 #include "krot/model/image_geometry.h"
+#include "krot/model/image_names.h"
 #include "krot/model/model_error.h"
 #include "krot/model/text_reader.h"
 
@@ -18,22 +17,9 @@ namespace {
 
 // What rounding to six digits makes of one rotation, twice, radians.
 constexpr double kSameRotation = 1e-5;
-// Of a name that several images bear.
-constexpr int32_t kAmbiguous = -1;
 
 std::string Quoted(std::string_view text) {
   return "\"" + std::string(text) + "\"";
-}
-
-// The keys are those of `model`.
-std::unordered_map<std::string_view, int32_t> ImagesByName(const Model& model) {
-  std::unordered_map<std::string_view, int32_t> images;
-  for (size_t n = 0; n < model.images.size(); ++n) {
-    const auto [image, is_new] =
-        images.emplace(model.images[n].name, static_cast<int32_t>(n));
-    if (!is_new) image->second = kAmbiguous;
-  }
-  return images;
 }
 
 // Takes the last four words of the line.
@@ -57,22 +43,12 @@ QuaternionWxyz ReadQuaternion(TextReader* reader) {
 }
 
 // Takes the rest of the line.
-int32_t ReadImage(
-    const std::unordered_map<std::string_view, int32_t>& image_of_name,
-    TextReader* reader) {
+int32_t ReadImage(const ImageNames& names, TextReader* reader) {
   const std::string_view name = reader->Rest();
   if (name.empty()) {
     reader->Fail("no name", "an image's name in front of QW QX QY QZ");
   }
-  const auto image = image_of_name.find(name);
-  if (image == image_of_name.end()) {
-    reader->Fail(Quoted(name), "the name of an image of the model");
-  }
-  if (image->second == kAmbiguous) {
-    reader->Fail(Quoted(name) + ", which several images of the model bear",
-                 "the name of one");
-  }
-  return image->second;
+  return names.Find(name, *reader);
 }
 
 // What the lines so far say of a frame.
@@ -106,11 +82,11 @@ class Replacement {
 };
 
 void Replacement::Read(const FileBytes& file) {
-  const auto image_of_name = ImagesByName(model_);
+  const ImageNames names(model_);
   TextReader reader(file);
   while (reader.NextRecord()) {
     const QuaternionWxyz cam_from_world = ReadQuaternion(&reader);
-    Add(ReadImage(image_of_name, &reader), cam_from_world, reader);
+    Add(ReadImage(names, &reader), cam_from_world, reader);
   }
 }
 
