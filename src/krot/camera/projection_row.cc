@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "krot/camera/chart.h"
+#include "krot/camera/dual.h"
 #include "krot/camera/models.h"
 #include "krot/camera/undistort.h"
 
@@ -38,6 +39,28 @@ Eigen::Vector2d Project(const double* params, const Eigen::Vector3d& x_cam) {
   if (!Model::Sees(params, n.x(), n.y(), n.z())) return pixel;
   Model::ProjectPoint(params, n.x(), n.y(), n.z(), &pixel.x(), &pixel.y());
   return pixel;
+}
+
+// RowAtProjection in front of a perspective lens, whose chart is z = 1: value
+// and derivatives in one go. False, and no E, everywhere else.
+template <typename Model>
+bool RowOnImagePlane(const double* params, const Eigen::Vector2d& pixel,
+                     const Eigen::Vector3d& x_hat, Eigen::Matrix3d* E) {
+  if constexpr (kHasImagePlane<Model>) {
+    if constexpr (std::is_same_v<typename Model::Lens, PerspectiveLens>) {
+      const Eigen::Vector2d u = x_hat.hnormalized();
+      if (!(x_hat.z() > 0 && std::isfinite(u.squaredNorm()))) return false;
+      Dual<double> x, y;
+      Model::Project(params, Dual<double>{u.x(), 1, 0},
+                     Dual<double>{u.y(), 0, 1}, &x, &y);
+      Eigen::Matrix2d J;
+      J << x.du, x.dv, y.du, y.dv;
+      const Eigen::Vector2d error(x.value - pixel.x(), y.value - pixel.y());
+      *E << 0, 0, 1, J, error - J * u;
+      return true;
+    }
+  }
+  return false;
 }
 
 template <typename Model>
@@ -103,6 +126,12 @@ std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
                                                const double* params,
                                                const Eigen::Vector2d& pixel,
                                                const Eigen::Vector3d& x_hat) {
+  Eigen::Matrix3d E;
+  if (VisitEveryCameraModel(model_id, [&](auto model) {
+        return RowOnImagePlane<decltype(model)>(params, pixel, x_hat, &E);
+      })) {
+    return E.allFinite() ? std::optional(E) : std::nullopt;
+  }
   const auto error = ProjectionError(model_id, params, pixel, x_hat);
   if (!error) return std::nullopt;
   const auto chart = ChartAt(model_id, params, x_hat);
@@ -110,7 +139,6 @@ std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
   const Eigen::Vector3d on_chart = x_hat / chart->n.dot(x_hat);
   const Eigen::Matrix2d J = ChartJacobian(model_id, params, *chart, on_chart);
   const Eigen::Vector2d p_hat = chart->B.transpose() * on_chart;
-  Eigen::Matrix3d E;
   E.row(0) = chart->n.transpose();
   E.bottomRows<2>() =
       J * chart->B.transpose() + (*error - J * p_hat) * chart->n.transpose();

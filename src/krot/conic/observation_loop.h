@@ -38,24 +38,27 @@ class ObservationLoop {
                   [](double a, double b) { return std::min(a, b); });
   }
 
- private:
-  static constexpr int64_t kChunk = 4096;
-
-  template <typename Term, typename Combine>
-  double Reduce(double start, const Term& term, const Combine& combine) const {
-    std::vector<double> parts(NumChunks(count_, kChunk), start);
+  // combine(... combine(start, term(0)) ..., term(count - 1)), chunk by chunk;
+  // `start` is neutral.
+  template <typename Value, typename Term, typename Combine>
+  Value Reduce(const Value& start, const Term& term,
+               const Combine& combine) const {
+    std::vector<Value> parts(NumChunks(count_, kChunk), start);
     ParallelFor(count_, kChunk, num_threads_,
                 [&](int64_t begin, int64_t end, int) {
-                  double value = start;
+                  Value value = start;
                   for (int64_t i = begin; i < end; ++i) {
                     value = combine(value, term(i));
                   }
                   parts[begin / kChunk] = value;
                 });
-    double value = start;
-    for (const double part : parts) value = combine(value, part);
+    Value value = start;
+    for (const Value& part : parts) value = combine(value, part);
     return value;
   }
+
+ private:
+  static constexpr int64_t kChunk = 4096;
 
   int64_t count_;
   int num_threads_;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include "krot/finish/log_product.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -67,48 +69,50 @@ BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
       multipliers_(problem.observations.size()) {
   now_.x = start;
   now_.viewed.resize(problem.observations.size());
-  if (options_.take_rows) now_.rows = problem;
+  if (options_.take_rows) rows_ = problem;
   trial_ = now_;
 }
 
 template <typename Cap>
-bool BoundedPath<Cap>::View(State* state) const {
-  if (options_.take_rows && !options_.take_rows(state->x, &state->rows)) {
-    return false;
-  }
-  const std::vector<Observation>& observations = RowsOf(*state).observations;
-  const double least = system_.loop().Min([&](int64_t i) {
-    const ViewedPoint viewed = ViewPoint(problem_, observations[i], state->x);
-    if (!(viewed.depth > 0)) return -1.0;
-    state->viewed[i] = {viewed.v / viewed.depth, viewed.depth};
-    return system_.cap().Slacks(state->viewed[i].e).minCoeff();
-  });
-  if (!(least > 0)) return false;
-  state->cost = system_.loop().Sum([&](int64_t i) {
-    return options_.loss.Value(state->viewed[i].e.squaredNorm()) / 2;
-  });
-  state->barrier = system_.loop().Sum(
-      [&](int64_t i) { return system_.cap().Barrier(state->viewed[i].e); });
-  return std::isfinite(state->barrier);
+bool BoundedPath<Cap>::View(State* state) {
+  if (!TakeRows(state->x)) return false;
+  struct Totals {
+    double least;  // slack
+    double cost;
+    LogProduct slacks;
+  };
+  const Totals totals = system_.loop().Reduce(
+      Totals{std::numeric_limits<double>::infinity(), 0, {}},
+      [&](int64_t i) -> Totals {
+        const ViewedPoint viewed =
+            ViewPoint(problem_, observations()[i], state->x);
+        if (!(viewed.depth > 0)) return {-1, 0, {}};
+        const Eigen::Vector2d e = viewed.v / viewed.depth;
+        state->viewed[i] = {e, viewed.depth};
+        const Vector h = system_.cap().Slacks(e);
+        if (!(h.minCoeff() > 0)) return {-1, 0, {}};
+        return {h.minCoeff(), options_.loss.Value(e.squaredNorm()) / 2,
+                LogProduct(system_.cap().RelativeSlack(h))};
+      },
+      [](const Totals& a, const Totals& b) {
+        return Totals{std::min(a.least, b.least), a.cost + b.cost,
+                      a.slacks.Times(b.slacks)};
+      });
+  state->cost = totals.cost;
+  state->barrier = -totals.slacks.Log();
+  return totals.least > 0 && std::isfinite(state->cost);
 }
 
 template <typename Cap>
 void BoundedPath<Cap>::CentreMultipliers(double mu, double least_slack) {
   const Vector least =
       least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
-  system_.loop().ForEach([&](int64_t i) {
-    multipliers_[i] =
-        mu *
-        system_.cap().Slacks(now_.viewed[i].e).cwiseMax(least).cwiseInverse();
+  const double gap = system_.loop().Sum([&](int64_t i) {
+    const Vector h = system_.cap().Slacks(now_.viewed[i].e);
+    multipliers_[i] = mu * h.cwiseMax(least).cwiseInverse();
+    return multipliers_[i].dot(h);
   });
-  MeasureGap();
-}
-
-template <typename Cap>
-void BoundedPath<Cap>::MeasureGap() {
-  mu_ = system_.loop().Sum([&](int64_t i) {
-    return multipliers_[i].dot(system_.cap().Slacks(now_.viewed[i].e));
-  }) / Count();
+  mu_ = gap / Count();
 }
 
 // Returns the mu that the direction aims at.
@@ -130,10 +134,7 @@ template <typename Cap>
 double BoundedPath<Cap>::AffineSigma() const {
   const double primal = system_.MaxStep(1);
   const double dual = system_.MaxDualStep(1);
-  const double gap = system_.loop().Sum([&](int64_t i) {
-    const auto pairs = system_.StepOf(i);
-    return (pairs.h + primal * pairs.dh).dot(multipliers_[i] + dual * pairs.dl);
-  });
+  const double gap = system_.GapAfter(primal, dual);
   const double left = std::max(0.0, gap / (Count() * mu_));
   return std::min(1.0, std::max(kSmallestSigma, left * left * left));
 }
@@ -148,10 +149,10 @@ double BoundedPath<Cap>::TakeStep(double mu) {
     if (!View(&trial_) || !(BarrierCost(trial_, mu) <= highest)) continue;
     MoveMultipliers(mu);
     std::swap(now_, trial_);
-    MeasureGap();
     step_ = step;
     return before - BarrierCost(now_, mu);
   }
+  TakeRows(now_.x);
   step_ = 0;
   return 0;
 }
@@ -160,7 +161,7 @@ double BoundedPath<Cap>::TakeStep(double mu) {
 template <typename Cap>
 void BoundedPath<Cap>::MoveMultipliers(double mu) {
   const double step = system_.MaxDualStep(kDamping);
-  system_.loop().ForEach([&](int64_t i) {
+  const double gap = system_.loop().Sum([&](int64_t i) {
     Vector& l = multipliers_[i];
     l += step * system_.StepOf(i).dl;
     const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
@@ -170,7 +171,9 @@ void BoundedPath<Cap>::MoveMultipliers(double mu) {
         l[j] = mu / h[j];
       }
     }
+    return l.dot(h);
   });
+  mu_ = gap / Count();
 }
 
 // Why the run ends here, if it does.
@@ -178,8 +181,7 @@ template <typename Cap>
 std::optional<BoundedTermination> BoundedPath<Cap>::Iterate(
     BoundedSummary* summary) {
   if (context_.IsCancelled()) return BoundedTermination::kInterrupted;
-  if (!system_.Factorize(RowsOf(now_).observations, now_.viewed,
-                         multipliers_)) {
+  if (!system_.Factorize(observations(), now_.viewed, multipliers_)) {
     return BoundedTermination::kSingular;
   }
   summary->duality_gap = RelativeGap();
@@ -250,7 +252,7 @@ int64_t BoundedPath<Cap>::MemoryBytes(const KnownRotationProblem& problem,
                                       bool rows_are_taken_anew) {
   const int64_t per_observation =
       sizeof(Vector) + 2 * sizeof(ViewedError) +
-      (rows_are_taken_anew ? 2 * (sizeof(Observation) + sizeof(int32_t)) : 0);
+      (rows_are_taken_anew ? sizeof(Observation) + sizeof(int32_t) : 0);
   constexpr int64_t kPerUnknown = 2 * sizeof(Eigen::Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * per_observation +
          (problem.num_points + problem.num_frames) * kPerUnknown +

@@ -10,7 +10,7 @@ namespace krot {
 
 // One run of bounded least squares along the central path: the minima of
 //
-//   1/2 sum rho + mu sum Barrier
+//   1/2 sum rho - mu sum log(h_j(e) / h_j(0))
 //
 // as mu falls. An iteration
 //
@@ -44,18 +44,20 @@ class BoundedPath {
 
   struct State {
     Estimate x;
-    // With the rows at x, where they depend on it; otherwise unused.
-    KnownRotationProblem rows;
     std::vector<ViewedError> viewed;
     double cost = 0;     // 1/2 sum rho
-    double barrier = 0;  // sum, at mu = 1
+    double barrier = 0;  // -sum log(h_j(e) / h_j(0))
   };
 
-  // Whether every error is below the cap.
-  bool View(State* state) const;
-  const KnownRotationProblem& RowsOf(const State& state) const {
-    return options_.take_rows ? state.rows : problem_;
+  // Of the state viewed last.
+  const std::vector<Observation>& observations() const {
+    return options_.take_rows ? rows_.observations : problem_.observations;
   }
+  bool TakeRows(const Estimate& x) {
+    return !options_.take_rows || options_.take_rows(x, &rows_);
+  }
+  // Whether every error is below the cap.
+  bool View(State* state);
   double BarrierCost(const State& state, double mu) const {
     return state.cost + mu * state.barrier;
   }
@@ -71,7 +73,6 @@ class BoundedPath {
 
   // mu / h, with slacks h of no less than this share of the cap's.
   void CentreMultipliers(double mu, double least_slack);
-  void MeasureGap();
   double FindDirection();
   double AffineSigma() const;
   // Sets step_, 0 if none is found, and returns what it takes off the cost.
@@ -84,6 +85,7 @@ class BoundedPath {
   const BoundedOptions options_;
   const Context context_;
   BoundedSystem<Cap> system_;
+  KnownRotationProblem rows_;  // where they depend on the state
   State now_;
   State trial_;
   std::vector<Vector> multipliers_;

@@ -5,9 +5,25 @@
 #include <limits>
 
 namespace krot {
+namespace {
 
+using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+// No step is followed farther.
+constexpr double kFurthest = 2;
+
+std::vector<Matrix3d> FrameRotations(const KnownRotationProblem& problem) {
+  std::vector<Matrix3d> rotations(problem.num_frames, Matrix3d::Identity());
+  for (const View& view : problem.views) {
+    rotations[view.frame] =
+        view.cam_from_rig_rotation.transpose() * view.cam_from_world_rotation;
+  }
+  return rotations;
+}
+
+}  // namespace
 
 template <typename Cap>
 BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
@@ -18,13 +34,11 @@ BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
       loss_(loss),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       structure_(AnchoredStructure(problem)),
+      frame_rotations_(FrameRotations(problem)),
       elimination_(structure_, num_threads),
       root_(problem.observations.size()),
       correction_(problem.observations.size()),
-      rhs_(problem.observations.size()),
-      d_(problem.observations.size()) {
-  zero_.SetZero(problem.num_points, problem.num_frames);
-}
+      d_(problem.observations.size()) {}
 
 // The determinant as a sum of what is not negative: near the cap the normals'
 // part is many orders of magnitude above the rest.
@@ -32,7 +46,8 @@ template <typename Cap>
 typename BoundedSystem<Cap>::Root BoundedSystem<Cap>::RootOf(int64_t i) const {
   const Vector2d& e = (*viewed_)[i].e;
   const Vector& l = (*multipliers_)[i];
-  const Vector stiffness = l.cwiseQuotient(cap_.Slacks(e));
+  const Vector h = cap_.Slacks(e);
+  const Vector stiffness = l.cwiseQuotient(h);
   const Eigen::Matrix<double, 2, Cap::kNum> n = cap_.Normals(e);
   const double own = loss_.Weight(e.squaredNorm()) + Cap::kBend * l.sum();
   const Vector nx2 = n.row(0).cwiseAbs2(), ny2 = n.row(1).cwiseAbs2();
@@ -47,33 +62,27 @@ typename BoundedSystem<Cap>::Root BoundedSystem<Cap>::RootOf(int64_t i) const {
     }
   }
   const double a = std::sqrt(own + xx);
-  return {a, xy / a, std::sqrt(determinant) / a};
+  return {a, xy / a, std::sqrt(determinant) / a, std::sqrt(l.dot(h))};
 }
 
 template <typename Cap>
 bool BoundedSystem<Cap>::Factorize(const std::vector<Observation>& observations,
                                    const std::vector<ViewedError>& viewed,
                                    const std::vector<Vector>& multipliers) {
-  observations_ = &observations;
   viewed_ = &viewed;
   multipliers_ = &multipliers;
   loop_.ForEach([&](int64_t i) {
     const Observation& o = observations[i];
-    const View& view = problem_.views[o.view];
     const ViewedError& at = viewed[i];
-    root_[i] = RootOf(i);
+    const Root U = root_[i] = RootOf(i);
     const double scale = 1 / at.depth;
-    const Vector3d Jx = scale * (o.E.row(1) - at.e[0] * o.E.row(0));
-    const Vector3d Jy = scale * (o.E.row(2) - at.e[1] * o.E.row(0));
-    Matrix3 R;
-    R.row(0) = root_[i].a * Jx + root_[i].b * Jy;
-    R.row(1) = root_[i].c * Jy;
-    R.row(2) =
-        std::sqrt(multipliers[i].dot(cap_.Slacks(at.e))) * scale * o.E.row(0);
-    Eigen::Map<Matrix3>(elimination_.point_rows(i)).noalias() =
-        R * view.cam_from_world_rotation;
-    Eigen::Map<Matrix3>(elimination_.frame_rows(i)).noalias() =
-        R * view.cam_from_rig_rotation;
+    const Eigen::RowVector3d Jx = scale * (o.E.row(1) - at.e[0] * o.E.row(0));
+    const Eigen::RowVector3d Jy = scale * (o.E.row(2) - at.e[1] * o.E.row(0));
+    Eigen::Matrix<double, 3, 3, Eigen::RowMajor> B;
+    B << U.a * Jx + U.b * Jy, U.c * Jy, U.depth * scale * o.E.row(0);
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
+        elimination_.rows(i))
+        .noalias() = B * problem_.views[o.view].cam_from_world_rotation;
   });
   return elimination_.Factorize();
 }
@@ -82,7 +91,7 @@ bool BoundedSystem<Cap>::Factorize(const std::vector<Observation>& observations,
 template <typename Cap>
 Vector2d BoundedSystem<Cap>::PullOf(int64_t i) const {
   const Vector2d& e = (*viewed_)[i].e;
-  const Correction& c = correction_[i];
+  const Correction c = CorrectionOf(i);
   const Vector target =
       Vector::Constant(mu_) - c.product + c.slack * (*multipliers_)[i];
   return loss_.Weight(e.squaredNorm()) * e +
@@ -95,25 +104,65 @@ void BoundedSystem<Cap>::SolveForTarget() {
     const Vector2d pull = PullOf(i);
     const Root& U = root_[i];
     const double x = -pull[0] / U.a;
-    rhs_[i] << x, (-pull[1] - U.b * x) / U.c, 0;
+    d_[i] << x, (-pull[1] - U.b * x) / U.c, 0;
   });
-  elimination_.Solve(zero_, rhs_.data()->data(), &dx_, /*refinements=*/0);
+  elimination_.Solve(d_.data()->data(), &dx_);
+  for (size_t f = 0; f < dx_.frames.size(); ++f) {  // t = -R_rw c
+    dx_.frames[f] = -(frame_rotations_[f] * dx_.frames[f]);
+  }
   loop_.ForEach([&](int64_t i) {
-    const Observation& o = (*observations_)[i];
-    const View& view = problem_.views[o.view];
-    const ViewedError& at = (*viewed_)[i];
-    const Vector3d dwv = o.E *
-                         (view.cam_from_world_rotation * dx_.points[o.point] +
-                          view.cam_from_rig_rotation * dx_.frames[view.frame]) /
-                         at.depth;
-    d_[i] = {dwv.tail<2>() - dwv[0] * at.e, dwv[0]};
+    Vector3d& d = d_[i];
+    const Root& U = root_[i];
+    d[1] /= U.c;
+    d[0] = (d[0] - U.b * d[1]) / U.a;
+    d[2] /= U.depth;
   });
+  reach_ = FollowDirection();
+}
+
+template <typename Cap>
+typename BoundedSystem<Cap>::Reach BoundedSystem<Cap>::FollowDirection() {
+  return loop_.Reduce(
+      Reach{kFurthest, kFurthest, 0, 0, 0, 0},
+      [&](int64_t i) {
+        const PairStep step = StepOf(i);
+        const Vector& l = (*multipliers_)[i];
+        Reach reach = {ReachOf(i),          kFurthest,
+                       step.h.dot(l),       step.dh.dot(l),
+                       step.h.dot(step.dl), step.dh.dot(step.dl)};
+        for (int j = 0; j < Cap::kNum; ++j) {
+          if (-step.dl[j] * reach.dual > l[j]) reach.dual = -l[j] / step.dl[j];
+        }
+        return reach;
+      },
+      [](const Reach& a, const Reach& b) {
+        return Reach{std::min(a.primal, b.primal),
+                     std::min(a.dual, b.dual),
+                     a.gap + b.gap,
+                     a.by_primal + b.by_primal,
+                     a.by_dual + b.by_dual,
+                     a.by_both + b.by_both};
+      });
+}
+
+// A step t takes the depth to w + t dw and the error along de by
+// a = t / (1 + t dw / w): to all of a >= 0 if the depth vanishes on the way.
+template <typename Cap>
+double BoundedSystem<Cap>::ReachOf(int64_t i) const {
+  const double dw = d_[i][2];
+  const double limit = 1 + kFurthest * dw > 0 ? kFurthest : -1 / dw;
+  const double furthest = limit == kFurthest
+                              ? kFurthest / (1 + kFurthest * dw)
+                              : std::numeric_limits<double>::infinity();
+  const double a =
+      cap_.MaxStep((*viewed_)[i].e, d_[i].template head<2>(), furthest);
+  return a < furthest ? a / (1 - a * dw) : limit;
 }
 
 template <typename Cap>
 void BoundedSystem<Cap>::Solve(double mu) {
   mu_ = mu;
-  std::fill(correction_.begin(), correction_.end(), Correction());
+  is_corrected_ = false;
   SolveForTarget();
 }
 
@@ -122,9 +171,10 @@ void BoundedSystem<Cap>::Correct(double mu) {
   loop_.ForEach([&](int64_t i) {
     const PairStep step = StepOf(i);
     correction_[i] = {step.dh.cwiseProduct(step.dl),
-                      Cap::kBend * d_[i].e.squaredNorm() / 2};
+                      Cap::kBend * d_[i].template head<2>().squaredNorm() / 2};
   });
   mu_ = mu;
+  is_corrected_ = true;
   SolveForTarget();
 }
 
@@ -133,61 +183,48 @@ typename BoundedSystem<Cap>::PairStep BoundedSystem<Cap>::StepOf(
     int64_t i) const {
   const Vector2d& e = (*viewed_)[i].e;
   const Vector& l = (*multipliers_)[i];
-  const Correction& c = correction_[i];
+  const Correction c = CorrectionOf(i);
   PairStep step;
   step.h = cap_.Slacks(e);
-  step.dh =
-      -(cap_.Normals(e).transpose() * d_[i].e) - Vector::Constant(c.slack);
+  step.dh = -(cap_.Normals(e).transpose() * d_[i].template head<2>()) -
+            Vector::Constant(c.slack);
   step.dl = (Vector::Constant(mu_) - c.product - l.cwiseProduct(step.dh))
                 .cwiseQuotient(step.h) -
             l;
   return step;
 }
 
-// A step t takes the depth to w + t dw and the error along de by
-// a = t / (1 + t dw / w): to all of a >= 0 if the depth vanishes on the way.
 template <typename Cap>
 double BoundedSystem<Cap>::MaxStep(double damping) const {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  return damping * loop_.Min([&](int64_t i) {
-    const double dw = d_[i].depth;
-    const double ahead = 1 / damping;
-    const double limit = 1 + ahead * dw > 0 ? ahead : -1 / dw;
-    const double furthest =
-        limit == ahead ? ahead / (1 + ahead * dw) : kInfinity;
-    const double a = cap_.MaxStep((*viewed_)[i].e, d_[i].e, furthest);
-    return a < furthest ? a / (1 - a * dw) : limit;
-  });
+  return std::min(1.0, damping * reach_.primal);
 }
 
 template <typename Cap>
 double BoundedSystem<Cap>::MaxDualStep(double damping) const {
-  return damping * loop_.Min([&](int64_t i) {
-    const Vector dl = StepOf(i).dl;
-    double limit = 1 / damping;
-    for (int j = 0; j < Cap::kNum; ++j) {
-      const double l = (*multipliers_)[i][j];
-      if (-dl[j] * limit > l) limit = -l / dl[j];
-    }
-    return limit;
-  });
+  return std::min(1.0, damping * reach_.dual);
+}
+
+template <typename Cap>
+double BoundedSystem<Cap>::GapAfter(double primal, double dual) const {
+  return reach_.gap + primal * reach_.by_primal + dual * reach_.by_dual +
+         primal * dual * reach_.by_both;
 }
 
 template <typename Cap>
 double BoundedSystem<Cap>::Slope() const {
-  return loop_.Sum([&](int64_t i) { return -PullOf(i).dot(d_[i].e); });
+  return loop_.Sum(
+      [&](int64_t i) { return -PullOf(i).dot(d_[i].template head<2>()); });
 }
 
 template <typename Cap>
 int64_t BoundedSystem<Cap>::MemoryBytes(const KnownRotationProblem& problem) {
-  constexpr int64_t kPerObservation =
-      sizeof(Root) + sizeof(Correction) + sizeof(Vector3d) +
-      sizeof(ViewedError) + 3 * 9 * sizeof(double) +  // A_s, A_t, Q
-      2 * sizeof(int32_t);                            // structure and order
-  constexpr int64_t kPerUnknown = 4 * sizeof(Vector3d);
+  constexpr int64_t kPerObservation = sizeof(Root) + sizeof(Correction) +
+                                      sizeof(Vector3d) +  // d
+                                      sizeof(int32_t);    // structure
+  constexpr int64_t kPerUnknown = 2 * sizeof(Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
          (problem.num_points + problem.num_frames) * kPerUnknown +
-         FrameSystem(AnchoredStructure(problem)).MemoryBytes();
+         CentreElimination::MemoryBytes(AnchoredStructure(problem));
 }
 
 template class BoundedSystem<DiscCap>;

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "krot/conic/observation_loop.h"
-#include "krot/conic/point_elimination.h"
+#include "krot/finish/centre_elimination.h"
 #include "krot/finish/error_cap.h"
 #include "krot/finish/error_loss.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -32,6 +32,9 @@ struct ViewedError {
 // the barrier of the cone of (cap w; v) would; it vanishes with mu. The
 // right-hand side, -(rho' e + sum_j mu / h_j n_j), is minus the gradient of the
 // barrier problem: any l > 0 gives a descent direction.
+//
+// As rotations stay, dx_cam = R_sr R_rw (ds_k - dc_f) with c_f the centre of
+// frame f: the unknowns of CentreElimination.
 template <typename Cap>
 class BoundedSystem {
  public:
@@ -41,15 +44,15 @@ class BoundedSystem {
   BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
                 const ErrorLoss& loss, int num_threads);
 
-  // The system at an iterate, whose rows are those of `observations`; all of it
-  // must outlive the calls below. False if there is no factor.
+  // The system at an iterate, whose rows are those of `observations`; errors
+  // and multipliers must outlive the calls below. False if there is no factor.
   bool Factorize(const std::vector<Observation>& observations,
                  const std::vector<ViewedError>& viewed,
                  const std::vector<Vector>& multipliers);
 
   // Newton's direction for the barrier problem of this mu.
   void Solve(double mu);
-  // The same with the second order of the products and slacks along the last
+  // The same with the second order of the products and slacks along that
   // direction [Mehrotra 1992].
   void Correct(double mu);
 
@@ -60,9 +63,12 @@ class BoundedSystem {
   };
   PairStep StepOf(int64_t i) const;
   // The longest step <= 1 along dx that keeps all errors below the cap where
-  // rows stay, and the longest along dl, both times `damping`.
+  // rows stay, and the longest along dl, both times `damping`, which is
+  // >= 1 / 2.
   double MaxStep(double damping) const;
   double MaxDualStep(double damping) const;
+  // sum h'l after such steps, to second order.
+  double GapAfter(double primal, double dual) const;
   // What a full step gains of the quadratic model, twice; squared pixels.
   double Slope() const;
 
@@ -72,37 +78,49 @@ class BoundedSystem {
   static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
  private:
-  using Matrix3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
-  // U = [a b; 0 c].
+  // What an observation's rows are made of: U = [a b; 0 c] and sqrt(h'l).
   struct Root {
-    double a, b, c;
+    double a, b, c, depth;
   };
-  // Second order along the last direction: of h_j l_j, and of each h_j.
+  // Second order along Newton's direction: of h_j l_j, and of each h_j.
   struct Correction {
-    Vector product = Vector::Zero();
-    double slack = 0;
+    Vector product;
+    double slack;
+  };
+  // Along the last direction: the longest steps <= 2, and sum h'l, as a
+  // polynomial in the two step lengths.
+  struct Reach {
+    double primal, dual;
+    double gap, by_primal, by_dual, by_both;
   };
 
   Root RootOf(int64_t i) const;
+  Correction CorrectionOf(int64_t i) const {
+    return is_corrected_ ? correction_[i] : Correction{Vector::Zero(), 0};
+  }
   Eigen::Vector2d PullOf(int64_t i) const;
+  double ReachOf(int64_t i) const;
   void SolveForTarget();
+  Reach FollowDirection();
 
   const KnownRotationProblem& problem_;
   const Cap cap_;
   const ErrorLoss loss_;
   const ObservationLoop loop_;
   const BlockStructure structure_;
-  PointElimination<3> elimination_;
-  const std::vector<Observation>* observations_ = nullptr;
+  // R_rw of the frames that an observation has.
+  const std::vector<Eigen::Matrix3d> frame_rotations_;
+  CentreElimination elimination_;
   const std::vector<ViewedError>* viewed_ = nullptr;
   const std::vector<Vector>* multipliers_ = nullptr;
   double mu_ = 0;
+  bool is_corrected_ = false;
   std::vector<Root> root_;
   std::vector<Correction> correction_;
-  std::vector<Eigen::Vector3d> rhs_;  // of the rows
-  BlockVector zero_, dx_;
-  std::vector<ViewedError> d_;  // de and dw / w
+  // Of the rows: the right-hand side, then (de; dw / w).
+  std::vector<Eigen::Vector3d> d_;
+  BlockVector dx_;
+  Reach reach_ = {};
 };
 
 }  // namespace krot

@@ -11,12 +11,13 @@ namespace krot {
 // ||e||_p <= cap as kNum conditions h_j(e) >= 0 on an error e, pixels. Each cap
 // offers, at e,
 //
-//   Slacks    h_j > 0 inside
-//   Normals   n_j = -dh_j/de, as columns
-//   kBend     -d^2 h_j / de^2 = kBend I
-//   MaxStep   the largest t <= limit with e + t d inside
-//   Barrier   -sum_j log(h_j(e) / h_j(0))
-//   Share     of multipliers: what they weigh beside an error's own weight, 1
+//   Slacks         h_j > 0 inside
+//   Normals        n_j = -dh_j/de, as columns
+//   kBend          -d^2 h_j / de^2 = kBend I
+//   MaxStep        the largest t <= limit with e + t d inside
+//   RelativeSlack  of slacks h_j, the product of all h_j / h_j(0)
+//   Share          of multipliers: what they weigh beside an error's own
+//                  weight, 1
 
 // p = 2: h = (cap^2 - |e|^2) / 2.
 struct DiscCap {
@@ -42,9 +43,7 @@ struct DiscCap {
     const double t = b > 0 ? h2 / (b + root) : (root - b) / d.squaredNorm();
     return t < limit ? t : limit;
   }
-  double Barrier(const Eigen::Vector2d& e) const {
-    return -std::log(2 * Slacks(e)[0] / (cap * cap));
-  }
+  double RelativeSlack(const Vector& h) const { return 2 * h[0] / (cap * cap); }
   double Share(const Vector& multiplier) const { return multiplier[0]; }
 
   double cap;
@@ -79,9 +78,7 @@ struct PolygonCap {
     }
     return limit;
   }
-  double Barrier(const Eigen::Vector2d& e) const {
-    return -(Slacks(e) / cap).array().log().sum();
-  }
+  double RelativeSlack(const Vector& h) const { return (h / cap).prod(); }
   double Share(const Vector& multipliers) const {
     return multipliers.maxCoeff() / cap;
   }
