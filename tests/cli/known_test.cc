@@ -192,6 +192,7 @@ TEST_F(WhatIsFixed, KeepTheirBitsAndAreProvedInTheirPlace) {
     const KrotResult result = Solve("input", "output", Options());
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_THAT(result.err, HasSubstr("of which 2 frames and "));
+    EXPECT_THAT(result.out, HasSubstr("with what is fixed, no translations"));
     const Json report = Report("output");
     EXPECT_EQ(report["termination"], "gap_reached");
     EXPECT_EQ(report["fixed"]["num_frames"], 2);
