@@ -93,6 +93,32 @@ class CentreEliminationTest : public testing::Test {
   std::vector<double> r_;
 };
 
+TEST_F(CentreEliminationTest, LeavesFixedPointsWhereTheyAre) {
+  BlockStructure structure = structure_;
+  structure.point_is_fixed.assign(structure.num_points(), 0);
+  CentreElimination elimination(structure, 1);
+  Fill(2, &elimination);
+  LongMatrix A = DenseA(&elimination);
+  for (const int64_t k : {3, 5}) {
+    structure.point_is_fixed[k] = 1;
+    A.middleCols(3 * (structure.num_frames() - 1 + k), 3).setZero();
+  }
+  const LongVector r = Eigen::Map<const Eigen::VectorXd>(
+                           r_.data(), static_cast<Eigen::Index>(r_.size()))
+                           .cast<long double>();
+  const LongVector expected = DenseSolution(A, r);
+  ASSERT_TRUE(elimination.Factorize());
+  BlockVector x;
+  elimination.Solve(r_.data(), &x);
+  EXPECT_TRUE(x.points[3].isZero(0));
+  EXPECT_TRUE(x.points[5].isZero(0));
+  EXPECT_LT((Unknowns(x) - expected).norm(), 1e-8L * expected.norm());
+  const Eigen::VectorXd moved = (A * expected).cast<double>();
+  EXPECT_LT((Eigen::Map<const Eigen::VectorXd>(r_.data(), moved.size()) - moved)
+                .norm(),
+            1e-8 * moved.norm());
+}
+
 TEST_F(CentreEliminationTest, SolvesTheLeastSquares) {
   for (const double decades : {0.0, 2.0, 4.0}) {
     CentreElimination elimination(structure_, 1);

@@ -77,7 +77,11 @@ void CentreElimination::FindSightings(int64_t k, Sightings* sightings) {
   s.high.clear();
   s.fixed_G.setZero();
   for (std::vector<double>& row : s.G) row.resize(3 * m);
-  std::copy_n(rows_.data() + 9 * begin, 9 * m, Q_.data() + 9 * begin);
+  if (structure_.IsFixedPoint(k)) {
+    std::fill_n(Q_.data() + 9 * begin, 9 * m, 0.0);  // all free: s is 0
+  } else {
+    std::copy_n(rows_.data() + 9 * begin, 9 * m, Q_.data() + 9 * begin);
+  }
   R_[k] = Orthogonalize(3 * m, Q_.data() + 9 * begin);
   for (int64_t n = begin; n < begin + m;) {
     const int32_t frame = structure_.frame_of[begin + order_[n]];
