@@ -1,5 +1,7 @@
 #include "krot/conic/block_structure.h"
 
+#include <algorithm>
+
 #include "krot/problem/components.h"
 
 namespace krot {
@@ -40,6 +42,24 @@ BlockStructure AnchoredStructure(const KnownRotationProblem& problem) {
     if (f >= 0) structure.frame_is_fixed[f] = 1;
   }
   return structure;
+}
+
+std::vector<int32_t> OrderByFrame(const BlockStructure& structure) {
+  std::vector<int32_t> order;
+  order.reserve(structure.num_observations());
+  for (int64_t k = 0; k < structure.num_points(); ++k) {
+    const int64_t begin = structure.point_begin[k];
+    const int64_t end = structure.point_begin[k + 1];
+    for (int64_t i = begin; i < end; ++i) {
+      order.push_back(static_cast<int32_t>(i - begin));
+    }
+    std::sort(order.begin() + begin, order.end(), [&](int32_t a, int32_t b) {
+      const int32_t frame_a = structure.frame_of[begin + a];
+      const int32_t frame_b = structure.frame_of[begin + b];
+      return frame_a != frame_b ? frame_a < frame_b : a < b;
+    });
+  }
+  return order;
 }
 
 }  // namespace krot

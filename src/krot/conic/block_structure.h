@@ -34,6 +34,10 @@ struct BlockStructure {
 // observations. So is a frame without any.
 BlockStructure AnchoredStructure(const KnownRotationProblem& problem);
 
+// Per point, the places of its observations among them, in the order of their
+// frames.
+std::vector<int32_t> OrderByFrame(const BlockStructure& structure);
+
 // A vector with the structure of the unknowns.
 struct BlockVector {
   std::vector<Eigen::Vector3d> points;
