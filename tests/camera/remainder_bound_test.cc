@@ -196,6 +196,31 @@ TEST_P(RemainderBoundOf, InOneDirectionIsNeverExceeded) {
   EXPECT_GT(num_bounded, 6);
 }
 
+TEST_P(RemainderBoundOf, InOneDirectionIsTheSameWhereNothingIsSufficient) {
+  std::mt19937 random(4);
+  int num_bounded = 0;
+  for (int i = 0; i < 20; ++i) {
+    const std::vector<double> params = StrongParams(GetParam(), &random);
+    const auto trial =
+        DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
+    if (!trial) continue;
+    const Eigen::Vector2d y = 3 * RandomRay(1, &random);
+    const auto bound = [&](double sufficient) {
+      return SupportBound(GetParam(), params.data(), trial->pixel, trial->x_hat,
+                          y, trial->level_px, trial->p, sufficient);
+    };
+    const auto smallest = bound(0);
+    if (!smallest) continue;
+    ++num_bounded;
+    EXPECT_EQ(bound(0.9 * *smallest), smallest);
+    const double sufficient = 1.1 * *smallest;
+    ASSERT_TRUE(bound(sufficient));
+    EXPECT_LE(*bound(sufficient), sufficient);
+    EXPECT_GE(*bound(sufficient), *smallest * (1 - 1e-9));
+  }
+  EXPECT_GT(num_bounded, 3);
+}
+
 // The point of the ball |e|_p = 1 that is farthest in the direction -y.
 Eigen::Vector2d FarthestAgainst(const Eigen::Vector2d& y, double p) {
   if (p == 2) return -y.normalized();

@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <fstream>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -25,7 +28,8 @@ class OutlierFilterCommand : public ::testing::Test {
     Save(SynthesizeScene(options).model, folder_ / "input");
   }
 
-  KrotResult Filter(std::vector<std::string> more = {}) const {
+  KrotResult Filter(std::vector<std::string> more = {},
+                    const std::string& max_error = "3") const {
     std::vector<std::string> arguments = {"outlier_filter",
                                           "--input_path",
                                           folder_ / "input",
@@ -34,7 +38,7 @@ class OutlierFilterCommand : public ::testing::Test {
                                           "--report_path",
                                           folder_ / "r.json",
                                           "--OutlierFilter.max_error",
-                                          "3",
+                                          max_error,
                                           "--overwrite",
                                           "1"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -141,6 +145,52 @@ TEST_F(OutlierFilterCommand, DrawsItsProfileDownToTheBoundThatIsGiven) {
   const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
   EXPECT_EQ(report["max_error"], 3);
   EXPECT_EQ(report["num_removed"], levels.back()["num_removed"]);
+}
+
+TEST_F(OutlierFilterCommand, WritesModelsToLookAt) {
+  const KrotResult result = Filter({"--suspects_path", folder_ / "suspects",
+                                    "--overlay_path", folder_ / "overlay"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  const Model input = Load(folder_ / "input");
+  const Model suspects = Load(folder_ / "suspects");
+  const size_t num_kept = Load(folder_ / "output").points3D.size();
+  ASSERT_EQ(suspects.points3D.size(), input.points3D.size());
+  std::set<std::array<uint8_t, 3>> colors;
+  for (const Point3D& point : suspects.points3D) colors.insert(point.color);
+  EXPECT_EQ(colors.size(), 3u);
+  EXPECT_EQ(Load(folder_ / "overlay").points3D.size(),
+            input.points3D.size() + num_kept);
+}
+
+TEST_F(OutlierFilterCommand, RefusesToWriteModelsToLookAtOverOthers) {
+  for (const char* name : {"--suspects_path", "--overlay_path"}) {
+    for (const char* folder : {"input", "output"}) {
+      const KrotResult result = Filter({name, folder_ / folder});
+      EXPECT_EQ(result.exit_code, 1);
+      EXPECT_THAT(result.err, HasSubstr("must be a folder of its own"));
+    }
+  }
+}
+
+TEST_F(OutlierFilterCommand, LeavesTwinsOfAnImageToTheEnd) {
+  SceneOptions options = SmallScene();
+  options.pixel_noise = 0;
+  options.duplicate_ratio = 0.1;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const auto removed = [&](const std::string& same_image) {
+    const KrotResult result =
+        Filter({"--Problem.same_image", same_image}, "0.1");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+    EXPECT_TRUE(report["is_within"]);
+    return std::pair<int, int>(report["num_removed"], report["num_must_go"]);
+  };
+  const auto [kept_removed, kept_proved] = removed("keep");
+  const auto [closest_removed, closest_proved] = removed("closest");
+  EXPECT_GT(kept_proved, 0);
+  EXPECT_LT(closest_proved, kept_proved);
+  EXPECT_GE(closest_removed, kept_proved);
 }
 
 TEST_F(OutlierFilterCommand, RefusesToFilterWithoutABoundOrAProfile) {

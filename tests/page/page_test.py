@@ -464,6 +464,63 @@ class FilterTest(unittest.TestCase):
             [worst["image_name"], "Point %d" % worst["point3D_id"]])
 
 
+class RotationSuspectTest(unittest.TestCase):
+    """A scene in which one camera is turned by a degree about its own axis."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        root = pathlib.Path(folder.name)
+        run_krot("model_synthesizer", "--output_path", root / "input",
+                 "--Scene.num_frames", 6, "--Scene.num_points", 150,
+                 "--Scene.pixel_noise", 0.5, "--output_type", "TXT")
+        for name, row, first in (("images.txt", 4, 1), ("frames.txt", 2, 2)):
+            path = root / "input" / name
+            path.write_text(cls.turned(path.read_text(), row, first))
+        run_krot("outlier_filter", "--input_path", root / "input",
+                 "--output_path", root / "output", "--OutlierFilter.max_error",
+                 3, "--report_path", root / "report.json", "--html_path",
+                 root / "page.html")
+        cls.suspect = json.loads(
+            (root / "report.json").read_text())["rotation_suspect"]
+        cls.page = (root / "page.html").as_uri()
+        cls.browser = cls.enterClassContext(webdriver.Browser((1200, 1300)))
+
+    @staticmethod
+    def turned(text, row, first):
+        """With the pose of a row turned: a quaternion from column `first` on,
+        and a translation."""
+        lines = text.splitlines()
+        starts = [n for n, line in enumerate(lines)
+                  if not line.startswith("#")]
+        n = starts[row]
+        words = lines[n].split()
+        w, x, y, z, t_x, t_y, t_z = map(float, words[first:first + 7])
+        cos, sin = math.cos(math.radians(1)), math.sin(math.radians(1))
+        half_cos, half_sin = (math.cos(math.radians(0.5)),
+                              math.sin(math.radians(0.5)))
+        turned = (half_cos * w - half_sin * y, half_cos * x + half_sin * z,
+                  half_cos * y + half_sin * w, half_cos * z - half_sin * x,
+                  cos * t_x + sin * t_z, t_y, cos * t_z - sin * t_x)
+        words[first:first + 7] = map(repr, turned)
+        lines[n] = " ".join(words)
+        return "\n".join(lines) + "\n"
+
+    def test_suspect_is_named_with_the_turn_that_fits(self):
+        self.browser.open(self.page)
+        self.assertAlmostEqual(self.suspect["angle_deg"], 1, delta=0.1)
+        text = self.browser.text("#rotation-suspect")
+        self.assertIn(self.suspect["image_name"], text)
+        self.assertIn("A turn by %.2f degrees" % self.suspect["angle_deg"],
+                      text)
+        self.browser.run(
+            "document.querySelector('#rotation-suspect button').click()")
+        self.assertEqual(self.browser.texts(".info h3"),
+                         [self.suspect["image_name"]])
+        self.assertEqual(self.browser.console(), [])
+
+
 class PathTest(unittest.TestCase):
     def test_page_does_not_take_the_place_of_the_report(self):
         run = subprocess.run(

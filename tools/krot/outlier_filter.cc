@@ -2,11 +2,13 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/overlay.h"
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
 #include "krot/options/outlier_filter_options.h"
 #include "krot/outliers/outlier_filter.h"
+#include "krot/outliers/suspect_colors.h"
 #include "krot/report/outlier_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
@@ -28,6 +30,8 @@ struct OutlierCommand {
   std::string outliers_path;
   std::string profile_path;
   std::string image_path;
+  std::string suspects_path;
+  std::string overlay_path;
   Context context;
   OutlierFilterOptions options;
   CommonOptions common;
@@ -44,6 +48,13 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst of what was "
                   "removed in them");
+  parser->AddPath("suspects_path", &command->suspects_path, false, "a folder",
+                  "Where a copy of the input goes whose points are coloured by "
+                  "whether they lost observations or take part in conflicts, "
+                  "for COLMAP's GUI; created if need be");
+  parser->AddPath("overlay_path", &command->overlay_path, false, "a folder",
+                  "Where one model that holds both, input and result, in two "
+                  "colours, goes; created if need be");
   AddOutlierFilterOptions(&command->options, &command->context, parser);
   parser->AddOutputFile(
       "OutlierFilter.profile_path", &command->profile_path,
@@ -92,6 +103,49 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
   return result;
 }
 
+// What can be known before the model is read.
+WriteModelOptions CheckPaths(const OutlierCommand& command) {
+  const ModelPaths& paths = command.paths;
+  const WriteModelOptions write_options = CheckModelPaths(paths);
+  CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
+  CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
+  CheckSidePath("OutlierFilter.profile_path", command.profile_path,
+                paths.output_path);
+  std::vector<std::string> taken = {paths.input_path, paths.output_path};
+  for (const auto& [name, path] :
+       {std::pair("suspects_path", command.suspects_path),
+        std::pair("overlay_path", command.overlay_path)}) {
+    if (path.empty()) continue;
+    for (const std::string& other : taken) {
+      if (!IsSamePath(path, other)) continue;
+      throw OptionError("--" + std::string(name) + " = " + path +
+                        ", must be a folder of its own");
+    }
+    CheckWritable(path, write_options);
+    taken.push_back(path);
+  }
+  return write_options;
+}
+
+// Models to look at.
+void WriteViews(const OutlierCommand& command,
+                const OutlierFilterSummary& summary,
+                const WriteModelOptions& write_options, const Model& input,
+                const Model& result) {
+  const LogOptions& log = command.common.log;
+  if (!command.suspects_path.empty()) {
+    LogLine(log, 2, "writing " + command.suspects_path);
+    Model colored = input;
+    ColorSuspects(summary, &colored);
+    WriteModel(colored, command.suspects_path, write_options);
+  }
+  if (!command.overlay_path.empty()) {
+    LogLine(log, 2, "writing " + command.overlay_path);
+    WriteModel(OverlayModels(input, result, command.context.num_threads),
+               command.overlay_path, write_options);
+  }
+}
+
 void WriteSideFiles(const OutlierCommand& command,
                     const OutlierReport& report) {
   const LogOptions& log = command.common.log;
@@ -113,11 +167,7 @@ int Run(const OutlierCommand& command) {
   const LogOptions& log = command.common.log;
   const ModelPaths& paths = command.paths;
   const CancelFlag& cancel = CatchInterrupts();
-  const WriteModelOptions write_options = CheckModelPaths(paths);
-  CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
-  CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
-  CheckSidePath("OutlierFilter.profile_path", command.profile_path,
-                paths.output_path);
+  const WriteModelOptions write_options = CheckPaths(command);
   OutlierReport report;
   report.run.version = KROT_VERSION;
   report.run.threads = ResolveNumThreads(command.context.num_threads);
@@ -139,6 +189,7 @@ int Run(const OutlierCommand& command) {
   report.run.seconds_total = total_timer.Seconds();
   report.run.peak_memory_bytes = PeakMemoryBytes();
   WriteSideFiles(command, report);
+  WriteViews(command, report.summary, write_options, model, result.model);
   const std::string report_json = OutlierJson(report);
   const std::string crops =
       command.image_path.empty()

@@ -1,6 +1,7 @@
 #include "krot/bridge/pixel_certificate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -18,6 +19,8 @@ constexpr double kNoRegion = std::numeric_limits<double>::infinity();
 constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
 constexpr double kRoom = 1e-9;
+// Support lines that are found at the same time; the next profit from them.
+constexpr int64_t kLinesAtOnce = 32;
 
 std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
   return "observation " + std::to_string(built.point2D_of[i]) + " of image " +
@@ -26,25 +29,61 @@ std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
                  .id);
 }
 
-// (3) at the rows' bearings.
-std::vector<double> LinesAt(const Reprojection& reprojection,
-                            const BuiltProblem& built, Norm norm,
-                            const Certificate& rows,
-                            const std::vector<Eigen::Vector3d>& bearings,
-                            double gamma, const Context& context) {
-  std::vector<double> lines(rows.observations.size(), kNoRegion);
-  ParallelFor(static_cast<int64_t>(lines.size()), 1, context.num_threads,
-              [&](int64_t n, int64_t, int) {
-                const CertifiedObservation& o = rows.observations[n];
-                const Reprojection::Source& source =
-                    reprojection.SourceOf(o.observation);
-                const std::optional<double> largest = SupportBound(
-                    source.model_id, source.params, built.pixels[o.observation],
-                    bearings[n], o.y, gamma, norm.p);
-                if (largest)
-                  lines[n] = *largest / (rows.lower_bound * o.lambda);
-              });
-  return lines;
+// (3) of observation n of the support, at its bearing.
+double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
+              Norm norm, const Certificate& rows,
+              const std::vector<Eigen::Vector3d>& bearings, int64_t n,
+              double gamma, double sufficient) {
+  const CertifiedObservation& o = rows.observations[n];
+  const Reprojection::Source& source = reprojection.SourceOf(o.observation);
+  const double unit = rows.lower_bound * o.lambda;
+  const std::optional<double> largest =
+      SupportBound(source.model_id, source.params, built.pixels[o.observation],
+                   bearings[n], o.y, gamma, norm.p, sufficient * unit);
+  return largest ? *largest / unit : kNoRegion;
+}
+
+// The highest of them, or one that is at most `sufficient`: those that are
+// lower than others need not be known.
+double HighestLine(const Reprojection& reprojection, const BuiltProblem& built,
+                   Norm norm, const Certificate& rows,
+                   const std::vector<Eigen::Vector3d>& bearings, double gamma,
+                   double sufficient, const Context& context) {
+  const int64_t count = static_cast<int64_t>(rows.observations.size());
+  double highest = sufficient;
+  for (int64_t begin = 0; begin < count; begin += kLinesAtOnce) {
+    std::array<double, kLinesAtOnce> lines = {};
+    ParallelFor(std::min(kLinesAtOnce, count - begin), 1, context.num_threads,
+                [&](int64_t n, int64_t, int) {
+                  lines[n] = LineAt(reprojection, built, norm, rows, bearings,
+                                    begin + n, gamma, highest);
+                });
+    highest = std::max(highest, *std::max_element(lines.begin(), lines.end()));
+    if (highest == kNoRegion) break;
+  }
+  return highest;
+}
+
+// Whether (3) holds for observation n of the support, whatever the change of
+// its multipliers.
+bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
+                    Norm norm, const PixelCertificate& certificate,
+                    const MultiplierChange& change, size_t n) {
+  const CertifiedObservation& o = certificate.rows.observations[n];
+  const Reprojection::Source& source = reprojection.SourceOf(o.observation);
+  const double gamma = certificate.lower_bound;
+  const std::optional<double> kappa = RemainderBound(
+      source.model_id, source.params, built.pixels[o.observation],
+      certificate.bearings[n], gamma, norm.p);
+  if (!kappa) return false;
+  // |L| <= sqrt(2) |L|_p over S_i.
+  const double reach =
+      1.5 * gamma * (1 + *kappa) / (certificate.rows.lower_bound * o.lambda);
+  const double allowance = change.y * reach + change.depth;
+  const double line =
+      LineAt(reprojection, built, norm, certificate.rows, certificate.bearings,
+             static_cast<int64_t>(n), gamma, 1 - 2 * allowance);
+  return line + allowance <= 1;
 }
 
 }  // namespace
@@ -79,9 +118,16 @@ std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
 std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
                                  Norm norm, const Certificate& rows,
                                  const std::vector<Eigen::Vector3d>& bearings,
-                                 double gamma, const Context& context) {
-  return LinesAt(Reprojection(model, built), built, norm, rows, bearings, gamma,
-                 context);
+                                 double gamma, double sufficient,
+                                 const Context& context) {
+  const Reprojection reprojection(model, built);
+  std::vector<double> lines(rows.observations.size());
+  ParallelFor(static_cast<int64_t>(lines.size()), 1, context.num_threads,
+              [&](int64_t n, int64_t, int) {
+                lines[n] = LineAt(reprojection, built, norm, rows, bearings, n,
+                                  gamma, sufficient);
+              });
+  return lines;
 }
 
 std::optional<PixelCertificate> MakePixelCertificate(
@@ -93,9 +139,9 @@ std::optional<PixelCertificate> MakePixelCertificate(
   PixelCertificate certificate{rows, std::move(bearings), 0};
   double gamma = rows.lower_bound * (1 - kRoom);
   for (int n = 0; n < kMaxCorrections; ++n) {
-    const std::vector<double> lines = LinesAt(
-        reprojection, built, norm, rows, certificate.bearings, gamma, context);
-    const double highest = *std::max_element(lines.begin(), lines.end());
+    const double highest =
+        HighestLine(reprojection, built, norm, rows, certificate.bearings,
+                    gamma, 1 - kRoom / 2, context);
     if (!std::isfinite(highest)) return std::nullopt;
     if (highest <= 1 - kRoom / 2) {
       certificate.lower_bound = gamma;
@@ -147,23 +193,18 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
     check.refusal = rows.refusal;
     return check;
   }
-  const std::vector<double> lines =
-      LinesAt(reprojection, built, norm, certificate.rows, certificate.bearings,
-              gamma, context);
-  for (size_t n = 0; n < support.size(); ++n) {
-    const int64_t i = support[n].observation;
-    const Reprojection::Source& source = reprojection.SourceOf(i);
-    // |L| <= sqrt(2) |L|_p over S_i.
-    const std::optional<double> kappa =
-        RemainderBound(source.model_id, source.params, built.pixels[i],
-                       certificate.bearings[n], gamma, norm.p);
-    const double reach =
-        kappa ? 1.5 * gamma * (1 + *kappa) /
-                    (certificate.rows.lower_bound * support[n].lambda)
-              : kNoRegion;
-    const MultiplierChange& change = rows.changes[n];
-    if (!(lines[n] + change.y * reach + change.depth <= 1)) {
-      check.refusal = NameOf(model, built, i) +
+  std::vector<char> keeps(support.size(), 0);
+  for (size_t begin = 0; begin < support.size(); begin += kLinesAtOnce) {
+    const size_t end = std::min(support.size(), begin + kLinesAtOnce);
+    ParallelFor(static_cast<int64_t>(end - begin), 1, context.num_threads,
+                [&](int64_t n, int64_t, int) {
+                  keeps[begin + n] =
+                      KeepsToItsSide(reprojection, built, norm, certificate,
+                                     rows.changes[begin + n], begin + n);
+                });
+    for (size_t n = begin; n < end; ++n) {
+      if (keeps[n]) continue;
+      check.refusal = NameOf(model, built, support[n].observation) +
                       " may be seen below the bound on the far side of its "
                       "support line";
       return check;

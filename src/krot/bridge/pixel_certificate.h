@@ -75,10 +75,12 @@ std::optional<PixelCertificate> MakePixelCertificate(
 
 // Per observation of `rows`, taken at `bearings`, its (3): the largest -y_i'L_i
 // over S_i at `gamma` pixels, relative to delta lambda_i: at most 1 where it
-// holds. Infinity without a region.
+// holds. What is at most `sufficient` is not found any better. Infinity without
+// a region.
 std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
                                  Norm norm, const Certificate& rows,
                                  const std::vector<Eigen::Vector3d>& bearings,
-                                 double gamma, const Context& context);
+                                 double gamma, double sufficient,
+                                 const Context& context);
 
 }  // namespace krot

@@ -102,7 +102,7 @@ std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector2d& pixel,
                                    const Eigen::Vector3d& x_hat,
                                    const Eigen::Vector2d& y, double level_px,
-                                   double p) {
+                                   double p, double sufficient) {
   CheckArguments(level_px, p);
   const double length = DualNorm(y, p) * (1 + kRounding);
   if (!(length > 0))
@@ -119,9 +119,11 @@ std::optional<double> SupportBound(int model_id, const double* params,
   }
   const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
   if (!region) return std::nullopt;
-  const auto largest = LargestAlong(*region->map, p, region->reach, y / length);
+  const double unit = length * level_px * (1 + kRounding);
+  const auto largest = LargestAlong(*region->map, p, region->reach, y / length,
+                                    sufficient / unit * (1 - kRounding));
   if (!largest) return std::nullopt;
-  return std::max(0.0, *largest) * length * level_px * (1 + kRounding);
+  return std::max(0.0, *largest) * unit;
 }
 
 }  // namespace krot

@@ -44,11 +44,12 @@ std::optional<double> RemainderBound(int model_id, const double* params,
 // x_hat, it is gamma |y| to first order, in the dual norm, if x_hat lies on the
 // ball in that direction, however strong the lens: what a proof needs, which
 // has one direction per observation. U, nullopt and cost as above; 1e-7 gamma
-// |y| above its smallest value unless the budget of cells ends first.
+// |y| above its smallest value unless the budget of cells ends first, or any
+// value that is at most `sufficient`, which may cost much less.
 std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector2d& pixel,
                                    const Eigen::Vector3d& x_hat,
                                    const Eigen::Vector2d& y, double level_px,
-                                   double p);
+                                   double p, double sufficient = 0);
 
 }  // namespace krot

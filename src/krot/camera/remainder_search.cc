@@ -232,7 +232,8 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
 }
 
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
-                                   const Eigen::Vector2d& y) {
+                                   const Eigen::Vector2d& y,
+                                   double sufficient) {
   const auto along = [&y](const Interval* v) {
     return v[0] * -y[0] + v[1] * -y[1];
   };
@@ -248,15 +249,15 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
       });
   // -y'm = -y'f + y'r, of which the first is at most |f| <= 1, and the second
   // small of second order around x_hat.
-  return Search(
-      map, p, reach, sampled + kAlongSlack, [&](const Enclosure& enclosure) {
-        const double direct = along(enclosure.m).hi;
-        const double first = along(enclosure.f).hi;
-        const Interval sum =
-            Interval{0, first < 1 ? first : 1.0} - along(enclosure.remainder);
-        if (!(sum.hi < kInfinity)) return direct;
-        return direct < sum.hi ? direct : sum.hi;
-      });
+  return Search(map, p, reach, std::max(sampled + kAlongSlack, sufficient),
+                [&](const Enclosure& enclosure) {
+                  const double direct = along(enclosure.m).hi;
+                  const double first = along(enclosure.f).hi;
+                  const Interval sum = Interval{0, first < 1 ? first : 1.0} -
+                                       along(enclosure.remainder);
+                  if (!(sum.hi < kInfinity)) return direct;
+                  return direct < sum.hi ? direct : sum.hi;
+                });
 }
 
 }  // namespace krot

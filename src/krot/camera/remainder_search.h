@@ -19,9 +19,9 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
                                          double reach);
 
 // An upper bound of max -y'm over the points of the box with |f| <= 1, near it:
-// at most 1e-7 too large unless the budget of cells ends. Requires a dual norm
-// of y of 1. nullopt as above.
+// at most 1e-7 too large unless the budget of cells ends, or any that is at
+// most `sufficient`. Requires a dual norm of y of 1. nullopt as above.
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
-                                   const Eigen::Vector2d& y);
+                                   const Eigen::Vector2d& y, double sufficient);
 
 }  // namespace krot

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "krot/options/solve_options.h"
+
 namespace krot {
 
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
@@ -27,6 +29,7 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                  Above(0.0),
                  "How far the largest error of what is left may be above the "
                  "proved bound, relative to it");
+  AddSameImage(&options->solve.problem, table);
   table->AddThreads("Solver.num_threads", &context->num_threads,
                     "the result is the same, bit by bit");
 }

@@ -70,8 +70,12 @@ void AddSolveOptions(SolveModelOptions* options, Context* context,
                     AtLeast(1, "observations"),
                     "Leave out points with fewer usable observations; they "
                     "stay in the model");
+  AddSameImage(&options->problem, table);
+}
+
+void AddSameImage(BuildProblemOptions* options, OptionTable* table) {
   table->AddNamed<SameImage>(
-      "Problem.same_image", &options->problem.same_image,
+      "Problem.same_image", &options->same_image,
       {{"keep", SameImage::kKeep}, {"closest", SameImage::kClosest}},
       "Of an image's observations in the same track: keep all, or leave out "
       "all but the one closest to the model's own point; they stay in the "

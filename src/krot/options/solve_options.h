@@ -12,6 +12,9 @@ namespace krot {
 void AddSolveOptions(SolveModelOptions* options, Context* context,
                      OptionTable* table);
 
+// Problem.same_image, which `outlier_filter` has as well.
+void AddSameImage(BuildProblemOptions* options, OptionTable* table);
+
 // Throws OptionError for pairs of options that contradict each other. To be
 // called once they are set.
 void CheckSolveOptions(const SolveModelOptions& options,

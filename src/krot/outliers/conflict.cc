@@ -33,13 +33,13 @@ constexpr size_t kMaxDeletions = 60;
 // Makes a refuted support irreducible, within its own small problem.
 class Deletion {
  public:
-  Deletion(const Model& model, const BuiltProblem& support,
-           const ErrorBound& bound, const Context& context)
+  Deletion(const Model& model, BuiltProblem support, const ErrorBound& bound,
+           const Context& context)
       : model_(model),
-        built_(support),
+        built_(std::move(support)),
         bound_(bound),
         context_(context),
-        kept_(support.pixels.size()) {
+        kept_(built_.pixels.size()) {
     std::iota(kept_.begin(), kept_.end(), 0);
   }
 
@@ -76,7 +76,7 @@ class Deletion {
 
  private:
   const Model& model_;
-  const BuiltProblem& built_;
+  const BuiltProblem built_;
   const ErrorBound bound_;
   const Context context_;
   std::vector<int64_t> kept_;  // ascending
@@ -95,25 +95,31 @@ std::optional<Conflict> FindConflict(const Model& model,
   if (!first.is_refuted) return std::nullopt;
 
   const ProblemSubset support(part.problem, first.support);
-  const BuiltProblem small = BuiltPart(part, support, part.start);
-  Deletion deletion(model, small, bound, context);
+  Deletion deletion(model, BuiltPart(part, support, part.start), bound,
+                    context);
   Conflict conflict;
   conflict.is_irreducible = deletion.Run();
-
-  const ProblemSubset core(small.problem, deletion.kept());
-  const BuiltProblem smallest = BuiltPart(small, core, small.start);
-  const Decision last = Decide(model, smallest, bound, context);
-  if (!last.is_refuted) return std::nullopt;
-  std::optional<PixelCertificate> proof =
-      ProveRefutation(model, smallest, bound, last, context);
-  if (!proof) return std::nullopt;
-  conflict.proof = *std::move(proof);
-  conflict.proof.rows = InWhole(
-      subset, InWhole(support, InWhole(core, std::move(conflict.proof.rows))));
-  for (const CertifiedObservation& o : conflict.proof.rows.observations) {
-    conflict.observations.push_back(o.observation);
-  }
+  conflict.observations = subset.InWhole(support.InWhole(deletion.kept()));
   return conflict;
+}
+
+bool ProveConflict(const Model& model, const BuiltProblem& built,
+                   const ErrorBound& bound, const Context& context,
+                   Conflict* conflict) {
+  const ProblemSubset subset(built.problem, conflict->observations);
+  const BuiltProblem part = BuiltPart(built, subset, built.start);
+  const Decision decision = Decide(model, part, bound, context);
+  if (!decision.is_refuted) return false;
+  std::optional<PixelCertificate> proof =
+      ProveRefutation(model, part, bound, decision, context);
+  if (!proof) return false;
+  conflict->proof = *std::move(proof);
+  conflict->proof.rows = InWhole(subset, std::move(conflict->proof.rows));
+  conflict->observations.clear();
+  for (const CertifiedObservation& o : conflict->proof.rows.observations) {
+    conflict->observations.push_back(o.observation);
+  }
+  return true;
 }
 
 std::vector<Conflict> PackConflicts(const Model& model,
@@ -128,7 +134,9 @@ std::vector<Conflict> PackConflicts(const Model& model,
     open.pop_back();
     std::optional<Conflict> conflict =
         FindConflict(model, built, bound, part, context);
-    if (!conflict) continue;
+    if (!conflict || !ProveConflict(model, built, bound, context, &*conflict)) {
+      continue;
+    }
     for (std::vector<int64_t>& rest :
          Parts(built, Without(part, conflict->observations))) {
       open.push_back(std::move(rest));

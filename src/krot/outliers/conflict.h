@@ -16,7 +16,7 @@ namespace krot {
 // so that at least one of them must go [Sim, Hartley 2006].
 struct Conflict {
   std::vector<int64_t> observations;  // of the built problem, ascending
-  // Of the built problem; its support is the observations.
+  // Of the built problem, once there is one; its support is the observations.
   PixelCertificate proof;
   // Whether none of the observations can be spared: an estimate was found for
   // the others. Not asked of large ones.
@@ -25,17 +25,24 @@ struct Conflict {
 
 // A conflict among observations of `built` (ascending) that hang together, made
 // irreducible by deletion: as long as what is left without one is refuted, too,
-// it goes. None if they go together, or if that is not proved otherwise. Takes
-// as many solves of the support as it has observations.
+// it goes. None if they go together, or if that is not decided. It is refuted
+// as far as the linear rows tell, not proved yet. Takes as many solves of the
+// support as it has observations.
 std::optional<Conflict> FindConflict(const Model& model,
                                      const BuiltProblem& built,
                                      const ErrorBound& bound,
                                      const std::vector<int64_t>& observations,
                                      const Context& context);
 
-// Conflicts without a common observation among the given ones, as many as are
-// found: every part of them that hangs together is asked for one, which is
-// taken out, and so on with what remains. At least as many observations must
+// Gives a conflict its proof, by which some observations may fall away; false
+// if there is none. With strong lenses most of the time of a conflict.
+bool ProveConflict(const Model& model, const BuiltProblem& built,
+                   const ErrorBound& bound, const Context& context,
+                   Conflict* conflict);
+
+// Proved conflicts without a common observation among the given ones, as many
+// as are found: every part of them that hangs together is asked for one, which
+// is taken out, and so on with what remains. At least as many observations must
 // go.
 std::vector<Conflict> PackConflicts(const Model& model,
                                     const BuiltProblem& built,

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <utility>
 
+#include <Eigen/Geometry>
+
 #include "krot/problem/cameras.h"
 
 namespace krot {
@@ -14,7 +16,7 @@ using Eigen::Vector3d;
 
 // Of the points that two frames see: so many with the most strained rays are
 // looked at.
-constexpr int kStrainedPoints = 16;
+constexpr int kStrainedPoints = 64;
 // Frames of a track that are looked at together; no more.
 constexpr size_t kMaxFramesTogether = 8;
 constexpr size_t kFramesInTriples = 4;
@@ -134,9 +136,7 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
   }
   if (others.size() > kMaxFramesTogether) others.resize(kMaxFramesTogether);
   std::vector<std::vector<int32_t>> sets;
-  if (num_others == 1) {
-    for (const int32_t f : others) sets.push_back({f});
-  } else if (num_others == 2) {
+  if (num_others == 2) {
     for (size_t n = 0; n < std::min(others.size(), kFramesInTriples); ++n) {
       for (size_t m = 0; m < n; ++m) sets.push_back({others[m], others[n]});
     }

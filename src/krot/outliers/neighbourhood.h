@@ -16,9 +16,8 @@ class Neighbourhoods {
   // Keeps references. Cameras stand as in `estimate`.
   Neighbourhoods(const KnownRotationProblem& problem, const Estimate& estimate);
 
-  // Sets of frames of the track of observation i, beside its own: every other
-  // one, for num_others = 1, pairs of the most strained, for 2, or all. Only
-  // those of free observations.
+  // Sets of frames of the track of observation i, beside its own: pairs of the
+  // most strained, for num_others = 2, or all. Only those of free observations.
   std::vector<std::vector<int32_t>> FrameSets(
       int64_t i, int num_others, const std::vector<char>& is_free) const;
 

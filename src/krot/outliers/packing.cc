@@ -9,17 +9,23 @@
 #include "krot/bridge/built_part.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/outliers/neighbourhood.h"
+#include "krot/outliers/two_view_conflicts.h"
 #include "krot/problem/components.h"
 #include "krot/problem/subset.h"
+#include "krot/proof/certificate.h"
 #include "krot/sweeps/block_sweep.h"
 
 namespace krot {
 namespace {
 
-// More open observations than these are tried with one other frame only.
+// More open observations than these are tried in two views only.
 constexpr size_t kMaxForMoreFrames = 2000;
 // More tight observations than these are left alone.
 constexpr size_t kMaxTight = 250;
+// Open observations that look for a conflict at the same time.
+constexpr size_t kBatch = 16;
+// What an observation is worth that others of its track need.
+constexpr float kWorthToItsTrack = 0.3F;
 
 class Packing {
  public:
@@ -34,7 +40,8 @@ class Packing {
         context_(context),
         is_free_(problem_.observations.size(), 1),
         is_taken_(problem_.observations.size(), 0),
-        neighbourhoods_(problem_, removal.estimate) {
+        neighbourhoods_(problem_, removal.estimate),
+        two_views_(problem_, removal.estimate, bound.max_error) {
     small_context_ = context;
     small_context_.num_threads = 1;
     for (const int64_t i : removal.observations) is_free_[i] = 0;
@@ -48,11 +55,20 @@ class Packing {
     return problem_.views[problem_.observations[i].view].frame;
   }
   bool FitsIn(int64_t i, const std::vector<int32_t>& frames) const;
+  std::optional<Conflict> Refute(int64_t i,
+                                 const std::vector<int64_t>& near) const;
   std::optional<Conflict> Try(int64_t i,
                               const std::vector<int32_t>& frames) const;
+  bool Prove(Conflict* conflict) const {
+    return ProveConflict(model_, built_, bound_, small_context_, conflict);
+  }
   bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
+  std::vector<float> Worths(const std::vector<int64_t>& open) const;
+  std::optional<Conflict> InTwoViews(int64_t i,
+                                     const std::vector<float>& worth) const;
+  void ChargeInTwoViews(std::vector<int64_t>* open);
   bool Charge(int64_t i, int num_others);
-  void Charge(std::vector<std::pair<double, int64_t>>* open);
+  void Charge(std::vector<int64_t>* open);
   void ChargeTight();
   void Take(Conflict conflict);
 
@@ -66,6 +82,7 @@ class Packing {
   std::vector<char> is_free_;   // to make conflicts with others
   std::vector<char> is_taken_;  // by a conflict
   const Neighbourhoods neighbourhoods_;
+  const TwoViewConflicts two_views_;
   std::vector<Conflict> conflicts_;
 };
 
@@ -89,26 +106,22 @@ bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
              .IntersectPoints(&estimate) <= bound_.max_error;
 }
 
+// A conflict among observations (ascending) that hang together with i.
+std::optional<Conflict> Packing::Refute(
+    int64_t i, const std::vector<int64_t>& near) const {
+  for (const std::vector<int64_t>& part :
+       SplitIntoComponents(problem_, PruneUnconstrained(problem_, near))) {
+    if (!std::binary_search(part.begin(), part.end(), i)) continue;
+    return FindConflict(model_, built_, bound_, part, small_context_);
+  }
+  return std::nullopt;
+}
+
 // A conflict of observation i in its frame and others.
 std::optional<Conflict> Packing::Try(int64_t i,
                                      const std::vector<int32_t>& frames) const {
   if (FitsIn(i, frames)) return std::nullopt;
-  const std::vector<int64_t> near = neighbourhoods_.Around(i, frames, is_free_);
-  for (const std::vector<int64_t>& part :
-       SplitIntoComponents(problem_, PruneUnconstrained(problem_, near))) {
-    if (!std::binary_search(part.begin(), part.end(), i)) continue;
-    const ProblemSubset subset(problem_, part);
-    std::vector<int64_t> all(part.size());
-    std::iota(all.begin(), all.end(), 0);
-    std::optional<Conflict> conflict =
-        FindConflict(model_, BuiltPart(built_, subset, built_.start), bound_,
-                     all, small_context_);
-    if (!conflict) return std::nullopt;
-    conflict->observations = subset.InWhole(std::move(conflict->observations));
-    conflict->proof.rows = InWhole(subset, std::move(conflict->proof.rows));
-    return conflict;
-  }
-  return std::nullopt;
+  return Refute(i, neighbourhoods_.Around(i, frames, is_free_));
 }
 
 void Packing::Take(Conflict conflict) {
@@ -119,35 +132,108 @@ void Packing::Take(Conflict conflict) {
   conflicts_.push_back(std::move(conflict));
 }
 
-// Looks in all the frames' sets at once and takes the first conflict in their
-// order.
+// How dispensable observations are; those of a track that an open one has
+// little else of are less so.
+std::vector<float> Packing::Worths(const std::vector<int64_t>& open) const {
+  std::vector<float> worth(is_free_.begin(), is_free_.end());
+  for (const int64_t i : open) {
+    const int32_t k = problem_.observations[i].point;
+    const int64_t begin = problem_.point_begin[k];
+    const int64_t end = problem_.point_begin[k + 1];
+    if (std::count(&is_free_[0] + begin, &is_free_[0] + end, 1) > 2) continue;
+    for (int64_t j = begin; j < end; ++j) {
+      if (is_free_[j]) worth[j] = kWorthToItsTrack;
+    }
+  }
+  return worth;
+}
+
+std::optional<Conflict> Packing::InTwoViews(
+    int64_t i, const std::vector<float>& worth) const {
+  std::vector<std::vector<int64_t>> sets;
+  const Observation& own = problem_.observations[i];
+  for (int64_t j = problem_.point_begin[own.point];
+       j < problem_.point_begin[own.point + 1]; ++j) {
+    const bool is_twin = j != i && problem_.observations[j].view == own.view;
+    if (is_twin && worth[j] > 0) {
+      sets.push_back({std::min(i, j), std::max(i, j)});
+    }
+  }
+  for (std::vector<int64_t>& set : two_views_.Candidates(i, worth)) {
+    sets.push_back(std::move(set));
+  }
+  for (const std::vector<int64_t>& set : sets) {
+    std::optional<Conflict> conflict = Refute(i, set);
+    if (conflict && Prove(&*conflict)) return conflict;
+  }
+  return std::nullopt;
+}
+
+// Those that are left open found none. What is found at the same time and needs
+// the same observations is looked for anew.
+void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
+  std::vector<int64_t> queue(open->rbegin(), open->rend());
+  std::vector<int64_t> left;
+  while (!queue.empty() && !context_.IsCancelled()) {
+    std::vector<int64_t> batch;
+    while (batch.size() < kBatch && !queue.empty()) {
+      if (!IsTaken(queue.back())) batch.push_back(queue.back());
+      queue.pop_back();
+    }
+    std::vector<int64_t> all = queue;
+    all.insert(all.end(), batch.begin(), batch.end());
+    const std::vector<float> worth = Worths(all);
+    std::vector<std::optional<Conflict>> found(batch.size());
+    ParallelFor(static_cast<int64_t>(batch.size()), 1, context_.num_threads,
+                [&](int64_t n, int64_t, int) {
+                  found[n] = InTwoViews(batch[n], worth);
+                });
+    std::vector<int64_t> again;
+    for (size_t n = 0; n < batch.size(); ++n) {
+      if (!found[n]) {
+        left.push_back(batch[n]);
+      } else if (std::any_of(found[n]->observations.begin(),
+                             found[n]->observations.end(),
+                             [this](int64_t i) { return IsTaken(i); })) {
+        again.push_back(batch[n]);
+      } else {
+        Take(*std::move(found[n]));
+      }
+    }
+    queue.insert(queue.end(), again.rbegin(), again.rend());
+  }
+  *open = std::move(left);
+}
+
+// Looks in all the frames' sets at once and takes the smallest conflict.
 bool Packing::Charge(int64_t i, int num_others) {
   const std::vector<std::vector<int32_t>> sets =
       neighbourhoods_.FrameSets(i, num_others, is_free_);
   std::vector<std::optional<Conflict>> found(sets.size());
   ParallelFor(static_cast<int64_t>(sets.size()), 1, context_.num_threads,
               [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n]); });
-  std::optional<Conflict>* smallest = nullptr;
-  for (std::optional<Conflict>& conflict : found) {
-    if (conflict &&
-        (smallest == nullptr ||
-         conflict->observations.size() < (*smallest)->observations.size())) {
-      smallest = &conflict;
-    }
+  std::vector<std::pair<size_t, size_t>> smallest_first;
+  for (size_t n = 0; n < found.size(); ++n) {
+    if (found[n]) smallest_first.emplace_back(found[n]->observations.size(), n);
   }
-  if (smallest == nullptr) return false;
-  Take(**smallest);
-  return true;
+  std::sort(smallest_first.begin(), smallest_first.end());
+  for (const auto& [size, n] : smallest_first) {
+    if (!Prove(&*found[n])) continue;
+    Take(*std::move(found[n]));
+    return true;
+  }
+  return false;
 }
 
 // Those that are left open found no conflict of their own.
-void Packing::Charge(std::vector<std::pair<double, int64_t>>* open) {
-  for (const int num_others : {1, 2, 3}) {
-    if (num_others > 1 && open->size() > kMaxForMoreFrames) return;
-    std::vector<std::pair<double, int64_t>> left;
-    for (const auto& removed : *open) {
-      if (context_.IsCancelled() || IsTaken(removed.second)) continue;
-      if (!Charge(removed.second, num_others)) left.push_back(removed);
+void Packing::Charge(std::vector<int64_t>* open) {
+  ChargeInTwoViews(open);
+  for (const int num_others : {2, 3}) {
+    if (open->size() > kMaxForMoreFrames) return;
+    std::vector<int64_t> left;
+    for (const int64_t i : *open) {
+      if (context_.IsCancelled() || IsTaken(i)) continue;
+      if (!Charge(i, num_others)) left.push_back(i);
     }
     *open = std::move(left);
   }
@@ -155,15 +241,17 @@ void Packing::Charge(std::vector<std::pair<double, int64_t>>* open) {
 
 std::vector<Conflict> Packing::Run() {
   const Reprojection reprojection(model_, built_);
-  std::vector<std::pair<double, int64_t>> open;  // -error, observation
+  std::vector<std::pair<double, int64_t>> by_error;
   for (const int64_t i : removal_.observations) {
     if (IsTaken(i)) continue;
-    open.emplace_back(-reprojection.Error(removal_.estimate, bound_.norm, i),
-                      i);
+    by_error.emplace_back(reprojection.Error(removal_.estimate, bound_.norm, i),
+                          i);
   }
-  std::sort(open.begin(), open.end());
+  std::sort(by_error.begin(), by_error.end());
+  std::vector<int64_t> open;
+  for (const auto& [error, i] : by_error) open.push_back(i);
   Charge(&open);
-  for (const auto& removed : open) is_free_[removed.second] = 1;
+  for (const int64_t i : open) is_free_[i] = 1;
   Charge(&open);
   ChargeTight();
   return std::move(conflicts_);

@@ -12,10 +12,13 @@ namespace krot {
 
 // Disjoint conflicts, each of which charges one of the removed observations
 // with what others it does not go together with, so that as many as possible
-// have one of their own. For each, worst first, it looks
+// have one of their own. For each, those that barely miss the bound first, as
+// they have the least choice, it looks
 //
-//   in its image and one other of its track, then two others, then all, among
-//     the observations there whose rays miss each other by most,
+//   in its image alone and one other of its track, with the companions that
+//     others need least (two_view_conflicts.h),
+//   in two others, then in all, among the observations there whose rays miss
+//     each other by most (neighbourhood.h),
 //   and at last among the removal's tight observations,
 //
 // first among those that are neither removed nor taken already, so that no

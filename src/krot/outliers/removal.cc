@@ -17,7 +17,11 @@ namespace {
 
 // Of the bound: what the interior point leaves open.
 constexpr double kInside = 1e-3;
-constexpr int kMaxProgrammes = 4;
+constexpr int kMaxProgrammes = 10;
+// So many programmes in a row that remove no fewer are the last but one.
+constexpr int kPatience = 2;
+// Of the bound: less excess is dear.
+constexpr double kDear = 0.03;
 // Where the programmes end, of the bound, and where the last one does.
 constexpr double kRoughMu = 1e-3;
 constexpr double kFineMu = 1e-5;
@@ -56,7 +60,7 @@ std::vector<double> RemovalSearch::WeightsAtStart() const {
     excess.push_back(
         std::clamp(error - max_error_, 0.0, kLargestExcess * max_error_));
   }
-  return WeightsAgainst(excess, max_error_);
+  return WeightsAgainst(excess, max_error_, kDear);
 }
 
 // Solves a component's programme, with rows as they are, and sets the weights
@@ -73,7 +77,8 @@ void RemovalSearch::Excess(const std::vector<int64_t>& component,
   const ExcessSolution solution =
       MinimizeExcess(part.problem(), level, options, context_, &own);
   part.Replace(own, &estimate_);
-  const std::vector<double> weights = WeightsAgainst(solution.excess, level);
+  const std::vector<double> weights =
+      WeightsAgainst(solution.excess, level, kDear);
   for (size_t n = 0; n < component.size(); ++n) {
     if (solution.price[n] > kSmallPrice) is_tight_[component[n]] = 1;
     weights_[component[n]] = weights[n];
@@ -146,10 +151,10 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   Offer(estimate_, &best);
   is_tight_.assign(rows_.observations.size(), 0);
   if (weights_.empty()) weights_ = WeightsAtStart();
-  bool is_settled = false;
+  int num_idle = 0;
   for (int n = 0; n < max_programmes && !context_.IsCancelled(); ++n) {
     if (best.observations.empty()) break;
-    const bool is_last = is_settled || n + 1 == max_programmes;
+    const bool is_last = num_idle == kPatience || n + 1 == max_programmes;
     reprojection_.TakeRows(estimate_, context_.num_threads, &rows_);
     for (const std::vector<int64_t>& component : components_) {
       Excess(component, is_last ? kFineMu : kRoughMu);
@@ -157,7 +162,8 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
     const size_t before = best.observations.size();
     Offer(estimate_, &best);
     if (is_last) break;
-    is_settled = n > 0 && best.observations.size() >= before;
+    const bool is_idle = n > 0 && best.observations.size() >= before;
+    num_idle = is_idle ? num_idle + 1 : 0;
   }
   while (!context_.IsCancelled() && TakeBack(&best)) {
   }

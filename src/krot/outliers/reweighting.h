@@ -5,14 +5,14 @@
 namespace krot {
 
 // Weights for the next excess programme [Candes, Wakin, Boyd 2008]: an excess
-// much below a tenth of `bound` costs ten times as much as one of the bound.
+// much below the share `dear` of `bound` costs 1 / dear times as much as one of
+// the bound.
 inline std::vector<double> WeightsAgainst(const std::vector<double>& excess,
-                                          double bound) {
-  constexpr double kDearExcess = 0.1;
+                                          double bound, double dear) {
   std::vector<double> weights;
   weights.reserve(excess.size());
   for (const double own : excess) {
-    weights.push_back(kDearExcess / (kDearExcess + own / bound));
+    weights.push_back(dear / (dear + own / bound));
   }
   return weights;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <optional>
 
+#include <Eigen/Geometry>
+
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/retriangulate.h"
 #include "krot/problem/cameras.h"

@@ -22,6 +22,8 @@ constexpr int64_t kObservationsPerFrame = 100;
 constexpr int kStartReweightings = 2;
 // A start needs no more; of the level.
 constexpr double kStartMu = 1e-3;
+// In levels.
+constexpr double kDearExcess = 0.1;
 // In levels: what disagrees with a point is no farther off than that.
 constexpr double kCapOfPoints = 4;
 
@@ -85,7 +87,7 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
     const ExcessSolution solution =
         MinimizeExcess(part.problem(), level, options, context, &own);
-    options.weights = WeightsAgainst(solution.excess, level);
+    options.weights = WeightsAgainst(solution.excess, level, kDearExcess);
   }
   part.Replace(own, &estimate);
   std::vector<char> is_placed(problem.num_points, 0);

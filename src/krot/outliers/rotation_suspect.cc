@@ -121,9 +121,9 @@ int64_t TurnFit::NumAbove(const Turn& turn) const {
       });
 }
 
-// The view that most conflicts have an observation of, and how many do.
-std::pair<int32_t, int64_t> ViewOfMost(const KnownRotationProblem& problem,
-                                       const std::vector<Conflict>& conflicts) {
+// Per view, in how many conflicts it has an observation.
+std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,
+                                      const std::vector<Conflict>& conflicts) {
   std::vector<int64_t> counts(problem.views.size(), 0);
   for (const Conflict& conflict : conflicts) {
     std::vector<int32_t> views;
@@ -134,9 +134,30 @@ std::pair<int32_t, int64_t> ViewOfMost(const KnownRotationProblem& problem,
     views.erase(std::unique(views.begin(), views.end()), views.end());
     for (const int32_t v : views) ++counts[v];
   }
-  const auto most = std::max_element(counts.begin(), counts.end());
-  if (most == counts.end()) return {-1, 0};
-  return {static_cast<int32_t>(most - counts.begin()), *most};
+  return counts;
+}
+
+// Of the views in most conflicts the one that most was removed of: conflicts of
+// two images accuse both alike.
+std::optional<int32_t> SuspectedView(const KnownRotationProblem& problem,
+                                     const std::vector<int64_t>& counts,
+                                     size_t num_conflicts,
+                                     const Removal& removal) {
+  std::vector<int64_t> num_removed(problem.views.size(), 0);
+  for (const int64_t i : removal.observations) {
+    ++num_removed[problem.observations[i].view];
+  }
+  std::optional<int32_t> suspected;
+  for (size_t v = 0; v < counts.size(); ++v) {
+    const bool is_in_most = counts[v] >= kFewestConflicts &&
+                            static_cast<double>(counts[v]) >=
+                                kMost * static_cast<double>(num_conflicts);
+    if (!is_in_most) continue;
+    if (!suspected || num_removed[v] > num_removed[*suspected]) {
+      suspected = static_cast<int32_t>(v);
+    }
+  }
+  return suspected;
 }
 
 std::vector<int64_t> ObservationsOf(const KnownRotationProblem& problem,
@@ -177,13 +198,13 @@ std::optional<RotationSuspect> FindRotationSuspect(
     const Model& model, const BuiltProblem& built, const ErrorBound& bound,
     const std::vector<Conflict>& conflicts, const Removal& removal,
     const Context& context) {
-  const auto [view, count] = ViewOfMost(built.problem, conflicts);
-  if (count < kFewestConflicts ||
-      static_cast<double>(count) <
-          kMost * static_cast<double>(conflicts.size())) {
-    return std::nullopt;
-  }
-  const std::vector<int64_t> observations = ObservationsOf(built.problem, view);
+  const std::vector<int64_t> counts =
+      ConflictsOfViews(built.problem, conflicts);
+  const std::optional<int32_t> view =
+      SuspectedView(built.problem, counts, conflicts.size(), removal);
+  if (!view) return std::nullopt;
+  const std::vector<int64_t> observations =
+      ObservationsOf(built.problem, *view);
   std::vector<int64_t> observations_and_removed;
   std::set_union(observations.begin(), observations.end(),
                  removal.observations.begin(), removal.observations.end(),
@@ -204,10 +225,10 @@ std::optional<RotationSuspect> FindRotationSuspect(
     return std::nullopt;
   }
   RotationSuspect suspect;
-  const Image& image = model.images[built.image_of[view]];
+  const Image& image = model.images[built.image_of[*view]];
   suspect.image_id = image.id;
   suspect.image_name = image.name;
-  suspect.num_conflicts = count;
+  suspect.num_conflicts = counts[*view];
   suspect.lower_bound_with = with.lower_bound;
   suspect.max_error_without = without.max_error;
   suspect.num_observations = static_cast<int64_t>(sightings.size());

@@ -36,8 +36,8 @@ struct RotationSuspect {
   double max_error_without = 0;
 };
 
-// The image with most conflicts, if it has a part in most of them and in no
-// fewer than three; none otherwise. Points are placed by what the removal
+// Of the images that have a part in most conflicts, and in no fewer than three,
+// the one with most observations removed; none otherwise. Points are placed by what the removal
 // leaves of all other images, at their optimum; the turn, with the camera's
 // position, is then that of least squares in pixels, errors above `bound`
 // counting less (Cauchy). Costs three solves.

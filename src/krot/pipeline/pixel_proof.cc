@@ -55,7 +55,8 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     const double level =
         candidate ? candidate->lower_bound : certificate.lower_bound;
     const std::vector<double> lines =
-        SupportLines(model, built, norm, certificate, bearings, level, context);
+        SupportLines(model, built, norm, certificate, bearings, level,
+                     level / certificate.lower_bound, context);
     support.clear();
     for (size_t n = 0; n < lines.size(); ++n) {
       if (!std::isfinite(lines[n])) continue;

@@ -10,7 +10,7 @@ import { cards, differencesTable, factsTable } from './facts.js';
 import { counted } from './format.js';
 import { imagesTable, pairImages, supportTable } from './lists.js';
 import { profileChart, profileTable } from './profile.js';
-import { suspectRows } from './suspects.js';
+import { rotationSentence, suspectRows } from './suspects.js';
 import { scope, verdict } from './verdict.js';
 import { Viewer } from './viewer.js';
 
@@ -42,8 +42,17 @@ function showSupport(support, show) {
   })));
 }
 
-function showSuspects(suspects, show) {
-  byId('suspects-section').hidden = suspects.length === 0;
+function showSuspects({ rotation_suspect: rotation }, suspects, show) {
+  byId('suspects-section').hidden = !rotation && suspects.length === 0;
+  byId('rotation-suspect').hidden = !rotation;
+  if (rotation) {
+    byId('rotation-suspect').append(rotationSentence(rotation), ' ',
+      html('button', {
+        type: 'button',
+        onclick: () => show({ imageName: rotation.image_name }),
+      }, 'Show'));
+  }
+  byId('crops-note').hidden = suspects.length === 0;
   byId('suspects').append(...suspectRows(suspects, show));
 }
 
@@ -86,7 +95,7 @@ function showPage(report, models) {
   const show = showViewer(
     { models, labels, support, sharesPoints: !isComparison(report) });
   showSupport(support, show);
-  showSuspects(readJson('krot-crops'), show);
+  showSuspects(report, readJson('krot-crops'), show);
   const showImage = (imageName) => show({ imageName });
   byId('image-chart').append(
     imagesChart(pairImages(models), labels, showImage));

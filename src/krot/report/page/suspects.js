@@ -1,6 +1,7 @@
 // Photos of what was removed, and what its track sees elsewhere.
 
 import { html, svg } from './dom.js';
+import { count, fixed, lowerBound, pixels } from './format.js';
 
 // Drawn in the photo's pixels: a cross where the point was observed, a ring
 // where it projects.
@@ -43,4 +44,17 @@ export function suspectRows(suspects, onSelect) {
       }),
     }, `${suspect.image_name}, point ${suspect.point3D_id}`),
     html('div', { class: 'views' }, ...suspect.views.map(view))));
+}
+
+// What speaks against an image's rotation, which is taken as known.
+export function rotationSentence(suspect) {
+  const share = `${count(suspect.num_conflicts)} conflicts (${
+    fixed(100 * suspect.conflict_share, 0)} %)`;
+  return `${share} have ${suspect.image_name} in common: its rotation may be ` +
+    `wrong. A turn by ${fixed(suspect.angle_deg, 2)} degrees leaves ${
+      count(suspect.num_above_turned)} of its ${
+      count(suspect.num_observations)} observations above the bound instead ` +
+    `of ${count(suspect.num_above)}. With this image the largest error is at ` +
+    `least ${lowerBound(suspect.lower_bound_with)} px (proved), without it ${
+      pixels(suspect.max_error_without)} px.`;
 }

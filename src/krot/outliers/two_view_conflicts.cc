@@ -1,0 +1,209 @@
+#include "krot/outliers/two_view_conflicts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/problem/cameras.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// Of the excess, what companions may use up: the chart is not all exact.
+constexpr double kUse[] = {0.97, 0.8};
+constexpr size_t kMaxCandidates = 4;
+
+// The cone of rays within a bound, in the world: { x = d + P y : ||y|| <= 1 },
+// at depth 1.
+struct RayCone {
+  RayCone(const KnownRotationProblem& problem, int64_t i, double max_error) {
+    const Observation& o = problem.observations[i];
+    const Matrix3d world_from_row =
+        problem.views[o.view].cam_from_world_rotation.transpose() *
+        Matrix3d(o.E).inverse();
+    d = world_from_row.col(0);
+    P = max_error * world_from_row.rightCols<2>();
+  }
+
+  Vector3d d;
+  Eigen::Matrix<double, 3, 2> P;
+};
+
+// Two axes across e.
+std::array<Vector3d, 2> AxesAcross(const Vector3d& e) {
+  const Vector3d first = e.unitOrthogonal();
+  return {first, e.cross(first)};
+}
+
+}  // namespace
+
+struct TwoViewConflicts::HalfPlane {
+  Vector2d normal;   // unit
+  double slack = 0;  // normal.x <= slack
+  double ease = 0;   // of both edges' the smaller slack, 1: in the middle
+  std::array<int64_t, 2> observations;
+};
+
+struct TwoViewConflicts::Candidate {
+  double ease = 0;
+  std::vector<int64_t> observations;
+};
+
+TwoViewConflicts::TwoViewConflicts(const KnownRotationProblem& problem,
+                                   const Estimate& estimate, double max_error)
+    : problem_(problem),
+      estimate_(estimate),
+      max_error_(max_error),
+      observations_of_view_(problem.views.size()) {
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
+    observations_of_view_[problem.observations[i].view].push_back(
+        static_cast<int64_t>(i));
+  }
+}
+
+Vector3d TwoViewConflicts::CentreOf(int64_t i) const {
+  const View& view = problem_.views[problem_.observations[i].view];
+  const AffineMap map = CamFromWorld(view, estimate_.translations[view.frame]);
+  return -map.leftCols<3>().transpose() * map.col(3);
+}
+
+// Both edges of the band of baselines from the view of i to that of j; false if
+// their cones meet, or e is not between them.
+bool TwoViewConflicts::AppendBand(int64_t i, int64_t j, const Vector3d& e,
+                                  std::vector<HalfPlane>* planes) const {
+  const RayCone a(problem_, i, max_error_);
+  const RayCone b(problem_, j, max_error_);
+  Vector3d n = a.d.cross(b.d);
+  const double area = n.norm();
+  if (!(area > 0)) return false;
+  n /= area;
+  // g_a'd_a = 1, g_a'd_b = 0, and the other way round.
+  const Vector3d g_a = b.d.cross(n) / area;
+  const Vector3d g_b = n.cross(a.d) / area;
+  const double r_a = (a.P.transpose() * n).norm();
+  const double r_b = (b.P.transpose() * n).norm();
+  const double parallax = area / (a.d.norm() * b.d.norm());
+  if (parallax <= r_a / a.d.norm() + r_b / b.d.norm()) return false;
+  const double half_width = r_a * g_a.dot(e) - r_b * g_b.dot(e);
+  if (!(g_a.dot(e) > 0) || !(g_b.dot(e) < 0)) return false;
+  const double off = n.dot(e);
+  const std::array<Vector3d, 2> axes = AxesAcross(e);
+  const double ease = 1 - std::abs(off) / half_width;
+  for (const double side : {1.0, -1.0}) {
+    // h'x <= 0 for all x of the one cone, h'x >= 0 for all of the other.
+    const Vector3d h = side * n - r_a * g_a + r_b * g_b;
+    HalfPlane plane;
+    plane.normal = Vector2d(h.dot(axes[0]), h.dot(axes[1]));
+    const double length = plane.normal.norm();
+    if (!(length > 0)) return false;
+    plane.normal /= length;
+    plane.slack = (half_width - side * off) / length;
+    plane.ease = ease;
+    plane.observations = {i, j};
+    planes->push_back(plane);
+  }
+  return true;
+}
+
+// The two companions of the most ease. With A = n_o'n / |n_o x n| and
+// S = c / |n_o x n| on either side of n_o, and m = -c_o, a pair is a conflict
+// with o if (S_j + m A_j) + (S_k + m A_k) < 0.
+void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
+                                     const std::vector<HalfPlane>& planes,
+                                     float worth,
+                                     std::vector<Candidate>* candidates) const {
+  for (const double use : kUse) {
+    const double m = -use * violated.slack;
+    std::array<double, 2> least;
+    least.fill(std::numeric_limits<double>::infinity());
+    std::array<const HalfPlane*, 2> best = {nullptr, nullptr};
+    for (const HalfPlane& plane : planes) {
+      const double cross = violated.normal.x() * plane.normal.y() -
+                           violated.normal.y() * plane.normal.x();
+      const double across = std::abs(cross);
+      if (!(across > 0)) continue;
+      const size_t side = cross > 0 ? 1 : 0;
+      const double value =
+          (plane.slack + m * violated.normal.dot(plane.normal)) / across;
+      if (!(value < least[side])) continue;
+      least[side] = value;
+      best[side] = &plane;
+      if (!(least[0] + least[1] < 0)) continue;
+      Candidate candidate;
+      candidate.ease = std::min<double>(plane.ease, worth);
+      for (const HalfPlane* own : {&violated, best[0], best[1]}) {
+        candidate.observations.insert(candidate.observations.end(),
+                                      own->observations.begin(),
+                                      own->observations.end());
+      }
+      std::vector<int64_t>& all = candidate.observations;
+      std::sort(all.begin(), all.end());
+      all.erase(std::unique(all.begin(), all.end()), all.end());
+      candidates->push_back(std::move(candidate));
+      break;
+    }
+  }
+}
+
+std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
+    int64_t i, const std::vector<float>& worth) const {
+  const Observation& own = problem_.observations[i];
+  std::vector<Candidate> candidates;
+  for (int64_t j = problem_.point_begin[own.point];
+       j < problem_.point_begin[own.point + 1]; ++j) {
+    const Observation& other = problem_.observations[j];
+    if (j == i || !(worth[j] > 0) || other.view == own.view) continue;
+    const Vector3d baseline = CentreOf(j) - CentreOf(i);
+    if (!(baseline.norm() > 0)) continue;
+    const Vector3d e = baseline.normalized();
+    std::vector<HalfPlane> edges;
+    if (!AppendBand(i, j, e, &edges)) continue;
+    if (edges[0].slack >= 0 && edges[1].slack >= 0) continue;
+    std::vector<HalfPlane> planes;
+    const std::vector<int64_t>& in_own = observations_of_view_[own.view];
+    const std::vector<int64_t>& in_other = observations_of_view_[other.view];
+    size_t n = 0;
+    for (const int64_t a : in_own) {
+      const int32_t point = problem_.observations[a].point;
+      if (point == own.point || !(worth[a] > 0)) continue;
+      while (n < in_other.size() &&
+             problem_.observations[in_other[n]].point < point) {
+        ++n;
+      }
+      for (size_t l = n; l < in_other.size() &&
+                         problem_.observations[in_other[l]].point == point;
+           ++l) {
+        const int64_t b = in_other[l];
+        if (!(worth[b] > 0) || !AppendBand(a, b, e, &planes)) continue;
+        for (size_t edge = planes.size() - 2; edge < planes.size(); ++edge) {
+          planes[edge].ease *= std::min(worth[a], worth[b]);
+        }
+      }
+    }
+    std::sort(
+        planes.begin(), planes.end(),
+        [](const HalfPlane& a, const HalfPlane& b) { return a.ease > b.ease; });
+    for (const HalfPlane& edge : edges) {
+      if (edge.slack < 0) AppendTriples(edge, planes, worth[j], &candidates);
+    }
+  }
+  std::stable_sort(
+      candidates.begin(), candidates.end(),
+      [](const Candidate& a, const Candidate& b) { return a.ease > b.ease; });
+  std::vector<std::vector<int64_t>> sets;
+  for (Candidate& candidate : candidates) {
+    if (sets.size() == kMaxCandidates) break;
+    sets.push_back(std::move(candidate.observations));
+  }
+  return sets;
+}
+
+}  // namespace krot
