@@ -18,6 +18,7 @@
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
+#include "tools/krot/same_path.h"
 #include "tools/krot/solve_progress.h"
 #include "tools/krot/suspect_crops.h"
 
