@@ -1,6 +1,9 @@
-# Installs the headers, the libraries as krot::<folder>, and krot::krot, which
-# stands for all of them; find_package(krot) finds them.
+# Installs, as component libkrot-dev, the headers, the libraries as
+# krot::<folder>, and krot::krot, which stands for all of them; find_package(krot)
+# and pkg-config find them. Component krot is the command with its manual pages
+# and what shells complete.
 include(CMakePackageConfigHelpers)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME libkrot-dev)
 
 get_property(krot_libraries GLOBAL PROPERTY KROT_LIBRARIES)
 add_library(krot_all INTERFACE)
@@ -16,6 +19,8 @@ install(TARGETS ${krot_libraries} krot_all EXPORT krotTargets
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/krot
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   FILES_MATCHING PATTERN "*.h")
+install(FILES ${PROJECT_BINARY_DIR}/src/krot/version.h
+  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/krot)
 install(EXPORT krotTargets NAMESPACE krot:: DESTINATION ${package_dir})
 
 # What the installed targets link to, directly or not.
@@ -45,6 +50,40 @@ install(FILES
   ${PROJECT_BINARY_DIR}/krotConfig.cmake
   ${PROJECT_BINARY_DIR}/krotConfigVersion.cmake
   DESTINATION ${package_dir})
+
+# For the linker, who looks from left to right: the highest folders first.
+set(KROT_PC_LIBRARIES)
+foreach(library IN LISTS krot_libraries)
+  get_target_property(type ${library} TYPE)
+  if(NOT type STREQUAL INTERFACE_LIBRARY)
+    string(PREPEND KROT_PC_LIBRARIES "-l${library} ")
+  endif()
+endforeach()
+set(KROT_PC_BLAS)
+foreach(file IN LISTS BLAS_LIBRARIES)
+  get_filename_component(name ${file} NAME_WE)
+  string(REGEX REPLACE "^(lib|-l)" "" name ${name})
+  string(APPEND KROT_PC_BLAS "-l${name} ")
+endforeach()
+set(pkgconfig_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+file(RELATIVE_PATH KROT_PC_PREFIX /${pkgconfig_dir} /)
+configure_file(${PROJECT_SOURCE_DIR}/cmake/krot.pc.in
+  ${PROJECT_BINARY_DIR}/krot.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/krot.pc DESTINATION ${pkgconfig_dir})
+
+# The command's pages, all from its own tables of options.
+set(pages ${PROJECT_BINARY_DIR}/pages)
+add_custom_command(OUTPUT ${pages}/done
+  COMMAND ${PROJECT_SOURCE_DIR}/tools/docs/help_pages.sh $<TARGET_FILE:krot> ${pages}
+  COMMAND ${CMAKE_COMMAND} -E touch ${pages}/done
+  DEPENDS krot ${PROJECT_SOURCE_DIR}/tools/docs/help_pages.sh VERBATIM)
+add_custom_target(krot_pages ALL DEPENDS ${pages}/done)
+install(DIRECTORY ${pages}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR}
+  COMPONENT krot)
+install(FILES ${pages}/krot.bash RENAME krot COMPONENT krot
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${pages}/_krot COMPONENT krot
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions)
 
 add_custom_target(uninstall
   COMMAND ${CMAKE_COMMAND}

@@ -9,9 +9,11 @@ function(krot_library folder)
     add_library(${target} ${ARG_SOURCES})
     set(scope PUBLIC)
     krot_warnings(${target})
-    krot_precompiled_headers(${target})
     if(ARG_COLD)
       krot_cold(${target})
+      krot_precompiled_headers(${target} COLD)
+    else()
+      krot_precompiled_headers(${target} HOT)
     endif()
   else()
     add_library(${target} INTERFACE)
@@ -21,6 +23,7 @@ function(krot_library folder)
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${folder})
   target_include_directories(${target} ${scope}
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/src>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} ${scope} cxx_std_17)
   target_link_libraries(${target} ${scope} ${ARG_DEPENDS})
@@ -43,28 +46,37 @@ function(krot_cold target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-# krot_precompiled_headers(<target>)
+# krot_precompiled_headers(<target> HOT|COLD|TEST)
 #
-# What nearly every source includes, parsed once, by the lowest folder that
-# needs Eigen. Not where the compiler is launched by a cache, which would not
-# hold what is compiled so, and not in an executable beside libraries that are
-# compiled for a module: -fPIE and -fPIC do not go together.
-function(krot_precompiled_headers target)
-  get_target_property(type ${target} TYPE)
-  if(CMAKE_POSITION_INDEPENDENT_CODE AND type STREQUAL EXECUTABLE)
-    return()
-  endif()
+# What nearly every source includes, parsed once by the first target of its
+# kind: GCC's precompiled headers bring their level of optimisation with them.
+# Not where the compiler is launched by a cache, which would not hold what is
+# compiled so, and not in an executable beside libraries that are compiled for a
+# module: -fPIE and -fPIC do not go together.
+function(krot_precompiled_headers target kind)
   if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT KROT_UNITY OR target STREQUAL krot_base)
     return()
   endif()
-  if(target STREQUAL krot_geometry)
-    target_precompile_headers(${target} PRIVATE
-      <algorithm> <cmath> <cstdint> <functional> <limits> <map> <memory>
-      <optional> <sstream> <string> <unordered_map> <utility> <vector>
-      <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <Eigen/SVD>)
-  else()
-    target_precompile_headers(${target} REUSE_FROM krot_geometry)
+  get_target_property(type ${target} TYPE)
+  if(CMAKE_POSITION_INDEPENDENT_CODE AND type STREQUAL EXECUTABLE
+     AND NOT kind STREQUAL TEST)
+    return()
   endif()
+  get_property(first GLOBAL PROPERTY KROT_PRECOMPILED_${kind})
+  if(first)
+    target_precompile_headers(${target} REUSE_FROM ${first})
+    return()
+  endif()
+  set_property(GLOBAL PROPERTY KROT_PRECOMPILED_${kind} ${target})
+  set(frameworks)
+  if(kind STREQUAL TEST)
+    set(frameworks <gmock/gmock.h> <gtest/gtest.h>)
+  endif()
+  target_precompile_headers(${target} PRIVATE
+    <algorithm> <cmath> <cstdint> <functional> <limits> <map> <memory>
+    <optional> <sstream> <string> <unordered_map> <utility> <vector>
+    <Eigen/Core> <Eigen/Geometry> <Eigen/LU> <Eigen/SVD>
+    ${frameworks})
 endfunction()
 
 # krot_native_kernel(<file>)
@@ -92,6 +104,8 @@ function(krot_test name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   krot_warnings(${name})
+  krot_cold(${name})
+  krot_precompiled_headers(${name} TEST)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gmock GTest::gtest_main)
   set_target_properties(${name} PROPERTIES

@@ -11,7 +11,7 @@ input=$root/tools/sample/model
 output=$root/build/sample_linf
 
 install_missing "${build_needs[@]}"
-build_krot -DKROT_BUILD_TESTS=OFF
+build_krot "$root/build" -DKROT_BUILD_TESTS=OFF
 
 say "Solving $input"
 "$root/build/krot" solver --input_path "$input" --output_path "$output" \

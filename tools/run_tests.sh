@@ -21,8 +21,8 @@ list_skipped() {
 install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
   coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
   chromium:chromium chromedriver:chromium-driver povray:povray jq:jq \
-  shellcheck:shellcheck pybind11-dev python3-dev python3-numpy python3-pytest
-build_krot -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=OFF \
+  pkg-config:pkgconf shellcheck:shellcheck pybind11-dev python3-dev python3-numpy python3-pytest
+build_krot "$root/build" -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=OFF \
   -DKROT_BUILD_PYTHON=ON -DPYTHON_EXECUTABLE=/usr/bin/python3
 
 say "Testing"

@@ -1,9 +1,9 @@
 # shellcheck shell=bash disable=SC2034  # The sourcing scripts use the variables.
-# Shared by quickstart.sh and run_tests.sh, which source it: what Debian
+# Shared by the scripts beside it, which source it: what Debian
 # packages a build needs, and the build itself.
 
 if [[ -z ${BASH_VERSION:-} || ${BASH_SOURCE[0]} == "$0" ]]; then
-  echo "setup.sh is sourced by quickstart.sh and run_tests.sh" >&2
+  echo "setup.sh is sourced by the scripts beside it" >&2
   exit 1
 fi
 
@@ -52,13 +52,14 @@ install_missing() {
   "${apt[@]}" install -y --no-install-recommends "${missing[@]}"
 }
 
-# build_krot CMAKE_OPTION... builds into $root/build, in the generator of an
+# build_krot FOLDER CMAKE_OPTION... builds into FOLDER, in the generator of an
 # earlier build if there is one.
 build_krot() {
-  local generator=(-G Ninja)
-  [[ ! -e $root/build/CMakeCache.txt ]] || generator=()
-  say "Building into $root/build"
-  cmake -S "$root" -B "$root/build" "${generator[@]}" \
+  local folder=$1 generator=(-G Ninja)
+  shift
+  [[ ! -e $folder/CMakeCache.txt ]] || generator=()
+  say "Building into $folder"
+  cmake -S "$root" -B "$folder" "${generator[@]}" \
     -DCMAKE_BUILD_TYPE=Release "$@"
-  cmake --build "$root/build" --parallel "$(nproc)"
+  cmake --build "$folder" --parallel "$(nproc)"
 }

@@ -28,6 +28,7 @@
 #include "krot/report/outlier_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
+#include "krot/version.h"
 #include "python/bindings.h"
 #include "python/keywords.h"
 #include "python/run.h"

@@ -6,6 +6,7 @@
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
 #include "krot/options/option_error.h"
+#include "krot/version.h"
 #include "python/bindings.h"
 
 PYBIND11_MODULE(_core, module) {

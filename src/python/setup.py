@@ -1,8 +1,10 @@
-"""pip install . --no-build-isolation: builds pykrot by CMake. Needs what KROT
-needs, pybind11 and numpy."""
+"""pip install . --no-build-isolation: builds pykrot by CMake, with the options in
+CMAKE_ARGS. Needs what KROT needs, pybind11 and numpy."""
 
+import os
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
 
@@ -26,7 +28,8 @@ class CMakeBuild(build_ext):
         subprocess.run(
             ["cmake", "-S", ROOT, "-B", build, "-DCMAKE_BUILD_TYPE=Release",
              "-DKROT_BUILD_TESTS=OFF", "-DKROT_BUILD_PYTHON=ON",
-             f"-DPYTHON_EXECUTABLE={sys.executable}"], check=True)
+             f"-DPYTHON_EXECUTABLE={sys.executable}",
+             *shlex.split(os.environ.get("CMAKE_ARGS", ""))], check=True)
         subprocess.run(["cmake", "--build", build, "--target", "pykrot_core",
                         "--parallel"], check=True)
         built = next((build / "python" / "pykrot").glob("_core*.so"))

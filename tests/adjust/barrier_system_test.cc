@@ -29,13 +29,21 @@ struct Iterate {
   std::vector<ProjectedError> errors;
   std::vector<double> multipliers;
 
-  Iterate(const BundleAdjustmentOptions& options, bool cap_moves)
-      : columns(options, blocks),
+  Iterate(const BundleAdjustmentOptions& options, bool cap_moves,
+          bool has_fixed = false)
+      : columns(options, Fix(has_fixed)),
         errors(*ProjectErrors(blocks, std::sqrt(blocks.cap2), 1)) {
     if (cap_moves) columns.AddCap();
     for (size_t i = 0; i < errors.size(); ++i) {
       multipliers.push_back(0.1 + 0.7 * static_cast<double>(i % 5));
     }
+  }
+
+  const AdjustmentBlocks& Fix(bool has_fixed) {
+    if (!has_fixed) return blocks;
+    blocks.frame_is_fixed[1] = blocks.sensor_is_fixed[0] = 1;
+    blocks.point_is_fixed[2] = blocks.point_is_fixed[7] = 1;
+    return blocks;
   }
 
   std::unique_ptr<BarrierSystem> Solved(int num_threads = 1) const {
@@ -73,7 +81,7 @@ DenseSystem Assemble(const Iterate& at) {
   const int64_t cap_column = 3 * (num_points + at.columns.cap);
   for (size_t i = 0; i < at.errors.size(); ++i) {
     MatrixXd D = MatrixXd::Zero(3, size);
-    if (at.columns.points_move) {
+    if (at.columns.point_moves[at.blocks.observations[i].point]) {
       D.middleCols<3>(3 * at.blocks.observations[i].point) =
           jacobians.by_point(i);
     }
@@ -105,8 +113,9 @@ std::vector<Iterate> Iterates() {
   translations.refine_sensor_from_rig = false;
   translations.refine_focal_length = false;
   translations.refine_extra_params = false;
-  return {{all, false},      {all, true},           {no_points, false},
-          {no_points, true}, {translations, false}, {translations, true}};
+  return {{all, false},       {all, true},           {no_points, false},
+          {no_points, true},  {translations, false}, {translations, true},
+          {all, false, true}, {all, true, true}};
 }
 
 TEST(BarrierSystem, FindsTheDirectionOfTheDenseSystem) {

@@ -86,7 +86,8 @@ struct FixedRotationResidual {
 };
 
 double IndependentFixedRotationCost(const Model& model,
-                                    ceres::LossFunction* loss) {
+                                    ceres::LossFunction* loss,
+                                    const FixedParts& fixed = {}) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const auto image_indices = ImageIndices(model);
   std::vector<Eigen::Vector3d> translations, points;
@@ -113,6 +114,14 @@ double IndependentFixedRotationCost(const Model& model,
     }
   }
   problem.SetParameterBlockConstant(translations[0].data());
+  for (size_t n = 0; n < translations.size(); ++n) {
+    if (!fixed.HasFrame(geometries[n].frame)) continue;
+    problem.SetParameterBlockConstant(translations[n].data());
+  }
+  for (size_t k = 0; k < points.size(); ++k) {
+    if (!fixed.HasPoint(static_cast<int32_t>(k))) continue;
+    problem.SetParameterBlockConstant(points[k].data());
+  }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = 200;
@@ -134,6 +143,65 @@ TEST(AdjustBundle, WithFixedRotationsEndsWhereAnIndependentProblemDoes) {
   for (size_t f = 0; f < model.frames.size(); ++f) {
     EXPECT_EQ(result.model.frames[f].rig_from_world.quaternion_wxyz,
               model.frames[f].rig_from_world.quaternion_wxyz);
+  }
+}
+
+FixedParts SomeFixed(const Model& model) {
+  FixedParts fixed;
+  fixed.frames.assign(model.frames.size(), 0);
+  fixed.points3D.assign(model.points3D.size(), 0);
+  fixed.frames[0] = fixed.frames[3] = 1;
+  for (const size_t k : {1, 2, 30}) fixed.points3D[k] = 1;
+  return fixed;
+}
+
+TEST(AdjustBundle, WithFixedPartsEndsWhereAnIndependentProblemDoes) {
+  const Model model = SynthesizeScene(SmallScene()).model;
+  BundleAdjustmentOptions options = RotationsFixed();
+  options.fixed = SomeFixed(model);
+  const BundleAdjustmentResult result =
+      AdjustBundle(model, options, kOneThread);
+  const double expected =
+      IndependentFixedRotationCost(model, nullptr, options.fixed);
+  EXPECT_NEAR(CostOf(result.model), expected, 1e-8 * expected);
+  EXPECT_GT(expected, 1.001 * IndependentFixedRotationCost(model, nullptr));
+}
+
+TEST(AdjustBundle, LeavesTheBitsOfWhatIsFixedAndMovesTheRest) {
+  for (const bool is_bounded : {false, true}) {
+    SceneOptions scene = SmallScene();
+    scene.sensors_per_rig = 2;
+    const Model model = SynthesizeScene(scene).model;
+    BundleAdjustmentOptions options = Exact();
+    options.fixed = SomeFixed(model);
+    if (is_bounded) {
+      options.max_error = 1.05 * Summarize(PixelErrors(model, 1)).max;
+    }
+    const BundleAdjustmentResult result =
+        AdjustBundle(model, options, kOneThread);
+    EXPECT_LT(*result.summary.stationarity, 1e-5);
+    EXPECT_LT(CostOf(result.model), 0.9 * CostOf(model));
+    Model put_back = model;
+    put_back.cameras = result.model.cameras;
+    for (size_t f = 0; f < model.frames.size(); ++f) {
+      if (options.fixed.frames[f]) continue;
+      EXPECT_NE(result.model.frames[f].rig_from_world.translation,
+                model.frames[f].rig_from_world.translation);
+      put_back.frames[f] = result.model.frames[f];
+      for (const FrameData& data : model.frames[f].data) {
+        for (size_t n = 0; n < model.images.size(); ++n) {
+          if (model.images[n].id == data.data_id) {
+            put_back.images[n] = result.model.images[n];
+          }
+        }
+      }
+    }
+    for (size_t k = 0; k < model.points3D.size(); ++k) {
+      if (options.fixed.points3D[k]) continue;
+      EXPECT_NE(result.model.points3D[k].xyz, model.points3D[k].xyz);
+      put_back.points3D[k].xyz = result.model.points3D[k].xyz;
+    }
+    EXPECT_EQ(ModelComparison({}).FirstDifference(put_back, result.model), "");
   }
 }
 

@@ -111,13 +111,13 @@ TEST_P(EveryCamera, HasTheDerivativesOfItsReprojection) {
     const ceres::NumericDiffCostFunction<NaiveReprojection<Model>,
                                          ceres::CENTRAL, 2, 3, 7, kNum>
         plain(new NaiveReprojection<Model>{c.pixel});
-    ExpectSame(ReprojectionCost<Model, false>(c.pixel), plain,
+    ExpectSame(ReprojectionCost(Model::kId, false, c.pixel), plain,
                {c.point.data(), c.frame.data(), c.camera.data()});
     const ceres::NumericDiffCostFunction<NaiveReprojection<Model>,
                                          ceres::CENTRAL, 2, 3, 7, 7, kNum>
         rig(new NaiveReprojection<Model>{c.pixel});
     ExpectSame(
-        ReprojectionCost<Model, true>(c.pixel), rig,
+        ReprojectionCost(Model::kId, true, c.pixel), rig,
         {c.point.data(), c.frame.data(), c.sensor.data(), c.camera.data()});
   });
 }
@@ -133,7 +133,7 @@ TEST(ReprojectionCost, FailsBehindTheCamera) {
   Vector2d residual;
   const std::vector<const double*> blocks = {c.point.data(), c.frame.data(),
                                              c.camera.data()};
-  const ReprojectionCost<SimplePinhole, false> cost(c.pixel);
+  const ReprojectionCost cost(SimplePinhole::kId, false, c.pixel);
   EXPECT_TRUE(cost.Evaluate(blocks.data(), residual.data(), nullptr));
   c.frame[6] = -50;
   EXPECT_FALSE(cost.Evaluate(blocks.data(), residual.data(), nullptr));

@@ -1,9 +1,10 @@
-# cmake -DBUILD_DIR= -DSCRATCH_DIR= -DCONSUMER_DIR= -DGENERATOR=
+# cmake -DBUILD_DIR= -DSCRATCH_DIR= -DCONSUMER_DIR= -DMODEL= -DGENERATOR=
 #       -DCXX_COMPILER= -DCXX_FLAGS= -P install_test.cmake
 #
 # Installs BUILD_DIR below SCRATCH_DIR, moves the prefix (packages are
-# relocatable), builds and runs CONSUMER_DIR against it, then uninstalls and
-# checks that no file is left.
+# relocatable), builds CONSUMER_DIR against it, once as find_package and once as
+# pkg-config says, and solves MODEL with both, then uninstalls and checks that
+# no file is left.
 
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status
@@ -34,7 +35,19 @@ run(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${SCRATCH_DIR}/build
     -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=${moved}
     -DCMAKE_CXX_COMPILER=${CXX_COMPILER} -DCMAKE_CXX_FLAGS=${CXX_FLAGS})
 run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
-run(${SCRATCH_DIR}/build/consumer)
+run(${SCRATCH_DIR}/build/lower_largest_error ${MODEL} ${SCRATCH_DIR}/solved)
+
+file(GLOB pc_file ${moved}/lib*/pkgconfig/krot.pc ${moved}/lib/*/pkgconfig/krot.pc)
+get_filename_component(pc_dir ${pc_file} DIRECTORY)
+execute_process(
+  COMMAND ${CMAKE_COMMAND} -E env PKG_CONFIG_PATH=${pc_dir}
+    pkg-config --cflags --libs krot
+  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE
+  COMMAND_ERROR_IS_FATAL ANY)
+separate_arguments(flags UNIX_COMMAND "${CXX_FLAGS} ${flags}")
+run(${CXX_COMPILER} ${CONSUMER_DIR}/lower_largest_error.cc
+    -o ${SCRATCH_DIR}/by_pkg_config ${flags})
+run(${SCRATCH_DIR}/by_pkg_config ${MODEL} ${SCRATCH_DIR}/solved_again)
 
 # Uninstalling leaves no file behind.
 file(RENAME ${moved} ${prefix})

@@ -38,8 +38,8 @@ TEST(CarryLeftOutPoints, KeepsTheErrorOfAPointWhoseOnlyImageHasMoved) {
   ASSERT_GT(PixelErrors(moved)[0], errors_px[0] + 10);
 
   Model after = moved;
-  CarryLeftOutPoints(before, errors_px, Norm::L2(), built, /*level=*/1e-3,
-                     &after);
+  CarryLeftOutPoints(before, errors_px, Norm::L2(), built, {},
+                     /*level=*/1e-3, &after);
   EXPECT_NEAR(PixelErrors(after)[0], errors_px[0], 1e-9);
   for (size_t k = 1; k < after.points3D.size(); ++k) {
     EXPECT_EQ(after.points3D[k].xyz, before.points3D[k].xyz);
@@ -51,7 +51,7 @@ TEST(CarryLeftOutPoints, LeavesAPointWhoseErrorIsBelowTheLevel) {
   Model after = before;
   after.images[0].cam_from_world.translation += Eigen::Vector3d(0.3, 0.1, 0);
   CarryLeftOutPoints(before, PixelErrors(before), Norm::L2(),
-                     BuildProblem(before, {}),
+                     BuildProblem(before, {}), {},
                      /*level=*/1e4, &after);
   EXPECT_EQ(after.points3D[0].xyz, before.points3D[0].xyz);
 }

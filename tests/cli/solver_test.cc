@@ -119,16 +119,16 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "sweeps", "iterations", "support", "seconds", "peak_memory_bytes",
           "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
           "linear_relative_gap", "is_given_back", "contradictions", "finish",
-          "same_image", "outliers"));
+          "same_image", "outliers", "rotations", "fixed"));
   EXPECT_THAT(Keys(report["finish"]),
               ::testing::UnorderedElementsAre(
                   "finish", "loss", "termination", "cap", "lowest_cost",
                   "cost_initial", "cost_final", "duality_gap", "stationarity",
                   "num_active", "num_iterations", "seconds"));
-  EXPECT_EQ(
-      Keys(report["left_out"]),
-      (std::vector<std::string>{"behind", "no_pose", "off_axis", "same_image",
-                                "short_track", "single_ray", "undistortion"}));
+  EXPECT_EQ(Keys(report["left_out"]),
+            (std::vector<std::string>{"behind", "fixed", "no_pose", "off_axis",
+                                      "same_image", "short_track", "single_ray",
+                                      "undistortion"}));
   EXPECT_EQ(Keys(report["pixel_error"]),
             (std::vector<std::string>{"after", "before"}));
   EXPECT_EQ(Keys(report["pixel_error"]["after"]),

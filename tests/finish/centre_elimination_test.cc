@@ -65,6 +65,7 @@ class CentreEliminationTest : public testing::Test {
                                  .cast<long double>();
         const int32_t f = structure_.frame_of[i];
         if (f > 0) A.block(3 * i, 3 * (f - 1), 3, 3) = -B;
+        if (structure_.IsFixedPoint(k)) continue;
         A.block(3 * i, 3 * (num_free + k), 3, 3) = B;
       }
     }
@@ -88,13 +89,17 @@ class CentreEliminationTest : public testing::Test {
     return all;
   }
 
-  const BlockStructure structure_ = MakeStructure(5, 12);
+  BlockStructure structure_ = MakeStructure(5, 12);
   std::mt19937 generator_{7};
   std::vector<double> r_;
 };
 
 TEST_F(CentreEliminationTest, SolvesTheLeastSquares) {
   for (const double decades : {0.0, 2.0, 4.0}) {
+    // The point that one frame alone sees, too, and another.
+    structure_.point_is_fixed.assign(structure_.num_points(), 0);
+    if (decades == 0) structure_.point_is_fixed[0] = 1;
+    if (decades < 4) structure_.point_is_fixed[5] = 1;
     CentreElimination elimination(structure_, 1);
     Fill(decades, &elimination);
     const LongMatrix A = DenseA(&elimination);

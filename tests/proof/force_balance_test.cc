@@ -44,6 +44,26 @@ KnownRotationProblem MakeProblem() {
   return Glue(MakeSmallScene(1), MakeSmallScene(2)).problem;
 }
 
+TEST(BoundCorrections, LeadToWhatIsFixed) {
+  KnownRotationProblem problem = MakeSmallScene(1).problem;
+  problem.fixed_translations.resize(problem.num_frames);
+  problem.fixed_translations[1] = Eigen::Vector3d::Zero();
+  problem.fixed_points.resize(problem.num_points);
+  problem.fixed_points[2] = Eigen::Vector3d::Zero();
+  // A force at each of the two, where any is taken, and at one other point.
+  Imbalance imbalance{std::vector<Real>(problem.num_points, 0),
+                      std::vector<Real>(problem.num_frames, 0)};
+  imbalance.of_frame[1] = imbalance.of_point[2] = 100;
+  imbalance.of_point[0] = 1;
+  Real sum = 0;
+  for (const Real bound : BoundCorrections(
+           problem, RandomStrengths(problem.observations.size()), imbalance)) {
+    EXPECT_LT(bound, 1.1);
+    sum += bound;
+  }
+  EXPECT_GT(sum, 0.9);
+}
+
 TEST(BoundCorrections, LeavesRoomToBalanceWhateverForces) {
   const KnownRotationProblem problem = MakeProblem();
   const Eigen::MatrixXd incidence = Incidence(problem);

@@ -69,6 +69,25 @@ TEST(LeastNormSolver, FindsWhatAnOrthogonalDecompositionFinds) {
   }
 }
 
+TEST(LeastNormSolver, LeavesOutTheEquationsOfFixedPoints) {
+  for (const bool has_last_row : {false, true}) {
+    LeastNormProblem problem = RandomProblem(has_last_row);
+    const MatrixXd all = Dense(problem);
+    problem.point_is_fixed.assign(problem.num_points, 0);
+    problem.point_is_fixed[0] = problem.point_is_fixed[7] = 1;
+    ASSERT_EQ(problem.num_rows(), all.rows() - 6);
+    MatrixXd M(problem.num_rows(), all.cols());
+    M << all.middleRows(3, 18), all.bottomRows(all.rows() - 24);
+    const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
+    const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
+    for (const int64_t max_dense_rows : {0, 1000}) {
+      LeastNormSolver solver(max_dense_rows);
+      ASSERT_TRUE(solver.Factorize(problem));
+      EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
+    }
+  }
+}
+
 TEST(LeastNormSolver, RefusesEquationsThatMayHaveNoSolution) {
   LeastNormProblem few = RandomProblem(false);
   few.columns.resize(3);

@@ -1,6 +1,7 @@
 #include "tools/benchmark/benchmark_report.h"
 
 #include "krot/base/write_file.h"
+#include "krot/version.h"
 
 namespace krot {
 namespace {

@@ -3,7 +3,6 @@
 #include "krot/base/timer.h"
 #include "krot/joint/joint.h"
 #include "krot/pipeline/schedule.h"
-#include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
 #include "tools/benchmark/known_rotation_solver.h"
 

@@ -22,7 +22,7 @@ if [[ -z ${BUILD:-} ]]; then
   # shellcheck source=tools/setup.sh
   source "$here/../setup.sh"
   install_missing "${build_needs[@]}"
-  build_krot -DKROT_BUILD_BENCHMARKS=ON
+  build_krot "$root/build" -DKROT_BUILD_BENCHMARKS=ON
   BUILD=$root/build
 fi
 

@@ -5,7 +5,10 @@
 # Needs colmap, xvfb-run, xdotool and ImageMagick (import, mogrify); run it on an
 # idle machine, as it waits for the GUI by the clock.
 #
-# Usage: tools/docs/gui_screenshots.sh
+# With an executable of COLMAP 3.8 patched by third_party_patches/, makes
+# gui_patched.png alone: the dialogue, and the log of its run.
+#
+# Usage: tools/docs/gui_screenshots.sh [PATCHED_COLMAP]
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../.." && pwd)
@@ -110,6 +113,40 @@ shoot_model() {
   close
 }
 
+# shoot_dialogue COLMAP PICTURE: imports the sample by the menu, as COLMAP enables
+# what changes a model only then.
+shoot_dialogue() {
+  local window dialogue
+  cp -r "$sample" "$work/model"
+  "$1" gui --database_path "$work/database.db" --image_path "$work" \
+    >"$work/log" 2>&1 &
+  gui=$!
+  window=$(xdotool search --sync --onlyvisible --name '^COLMAP$' | head -n 1)
+  sleep 5
+  xdotool windowsize --sync "$window" 900 640
+  sleep 2
+  click 20 11    # File
+  click 77 162   # Import model
+  sleep 2
+  xdotool type "$work/model"
+  xdotool key Return sleep 2
+  xdotool key alt+n sleep 3  # no project.ini: only the model
+  click 195 11   # Reconstruction
+  click 228 240  # Lower the largest error
+  sleep 2
+  dialogue=$(xdotool search --onlyvisible --name 'Lower the largest error')
+  xdotool windowmove --sync "$dialogue" 20 340
+  xdotool mousemove 293 592 click 1 sleep 5  # Run
+  xdotool windowsize --sync "$window" 900 639  # draws it anew
+  sleep 2
+  shoot "$2"
+  close
+}
+
+if (($# == 1)); then
+  shoot_dialogue "$1" gui_patched.png
+  exit
+fi
 "$krot" solver --input_path "$sample" --output_path "$work/linf" \
   --log_level 0 >/dev/null
 "$krot" model_comparer --input_path1 "$sample" --input_path2 "$work/linf" \

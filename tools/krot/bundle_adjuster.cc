@@ -9,6 +9,7 @@
 #include "krot/report/adjustment_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
@@ -69,13 +70,10 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   report.run.threads = ResolveNumThreads(num_threads);
   report.run.seed = common.random_seed;
 
-  const Timer read_timer;
-  const auto [model, contradictions] =
-      ReadValidModel(paths.input_path, paths.on_contradiction, common.log);
-  report.run.contradictions = contradictions;
-  report.run.seconds_read = read_timer.Seconds();
+  const Model model = ReadInput(paths, common.log, &report.run);
   ThrowIfInterrupted();
 
+  options.adjustment.fixed = ReadFixedParts(paths, model);
   AdjustModelResult result =
       Adjust(model, std::move(options), context, common.log);
   report.summary = std::move(result.summary);
@@ -103,6 +101,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                       "COLMAP model, below a cap if you want; the coordinate "
                       "frame stays");
   AddModelPaths(&paths, &parser);
+  AddFixedPaths(&paths, &parser);
   options.AddTo(&parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers", &common,

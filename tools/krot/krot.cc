@@ -12,8 +12,10 @@
 #include "krot/model/model_error.h"
 #include "krot/options/option_error.h"
 #include "krot/options/option_value.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/command_error.h"
+#include "tools/krot/help_pages.h"
 
 namespace krot {
 namespace {
@@ -37,7 +39,8 @@ constexpr Command kCommands[] = {
     {"model_analyzer", "show what a model's errors look like",
      &RunModelAnalyzer},
     {"model_comparer", "show how two models differ", &RunModelComparer},
-    {"certificate_checker", "re-check the proof of a lower bound, or of conflicts",
+    {"certificate_checker",
+     "re-check the proof of a lower bound, or of conflicts",
      &RunCertificateChecker},
     {"model_synthesizer", "make a model with ground truth",
      &RunModelSynthesizer},
@@ -54,9 +57,7 @@ constexpr char kHelpHead[] =
     "\n"
     "Commands:\n";
 
-constexpr char kHelpTail[] =
-    "\n"
-    "Exit codes:\n"
+constexpr char kExitCodes[] =
     "    0  done\n"
     "    1  the options are wrong\n"
     "    2  the model cannot be read or is inconsistent\n"
@@ -86,17 +87,53 @@ const Command& RequireCommand(const std::string& name) {
                                      : "; did you mean " + nearest + "?"));
 }
 
+std::vector<CommandSummary> Summaries() {
+  std::vector<CommandSummary> summaries;
+  for (const Command& command : kCommands) {
+    summaries.push_back({command.name, command.summary});
+  }
+  return summaries;
+}
+
+void PrintHelpOfEach(const std::string& format) {
+  for (const Command& command : kCommands) {
+    if (command.run != &RunHelp) command.run({"--help=" + format});
+  }
+}
+
+void PrintHelp(HelpFormat format) {
+  const std::vector<CommandSummary> commands = Summaries();
+  switch (format) {
+    case HelpFormat::kText:
+      std::cout << kHelpHead;
+      for (const CommandSummary& command : commands) {
+        std::cout << "  " << command.name
+                  << std::string(20 - command.name.size(), ' ')
+                  << command.summary << '\n';
+      }
+      std::cout << "\nExit codes:\n" << kExitCodes;
+      break;
+    case HelpFormat::kMan:
+      std::cout << ManPage(commands, kExitCodes);
+      break;
+    case HelpFormat::kBash:
+      std::cout << BashHead(commands);
+      PrintHelpOfEach("bash");
+      std::cout << BashTail();
+      break;
+    case HelpFormat::kZsh:
+      std::cout << ZshHead(commands);
+      PrintHelpOfEach("zsh");
+      std::cout << ZshTail();
+      break;
+  }
+}
+
 int RunHelp(const std::vector<std::string>& arguments) {
   if (!arguments.empty() && arguments.front().rfind('-', 0) != 0) {
     return RequireCommand(arguments.front()).run({"--help"});
   }
-  std::cout << kHelpHead;
-  for (const Command& command : kCommands) {
-    const std::string name = command.name;
-    std::cout << "  " << name << std::string(20 - name.size(), ' ')
-              << command.summary << '\n';
-  }
-  std::cout << kHelpTail;
+  PrintHelp(AskedHelp(arguments).value_or(HelpFormat::kText));
   return kExitDone;
 }
 
@@ -107,7 +144,7 @@ int RunCommand(const std::vector<std::string>& arguments) {
     std::cout << "krot " KROT_VERSION "\n";
     return kExitDone;
   }
-  if (name == "-h" || name == "--help") return RunHelp({});
+  if (AskedHelp({name})) return RunHelp({name});
   return RequireCommand(name).run({arguments.begin() + 1, arguments.end()});
 }
 

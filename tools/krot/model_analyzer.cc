@@ -7,6 +7,7 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"

@@ -10,6 +10,7 @@
 #include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/report/comparison_report.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <utility>
 
+#include "krot/base/timer.h"
 #include "krot/base/write_file.h"
+#include "krot/model/file_bytes.h"
 #include "krot/model/model_error.h"
 #include "krot/model/validate.h"
 #include "krot/report/text_table.h"
@@ -70,6 +73,22 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
   AddOnContradiction(&paths->on_contradiction, parser);
 }
 
+void AddRotationsPath(ModelPaths* paths, OptionParser* parser) {
+  parser->AddPath("rotations_path", &paths->rotations_path, false, "a file",
+                  "Rotations that take the place of the model's: per line an "
+                  "image's name and QW QX QY QZ, camera from world");
+}
+
+void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
+  parser->AddPath("fixed_images_path", &paths->fixed_images_path, false,
+                  "a file",
+                  "Images that must not move, by name or id, one per line: "
+                  "place and scale come from what is fixed");
+  parser->AddPath("fixed_points_path", &paths->fixed_points_path, false,
+                  "a file",
+                  "3D points that must not move, by id, one per line");
+}
+
 void AddOverwrite(bool* overwrite, OptionParser* parser) {
   parser->AddBool("overwrite", overwrite,
                   "Replace the model that the output folder holds; other "
@@ -127,6 +146,37 @@ ValidModel ReadValidModel(const std::string& path,
               (follows_images ? "images" : "tracks") +
               " are followed (--Model.on_contradiction)");
   return read;
+}
+
+Model ReadInput(const ModelPaths& paths, const LogOptions& log,
+                RunRecord* run) {
+  const Timer timer;
+  ValidModel read =
+      ReadValidModel(paths.input_path, paths.on_contradiction, log);
+  run->contradictions = read.contradictions;
+  if (!paths.rotations_path.empty()) {
+    run->rotations =
+        ReplaceRotations(ReadFileBytes(paths.rotations_path), &read.model);
+    LogLine(log, 1,
+            paths.rotations_path + ": the rotations of " +
+                Counted(run->rotations->num_frames, "frame") + "; " +
+                Counted(run->rotations->num_kept_images, "image") +
+                " without one, as the model has them");
+  }
+  run->seconds_read = timer.Seconds();
+  return std::move(read.model);
+}
+
+FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model) {
+  FixedParts fixed;
+  if (!paths.fixed_images_path.empty()) {
+    fixed.frames = FixedFrames(ReadFileBytes(paths.fixed_images_path), model);
+  }
+  if (!paths.fixed_points_path.empty()) {
+    fixed.points3D =
+        FixedPoints3D(ReadFileBytes(paths.fixed_points_path), model);
+  }
+  return fixed;
 }
 
 }  // namespace krot

@@ -3,8 +3,10 @@
 #include <string>
 
 #include "krot/model/contradictions.h"
+#include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 #include "krot/model/model_io.h"
+#include "krot/report/run_record.h"
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
@@ -17,11 +19,18 @@ struct ModelPaths {
   std::string output_type = "auto";
   bool overwrite = false;
   std::string on_contradiction = "follow_tracks";
+  std::string rotations_path;     // "": the model's own
+  std::string fixed_images_path;  // "": all move
+  std::string fixed_points_path;  // "": all move
   std::string report_path;
   std::string html_path;
 };
 
 void AddModelPaths(ModelPaths* paths, OptionParser* parser);
+// Of a command that takes other rotations than the model's.
+void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
+// Of a command that may hold images and points.
+void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
 
 // Throws OptionError where the paths contradict each other, ModelError where
@@ -51,5 +60,13 @@ struct ValidModel {
 ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log);
+
+// The model to work on: read and validated, with the rotations of
+// paths.rotations_path, if there is one; fills in what `run` says of the
+// input. Throws ModelError.
+Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run);
+
+// What paths.fixed_*_path name of the model. Throws ModelError.
+FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model);
 
 }  // namespace krot

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -63,8 +64,9 @@ void OptionParser::AddOutputFile(const std::string& name, std::string* value,
 }
 
 bool OptionParser::Parse(const std::vector<std::string>& arguments) {
-  for (const std::string& argument : arguments) {
-    if (argument == "-h" || argument == "--help") return false;
+  if (const std::optional<HelpFormat> asked = AskedHelp(arguments)) {
+    help_format_ = *asked;
+    return false;
   }
   const std::vector<OptionAssignment> assignments = ReadArguments(arguments);
   Assign(assignments);
@@ -76,6 +78,20 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   RequireAll();
   CheckOutputFiles();
   return true;
+}
+
+std::string OptionParser::Help() const {
+  switch (help_format_) {
+    case HelpFormat::kText:
+      return OptionTable::Help();
+    case HelpFormat::kMan:
+      return ManPage(*this);
+    case HelpFormat::kBash:
+      return BashCompletion(*this);
+    case HelpFormat::kZsh:
+      return ZshCompletion(*this);
+  }
+  return "";
 }
 
 void OptionParser::CheckOutputFiles() const {

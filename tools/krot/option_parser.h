@@ -5,6 +5,7 @@
 
 #include "krot/options/option_table.h"
 #include "tools/krot/command_error.h"
+#include "tools/krot/help_pages.h"
 
 namespace krot {
 
@@ -28,6 +29,10 @@ class OptionParser : public OptionTable {
   // for help. Throws OptionError for the first thing wrong.
   bool Parse(const std::vector<std::string>& arguments);
 
+  // As Parse was asked for it: a text, a manual page, or what a shell needs to
+  // complete this command.
+  std::string Help() const;
+
  private:
   struct PathOption {
     std::string name;
@@ -41,6 +46,7 @@ class OptionParser : public OptionTable {
   void CheckOutputFiles() const;
 
   std::vector<PathOption> paths_;
+  HelpFormat help_format_ = HelpFormat::kText;
 };
 
 }  // namespace krot

@@ -10,6 +10,7 @@
 #include "krot/report/outlier_report.h"
 #include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
@@ -34,6 +35,7 @@ struct OutlierCommand {
 
 void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   AddModelPaths(&command->paths, parser);
+  AddRotationsPath(&command->paths, parser);
   parser->AddOutputFile("conflicts_path", &command->conflicts_path,
                         "Where the conflicts go, as JSON: the proof of how "
                         "many must go; see certificate_checker");
@@ -121,11 +123,7 @@ int Run(const OutlierCommand& command) {
   report.run.threads = ResolveNumThreads(command.context.num_threads);
   report.run.seed = command.common.random_seed;
 
-  const Timer read_timer;
-  const auto [model, contradictions] =
-      ReadValidModel(paths.input_path, paths.on_contradiction, log);
-  report.run.contradictions = contradictions;
-  report.run.seconds_read = read_timer.Seconds();
+  const Model model = ReadInput(paths, log, &report.run);
   ThrowIfInterrupted();
   OutlierFilterResult result = Filter(command, model, cancel);
   report.summary = std::move(result.summary);

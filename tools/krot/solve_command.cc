@@ -9,6 +9,7 @@
 #include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
+#include "krot/version.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
@@ -26,13 +27,20 @@ SolveReport DescribeRun(const SolveCommand& command) {
   return report;
 }
 
+std::string FixedWords(const SolveSummary& summary) {
+  if (summary.num_fixed_frames + summary.num_fixed_points == 0) return "";
+  return ", of which " + Counted(summary.num_fixed_frames, "frame") + " and " +
+         Counted(summary.num_fixed_points, "point") + " stay";
+}
+
 std::string ProblemWords(const SolveSummary& summary) {
   return Counted(summary.num_images, "image") + ", " +
          Counted(summary.num_points, "point") + ", " +
          Counted(summary.num_observations, "observation") +
          (summary.num_components > 1
               ? " in " + std::to_string(summary.num_components) + " components"
-              : std::string());
+              : std::string()) +
+         FixedWords(summary);
 }
 
 std::string MemoryWords(const SolveSummary& summary) {
@@ -49,6 +57,7 @@ Model Solve(const SolveCommand& command, const Model& model,
             const CancelFlag& cancel, SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
+  options.solve.problem.fixed = ReadFixedParts(command.paths, model);
   Context context = command.context;
   context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
@@ -156,11 +165,7 @@ int RunSolveCommand(const SolveCommand& command) {
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
-  const Timer read_timer;
-  const auto [model, contradictions] =
-      ReadValidModel(paths.input_path, paths.on_contradiction, log);
-  report.run.contradictions = contradictions;
-  report.run.seconds_read = read_timer.Seconds();
+  const Model model = ReadInput(paths, log, &report.run);
   ThrowIfInterrupted();
 
   const Model solved = Solve(command, model, cancel, &report);

@@ -47,7 +47,7 @@ bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
 }
 
 void CollectObservations(const Model& model, int min_track_length,
-                         AdjustmentBlocks* blocks) {
+                         const FixedParts& fixed, AdjustmentBlocks* blocks) {
   const std::vector<ImageGeometry> images = ImageGeometries(model);
   const std::vector<int32_t> sensor_offsets = SensorOffsets(model);
   const std::unordered_map<ImageId, int32_t> image_indices =
@@ -79,7 +79,7 @@ void CollectObservations(const Model& model, int min_track_length,
       }
     }
     const auto length = static_cast<int>(images_of_point.size());
-    if (length < min_track_length) {
+    if (length < min_track_length && !fixed.HasPoint(static_cast<int32_t>(k))) {
       blocks->num_short_track += length;
       blocks->observations.resize(begin);
     } else {
@@ -87,6 +87,20 @@ void CollectObservations(const Model& model, int min_track_length,
     }
   }
   for (const bool has : has_observation) blocks->num_images += has ? 1 : 0;
+}
+
+// A sensor that moved would take the images of a fixed frame along.
+void MarkFixed(const FixedParts& fixed, AdjustmentBlocks* blocks) {
+  blocks->frame_is_fixed = fixed.frames;
+  blocks->frame_is_fixed.resize(blocks->frames.size(), 0);
+  blocks->point_is_fixed = fixed.points3D;
+  blocks->point_is_fixed.resize(blocks->points.size(), 0);
+  blocks->sensor_is_fixed.assign(blocks->sensors.size(), 0);
+  for (const AdjustmentObservation& observation : blocks->observations) {
+    if (observation.sensor >= 0 && blocks->frame_is_fixed[observation.frame]) {
+      blocks->sensor_is_fixed[observation.sensor] = 1;
+    }
+  }
 }
 
 }  // namespace
@@ -109,8 +123,8 @@ Eigen::Map<const Vector3d> TranslationOf(const PoseBlock& block) {
   return Eigen::Map<const Vector3d>(block.data() + 4);
 }
 
-AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
-                                      int min_track_length) {
+AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
+                                      const FixedParts& fixed) {
   AdjustmentBlocks blocks;
   for (const Frame& frame : model.frames) {
     blocks.frames.push_back(ToBlock(frame.rig_from_world));
@@ -128,7 +142,8 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model,
   for (const Point3D& point : model.points3D) {
     blocks.points.push_back(point.xyz);
   }
-  CollectObservations(model, min_track_length, &blocks);
+  CollectObservations(model, min_track_length, fixed, &blocks);
+  MarkFixed(fixed, &blocks);
   return blocks;
 }
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/model/fixed_parts.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model.h"
 
@@ -41,6 +42,10 @@ struct AdjustmentBlocks {
   // the model, but unknown where it is lowered.
   double cap2 = std::numeric_limits<double>::infinity();
   std::vector<AdjustmentObservation> observations;  // point by point
+  // Marks of what must not move, one per block of the kind.
+  std::vector<char> frame_is_fixed;
+  std::vector<char> sensor_is_fixed;  // those of fixed frames
+  std::vector<char> point_is_fixed;
 
   int64_t num_images = 0;  // with observations
   int64_t num_no_pose = 0;
@@ -49,10 +54,11 @@ struct AdjustmentBlocks {
 };
 
 // Leaves out observations without a pose, behind their camera or without a
-// finite projection, then points with fewer than `min_track_length` others.
-// Throws ModelError for a camera without an image plane that an image with a
-// point uses. O(observations).
-AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length);
+// finite projection, then points with fewer than `min_track_length` others,
+// fixed ones excepted. Throws ModelError for a camera without an image plane
+// that an image with a point uses. O(observations).
+AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
+                                      const FixedParts& fixed = {});
 
 // A copy of the model with the blocks in place of what they were made from.
 // Records whose blocks are those of `before` keep their bits; the poses of

@@ -51,33 +51,42 @@ std::vector<int> RefinedParams(int camera_model,
 
 AdjustmentColumns::AdjustmentColumns(const BundleAdjustmentOptions& options,
                                      const AdjustmentBlocks& blocks)
-    : points_move(options.refine_points3D),
+    : point_moves(blocks.points.size(), options.refine_points3D),
       frames(blocks.frames.size()),
       sensors(blocks.sensors.size()),
       cameras(blocks.cameras.size()) {
   std::vector<char> has_frame(frames.size(), 0), has_sensor(sensors.size(), 0),
       has_camera(cameras.size(), 0);
+  for (size_t k = 0; k < point_moves.size(); ++k) {
+    if (blocks.point_is_fixed[k]) point_moves[k] = 0;
+  }
   int32_t last_point = -1;
   for (const AdjustmentObservation& observation : blocks.observations) {
     has_frame[observation.frame] = 1;
     has_camera[observation.camera] = 1;
     if (observation.sensor >= 0) has_sensor[observation.sensor] = 1;
-    if (points_move && observation.point != last_point) num_unknowns += 3;
+    if (point_moves[observation.point] && observation.point != last_point) {
+      num_unknowns += 3;
+    }
     last_point = observation.point;
   }
-  const auto add_poses = [&](const std::vector<char>& is_free, bool rotates,
+  const auto add_poses = [&](const std::vector<char>& is_used,
+                             const std::vector<char>& is_fixed, bool rotates,
                              std::vector<Pose>* poses) {
     for (size_t i = 0; i < poses->size(); ++i) {
-      if (!is_free[i]) continue;
+      if (!is_used[i] || is_fixed[i]) continue;
       if (rotates) (*poses)[i].rotation = num_blocks++;
       (*poses)[i].center = num_blocks++;
       num_unknowns += rotates ? 6 : 3;
     }
   };
   if (options.refine_rig_from_world) {
-    add_poses(has_frame, !options.constant_rig_from_world_rotation, &frames);
+    add_poses(has_frame, blocks.frame_is_fixed,
+              !options.constant_rig_from_world_rotation, &frames);
   }
-  if (options.refine_sensor_from_rig) add_poses(has_sensor, true, &sensors);
+  if (options.refine_sensor_from_rig) {
+    add_poses(has_sensor, blocks.sensor_is_fixed, true, &sensors);
+  }
   for (size_t c = 0; c < cameras.size(); ++c) {
     if (!has_camera[c]) continue;
     cameras[c].params = RefinedParams(blocks.camera_models[c], options);
@@ -91,10 +100,9 @@ void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
                const BlockVector& direction, double step,
                AdjustmentBlocks* to) {
   const std::vector<Vector3d>& blocks = direction.frames;
-  if (columns.points_move) {
-    for (size_t k = 0; k < from.points.size(); ++k) {
-      to->points[k] = from.points[k] + step * direction.points[k];
-    }
+  for (size_t k = 0; k < from.points.size(); ++k) {
+    if (!columns.point_moves[k]) continue;
+    to->points[k] = from.points[k] + step * direction.points[k];
   }
   for (size_t f = 0; f < from.frames.size(); ++f) {
     MovePose(columns.frames[f], from.frames[f], blocks, step, &to->frames[f]);

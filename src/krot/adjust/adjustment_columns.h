@@ -17,7 +17,7 @@ std::vector<int> RefinedParams(int camera_model,
 
 // Which unknowns move, the points aside: in blocks of three columns, by the
 // index of their block, in the order frames, sensors, cameras, cap. What takes
-// part in no observation is held still.
+// part in no observation is held still, and so is what is fixed.
 struct AdjustmentColumns {
   static constexpr int32_t kHeld = -1;
   // Of x -> R (x - c): R turns to R exp([theta]x), c moves.
@@ -39,9 +39,9 @@ struct AdjustmentColumns {
   AdjustmentColumns(const BundleAdjustmentOptions& options,
                     const AdjustmentBlocks& blocks);
 
-  bool points_move;
-  std::vector<Pose> frames;   // as AdjustmentBlocks::frames
-  std::vector<Pose> sensors;  // as sensors
+  std::vector<char> point_moves;  // as AdjustmentBlocks::points
+  std::vector<Pose> frames;       // as AdjustmentBlocks::frames
+  std::vector<Pose> sensors;      // as sensors
   std::vector<Camera> cameras;
   int32_t cap = kHeld;  // one column
   int32_t num_blocks = 0;

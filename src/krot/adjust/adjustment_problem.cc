@@ -11,7 +11,6 @@
 #include "krot/adjust/adjustment_columns.h"
 #include "krot/adjust/reprojection_cost.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/models.h"
 
 namespace krot {
 namespace {
@@ -23,20 +22,6 @@ using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
 // which is the diagonal of J'J divided by the radius: a larger one would leave
 // it to rounding whether they are positive definite.
 constexpr double kLargestTrustRegion = 1e8;
-
-std::unique_ptr<ceres::CostFunction> MakeProjection(
-    const AdjustmentObservation& observation, int camera_model) {
-  return VisitCameraModel(
-      camera_model, [&](auto camera) -> std::unique_ptr<ceres::CostFunction> {
-        using Camera = decltype(camera);
-        if (observation.sensor < 0) {
-          return std::make_unique<ReprojectionCost<Camera, false>>(
-              observation.pixel);
-        }
-        return std::make_unique<ReprojectionCost<Camera, true>>(
-            observation.pixel);
-      });
-}
 
 // Holds still the coordinates in `constant` of a block of `size`.
 void HoldStill(double* block, int size, const std::vector<int>& constant,
@@ -82,17 +67,19 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
     }
     parameters.push_back(blocks->cameras[observation.camera].data());
     problem->AddResidualBlock(
-        MakeProjection(observation, blocks->camera_models[observation.camera])
-            .release(),
+        new ReprojectionCost(blocks->camera_models[observation.camera],
+                             observation.sensor >= 0, observation.pixel),
         loss, parameters);
   }
-  for (PoseBlock& frame : blocks->frames) {
-    ParameterizePose(options.refine_rig_from_world,
-                     !options.constant_rig_from_world_rotation, &frame,
-                     problem);
+  for (size_t f = 0; f < blocks->frames.size(); ++f) {
+    ParameterizePose(
+        options.refine_rig_from_world && !blocks->frame_is_fixed[f],
+        !options.constant_rig_from_world_rotation, &blocks->frames[f], problem);
   }
-  for (PoseBlock& sensor : blocks->sensors) {
-    ParameterizePose(options.refine_sensor_from_rig, true, &sensor, problem);
+  for (size_t s = 0; s < blocks->sensors.size(); ++s) {
+    ParameterizePose(
+        options.refine_sensor_from_rig && !blocks->sensor_is_fixed[s], true,
+        &blocks->sensors[s], problem);
   }
   for (size_t c = 0; c < blocks->cameras.size(); ++c) {
     const std::vector<int> refined =
@@ -106,9 +93,9 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
     }
     HoldStill(blocks->cameras[c].data(), size, constant, problem);
   }
-  if (options.refine_points3D) return;
-  for (Eigen::Vector3d& point : blocks->points) {
-    HoldStill(point.data(), 3, {0, 1, 2}, problem);
+  for (size_t k = 0; k < blocks->points.size(); ++k) {
+    if (options.refine_points3D && !blocks->point_is_fixed[k]) continue;
+    HoldStill(blocks->points[k].data(), 3, {0, 1, 2}, problem);
   }
 }
 

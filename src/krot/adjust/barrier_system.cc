@@ -118,7 +118,7 @@ void BarrierSystem::AddPoint(int64_t k, double damping, int part) {
       }
     }
   }
-  if (!columns_.points_move) return;
+  if (!columns_.point_moves[k]) return;
   diagonal_.points[k] = H.diagonal();
   H.diagonal() *= 1 + damping;
   const UpperTriangle R = R_[k] = CholeskyFactor(H);
@@ -155,7 +155,7 @@ void BarrierSystem::ReducePoint(int64_t k, int part) {
     return {pull.x(), pull.y(), 0};
   };
   Vector3d step = Vector3d::Zero();
-  if (columns_.points_move) {
+  if (columns_.point_moves[k]) {
     Vector3d& gradient = gradient_.points[k];
     for (int64_t i = begin; i < end; ++i) {
       gradient.noalias() += jacobians_.by_point(i).transpose() * by_error(i);
@@ -194,7 +194,7 @@ void BarrierSystem::BackSubstitute(int64_t k) {
     rest.noalias() += jacobians_.by_point(i).transpose() *
                       Weigh(i, slope, cap2_slope()).head<3>();
   }
-  if (!columns_.points_move || begin == end) return;
+  if (!columns_.point_moves[k] || begin == end) return;
   Vector3d& step = direction_.unknowns.points[k];
   step = -R_[k].Solve(R_[k].SolveTransposed(rest));
   for (int64_t i = begin; i < end; ++i) {

@@ -178,7 +178,7 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   CheckOptions(options);
   const Timer timer;
   const AdjustmentBlocks before =
-      MakeAdjustmentBlocks(model, options.min_track_length);
+      MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
   AdjustmentBlocks blocks = before;
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);

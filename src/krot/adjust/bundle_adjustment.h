@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 
 namespace krot {
@@ -40,8 +41,13 @@ struct BundleAdjustmentOptions {
   bool refine_points3D = true;
   bool constant_rig_from_world_rotation = false;
 
-  // Points with fewer usable observations take no part. At least 1; COLMAP's
-  // default is 0, which lets points of one ray move along it.
+  // Of what may move, what must not. Frames keep their rotations, too, and the
+  // sensors through which they see their places in the rig.
+  FixedParts fixed;
+
+  // Points with fewer usable observations take no part, if they are not fixed.
+  // At least 1; COLMAP's default is 0, which lets points of one ray move along
+  // it.
   int min_track_length = 2;
 
   RobustLoss loss = RobustLoss::kTrivial;
@@ -134,7 +140,8 @@ struct BundleAdjustmentResult {
 // bits, and so do points and frames that take no part. The gauge is free during
 // the solve; after it every connected component gets back the centroid of its
 // camera centres, their RMS distance to it (unless a constant rig baseline
-// fixes the scale) and the mean of its rotations. Stored point errors are not
+// fixes the scale) and the mean of its rotations; one with anything fixed stays
+// as it is. Stored point errors are not
 // updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a

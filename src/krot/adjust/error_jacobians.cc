@@ -2,7 +2,7 @@
 
 #include "krot/adjust/differentiated_pixel.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/models.h"
+#include "krot/camera/camera_model.h"
 #include "krot/geometry/rigid_transform.h"
 
 namespace krot {
@@ -37,15 +37,19 @@ Matrix3d* StorePose(const AdjustmentColumns::Pose& columns, const Matrix3d& D_x,
 }
 
 // Writes those by the parameters of a camera and returns those by x_cam.
-template <typename Camera>
-Matrix3d Project(const std::vector<double>& params, const Vector3d& x_cam,
+Matrix3d Project(int camera_model, const std::vector<double>& params,
+                 const Vector3d& x_cam,
                  const AdjustmentColumns::Camera& columns, Matrix3d* to) {
   const Eigen::Vector2d ray = x_cam.hnormalized();
-  const DifferentiatedPixel<Camera> projected(params.data(), ray,
-                                              !columns.params.empty());
+  const auto num_params = static_cast<int>(params.size());
+  double J_params[2 * kMaxCameraParams];  // row by row
+  const DifferentiatedPixel projected =
+      DifferentiatePixel(camera_model, params.data(), ray,
+                         columns.params.empty() ? nullptr : J_params);
   for (size_t n = 0; n < columns.params.size(); ++n) {
-    to[n / 3].col(n % 3).template head<2>() =
-        projected.J_params.col(columns.params[n]);
+    const int param = columns.params[n];
+    to[n / 3].col(n % 3).head<2>() << J_params[param],
+        J_params[num_params + param];
   }
   Matrix3d D;
   D.topRows<2>() << projected.J_ray, -projected.J_ray * ray;
@@ -102,11 +106,9 @@ void ErrorJacobians::Evaluate(const AdjustmentBlocks& blocks, int num_threads) {
       const AdjustmentColumns::Pose& columns = columns_.sensors[o.sensor];
       D += (columns.rotation != kHeld) + (columns.center != kHeld);
     }
-    Matrix3d D_rig = VisitCameraModel(
-        blocks.camera_models[o.camera], [&](auto camera) -> Matrix3d {
-          return Project<decltype(camera)>(blocks.cameras[o.camera], x_cam,
-                                           columns_.cameras[o.camera], D);
-        });
+    Matrix3d D_rig =
+        Project(blocks.camera_models[o.camera], blocks.cameras[o.camera], x_cam,
+                columns_.cameras[o.camera], D);
     if (o.sensor >= 0) {
       const PlacedPose& sensor = sensors[o.sensor];
       D_rig = D_rig * sensor.transform.rotation;

@@ -22,6 +22,7 @@ struct Component {
   std::vector<size_t> sensors;
   std::vector<size_t> points;
   bool has_fixed_scale = false;
+  bool is_held = false;  // something in it is fixed
 };
 
 std::vector<Component> FindComponents(const AdjustmentBlocks& blocks,
@@ -53,11 +54,14 @@ std::vector<Component> FindComponents(const AdjustmentBlocks& blocks,
     Component& component = components[nodes.Find(node)];
     if (node < num_frames) {
       component.frames.push_back(node);
+      component.is_held = component.is_held || blocks.frame_is_fixed[node];
       component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
     } else if (node < num_frames + num_sensors) {
       component.sensors.push_back(node - num_frames);
     } else {
-      component.points.push_back(node - num_frames - num_sensors);
+      const size_t point = node - num_frames - num_sensors;
+      component.points.push_back(point);
+      component.is_held = component.is_held || blocks.point_is_fixed[point];
     }
   }
   std::vector<Component> list;
@@ -126,6 +130,7 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
   const bool keep_rotation = options.constant_rig_from_world_rotation;
   for (const Component& component :
        FindComponents(before, options.refine_sensor_from_rig)) {
+    if (component.is_held) continue;
     const CenterStatistics old_centers =
         Summarize(before.frames, component.frames);
     const CenterStatistics new_centers =

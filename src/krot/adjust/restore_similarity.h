@@ -11,7 +11,8 @@ namespace krot {
 // distance to it, and the mean of its rotations. No error changes but by
 // rounding. The scale stays where a constant sensor_from_rig with a translation
 // fixes it, the rotation where rotations are constant; nothing is done where
-// frames or points are. O(observations).
+// frames or points are, or to a component in which any must not move.
+// O(observations).
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before, AdjustmentBlocks* after);
 

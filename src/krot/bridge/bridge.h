@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 #include "krot/problem/known_rotation_problem.h"
 
@@ -19,9 +20,11 @@ enum class LeftOut {
   kShortTrack,    // fewer than min_track_length usable observations
   kNoPose,        // the image has no frame or no finite translation
   kSameImage,     // its track has a closer one of the same image
+  kFixed,         // neither its image nor its point may move
 };
-inline constexpr int kNumLeftOutReasons = 6;
-// "behind", "undistortion", "off_axis", "short_track", "no_pose", "same_image".
+inline constexpr int kNumLeftOutReasons = 7;
+// "behind", "undistortion", "off_axis", "short_track", "no_pose", "same_image",
+// "fixed".
 const char* LeftOutName(LeftOut reason);
 
 // What becomes of several observations of one image in the same track, of
@@ -41,6 +44,7 @@ struct BuildProblemOptions {
   // unknown. No start then: `start` is what the model says, whatever that is.
   bool ignore_translations = false;
   SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
+  FixedParts fixed = {};                    // what must not move, of that model
 };
 
 // The problem, its start, and where each unknown lives in the model. All stand
@@ -68,13 +72,16 @@ struct BuiltProblem {
 // frames and points that have any. Every image of such a frame is a view,
 // whether or not it sees a point, so that the gauge knows all cameras.
 //
+// What options.fixed marks stands still in the problem, and a fixed point is
+// part of it for one usable observation.
+//
 // An observation is left out for the first of these reasons: its image has no
-// pose; its point does not project and its pixel has no trustworthy ray
-// (PixelBearing); it does not see its point, and re-triangulating that from all
-// its rays does not bring it into sight of all (then the fewest are left out);
-// options.same_image prefers another of its image and track; its point has too
-// few usable observations. Rows are taken where the points
-// project (RowAtProjection).
+// pose; neither that nor its point may move; its point does not project and its
+// pixel has no trustworthy ray (PixelBearing); it does not see its point, and
+// re-triangulating that from all its rays does not bring it into sight of all
+// (then the fewest are left out); options.same_image prefers another of its
+// image and track; its point has too few usable observations. Rows are taken
+// where the points project (RowAtProjection).
 //
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for bad
 // options. A problem without observations is no error. O(observations

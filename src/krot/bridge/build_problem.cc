@@ -89,9 +89,12 @@ std::optional<Eigen::Matrix3d> RowAtPixel(const Sources& sources,
 // Fills the slots with the observations that have a pose and a row: where the
 // point projects or, if it does not or must not count, at the pixel's ray. All
 // that have a ray are taken there if one does not see the point.
-int CollectRows(const Sources& sources, int32_t point, bool only_rays,
-                Slots slots, LeftOutCounts* left_out) {
+int CollectRows(const Sources& sources, int32_t point,
+                const BuildProblemOptions& options, Slots slots,
+                LeftOutCounts* left_out) {
   const Point3D& point3D = sources.model.points3D[point];
+  const bool only_rays = options.ignore_translations;
+  const bool is_fixed = options.fixed.HasPoint(point);
   int num_kept = 0;
   bool is_seen_by_all = true;
   for (uint64_t e = point3D.track_begin; e < point3D.track_end; ++e) {
@@ -100,6 +103,10 @@ int CollectRows(const Sources& sources, int32_t point, bool only_rays,
     const ImageGeometry& geometry = sources.geometries[image];
     if (!geometry.has_pose) {
       ++(*left_out)[static_cast<size_t>(LeftOut::kNoPose)];
+      continue;
+    }
+    if (is_fixed && options.fixed.HasFrame(geometry.frame)) {
+      ++(*left_out)[static_cast<size_t>(LeftOut::kFixed)];
       continue;
     }
     const Point2D& point2D =
@@ -160,8 +167,8 @@ void KeepClosest(const Sources& sources, const Vector3d& xyz, Slots slots,
 void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
                   Slots slots, PointOutcome* outcome, LeftOutCounts* left_out) {
   const int32_t point = outcome->index;
-  const int num_rays =
-      CollectRows(sources, point, options.ignore_translations, slots, left_out);
+  const bool is_fixed = options.fixed.HasPoint(point);
+  const int num_rays = CollectRows(sources, point, options, slots, left_out);
   const Vector3d& xyz = sources.model.points3D[point].xyz;
   outcome->has_image_twice = HasImageTwice(slots.observations, num_rays);
   if (options.ignore_translations) {
@@ -173,8 +180,11 @@ void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
                         slots.pixels[i], position)
           .has_value();
     };
-    outcome->point = RepairPoint(sources.geometries, slots.observations,
-                                 num_rays, xyz, is_seen);
+    outcome->point = {xyz, /*is_retriangulated=*/false};
+    if (!is_fixed) {
+      outcome->point = RepairPoint(sources.geometries, slots.observations,
+                                   num_rays, xyz, is_seen);
+    }
     outcome->num_kept =
         RemoveBehind(sources, outcome->point.xyz, num_rays, slots);
     (*left_out)[static_cast<size_t>(LeftOut::kBehind)] +=
@@ -184,7 +194,7 @@ void ProcessPoint(const Sources& sources, const BuildProblemOptions& options,
                   left_out);
     }
   }
-  if (outcome->num_kept < options.min_track_length) {
+  if (!is_fixed && outcome->num_kept < options.min_track_length) {
     (*left_out)[static_cast<size_t>(LeftOut::kShortTrack)] += outcome->num_kept;
     outcome->num_kept = 0;
   }
@@ -273,6 +283,7 @@ BuiltProblem BuildProblem(const Model& model,
   BuiltProblem built;
   Compact(ProcessPoints(sources, options, &built), &built);
   AddFramesAndViews(model, sources.geometries, &built);
+  FixPositions(options.fixed, &built);
   IndexObservations(&built.problem);
   return built;
 }

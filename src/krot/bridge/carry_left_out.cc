@@ -60,7 +60,8 @@ class TrackError {
 
 void CarryLeftOutPoints(const Model& before,
                         const std::vector<double>& errors_px, Norm norm,
-                        const BuiltProblem& built, double level, Model* after) {
+                        const BuiltProblem& built, const FixedParts& fixed,
+                        double level, Model* after) {
   std::vector<char> is_in(before.points3D.size(), 0);
   for (const int32_t k : built.point_of) is_in[k] = 1;
   if (std::count(is_in.begin(), is_in.end(), 0) == 0) return;
@@ -68,7 +69,7 @@ void CarryLeftOutPoints(const Model& before,
   const TrackError error_before(before, errors_px, norm);
   const TrackError error_after(*after, errors_px, norm);
   for (size_t k = 0; k < is_in.size(); ++k) {
-    if (is_in[k]) continue;
+    if (is_in[k] || fixed.HasPoint(static_cast<int32_t>(k))) continue;
     Point3D& point = after->points3D[k];
     const Vector3d& start = before.points3D[k].xyz;
     const double allowed =

@@ -12,11 +12,12 @@ namespace krot {
 // moved: where the largest error of such a point, finite before, has risen
 // above both its own old one and `level`, pixels, the point moves along with
 // the image, of those of its track, that serves it best, and stays where it is
-// if none does. A point of one observation keeps its error exactly to rounding.
-// `errors_px` are PixelErrors of `before` in the norm.
+// if none does. What is fixed stays. A point of one observation keeps its error
+// exactly to rounding. `errors_px` are PixelErrors of `before` in the norm.
 // O(observations of such points).
 void CarryLeftOutPoints(const Model& before,
                         const std::vector<double>& errors_px, Norm norm,
-                        const BuiltProblem& built, double level, Model* after);
+                        const BuiltProblem& built, const FixedParts& fixed,
+                        double level, Model* after);
 
 }  // namespace krot

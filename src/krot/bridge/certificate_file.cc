@@ -1,6 +1,7 @@
 #include "krot/bridge/certificate_file.h"
 
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "krot/bridge/certificate_json.h"
@@ -32,6 +33,8 @@ CertificateFile ReadCertificate(const JsonReader& reader, const Json& json) {
   file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
   file.observations =
       reader.ReadSupport(member("observations"), file.version, "observations");
+  const auto fixed = json.find("fixed");
+  if (fixed != json.end()) reader.ReadFixed(*fixed, &file);
   return file;
 }
 
@@ -58,6 +61,34 @@ std::vector<CertificateFile::SupportObservation> DescribeSupport(
   return support;
 }
 
+namespace {
+
+// What of the support does not move.
+void DescribeFixed(const Model& model, const BuiltProblem& built,
+                   const PixelCertificate& certificate, CertificateFile* file) {
+  const KnownRotationProblem& problem = built.problem;
+  std::set<int32_t> frames;
+  std::set<int32_t> points;
+  for (const CertifiedObservation& certified : certificate.rows.observations) {
+    const Observation& observation =
+        problem.observations[certified.observation];
+    const int32_t frame = problem.views[observation.view].frame;
+    if (problem.IsFixedFrame(frame) && frames.insert(frame).second) {
+      file->fixed_images.push_back(
+          {model.images[built.image_of[observation.view]].id,
+           *problem.fixed_translations[frame]});
+    }
+    if (problem.IsFixedPoint(observation.point) &&
+        points.insert(observation.point).second) {
+      file->fixed_points.push_back(
+          {model.points3D[built.point_of[observation.point]].id,
+           *problem.fixed_points[observation.point]});
+    }
+  }
+}
+
+}  // namespace
+
 CertificateFile DescribeCertificate(const Model& model,
                                     const BuiltProblem& built, Norm norm,
                                     const PixelCertificate& certificate) {
@@ -68,6 +99,7 @@ CertificateFile DescribeCertificate(const Model& model,
   file.defect = certificate.rows.defect;
   file.model_sha256 = ModelSha256(model);
   file.observations = DescribeSupport(model, built, certificate);
+  DescribeFixed(model, built, certificate, &file);
   return file;
 }
 
@@ -78,6 +110,9 @@ std::string CertificateJson(const CertificateFile& file) {
   if (file.version != 1) json["rows_bound"] = file.rows_bound;
   json["defect"] = file.defect;
   json["model_sha256"] = file.model_sha256;
+  if (!file.fixed_images.empty() || !file.fixed_points.empty()) {
+    json["fixed"] = FixedJson(file);
+  }
   json["observations"] = SupportJson(file.observations, file.version);
   return json.dump(1) + "\n";
 }

@@ -35,6 +35,16 @@ struct CertificateFile {
     Eigen::Vector2d y = Eigen::Vector2d::Zero();
   };
 
+  // What must not move, and where it stands: its position is part of the proof.
+  struct FixedImage {
+    ImageId image_id = 0;
+    Eigen::Vector3d translation;  // rig_from_world, of its frame
+  };
+  struct FixedPoint {
+    Point3DId point3D_id = 0;
+    Eigen::Vector3d xyz;
+  };
+
   int version = kCertificateVersion;
   Norm norm;
   double lower_bound = 0;  // true pixels; version 1: of the rows
@@ -42,6 +52,9 @@ struct CertificateFile {
   double defect = 0;       // of the rows' identities, relative
   std::string model_sha256;
   std::vector<SupportObservation> observations;
+  // Of the support; the first image of a frame.
+  std::vector<FixedImage> fixed_images;
+  std::vector<FixedPoint> fixed_points;
 };
 
 // Its support in terms of the model's ids; `certificate` must be one of

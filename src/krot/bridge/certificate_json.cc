@@ -40,13 +40,7 @@ CertificateFile::SupportObservation ReadObservation(const JsonReader& reader,
   if (version == 1) {
     ReadRow(reader, member("u"), member("J"), place, &o);
   } else {
-    const Json& bearing = member("bearing");
-    if (!bearing.is_array() || bearing.size() != 3) {
-      reader.Fail(place + ".bearing", bearing, "an array of three numbers");
-    }
-    for (int k = 0; k < 3; ++k) {
-      o.bearing[k] = reader.Number(bearing[k], place + ".bearing");
-    }
+    o.bearing = reader.Triple(member("bearing"), place + ".bearing");
   }
   o.lambda = reader.Number(member("lambda"), place + ".lambda");
   o.y = reader.Pair(member("y"), place + ".y");
@@ -101,6 +95,15 @@ const Json& JsonReader::Array(const Json& value,
   return value;
 }
 
+Eigen::Vector3d JsonReader::Triple(const Json& value,
+                                   const std::string& place) const {
+  if (!value.is_array() || value.size() != 3) {
+    Fail(place, value, "an array of three numbers");
+  }
+  return {Number(value[0], place), Number(value[1], place),
+          Number(value[2], place)};
+}
+
 Eigen::Vector2d JsonReader::Pair(const Json& value,
                                  const std::string& place) const {
   if (!value.is_array() || value.size() != 2) {
@@ -126,6 +129,45 @@ std::vector<CertificateFile::SupportObservation> JsonReader::ReadSupport(
                                       place + "[" + std::to_string(n) + "]"));
   }
   return support;
+}
+
+void JsonReader::ReadFixed(const Json& fixed, CertificateFile* file) const {
+  const Json& images = Array(Member(fixed, "fixed", "images"), "fixed.images");
+  for (size_t n = 0; n < images.size(); ++n) {
+    const std::string place = "fixed.images[" + std::to_string(n) + "]";
+    file->fixed_images.push_back(
+        {static_cast<ImageId>(Id(Member(images[n], place, "image_id"),
+                                 place + ".image_id",
+                                 std::numeric_limits<ImageId>::max())),
+         Triple(Member(images[n], place, "translation"),
+                place + ".translation")});
+  }
+  const Json& points =
+      Array(Member(fixed, "fixed", "points3D"), "fixed.points3D");
+  for (size_t n = 0; n < points.size(); ++n) {
+    const std::string place = "fixed.points3D[" + std::to_string(n) + "]";
+    file->fixed_points.push_back(
+        {Id(Member(points[n], place, "point3D_id"), place + ".point3D_id",
+            std::numeric_limits<Point3DId>::max()),
+         Triple(Member(points[n], place, "xyz"), place + ".xyz")});
+  }
+}
+
+CertificateFileJson FixedJson(const CertificateFile& file) {
+  const auto triple = [](const Eigen::Vector3d& x) -> Json {
+    return {x[0], x[1], x[2]};
+  };
+  Json images = Json::array();
+  for (const CertificateFile::FixedImage& image : file.fixed_images) {
+    images.push_back({{"image_id", image.image_id},
+                      {"translation", triple(image.translation)}});
+  }
+  Json points = Json::array();
+  for (const CertificateFile::FixedPoint& point : file.fixed_points) {
+    points.push_back(
+        {{"point3D_id", point.point3D_id}, {"xyz", triple(point.xyz)}});
+  }
+  return {{"images", images}, {"points3D", points}};
 }
 
 CertificateFileJson NormJson(Norm norm) {

@@ -32,17 +32,21 @@ class JsonReader {
               uint64_t largest) const;
   std::string String(const Json& value, const std::string& place) const;
   const Json& Array(const Json& value, const std::string& place) const;
+  Eigen::Vector3d Triple(const Json& value, const std::string& place) const;
   Eigen::Vector2d Pair(const Json& value, const std::string& place) const;
   Norm ReadNorm(const Json& value) const;
   // The support of a certificate of a version.
   std::vector<CertificateFile::SupportObservation> ReadSupport(
       const Json& observations, int version, const std::string& place) const;
+  // Fills in what does not move.
+  void ReadFixed(const Json& fixed, CertificateFile* file) const;
 
  private:
   const std::string file_name_;
 };
 
 CertificateFileJson NormJson(Norm norm);
+CertificateFileJson FixedJson(const CertificateFile& file);
 CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& observations,
     int version);

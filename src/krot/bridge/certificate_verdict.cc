@@ -4,11 +4,15 @@
 #include <map>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/camera_model.h"
+#include "krot/model/id_index.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/local_frame.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -54,6 +58,47 @@ std::string RefusalOfUnused(const CertificateFile::SupportObservation& o,
              ? NameOf(o) + " is not of point " + std::to_string(o.point3D_id) +
                    " in the model"
              : NameOf(o) + " is not among those that can be used";
+}
+
+// The parts of the model that the certificate says do not move; refuses if they
+// are elsewhere in the model.
+struct FixedClaim {
+  FixedParts parts;
+  std::string refusal;
+};
+
+FixedClaim FindFixed(const Model& model, const CertificateFile& file) {
+  FixedClaim claim;
+  if (!file.fixed_images.empty()) {
+    claim.parts.frames.assign(model.frames.size(), 0);
+  }
+  if (!file.fixed_points.empty()) {
+    claim.parts.points3D.assign(model.points3D.size(), 0);
+  }
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const IdIndex<ImageId> image_index(model.images);
+  for (const CertificateFile::FixedImage& fixed : file.fixed_images) {
+    const std::optional<int32_t> image = image_index.Find(fixed.image_id);
+    const int32_t frame = image ? geometries[*image].frame : -1;
+    if (frame < 0 ||
+        model.frames[frame].rig_from_world.translation != fixed.translation) {
+      claim.refusal = "image " + std::to_string(fixed.image_id) +
+                      " is not where the certificate takes it to be fixed";
+      return claim;
+    }
+    claim.parts.frames[frame] = 1;
+  }
+  const IdIndex<Point3DId> point_index(model.points3D);
+  for (const CertificateFile::FixedPoint& fixed : file.fixed_points) {
+    const std::optional<int32_t> point = point_index.Find(fixed.point3D_id);
+    if (!point || model.points3D[*point].xyz != fixed.xyz) {
+      claim.refusal = "point " + std::to_string(fixed.point3D_id) +
+                      " is not where the certificate takes it to be fixed";
+      return claim;
+    }
+    claim.parts.points3D[*point] = 1;
+  }
+  return claim;
 }
 
 // The certificate in terms of the problem, into which the rows of a file of
@@ -107,21 +152,31 @@ Translation Translate(const Model& model, const CertificateFile& file,
 
 }  // namespace
 
-CertificateVerdict VerifyCertificateFile(const Model& model,
+CertificateVerdict VerifyCertificateFile(const Model& original,
                                          const CertificateFile& file) {
   CertificateVerdict verdict;
-  if (file.model_sha256 != ModelSha256(model)) {
+  if (file.model_sha256 != ModelSha256(original)) {
     verdict.refusal =
         "it belongs to another model: cameras, rotations or observations "
         "differ";
     return verdict;
   }
-  BuiltProblem built = BuildProblem(model, {});
+  FixedClaim fixed = FindFixed(original, file);
+  verdict.refusal = fixed.refusal;
+  if (!verdict.refusal.empty()) return verdict;
+  const LocalFrame frame(original, fixed.parts);
+  std::optional<Model> local;
+  if (!frame.IsModels()) local = frame.ToLocal(original);
+  const Model& model = local ? *local : original;
+  verdict.num_fixed_images = static_cast<int64_t>(file.fixed_images.size());
+  verdict.num_fixed_points = static_cast<int64_t>(file.fixed_points.size());
+  BuildProblemOptions build;
+  build.fixed = std::move(fixed.parts);
+  BuiltProblem built = BuildProblem(model, build);
   Translation translation = Translate(model, file, &built);
   if (translation.is_unseen) {
-    BuildProblemOptions rays_alone;
-    rays_alone.ignore_translations = true;
-    built = BuildProblem(model, rays_alone);
+    build.ignore_translations = true;
+    built = BuildProblem(model, build);
     translation = Translate(model, file, &built);
   }
   verdict.refusal = translation.refusal;

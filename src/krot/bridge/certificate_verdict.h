@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct CertificateVerdict {
   std::optional<double> relative_gap;  // (cost - lower_bound) / cost
   // Version 1: the bound is one of rows linearised at the observations.
   bool is_linearised = false;
+  // Of those whose positions it takes as fixed.
+  int64_t num_fixed_images = 0;
+  int64_t num_fixed_points = 0;
   double defect = 0;  // what rounding takes from the stated bound
   std::vector<SupportObservation> support;  // worst first
 };
@@ -32,7 +36,8 @@ struct CertificateVerdict {
 // the model to 1e-9, and CheckCertificate accepts the multipliers for the rows
 // of the file's u and J. Translations and points do not enter into that:
 // where they keep BuildProblem from using an observation of the certificate,
-// it ignores them. Requires a valid model; throws what BuildProblem does.
+// it ignores them. But what the file takes as fixed has to stand where it says,
+// to the bit. Requires a valid model; throws what BuildProblem does.
 // O(observations), and the check.
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);

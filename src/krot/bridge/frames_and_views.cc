@@ -1,5 +1,8 @@
 #include "krot/bridge/frames_and_views.h"
 
+#include <optional>
+#include <vector>
+
 #include "krot/bridge/order_of_ids.h"
 
 namespace krot {
@@ -34,6 +37,24 @@ void AddFramesAndViews(const Model& model,
   for (Observation& observation : problem.observations) {
     observation.view = view_index[observation.view];
   }
+}
+
+void FixPositions(const FixedParts& fixed, BuiltProblem* built) {
+  KnownRotationProblem& problem = built->problem;
+  const auto fix = [](const std::vector<char>& marks,
+                      const std::vector<int32_t>& index_of,
+                      const std::vector<Eigen::Vector3d>& start,
+                      std::vector<std::optional<Eigen::Vector3d>>* positions) {
+    if (marks.empty()) return;
+    positions->resize(index_of.size());
+    for (size_t n = 0; n < index_of.size(); ++n) {
+      if (marks[index_of[n]]) (*positions)[n] = start[n];
+    }
+  };
+  fix(fixed.frames, built->frame_of, built->start.translations,
+      &problem.fixed_translations);
+  fix(fixed.points3D, built->point_of, built->start.points,
+      &problem.fixed_points);
 }
 
 }  // namespace krot

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
+#include "krot/model/fixed_parts.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -13,5 +14,8 @@ namespace krot {
 void AddFramesAndViews(const Model& model,
                        const std::vector<ImageGeometry>& geometries,
                        BuiltProblem* built);
+
+// Fixes what is marked of the model where the problem starts.
+void FixPositions(const FixedParts& fixed, BuiltProblem* built);
 
 }  // namespace krot

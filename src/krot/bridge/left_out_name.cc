@@ -16,6 +16,8 @@ const char* LeftOutName(LeftOut reason) {
       return "no_pose";
     case LeftOut::kSameImage:
       return "same_image";
+    case LeftOut::kFixed:
+      return "fixed";
   }
   return "unknown";
 }

@@ -14,6 +14,11 @@ struct BlockStructure {
   std::vector<int64_t> point_begin;  // num_points + 1
   std::vector<int32_t> frame_of;     // per observation
   std::vector<char> frame_is_fixed;  // per frame: it has no columns
+  std::vector<char> point_is_fixed;  // per point, likewise; empty: none is
+
+  bool IsFixedPoint(int64_t k) const {
+    return !point_is_fixed.empty() && point_is_fixed[k] != 0;
+  }
 
   int64_t num_points() const {
     return static_cast<int64_t>(point_begin.size()) - 1;
@@ -24,9 +29,14 @@ struct BlockStructure {
   }
 };
 
-// That of a problem, with the translation's gauge: of each connected component
-// the frame with the most observations is fixed, and so is one without any.
+// That of a problem: what it fixes is, and for the translation's gauge, of each
+// connected component in which it fixes nothing, the frame with the most
+// observations. So is a frame without any.
 BlockStructure AnchoredStructure(const KnownRotationProblem& problem);
+
+// Per point, the places of its observations among them, in the order of their
+// frames.
+std::vector<int32_t> OrderByFrame(const BlockStructure& structure);
 
 // A vector with the structure of the unknowns.
 struct BlockVector {

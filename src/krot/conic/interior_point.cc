@@ -7,6 +7,7 @@
 #include "krot/base/check.h"
 #include "krot/conic/conic_solver.h"
 #include "krot/minimax/residual.h"
+#include "krot/problem/fixed.h"
 
 namespace krot {
 namespace {
@@ -78,9 +79,7 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
   program.kind = ConeProgram::Kind::kFeasibility;
   program.bound = bound;
   program.unit_depth = unit_depth;
-  Estimate origin;
-  origin.translations.assign(problem.num_frames, Eigen::Vector3d::Zero());
-  origin.points.assign(problem.num_points, Eigen::Vector3d::Zero());
+  const Estimate origin = AllAtOrigin(problem);
   // The least tau that leaves every cone at the origin, and a margin: the
   // origin's depths and v vanish but for the baselines.
   double scalar = 1;

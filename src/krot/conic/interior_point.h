@@ -75,9 +75,9 @@ InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
 //
 // from scratch: `*estimate` is only written, and only if one is found
 // (kFeasible). Otherwise the multipliers converge to a proof that there is
-// none. `stop` sees tau as gamma. With metric baselines the depth of 1 is
-// replaced by `unit_depth`, scene units, which must be small against the
-// scene.
+// none. `stop` sees tau as gamma. With metric baselines, or fixed positions,
+// the depth of 1 is replaced by `unit_depth`, scene units, which must be small
+// against the scene.
 InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   const InteriorPointOptions& options,
                                   const Context& context, double bound,

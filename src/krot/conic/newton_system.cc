@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 
+#include "krot/problem/fixed.h"
 
 namespace krot {
 namespace {
@@ -33,7 +34,7 @@ NewtonSystem<Cone>::NewtonSystem(const KnownRotationProblem& problem,
     : problem_(problem),
       program_(program),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
-      has_free_scale_(program.IsCost() && !HasBaseline(problem)),
+      has_free_scale_(program.IsCost() && IsScaleFree(problem)),
       structure_(AnchoredStructure(problem)),
       T_(ConeMap<kDim>(norm)),
       elimination_(structure_, num_threads),

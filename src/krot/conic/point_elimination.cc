@@ -39,29 +39,20 @@ PointElimination<kRows>::PointElimination(const BlockStructure& structure,
       point_rows_(structure.num_observations() * kBlock),
       frame_rows_(structure.num_observations() * kBlock),
       Q_(structure.num_observations() * kBlock),
-      R_(structure.num_points()) {
-  order_.reserve(structure.num_observations());
-  for (int64_t k = 0; k < structure.num_points(); ++k) {
-    const int64_t begin = structure.point_begin[k];
-    const int64_t end = structure.point_begin[k + 1];
-    for (int64_t i = begin; i < end; ++i) {
-      order_.push_back(static_cast<int32_t>(i - begin));
-    }
-    std::sort(order_.begin() + begin, order_.end(), [&](int32_t a, int32_t b) {
-      const int32_t frame_a = structure.frame_of[begin + a];
-      const int32_t frame_b = structure.frame_of[begin + b];
-      return frame_a != frame_b ? frame_a < frame_b : a < b;
-    });
-  }
-}
+      R_(structure.num_points()),
+      order_(OrderByFrame(structure)) {}
 
 template <int kRows>
 void PointElimination<kRows>::OrthogonalizePoint(int64_t k) {
   const int64_t begin = structure_.point_begin[k];
   const int64_t end = structure_.point_begin[k + 1];
   double* Q = Q_.data() + begin * kBlock;
-  std::copy(point_rows_.data() + begin * kBlock,
-            point_rows_.data() + end * kBlock, Q);
+  if (structure_.IsFixedPoint(k)) {
+    std::fill(Q, Q + (end - begin) * kBlock, 0.0);  // all free: x is 0
+  } else {
+    std::copy(point_rows_.data() + begin * kBlock,
+              point_rows_.data() + end * kBlock, Q);
+  }
   R_[k] = Orthogonalize((end - begin) * kRows, Q);
 }
 

@@ -39,6 +39,9 @@ namespace krot {
 // determines the point, |Q_a|^2 > 1/2. As |Q|^2 = 3, these are fewer than six,
 // and there (I - Q Q') A_t is formed first.
 //
+// A fixed point has no columns: its part of A_s counts as 0, and its part of x
+// is 0.
+//
 // Fill point_rows and frame_rows; Factorize; then Solve and Multiply as often
 // as need be, until the rows are filled anew.
 template <int kRows>  // per observation: 3 or 4

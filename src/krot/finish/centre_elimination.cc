@@ -50,21 +50,8 @@ CentreElimination::CentreElimination(const BlockStructure& structure,
       fine_parts_(structure.point_begin, kFineParts),
       rows_(structure.num_observations() * 9),
       Q_(rows_.size()),
-      R_(structure.num_points()) {
-  order_.reserve(structure.num_observations());
-  for (int64_t k = 0; k < structure.num_points(); ++k) {
-    const int64_t begin = structure.point_begin[k];
-    const int64_t end = structure.point_begin[k + 1];
-    for (int64_t i = begin; i < end; ++i) {
-      order_.push_back(static_cast<int32_t>(i - begin));
-    }
-    std::sort(order_.begin() + begin, order_.end(), [&](int32_t a, int32_t b) {
-      const int32_t frame_a = structure.frame_of[begin + a];
-      const int32_t frame_b = structure.frame_of[begin + b];
-      return frame_a != frame_b ? frame_a < frame_b : a < b;
-    });
-  }
-}
+      R_(structure.num_points()),
+      order_(OrderByFrame(structure)) {}
 
 // Sets Q and R, too.
 void CentreElimination::FindSightings(int64_t k, Sightings* sightings) {
@@ -77,7 +64,11 @@ void CentreElimination::FindSightings(int64_t k, Sightings* sightings) {
   s.high.clear();
   s.fixed_G.setZero();
   for (std::vector<double>& row : s.G) row.resize(3 * m);
-  std::copy_n(rows_.data() + 9 * begin, 9 * m, Q_.data() + 9 * begin);
+  if (structure_.IsFixedPoint(k)) {
+    std::fill_n(Q_.data() + 9 * begin, 9 * m, 0.0);  // all free: s is 0
+  } else {
+    std::copy_n(rows_.data() + 9 * begin, 9 * m, Q_.data() + 9 * begin);
+  }
   R_[k] = Orthogonalize(3 * m, Q_.data() + 9 * begin);
   for (int64_t n = begin; n < begin + m;) {
     const int32_t frame = structure_.frame_of[begin + order_[n]];

@@ -29,7 +29,8 @@ namespace krot {
 // filled anew.
 class CentreElimination {
  public:
-  // Keeps a reference to `structure`, whose fixed frames have c_f = 0.
+  // Keeps a reference to `structure`, of which what is fixed has c_f = 0, s =
+  // 0.
   CentreElimination(const BlockStructure& structure, int num_threads);
 
   // B_i, row-major.

@@ -4,17 +4,18 @@
 #include <vector>
 
 #include "krot/problem/cost.h"
+#include "krot/problem/fixed.h"
 
 namespace krot {
 namespace {
 
-// Of the longest baseline: a depth that is small against the scene. Without
-// baselines there is no scale, and any depth will do.
+// Of the longest baseline or distance of fixed positions: a depth that is small
+// against the scene. Without either there is no scale, and any depth will do.
 constexpr double kUnitDepthPerBaseline = 1e-2;
 constexpr double kShare = 0.25;
 
 double UnitDepth(const KnownRotationProblem& problem) {
-  double longest = 0;
+  double longest = FixedExtent(problem);
   for (const View& view : problem.views) {
     longest = std::max(longest, view.cam_from_rig_translation.norm());
   }

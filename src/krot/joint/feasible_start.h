@@ -15,7 +15,8 @@ struct FeasibleStartOptions {
   Norm norm;
   int max_iterations = 200;  // >= 1
   // A depth that is small against the scene, scene units; it only shapes the
-  // way. None: a share of the longest baseline, or 1 where the scale is free.
+  // way. None: a share of the longest baseline or distance
+  // of fixed positions, or 1 where the scale is free.
   std::optional<double> unit_depth;
   // Nothing below this is sought, pixels.
   double known_bound = 0;

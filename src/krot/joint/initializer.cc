@@ -8,6 +8,7 @@
 #include "krot/joint/joint.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/fixed.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
@@ -164,7 +165,9 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
     if (summary.termination != InitializerTermination::kFeasible) {
       return summary;
     }
-    if (!HasBaseline(part.problem())) NormalizeScale(part.problem(), &start);
+    if (!HasBaseline(part.problem()) && !HasFixed(part.problem())) {
+      NormalizeScale(part.problem(), &start);
+    }
     part.Replace(start, &found);
   }
   summary.termination = InitializerTermination::kFeasible;

@@ -41,8 +41,9 @@ struct InitializerSummary {
 // Finds an estimate whose residuals are all below max_error, and as far below
 // as comes easily, each connected component for itself; `*estimate` is only
 // written if there is one, its points and frames without observations not even
-// then. Where baselines do not set the scale, components come out with a median
-// depth of one. Throws std::invalid_argument for options out of range.
+// then. Where nothing is fixed and baselines do not set the scale, components
+// come out with a median depth of one. Throws std::invalid_argument for options
+// out of range.
 InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
                              const Context& context, Estimate* estimate);

@@ -55,6 +55,20 @@ class TextReader {
     return word;
   }
 
+  // The last word of the line, which the line then lacks.
+  std::string_view LastWord(const char* what) {
+    TrimEnd();
+    if (AtEnd()) Fail("the end of the line", what);
+    size_t length = 0;
+    while (length < line_.size() &&
+           !IsBlank(line_[line_.size() - 1 - length])) {
+      ++length;
+    }
+    const std::string_view word = line_.substr(line_.size() - length);
+    line_.remove_suffix(length);
+    return word;
+  }
+
   // The next word as a number; exact for what std::to_chars or 17 digits
   // wrote. Throws if it is none or out of range of T.
   template <typename T>
@@ -67,7 +81,7 @@ class TextReader {
 
   // The rest of the line without the blanks at its ends.
   std::string_view Rest() {
-    while (!line_.empty() && IsBlank(line_.back())) line_.remove_suffix(1);
+    TrimEnd();
     return std::exchange(line_, {});
   }
 
@@ -76,6 +90,9 @@ class TextReader {
     Fail("\"" + std::string(Word(after)) + "\"",
          std::string("the end of the line after ") + after);
   }
+
+  // Of the current line, from 1.
+  size_t line_number() const { return line_number_; }
 
   // "images.txt:12: found ..., expected ...".
   [[noreturn]] void Fail(const std::string& found,
@@ -99,6 +116,10 @@ class TextReader {
 
  private:
   static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+  void TrimEnd() {
+    while (!line_.empty() && IsBlank(line_.back())) line_.remove_suffix(1);
+  }
 
   void SkipBlanks() {
     size_t count = 0;

@@ -34,8 +34,14 @@ void OptionTable::Add(Option option) { options_.push_back(std::move(option)); }
 
 void OptionTable::AddBool(const std::string& name, bool* value,
                           const std::string& description) {
-  Add({name, description, "{0, 1}", *value ? "1" : "0", false,
-       [value](const std::string& text) { return ParseBool(text, value); }});
+  Add({name,
+       description,
+       "{0, 1}",
+       *value ? "1" : "0",
+       false,
+       [value](const std::string& text) { return ParseBool(text, value); },
+       false,
+       {"0", "1"}});
 }
 
 void OptionTable::AddInteger(const std::string& name, int* value,
@@ -64,7 +70,8 @@ void OptionTable::AddChoice(const std::string& name, std::string* value,
          *value = text;
          return std::find(choices.begin(), choices.end(), text) !=
                 choices.end();
-       }});
+       },
+       false, choices});
 }
 
 void OptionTable::AddThreads(const std::string& name, int* value,

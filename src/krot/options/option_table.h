@@ -19,7 +19,8 @@ struct Option {
   std::string default_text;  // "" if there is none
   bool required = false;
   std::function<bool(const std::string& text)> parse;
-  bool repeatable = false;  // parse is called for every one
+  bool repeatable = false;                // parse is called for every one
+  std::vector<std::string> choices = {};  // all that it takes, if they are few
 };
 
 // What one argument, one line of a project file or one keyword says.
@@ -74,6 +75,8 @@ class OptionTable {
   // Every option with its range and default; 80 columns.
   std::string Help() const;
 
+  const std::string& command() const { return command_; }
+  const std::string& summary() const { return summary_; }
   const std::vector<Option>& options() const { return options_; }
 
  protected:
@@ -107,7 +110,8 @@ void OptionTable::AddNamed(
            return true;
          }
          return false;
-       }});
+       },
+       false, names});
 }
 
 }  // namespace krot

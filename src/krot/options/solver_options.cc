@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "krot/options/finish_options.h"
 #include "krot/options/solve_options.h"
@@ -88,6 +89,9 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     table.Refuse("Solver.finish_slack", why);
     table.Refuse("Problem.init_max_error",
                  "with --Solver.max_error, which needs no such start");
+    for (const char* name : {"fixed_images_path", "fixed_points_path"}) {
+      table.Refuse(name, "with --Solver.max_error, which moves everything");
+    }
   } else {
     table.Refuse("conflicts_path", "without --Solver.max_error");
   }

@@ -5,6 +5,7 @@
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
+#include "krot/model/local_frame.h"
 #include "krot/model/remove_observations.h"
 #include "krot/outliers/element_index.h"
 #include "krot/outliers/error_profile.h"
@@ -248,8 +249,8 @@ OutlierFilterResult OutlierFilter::Run() {
   RankSuspects(model_, is_removed_, conflict_of_, &summary_);
   if (options_.solve.polish != Polish::kNone && summary_.solve) {
     summary_.solve->polish =
-        PolishModel(options_.solve.polish, options_.solve.finish.loss, context_,
-                    &kept_.model);
+        PolishModel(options_.solve.polish, options_.solve.finish.loss,
+                    options_.solve.problem.fixed, context_, &kept_.model);
   }
   return {std::move(kept_.model), std::move(summary_)};
 }
@@ -266,7 +267,11 @@ OutlierFilterResult FilterOutliers(const Model& model,
       "make_profile", options.make_profile, "false with this method");
   CheckArgument(options.solve.norm.p == 2, "norm.p", options.solve.norm.p,
                 "2, that of pixel errors");
-  return OutlierFilter(model, options, context).Run();
+  CheckArgument(!options.solve.problem.fixed.Any(), "solve.problem.fixed",
+                "something", "empty: everything moves");
+  return InLocalFrame(model, {}, [&](const Model& local) {
+    return OutlierFilter(local, options, context).Run();
+  });
 }
 
 }  // namespace krot

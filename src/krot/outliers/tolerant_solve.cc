@@ -10,6 +10,7 @@ namespace {
 bool NeedsRemoval(const SolveModelOptions& options,
                   const SolveSummary& summary) {
   return summary.termination == SolveTermination::kNothingToSolve &&
+         !options.problem.fixed.Any() &&
          EffectiveMethod(options) == SolveMethod::kAuto && options.norm.p == 2;
 }
 

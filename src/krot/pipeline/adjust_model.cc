@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "krot/base/check.h"
+#include "krot/model/local_frame.h"
 
 namespace krot {
 namespace {
@@ -40,6 +41,7 @@ std::optional<Model> BoundedStart(const Model& model,
                      "for the lowest with these rotations");
   SolveModelOptions lowest = options.start;
   lowest.finish.finish = Finish::kNone;
+  lowest.problem.fixed = options.adjustment.fixed;
   SolveModelResult start = SolveModel(model, lowest, context);
   summary->pixel_error_start = start.summary.pixel_error_after;
   summary->start = std::move(start.summary);
@@ -59,15 +61,10 @@ std::optional<Model> BoundedStart(const Model& model,
   return std::move(start.model);
 }
 
-}  // namespace
-
-AdjustModelResult AdjustModel(const Model& model,
-                              const AdjustModelOptions& options,
-                              const Context& context) {
-  if (options.max_error_factor) {
-    CheckArgument(*options.max_error_factor > 1, "max_error_factor",
-                  *options.max_error_factor, "> 1");
-  }
+// AdjustModel in the coordinates of the model.
+AdjustModelResult AdjustInFrame(const Model& model,
+                                const AdjustModelOptions& options,
+                                const Context& context) {
   AdjustModelResult result;
   AdjustModelSummary& summary = result.summary;
   summary.pixel_error_before =
@@ -99,6 +96,20 @@ AdjustModelResult AdjustModel(const Model& model,
   UpdatePointErrors(errors_px, &result.model);
   summary.pixel_error_after = Summarize(errors_px);
   return result;
+}
+
+}  // namespace
+
+AdjustModelResult AdjustModel(const Model& model,
+                              const AdjustModelOptions& options,
+                              const Context& context) {
+  if (options.max_error_factor) {
+    CheckArgument(*options.max_error_factor > 1, "max_error_factor",
+                  *options.max_error_factor, "> 1");
+  }
+  return InLocalFrame(model, options.adjustment.fixed, [&](const Model& local) {
+    return AdjustInFrame(local, options, context);
+  });
 }
 
 }  // namespace krot

@@ -33,9 +33,11 @@ BundleAdjustmentOptions PolishOptions(Polish polish, const ErrorLoss& loss) {
 }  // namespace
 
 PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
-                          const Context& context, Model* model) {
-  BundleAdjustmentResult adjusted =
-      AdjustBundle(*model, PolishOptions(polish, loss), context);
+                          const FixedParts& fixed, const Context& context,
+                          Model* model) {
+  BundleAdjustmentOptions options = PolishOptions(polish, loss);
+  options.fixed = fixed;
+  BundleAdjustmentResult adjusted = AdjustBundle(*model, options, context);
   const std::vector<double> errors_px =
       PixelErrors(adjusted.model, context.num_threads);
   UpdatePointErrors(errors_px, &adjusted.model);

@@ -23,9 +23,11 @@ struct PolishSummary {
 };
 
 // Adjusts the model in place, by least squares or the least of a robust loss,
-// and updates its stored point errors. `polish` must not be kNone.
+// and updates its stored point errors; what is fixed stays. `polish` must not
+// be kNone.
 PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
-                          const Context& context, Model* model);
+                          const FixedParts& fixed, const Context& context,
+                          Model* model);
 
 // As --Solver.polish takes it: "none", "rotations_fixed", "full".
 const char* PolishName(Polish polish);

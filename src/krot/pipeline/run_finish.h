@@ -11,14 +11,14 @@ namespace krot {
 // that the options ask for:
 //
 //   least squares   of true errors, below a cap of (1 + slack) times the lowest
-//                   maximum, or max_error: `lower_bound` if the gap asked for is
-//                   reached, else the estimate's own; no error rises above the
-//                   start's largest
+//                   maximum, or max_error: `lower_bound` if the gap asked for
+//                   is reached, else the estimate's own; no error rises above
+//                   the start's largest
 //   sweeps          two, that do not raise the largest true error; they count
 //                   among the summary's
 //
-// Fills in SolveSummary::finish if least squares were found. The rows of `built`
-// are in the end those at `*estimate`.
+// Fills in SolveSummary::finish if least squares were found. The rows of
+// `built` are in the end those at `*estimate`.
 void RunFinish(const Model& model, const SolveModelOptions& options,
                std::optional<double> lower_bound, const Context& context,
                const Timer& timer, BuiltProblem* built, Estimate* estimate,

@@ -74,6 +74,8 @@ struct SolveSummary {
   int64_t num_points = 0;
   int64_t num_observations = 0;
   int32_t num_components = 0;
+  int64_t num_fixed_frames = 0;
+  int64_t num_fixed_points = 0;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
   int64_t num_same_image_tracks = 0;  // that hold an image more than once
@@ -170,7 +172,12 @@ struct SolveModelResult {
 // (mean, true pixels). Rotations, intrinsics, ids, names, tracks, colours, 2D
 // points and all orders stay; so do, per connected component, the centroid of
 // the camera centres and, unless a rig fixes it, their RMS distance to it,
-// where the model has finite ones.
+// where the model has finite ones. What options.problem.fixed marks keeps its
+// bits, and place and scale come from it.
+//
+// Models far from the origin are solved in a local frame
+// (krot/model/local_frame.h); costs and errors are those before the
+// coordinates are rounded to the model's own.
 //
 // kAuto takes a feasible start by itself where the model's own would leave out
 // observations (as behind or without a pose), has all centres in one place, or

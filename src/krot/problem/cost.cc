@@ -72,6 +72,18 @@ double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
   return cost;
 }
 
+double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
+                 Norm norm, int64_t frame) {
+  double cost = 0;
+  for (int64_t n = problem.frame_begin[frame];
+       n < problem.frame_begin[frame + 1]; ++n) {
+    const ViewedPoint viewed = ViewPoint(
+        problem, problem.observations[problem.frame_observations[n]], estimate);
+    cost = std::max(cost, ResidualOf(viewed, norm));
+  }
+  return cost;
+}
+
 bool AllDepthsPositive(const KnownRotationProblem& problem,
                        const Estimate& estimate, int num_threads) {
   const std::vector<AffineMap> cameras =

@@ -52,6 +52,10 @@ double ResidualAbove(double level, const KnownRotationProblem& problem,
 double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
                  Norm norm, int64_t point);
 
+// The same of a frame.
+double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
+                 Norm norm, int64_t frame);
+
 // max_i r_i in pixels [Zhang18, (KRot)]; 0 if there are no observations.
 // Throws std::invalid_argument unless p >= 1 and the estimate has one
 // translation per frame and one point per point. O(observations); the result

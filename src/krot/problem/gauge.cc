@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -151,6 +152,47 @@ struct Move {
   }
 };
 
+// What is fixed in a component.
+struct Hold {
+  std::optional<Vector3d> position;  // of the first; none: nothing is
+  bool coincides = true;             // all of it does
+
+  void Add(const Vector3d& x) {
+    if (!position) position = x;
+    coincides &= (x - *position).norm() <= kCoincident * position->norm();
+  }
+};
+
+std::vector<Hold> FindHolds(const KnownRotationProblem& problem,
+                            const std::vector<FrameGeometry>& frames,
+                            const Components& components) {
+  std::vector<Hold> holds(components.count);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    if (!problem.IsFixedFrame(f) || components.of_frame[f] < 0) continue;
+    holds[components.of_frame[f]].Add(
+        ProjectionCentre(frames[f], *problem.fixed_translations[f]));
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    if (!problem.IsFixedPoint(k) || components.of_point[k] < 0) continue;
+    holds[components.of_point[k]].Add(*problem.fixed_points[k]);
+  }
+  return holds;
+}
+
+// The scale alone, about what is fixed.
+Move ScaleAbout(const Vector3d& fixed, const Extent& reference,
+                const Extent& estimate) {
+  const bool use_points =
+      reference.CentresCoincide() || estimate.CentresCoincide();
+  const auto distance = [&](const Extent& extent) {  // RMS
+    const Spread& spread = use_points ? extent.points : extent.centres;
+    return std::hypot(spread.rms, (spread.centroid - fixed).norm());
+  };
+  Move move{fixed, fixed, distance(reference) / distance(estimate)};
+  if (!std::isfinite(move.scale) || !(move.scale > 0)) move.scale = 1;
+  return move;
+}
+
 Move MoveOnto(const Extent& reference, const Extent& estimate,
               bool scale_is_free) {
   const bool use_points =
@@ -190,14 +232,19 @@ void RestoreGauge(const KnownRotationProblem& problem,
       scale_is_free[components.of_frame[f]] = false;
     }
   }
+  const std::vector<Hold> holds = FindHolds(problem, frames, components);
   std::vector<Move> moves(components.count);
   for (int32_t c = 0; c < components.count; ++c) {
-    moves[c] = MoveOnto(wanted[c], found[c], scale_is_free[c]);
+    if (!holds[c].position) {
+      moves[c] = MoveOnto(wanted[c], found[c], scale_is_free[c]);
+    } else if (scale_is_free[c] && holds[c].coincides) {
+      moves[c] = ScaleAbout(*holds[c].position, wanted[c], found[c]);
+    }
   }
 
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     const int32_t component = components.of_frame[f];
-    if (component < 0) continue;
+    if (component < 0 || problem.IsFixedFrame(f)) continue;
     Vector3d& t = estimate->translations[f];
     const Vector3d shift =
         moves[component].Shift(ProjectionCentre(frames[f], t));
@@ -205,7 +252,7 @@ void RestoreGauge(const KnownRotationProblem& problem,
   }
   for (int32_t k = 0; k < problem.num_points; ++k) {
     const int32_t component = components.of_point[k];
-    if (component < 0) continue;
+    if (component < 0 || problem.IsFixedPoint(k)) continue;
     estimate->points[k] += moves[component].Shift(estimate->points[k]);
   }
 }

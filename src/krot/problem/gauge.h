@@ -11,7 +11,9 @@ namespace krot {
 //
 // Frame f moves as a whole: if its projection centre C_f shifts by d, then
 // t_f' = t_f - R_rw d. A component's scale is fixed as soon as one of its
-// frames sees points through two different projection centres.
+// frames sees points through two different projection centres. A component with
+// anything fixed keeps its place, and is free to be scaled about that alone,
+// if all that is fixed in it coincides.
 
 // Moves `estimate` onto the coordinate frame of `reference`, one component at
 // a time, so that the projection centres keep the centroid that they have in
@@ -20,8 +22,10 @@ namespace krot {
 // Where all centres of a component coincide (in either estimate), its points
 // take their place. What is not finite in `reference` does not count, and a
 // component without anything that does stays. The cost does not change. Frames
-// and points without an observation stay, and an estimate in the right place
-// keeps its bits. O(observations).
+// and points without an observation stay, and so does what is fixed, with all
+// of its component but for the scale, if that is free: it is that of the RMS
+// distance to what is fixed. An estimate in the right place keeps its bits.
+// O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -49,6 +50,18 @@ struct KnownRotationProblem {
   // [frame_begin[f], frame_begin[f + 1]).
   std::vector<int64_t> frame_begin;
   std::vector<int32_t> frame_observations;
+  // What does not move, and where it stands: t_f per frame, s_k per point;
+  // empty where nothing of the kind is fixed. Every estimate of the problem has
+  // it there (krot/problem/fixed.h).
+  std::vector<std::optional<Eigen::Vector3d>> fixed_translations;
+  std::vector<std::optional<Eigen::Vector3d>> fixed_points;
+
+  bool IsFixedFrame(int32_t f) const {
+    return !fixed_translations.empty() && fixed_translations[f].has_value();
+  }
+  bool IsFixedPoint(int32_t k) const {
+    return !fixed_points.empty() && fixed_points[k].has_value();
+  }
 };
 
 // The unknowns.
@@ -64,7 +77,8 @@ struct Estimate {
 void IndexObservations(KnownRotationProblem* problem);
 
 // Whether a camera stands off its frame's origin, t_sr != 0: without any, the
-// problem is homogeneous and its scale is free. O(views).
+// problem is homogeneous and its scale is free, if no two positions are fixed
+// either (IsScaleFree). O(views).
 bool HasBaseline(const KnownRotationProblem& problem);
 
 }  // namespace krot

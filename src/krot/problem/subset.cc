@@ -1,6 +1,7 @@
 #include "krot/problem/subset.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -80,6 +81,15 @@ void ProblemSubset::Copy(const std::vector<char>& has_point,
     copy_->views.push_back(whole_.views[v]);
     copy_->views.back().frame = new_frame[whole_.views[v].frame];
   }
+  const auto copy_fixed =
+      [](const std::vector<std::optional<Eigen::Vector3d>>& fixed,
+         const std::vector<int32_t>& old_of,
+         std::vector<std::optional<Eigen::Vector3d>>* copy) {
+        if (fixed.empty()) return;
+        for (const int32_t n : old_of) copy->push_back(fixed[n]);
+      };
+  copy_fixed(whole_.fixed_translations, frame_of_, &copy_->fixed_translations);
+  copy_fixed(whole_.fixed_points, point_of_, &copy_->fixed_points);
   copy_->observations.reserve(observation_of_.size());
   for (const int64_t i : observation_of_) {
     copy_->observations.push_back(whole_.observations[i]);
@@ -134,13 +144,13 @@ std::vector<int64_t> PruneUnconstrained(
 
   // Dooms the last observation of a point, or of a frame.
   const auto check_point = [&](int32_t k) {
-    if (left_of_point[k] != 1) return;
+    if (left_of_point[k] != 1 || p.IsFixedPoint(k)) return;
     for (int64_t i = p.point_begin[k]; i < p.point_begin[k + 1]; ++i) {
       if (!is_dropped[i]) doomed.push_back(i);
     }
   };
   const auto check_frame = [&](int32_t f) {
-    if (left_of_frame[f] != 1) return;
+    if (left_of_frame[f] != 1 || p.IsFixedFrame(f)) return;
     for (int64_t n = p.frame_begin[f]; n < p.frame_begin[f + 1]; ++n) {
       const int64_t i = p.frame_observations[n];
       if (!is_dropped[i]) doomed.push_back(i);

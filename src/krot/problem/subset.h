@@ -51,9 +51,9 @@ class ProblemSubset {
 };
 
 // Drops, until none is left, every observation that alone holds a point or a
-// frame: that point or frame can be moved until the residual is zero, so such
-// an observation bounds nothing. Takes and returns ascending indices.
-// O(observations given + points + frames).
+// frame that is not fixed: that point or frame can be moved until the residual
+// is zero, so such an observation bounds nothing. Takes and returns ascending
+// indices. O(observations given + points + frames).
 std::vector<int64_t> PruneUnconstrained(
     const KnownRotationProblem& problem,
     const std::vector<int64_t>& observations);

@@ -10,6 +10,7 @@
 
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_input.h"
+#include "krot/proof/fixed_constants.h"
 #include "krot/proof/force_balance.h"
 #include "krot/proof/observation_force.h"
 
@@ -162,9 +163,11 @@ void Checker::FindCorrections() {
 // (2), once every frame's origin has moved to the projection centre of the
 // first of its views that the support sees: t_f + R_sr^-1 t_sr of that view is
 // the unknown as well as t_f is. If each frame has one centre, the constants
-// are gone; the others are force times offset of the centre.
+// are gone; the others are force times offset of the centre. What is fixed has
+// its own (fixed_constants.h).
 std::optional<std::string> Checker::CheckConstants() const {
   const KnownRotationProblem& problem = part_.problem();
+  const FixedConstants fixed(problem);
   std::vector<int32_t> first_view(problem.num_frames, -1);
   Real kappa = 0;
   Real kappa_error = 0;
@@ -173,17 +176,27 @@ std::optional<std::string> Checker::CheckConstants() const {
     const View& view = problem.views[observation.view];
     int32_t& first = first_view[view.frame];
     if (first < 0) first = observation.view;
-    if (first == observation.view) continue;
-    const Vector3 t = view.cam_from_rig_translation.cast<Real>();
-    const Vector3 t_first =
-        problem.views[first].cam_from_rig_translation.cast<Real>();
-    const Vector3 offset =
-        t - view.cam_from_rig_rotation.cast<Real>() *
-                Matrix3(problem.views[first].cam_from_rig_rotation.cast<Real>())
-                    .inverse() *
-                t_first;
-    const Real offset_error =
-        16 * kRotationError * (t.cwiseAbs().sum() + t_first.cwiseAbs().sum());
+    const FixedConstants::Part of_point =
+        fixed.OfPoint(view, observation.point);
+    Vector3 offset = of_point.x_cam;
+    Real size = of_point.size;
+    if (fixed.IsAwayFromOrigin(view.frame)) {
+      const FixedConstants::Part of_frame = fixed.OfFrame(view);
+      offset += of_frame.x_cam;
+      size += of_frame.size;
+    } else if (first != observation.view) {
+      const Vector3 t = view.cam_from_rig_translation.cast<Real>();
+      const Vector3 t_first =
+          problem.views[first].cam_from_rig_translation.cast<Real>();
+      offset +=
+          t -
+          view.cam_from_rig_rotation.cast<Real>() *
+              Matrix3(problem.views[first].cam_from_rig_rotation.cast<Real>())
+                  .inverse() *
+              t_first;
+      size += t.cwiseAbs().sum() + t_first.cwiseAbs().sum();
+    }
+    const Real offset_error = 16 * kRotationError * size;
     kappa += forces_[i].sum.dot(offset);
     kappa_error += forces_[i].terms.sum() * offset_error +
                    forces_[i].terms.dot(offset.cwiseAbs()) * SumError() +

@@ -20,8 +20,8 @@ struct CertifiedObservation {
 
 // A proof that no estimate costs less than lower_bound (1 - defect).
 //
-// With z the stacked unknowns, w_i = c_i'z + d_i and v_i = A_i z + b_i,
-// multipliers with |y_i|_dual <= lambda_i and
+// With z the stacked unknowns (all that is not fixed), w_i = c_i'z + d_i and
+// v_i = A_i z + b_i, multipliers with |y_i|_dual <= lambda_i and
 //
 //   (1)  sum_i A_i'y_i + delta sum_i lambda_i c_i  = 0
 //   (2)  sum_i y_i'b_i + delta sum_i lambda_i d_i <= 0
@@ -63,9 +63,11 @@ struct CertificateCheck {
 // lower_bound (1 - certificate.defect), certificate.defect <= kMaxDefect, and
 // |y_i|_dual <= lambda_i (1 + 1e-12).
 //
-// The rotations count as known to kRotationError per entry. Works for p = 1, 2
-// and infinity; anything else, and whatever else is wrong with the
-// certificate, is a refusal and never an exception. O(support log support).
+// What the problem fixes counts as known exactly: of z, c_i, d_i, A_i and b_i
+// it is part of the constants. The rotations count as known to kRotationError
+// per entry. Works for p = 1, 2 and infinity; anything else, and whatever else
+// is wrong with the certificate, is a refusal and never an exception. O(support
+// log support).
 CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
                                   Norm norm, const Certificate& certificate);
 

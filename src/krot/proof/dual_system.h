@@ -15,10 +15,12 @@ namespace krot {
 // multipliers y_i, lambda_i, for one delta. Internal to the making of
 // certificates.
 //
-// The rows are those of the points and of all frames but the first (the
-// problem must be connected). Where a frame sees points through several
-// projection centres, one more row holds the constants (b; d), counted from the
-// centre of the frame's first view. Observation i fills, in the equations of
+// The rows are those of the points and frames that move, without those of the
+// first frame if nothing is fixed (the problem must be connected). Where a
+// frame sees points through several projection centres, or several positions
+// are fixed, one more row holds the constants (b; d), counted from the centre
+// of the frame's first view and from one of the positions (fixed_constants.h).
+// Observation i fills, in the equations of
 //
 //   its point            P_i' (y_i; lambda_i) + ...  = 0     P_i = E_i R_sr
 //   R_rw its frame, if not 0  F_i' (y_i; lambda_i) + ...  = 0     F_i = E_i
@@ -53,8 +55,11 @@ class DualSystem {
     Matrix3r frame;
     Vector3r constants = Vector3r::Zero();
     int32_t point_index = 0;
-    int32_t frame_index = 0;  // 0: omitted
+    int64_t point_equation = -1;  // its first; -1: fixed
+    int32_t frame_index = 0;      // 0: omitted
   };
+
+  std::vector<int32_t> OmitFrames(const KnownRotationProblem& problem);
 
   const std::vector<Multiplier> multipliers_;
   LeastNormProblem empty_;  // without columns

@@ -36,7 +36,7 @@ class StrongestForest {
   template <typename Visit>
   void ForObservationsOf(int32_t node, const Visit& visit) const;
   void Reach(int32_t node);
-  void GrowFrom(int32_t root);
+  void Spread();
 
   const KnownRotationProblem& problem_;
   const std::vector<Real>& strength_;
@@ -72,8 +72,8 @@ void StrongestForest::Reach(int32_t node) {
   });
 }
 
-void StrongestForest::GrowFrom(int32_t root) {
-  Reach(root);
+// From all that is reached.
+void StrongestForest::Spread() {
   while (!candidates_.empty()) {
     const auto [strength, negative, parent, node] = candidates_.top();
     candidates_.pop();
@@ -84,13 +84,22 @@ void StrongestForest::GrowFrom(int32_t root) {
 }
 
 std::vector<Branch> StrongestForest::Grow() {
+  for (int32_t k = 0; k < problem_.num_points; ++k) {
+    if (problem_.IsFixedPoint(k)) Reach(k);
+  }
+  for (int32_t f = 0; f < problem_.num_frames; ++f) {
+    if (problem_.IsFixedFrame(f)) Reach(problem_.num_points + f);
+  }
+  Spread();
   std::vector<int64_t> order(strength_.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int64_t a, int64_t b) {
     return strength_[a] > strength_[b];
   });
   for (const int64_t i : order) {
-    if (!is_reached_[FrameNode(i)]) GrowFrom(FrameNode(i));
+    if (is_reached_[FrameNode(i)]) continue;
+    Reach(FrameNode(i));
+    Spread();
   }
   return std::move(branches_);
 }

@@ -17,6 +17,16 @@ constexpr int kNumThreads = 1;
 
 }  // namespace
 
+std::vector<int64_t> LeastNormProblem::EquationsOfPoints() const {
+  std::vector<int64_t> first(num_points);
+  int64_t next = 0;
+  for (int32_t k = 0; k < num_points; ++k) {
+    first[k] = next;
+    if (!IsFixedPoint(k)) next += 3;
+  }
+  return first;
+}
+
 bool LeastNormSolver::Factorize(LeastNormProblem problem) {
   problem_ = std::move(problem);
   elimination_.reset();
@@ -43,12 +53,16 @@ bool LeastNormSolver::FactorizeDense() {
   const int64_t num_rows = problem_.num_rows();
   MatrixXd transposed = MatrixXd::Zero(
       3 * static_cast<int64_t>(problem_.columns.size()), num_rows);
+  const std::vector<int64_t> of_point = problem_.EquationsOfPoints();
+  const int64_t num_free_points = problem_.num_free_points();
   int64_t i = 0;
   for (const LeastNormProblem::Columns& c : problem_.columns) {
-    transposed.block<3, 3>(i, 3 * int64_t{c.point}) = c.point_rows;
+    if (!problem_.IsFixedPoint(c.point)) {
+      transposed.block<3, 3>(i, of_point[c.point]) = c.point_rows;
+    }
     if (c.frame > 0) {
-      transposed.block<3, 3>(
-          i, 3 * (int64_t{problem_.num_points} + c.frame - 1)) = c.frame_rows;
+      transposed.block<3, 3>(i, 3 * (num_free_points + c.frame - 1)) =
+          c.frame_rows;
     }
     if (problem_.has_last_row) {
       transposed.block<3, 1>(i, num_rows - 1) = c.last_row;
@@ -80,6 +94,7 @@ bool LeastNormSolver::FactorizeByPoints() {
       static_cast<int64_t>(structure_.frame_of.size()));
   structure_.frame_is_fixed.assign(problem_.num_frames, 0);
   structure_.frame_is_fixed[0] = 1;
+  structure_.point_is_fixed = problem_.point_is_fixed;
   elimination_ = std::make_unique<PointElimination<3>>(structure_, kNumThreads);
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   for (size_t i = 0; i < problem_.columns.size(); ++i) {
@@ -110,11 +125,15 @@ bool LeastNormSolver::FactorizeByPoints() {
 VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {
   BlockVector g;
   g.SetZero(problem_.num_points, problem_.num_frames);
+  const std::vector<int64_t> of_point = problem_.EquationsOfPoints();
   for (int32_t k = 0; k < problem_.num_points; ++k) {
-    g.points[k] = rhs.segment<3>(3 * int64_t{k});
+    if (!problem_.IsFixedPoint(k)) {
+      g.points[k] = rhs.segment<3>(of_point[k]);
+    }
   }
+  const int64_t num_free_points = problem_.num_free_points();
   for (int32_t f = 1; f < problem_.num_frames; ++f) {
-    g.frames[f] = rhs.segment<3>(3 * (int64_t{problem_.num_points} + f - 1));
+    g.frames[f] = rhs.segment<3>(3 * (num_free_points + f - 1));
   }
   BlockVector x;
   elimination_->Solve(g, nullptr, &x);

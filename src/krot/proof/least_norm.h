@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -13,10 +14,10 @@
 namespace krot {
 
 // Under-determined equations M x = rhs with the structure of bundle adjustment:
-// three equations per point, three per frame but frame 0, and perhaps one more
-// that concerns everything. An observation has three unknowns (those that no
-// equation mentions stay 0), which meet the equations of its point and of its
-// frame.
+// three equations per point that is not fixed, three per frame but frame 0, and
+// perhaps one more that concerns everything. An observation has three unknowns
+// (those that no equation mentions stay 0), which meet the equations of its
+// point and of its frame.
 struct LeastNormProblem {
   struct Columns {
     int32_t point = 0;
@@ -29,11 +30,22 @@ struct LeastNormProblem {
   int32_t num_points = 0;
   int32_t num_frames = 0;
   bool has_last_row = false;
-  std::vector<Columns> columns;  // in the order of their points
+  std::vector<Columns> columns;      // in the order of their points
+  std::vector<char> point_is_fixed;  // empty: none is
 
-  int64_t num_rows() const {
-    return 3 * (int64_t{num_points} + num_frames - 1) + has_last_row;
+  bool IsFixedPoint(int32_t k) const {
+    return !point_is_fixed.empty() && point_is_fixed[k] != 0;
   }
+  int64_t num_free_points() const {
+    return num_points -
+           std::count(point_is_fixed.begin(), point_is_fixed.end(), char{1});
+  }
+  int64_t num_rows() const {
+    return 3 * (num_free_points() + num_frames - 1) + has_last_row;
+  }
+  // The first equation of each point, without meaning for fixed ones; those of
+  // frames 1, 2, ... follow.
+  std::vector<int64_t> EquationsOfPoints() const;
 };
 
 // Their solutions of least norm, x = M' (M M')^-1 rhs. What is factorised is

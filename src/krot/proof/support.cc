@@ -104,8 +104,10 @@ std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
     for (const int64_t i : candidates) {
       const Observation& observation = problem.observations[i];
       const int32_t frame = problem.views[observation.view].frame;
-      if (balances.of_point[observation.point].IsWithin(tolerance) &&
-          balances.of_frame[frame].IsWithin(tolerance)) {
+      if ((problem.IsFixedPoint(observation.point) ||
+           balances.of_point[observation.point].IsWithin(tolerance)) &&
+          (problem.IsFixedFrame(frame) ||
+           balances.of_frame[frame].IsWithin(tolerance))) {
         balanced.push_back(i);
       }
     }

@@ -33,8 +33,9 @@ std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
 
 // The largest part of the `candidates`, ascending, in which the forces of the
 // multipliers at `delta` pixels (force_balance.h) balance at every point and
-// frame, up to `tolerance` > 0 of the largest delta lambda there: what does not
-// is dropped, until everything does, and without those that bound nothing.
+// frame that is not fixed, up to `tolerance` > 0 of the largest delta lambda
+// there: what does not is dropped, until everything does, and without those
+// that bound nothing.
 std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     double delta,
                                     const std::vector<Multiplier>& multipliers,

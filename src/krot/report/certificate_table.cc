@@ -14,6 +14,14 @@ std::string LinearisedSentence(const CertificateVerdict& verdict) {
          "at the\nobservation, which is exact for pinhole cameras alone.\n";
 }
 
+// What the bound presupposes beside rotations.
+std::string FixedSentence(const CertificateVerdict& verdict) {
+  if (verdict.num_fixed_images + verdict.num_fixed_points == 0) return "";
+  return "It takes " + Counted(verdict.num_fixed_images, "frame") + " and " +
+         Counted(verdict.num_fixed_points, "point") +
+         " as fixed where they stand in this model.\n";
+}
+
 }  // namespace
 
 std::string SupportTable(const std::vector<SupportObservation>& support,
@@ -48,8 +56,8 @@ std::string CertificateTable(const CertificateVerdict& verdict,
                                      : "-"});
   return "The certificate holds: whatever the translations and points, the "
          "largest error is at least\nthe lower bound, in pixels.\n" +
-         LinearisedSentence(verdict) + bounds.ToString() +
-         SupportTable(verdict.support, max_observations);
+         FixedSentence(verdict) + LinearisedSentence(verdict) +
+         bounds.ToString() + SupportTable(verdict.support, max_observations);
 }
 
 }  // namespace krot

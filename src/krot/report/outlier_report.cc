@@ -211,6 +211,7 @@ std::string OutlierJson(const OutlierReport& report) {
       {"num_irreducible",
        summary.conflicts ? Json(summary.num_irreducible) : Json()},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"rotations", RotationsJson(report.run.rotations)},
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},

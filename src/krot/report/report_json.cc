@@ -37,6 +37,12 @@ Json ContradictionsJson(const Contradictions& contradictions) {
           {"points2D", contradictions.num_points2D}};
 }
 
+Json RotationsJson(const std::optional<ReplacedRotations>& rotations) {
+  if (!rotations) return Json();
+  return {{"num_frames", rotations->num_frames},
+          {"num_kept_images", rotations->num_kept_images}};
+}
+
 std::string ReportText(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -8,6 +8,7 @@
 
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/contradictions.h"
+#include "krot/model/rotations_file.h"
 #include "krot/report/problem_words.h"
 
 namespace krot {
@@ -30,6 +31,9 @@ Json LeftOutJson(const LeftOutCounts& left_out);
 
 // How often tracks and images contradict each other.
 Json ContradictionsJson(const Contradictions& contradictions);
+
+// Null unless a file gave the rotations.
+Json RotationsJson(const std::optional<ReplacedRotations>& rotations);
 
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.

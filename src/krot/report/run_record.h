@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "krot/model/contradictions.h"
+#include "krot/model/rotations_file.h"
 
 namespace krot {
 
@@ -11,7 +13,9 @@ namespace krot {
 struct RunRecord {
   std::string version;            // KROT's
   Contradictions contradictions;  // of the input
-  double seconds_read = 0;        // wall clock
+  // Where the input's rotations were not its own.
+  std::optional<ReplacedRotations> rotations;
+  double seconds_read = 0;  // wall clock
   double seconds_write = 0;
   double seconds_total = 0;
   int64_t peak_memory_bytes = 0;

@@ -32,7 +32,10 @@ std::string GapPercent(double relative_gap) {
 std::string BoundWords(const SolveSummary& summary) {
   // Downwards: more than this is not proved.
   const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
-  return "no translations and points bring all errors below " +
+  const bool has_fixed =
+      summary.num_fixed_frames + summary.num_fixed_points > 0;
+  return (has_fixed ? std::string("with what is fixed, ") : std::string()) +
+         "no translations and points bring all errors below " +
          FormatNumber(bound, 4) + " px";
 }
 

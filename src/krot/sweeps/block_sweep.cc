@@ -1,6 +1,7 @@
 #include "krot/sweeps/block_sweep.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
@@ -67,6 +68,10 @@ double BlockSweep::IntersectPoint(int64_t k, FastDescent* descent,
   const int64_t begin = problem_.point_begin[k];
   const int64_t end = problem_.point_begin[k + 1];
   if (begin == end) return 0;
+  if (problem_.IsFixedPoint(static_cast<int32_t>(k))) {
+    return ResidualAbove(std::numeric_limits<double>::infinity(), problem_,
+                         cameras_, estimate->points, norm_, begin, end);
+  }
   if (goal_.level > 0) {  // whether it waits is known before rows are built
     const double cost = ResidualAbove(goal_.level, problem_, cameras_,
                                       estimate->points, norm_, begin, end);
@@ -87,6 +92,9 @@ double BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
   const int64_t begin = problem_.frame_begin[f];
   const int64_t end = problem_.frame_begin[f + 1];
   if (begin == end) return 0;
+  if (problem_.IsFixedFrame(static_cast<int32_t>(f))) {
+    return FrameCost(problem_, *estimate, norm_, f);
+  }
   double row[kResidualRow];
   descent->residuals().Clear();
   for (int64_t n = begin; n < end; ++n) {

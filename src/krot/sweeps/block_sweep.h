@@ -12,7 +12,8 @@ namespace krot {
 // The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
 // other and spread over threads; the result does not depend on how many. Each
 // thread keeps one FastDescent, so that sweeps do not allocate once warm.
-// Once it is cancelled, the blocks that are left are skipped.
+// Once it is cancelled, the blocks that are left are skipped. What the problem
+// fixes stays.
 //
 // Both return the cost that is reached, pixels, to rounding what Cost() gives:
 // infinity where a block starts at a depth that is not positive, and then the

@@ -1,0 +1,265 @@
+#include "krot/pipeline/solve_in_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "krot/base/check.h"
+#include "krot/base/timer.h"
+#include "krot/bridge/carry_left_out.h"
+#include "krot/bridge/pixel_certificate.h"
+#include "krot/bridge/reprojection.h"
+#include "krot/pipeline/iteration_log.h"
+#include "krot/pipeline/rounds.h"
+#include "krot/pipeline/run_finish.h"
+#include "krot/pipeline/solve_memory.h"
+#include "krot/pipeline/start.h"
+#include "krot/problem/components.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/fixed.h"
+#include "krot/problem/gauge.h"
+
+namespace krot {
+namespace {
+
+// A joint solver's stall is an answer only with a bound so near, relative.
+constexpr double kGapOfAnswer = 1e-2;
+// What rounding may add to the largest error, relative.
+constexpr double kErrorRounding = 1e-9;
+
+void CheckOptions(const SolveModelOptions& options) {
+  CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
+  CheckArgument(options.init_max_error > 0, "init_max_error",
+                options.init_max_error, "> 0");
+  CheckArgument(
+      options.init == SolveInit::kModel || HasJointSolver(options.norm),
+      "norm.p", options.norm.p, "1, 2 or infinity with this init");
+  CheckArgument(
+      options.method != SolveMethod::kJoint || HasJointSolver(options.norm),
+      "norm.p", options.norm.p, "1, 2 or infinity with this method");
+}
+
+void CountProblem(const Model& model, const BuiltProblem& built,
+                  SolveSummary* summary) {
+  const KnownRotationProblem& problem = built.problem;
+  summary->num_frames = problem.num_frames;
+  summary->num_images = static_cast<int64_t>(problem.views.size());
+  summary->num_points = problem.num_points;
+  summary->num_observations = static_cast<int64_t>(problem.observations.size());
+  summary->num_components = FindComponents(problem).count;
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    summary->num_fixed_frames += problem.IsFixedFrame(f);
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    summary->num_fixed_points += problem.IsFixedPoint(k);
+  }
+  summary->left_out = built.left_out;
+  summary->num_retriangulated_points = built.num_retriangulated_points;
+  summary->num_same_image_tracks = built.num_same_image_tracks;
+  const SolveMemory memory = EstimateSolveMemory(model, built, *summary);
+  summary->likely_bytes = memory.likely;
+  summary->largest_bytes = memory.at_most;
+}
+
+// Checks the certificate once more, apart from the solver that made it, and
+// says what it proves about the estimate.
+void Certify(const Model& model, const Start& start, const Estimate& estimate,
+             const SolveModelOptions& options, const Context& context,
+             const std::optional<PixelCertificate>& certificate,
+             SolveSummary* summary) {
+  if (!certificate) return;
+  const Timer timer;
+  const PixelCertificateCheck check = CheckPixelCertificate(
+      model, start.built, options.norm, *certificate, context);
+  if (check.is_accepted) {
+    summary->is_certified = true;
+    summary->lower_bound = check.lower_bound;
+    summary->support = ListSupport(model, start.built, estimate, options.norm,
+                                   certificate->rows);
+    if (options.describe_certificate) {
+      summary->certificate =
+          DescribeCertificate(model, start.built, options.norm, *certificate);
+    }
+  }
+  summary->seconds_certify = timer.Seconds();
+}
+
+// That no estimate is below a start's bound, in true pixels.
+void CertifyInfeasible(const Model& model, const Start& start,
+                       const SolveModelOptions& options, const Context& context,
+                       const std::optional<Certificate>& certificate,
+                       SolveSummary* summary) {
+  if (!certificate) return;
+  Certify(model, start, start.built.start, options, context,
+          MakePixelCertificate(
+              model, start.built, options.norm, *certificate,
+              BearingsOfPixels(model, start.built, *certificate), context),
+          summary);
+}
+
+// With the final cost. What is claimed is what the numbers say, whatever the
+// solver thought.
+void MeasureGap(double wanted_gap, SolveSummary* summary) {
+  if (summary->cost_final == 0) summary->lower_bound = 0;  // without proof
+  if (summary->lower_bound && std::isfinite(summary->cost_final)) {
+    summary->relative_gap =
+        summary->cost_final > 0
+            ? (summary->cost_final - *summary->lower_bound) /
+                  summary->cost_final
+            : 0;
+  }
+  // The gap that was asked for is one of the lowest maximum.
+  const auto is_within = [&](double gap) {
+    return summary->relative_gap &&
+           summary->LowestCost() - *summary->lower_bound <=
+               gap * summary->LowestCost();
+  };
+  const bool has_ended =
+      summary->termination == SolveTermination::kGapReached ||
+      summary->termination == SolveTermination::kZeroCost ||
+      summary->termination == SolveTermination::kStalled;
+  if (!has_ended || summary->method == SolveMethod::kResInt) return;
+  if (IsZeroUpToRounding(summary->cost_final)) {
+    summary->termination = SolveTermination::kZeroCost;
+  } else if (is_within(wanted_gap)) {
+    summary->termination = SolveTermination::kGapReached;
+  } else {
+    summary->termination = is_within(kGapOfAnswer)
+                               ? SolveTermination::kStalled
+                               : SolveTermination::kUnproved;
+  }
+}
+
+// Finds the estimate to start from; false, and the termination why, if there
+// is none.
+bool FindEstimate(const Model& model, const SolveModelOptions& options,
+                  const Context& context, const Timer& timer, Start* start,
+                  Estimate* estimate, SolveSummary* summary) {
+  if (start->init == SolveInit::kModel) {
+    *estimate = start->built.start;
+    return true;
+  }
+  FoundStart found =
+      FindFeasibleStart(start->built.problem, options, context,
+                        LogIterations(options.joint.callback, timer, summary));
+  if (found.estimate) {
+    *estimate = *std::move(found.estimate);
+    return true;
+  }
+  summary->termination = found.termination;
+  const bool was_asked = options.init == SolveInit::kFeasible;
+  if (found.termination == SolveTermination::kInterrupted || was_asked) {
+    CertifyInfeasible(model, *start, options, context, found.certificate,
+                      summary);
+    return false;
+  }
+  context.Note("there is none; going on without those observations");
+  *start = OwnStart(model, options, context);
+  summary->init = start->init;
+  CountProblem(model, start->built, summary);
+  *estimate = start->built.start;
+  summary->termination = SolveTermination::kNothingToSolve;
+  return !start->built.problem.observations.empty();
+}
+
+// Whether an error that was finite is now above the largest that was; both in
+// the norm of the solve.
+bool IsWorse(const std::vector<double>& errors_before_px,
+             const std::vector<double>& errors_after_px) {
+  double largest = 0;
+  for (const double error : errors_before_px) {
+    if (std::isfinite(error)) largest = std::max(largest, error);
+  }
+  largest *= 1 + kErrorRounding;
+  for (size_t i = 0; i < errors_before_px.size(); ++i) {
+    if (std::isfinite(errors_before_px[i]) &&
+        !(errors_after_px[i] <= largest)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+SolveModelResult SolveInFrame(const Model& model,
+                              const SolveModelOptions& options,
+                              const Context& context) {
+  CheckOptions(options);
+  SolveModelResult result;
+  SolveSummary& summary = result.summary;
+  summary.method = EffectiveMethod(options);
+  summary.norm = options.norm;
+
+  const int num_threads = context.num_threads;
+  const Timer build_timer;
+  Start start = ChooseStart(model, options, summary.method, context);
+  summary.init = start.init;
+  CountProblem(model, start.built, &summary);
+  summary.pixel_error_before = Summarize(PixelErrors(model, num_threads));
+  summary.pixel_error_after = summary.pixel_error_before;
+  summary.seconds_build = build_timer.Seconds();
+  if (options.on_built) options.on_built(summary);
+  if (start.built.problem.observations.empty()) {
+    summary.termination = SolveTermination::kNothingToSolve;
+    result.model = model;
+    return result;
+  }
+
+  const Timer solve_timer;
+  Estimate estimate;
+  if (!FindEstimate(model, options, context, solve_timer, &start, &estimate,
+                    &summary)) {
+    summary.seconds_solve = solve_timer.Seconds();
+    result.model = model;
+    return result;
+  }
+  const std::optional<PixelCertificate> certificate =
+      SolveInRounds(model, options, summary.method, context, solve_timer,
+                    &start.built, &estimate, &summary);
+  if (summary.method == SolveMethod::kAuto &&
+      summary.termination != SolveTermination::kInterrupted) {
+    RunFinish(
+        model, options,
+        certificate ? std::optional(certificate->lower_bound) : std::nullopt,
+        context, solve_timer, &start.built, &estimate, &summary);
+  }
+  if (options.res_int.update_frames) {
+    RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
+                           num_threads, &estimate);
+  }
+  PutFixed(start.built.problem, &estimate);
+  const Reprojection reprojection(model, start.built);
+  summary.cost_final =
+      reprojection.TrueCost(estimate, options.norm, num_threads);
+  result.model = ApplyEstimate(model, start.built, estimate);
+  const std::vector<double> before_px =
+      PixelErrors(model, num_threads, options.norm);
+  CarryLeftOutPoints(model, before_px, options.norm, start.built,
+                     options.problem.fixed, summary.cost_final, &result.model);
+  if (IsWorse(before_px,
+              PixelErrors(result.model, num_threads, options.norm))) {
+    summary.is_given_back = true;
+    summary.finish.reset();
+    result.model = model;
+    estimate = OwnEstimate(model, start.built);
+    reprojection.TakeRows(estimate, num_threads, &start.built.problem);
+    summary.cost_final =
+        reprojection.TrueCost(estimate, options.norm, num_threads);
+  }
+  const std::vector<double> errors_px = PixelErrors(result.model, num_threads);
+  UpdatePointErrors(errors_px, &result.model);
+  summary.pixel_error_after = Summarize(errors_px);
+  summary.seconds_solve = solve_timer.Seconds();
+
+  Certify(model, start, estimate, options, context, certificate, &summary);
+  MeasureGap(options.joint.relative_gap, &summary);
+  if (options.polish != Polish::kNone && !context.IsCancelled()) {
+    summary.polish = PolishModel(options.polish, options.finish.loss,
+                                 options.problem.fixed, context, &result.model);
+  }
+  return result;
+}
+
+}  // namespace krot

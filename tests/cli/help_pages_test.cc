@@ -1,0 +1,85 @@
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/cli/krot_process.h"
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::vector<std::string> Matches(const std::string& text,
+                                 const std::string& pattern) {
+  const std::regex regex(pattern);
+  std::vector<std::string> matches;
+  for (std::sregex_iterator it(text.begin(), text.end(), regex), end; it != end;
+       ++it) {
+    matches.push_back((*it)[1]);
+  }
+  return matches;
+}
+
+std::string OutputOf(const std::string& command) {
+  const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"),
+                                                   &pclose);
+  std::string output;
+  for (int c; (c = std::fgetc(pipe.get())) != EOF;) {
+    output += static_cast<char>(c);
+  }
+  return output;
+}
+
+// What the shell offers for the last of the words, which stand for a line.
+std::string Completed(const std::string& words) {
+  const TempFolder folder;
+  const std::string path = (folder.path() / "krot.bash").string();
+  std::ofstream(path) << RunKrot({"--help=bash"}).out << "COMP_WORDS=(" << words
+                      << ")\n"
+                      << "COMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n"
+                      << "_krot\necho \"${COMPREPLY[*]}\"\n";
+  return OutputOf("bash " + path);
+}
+
+TEST(HelpPages, TheManualHoldsEveryOptionOfEveryCommand) {
+  const std::string manual = RunKrot({"--help=man"}).out;
+  const std::vector<std::string> commands =
+      Matches(manual, R"(\.BR krot\\-(\S+))");
+  EXPECT_GE(commands.size(), 8);
+  for (const std::string& command : commands) {
+    const std::string page = RunKrot({command, "--help=man"}).out;
+    const std::vector<std::string> options =
+        Matches(RunKrot({command, "--help"}).out, R"(\n  --([^\s,]+)\n)");
+    EXPECT_GE(options.size(), 3) << command;
+    for (const std::string& option : options) {
+      EXPECT_THAT(page, HasSubstr("\\-\\-" + option + " "));
+    }
+  }
+}
+
+TEST(HelpPages, TheShellCompletesCommandsOptionsAndValues) {
+  EXPECT_EQ(Completed("krot bundle"), "bundle_adjuster\n");
+  EXPECT_EQ(Completed("krot help bundle"), "bundle_adjuster\n");
+  EXPECT_EQ(Completed("krot solver --Solver.meth"), "--Solver.method\n");
+  EXPECT_EQ(Completed("krot solver --Solver.method ''"),
+            "auto res_int joint\n");
+  EXPECT_EQ(Completed("krot solver --overwrite ''"), "0 1\n");
+}
+
+TEST(HelpPages, AFileIsLeftToTheShell) {
+  EXPECT_EQ(Completed("krot solver --input_path ''"), "\n");
+}
+
+TEST(HelpPages, AnUnknownFormatIsRefused) {
+  const KrotResult result = RunKrot({"solver", "--help=html"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, IsOneSentence("krot solver", "--help = html"));
+}
+
+}  // namespace
+}  // namespace krot
