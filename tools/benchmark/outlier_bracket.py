@@ -23,7 +23,8 @@ SHARES = (0.9, 0.75, 0.5)
 def run(krot, *arguments):
     start = time.monotonic()
     done = subprocess.run([krot, *arguments, "--log_level", "0"],
-                          capture_output=True, text=True, check=False)
+                          capture_output=True, text=True, errors="replace",
+                          check=False)
     return done, time.monotonic() - start
 
 

@@ -37,10 +37,10 @@ struct RotationSuspect {
 };
 
 // Of the images that have a part in most conflicts, and in no fewer than three,
-// the one with most observations removed; none otherwise. Points are placed by what the removal
-// leaves of all other images, at their optimum; the turn, with the camera's
-// position, is then that of least squares in pixels, errors above `bound`
-// counting less (Cauchy). Costs three solves.
+// the one with most observations removed; none otherwise. Points are placed by
+// what the removal leaves of all other images, at their optimum; the turn, with
+// the camera's position, is then that of least squares in pixels, errors above
+// `bound` counting less (Cauchy). Costs three solves.
 std::optional<RotationSuspect> FindRotationSuspect(
     const Model& model, const BuiltProblem& built, const ErrorBound& bound,
     const std::vector<Conflict>& conflicts, const Removal& removal,
