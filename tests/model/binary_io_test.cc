@@ -36,8 +36,7 @@ std::string Bytes(T value) {
 
 template <typename T>
 std::string With(std::string bytes, size_t offset, T value) {
-  std::memcpy(&bytes.at(offset), &value, sizeof(T));
-  return bytes;
+  return bytes.replace(offset, sizeof(T), Bytes(value));
 }
 
 std::string ErrorOf(void (*parse)(const FileBytes&, Model*),
