@@ -153,7 +153,7 @@ std::string BashTail() {
          "then\n"
          "    words=$options\n"
          "  fi\n"
-         "  mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$current\")\n"
+         "  COMPREPLY=($(compgen -W \"$words\" -- \"$current\"))\n"
          "}\n"
          "complete -o default -F _krot krot\n";
 }
