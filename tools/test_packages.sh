@@ -31,7 +31,7 @@ cp "$root"/build-packages/*.deb "$bare/krot"
 
 say "krot"
 inside apt-get -qq update
-inside apt-get -qq install --no-install-recommends -y ./krot_*.deb \
+inside apt-get -qq install --reinstall --no-install-recommends -y ./krot_*.deb \
   bash-completion man-db ">/dev/null"
 inside krot solver --input_path tools/sample/model --output_path by_command
 inside "test -e /usr/share/man/man1/krot-solver.1.gz"
@@ -40,7 +40,8 @@ inside "source /usr/share/bash-completion/completions/krot; \
   test \"\${COMPREPLY[*]}\" = 'auto res_int joint'"
 
 say "A program of one's own"
-inside apt-get -qq install --no-install-recommends -y ./libkrot-dev_*.deb \
+inside apt-get -qq install --reinstall --no-install-recommends -y \
+  ./libkrot-dev_*.deb \
   cmake g++ make ">/dev/null"
 inside cmake -S tests/architecture/consumer -B consumer ">/dev/null"
 inside cmake --build consumer
