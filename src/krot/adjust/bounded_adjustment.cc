@@ -25,7 +25,7 @@ constexpr double kFirstCap = 1.1;
 constexpr double kCapWeight = 1e4;
 // The cap of the least squares behind that is so far above the lowest maximum,
 // and they start no nearer to it, relative.
-constexpr double kRoom = 5e-4;
+constexpr double kCapRoom = 5e-4;
 constexpr double kLeastRoom = 1e-4;
 
 // One step of the path, told to the caller.
@@ -105,7 +105,7 @@ void LowerMaxError(const BundleAdjustmentOptions& options,
     path.LowerWeight(step > 0 ? step : 1);
   }
   summary->lowest_max_error = std::min(path.LargestError(), start_error);
-  const double cap = (1 + kRoom) * *summary->lowest_max_error;
+  const double cap = (1 + kCapRoom) * *summary->lowest_max_error;
   if (path.LargestError() < (1 - kLeastRoom) * cap) *blocks = path.blocks();
   blocks->cap2 = cap * cap;
 }

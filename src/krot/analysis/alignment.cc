@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/base/angle.h"
 #include "krot/geometry/rotation.h"
 
 namespace krot {
@@ -11,8 +12,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Matrix3Xd;
 using Eigen::Vector3d;
-
-constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 Matrix3Xd Centers(const std::vector<PosePair>& poses,
                   Vector3d PosePair::*center) {
@@ -55,7 +54,7 @@ double AngleDeg(const Matrix3d& A, const Matrix3d& B) {
   // The chord |A - B|_F = 2 sqrt(2) sin(angle / 2): the trace is blind to
   // small angles.
   const double sine = (A - B).norm() / std::sqrt(8.0);
-  return 2 * std::asin(std::min(1.0, sine)) * kDegrees;
+  return 2 * std::asin(std::min(1.0, sine)) * kDegreesPerRadian;
 }
 
 double SceneRadius(const std::vector<PosePair>& poses) {

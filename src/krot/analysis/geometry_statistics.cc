@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/base/angle.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/image_geometry.h"
 
@@ -15,7 +16,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int64_t kAnglesPerChunk = 256;
-constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr double kNoAngle = -1;
 
 struct Range {

@@ -18,7 +18,7 @@ constexpr double kNoRegion = std::numeric_limits<double>::infinity();
 // Corrections of gamma that MakePixelCertificate takes; two mostly do.
 constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
-constexpr double kRoom = 1e-9;
+constexpr double kMargin = 1e-9;
 // Support lines that are found at the same time; the next profit from them.
 constexpr int64_t kLinesAtOnce = 32;
 
@@ -137,17 +137,17 @@ std::optional<PixelCertificate> MakePixelCertificate(
   if (rows.observations.empty()) return std::nullopt;
   const Reprojection reprojection(model, built);
   PixelCertificate certificate{rows, std::move(bearings), 0};
-  double gamma = rows.lower_bound * (1 - kRoom);
+  double gamma = rows.lower_bound * (1 - kMargin);
   for (int n = 0; n < kMaxCorrections; ++n) {
     const double highest =
         HighestLine(reprojection, built, norm, rows, certificate.bearings,
-                    gamma, 1 - kRoom / 2, context);
+                    gamma, 1 - kMargin / 2, context);
     if (!std::isfinite(highest)) return std::nullopt;
-    if (highest <= 1 - kRoom / 2) {
+    if (highest <= 1 - kMargin / 2) {
       certificate.lower_bound = gamma;
       return certificate;
     }
-    gamma *= (1 - kRoom) / highest;
+    gamma *= (1 - kMargin) / highest;
   }
   return std::nullopt;
 }

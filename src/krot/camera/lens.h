@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "krot/base/angle.h"
+
 namespace krot {
 
 // A lens maps the ray (u, v, 1) to a point (a, b) of the lens plane, before
@@ -49,9 +51,6 @@ T AngleOverRadius(const T& r2, const T& Z) {
   const T r = sqrt(r2);
   return atan2(r, Z) / r;
 }
-
-inline constexpr double kHalfPi = 1.5707963267948966;
-inline constexpr double kPi = 2 * kHalfPi;
 
 // sin(angle) / angle
 inline double SineOverAngle(double angle) {

@@ -52,7 +52,7 @@ class ExcessSolver {
   double TakeStep();
 
   const KnownRotationProblem& problem_;
-  const ExcessOptions& options_;
+  const ExcessOptions options_;
   const Context& context_;
   const double bound_;
   const std::vector<double>& depths_;

@@ -37,7 +37,7 @@ constexpr double kFreshStartMargin = 1e-2;
 // Smaller depths, of the median, are those of points in a camera.
 constexpr double kDepthInCamera = 1e-6;
 // In the unit of depth, of the median.
-constexpr double kShareOfDepth = 0.1;
+constexpr double kUnitDepth = 0.1;
 constexpr double kHopelessGap = 1e-5;
 // Whether there is anything below the cost is asked at this share of the gap
 // that is to be shown.
@@ -125,7 +125,7 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
     const IterationReport& report) {
   FeasibleStartOptions options;
   options.norm = options_.norm;
-  options.unit_depth = kShareOfDepth * MedianDepth(problem_, estimate_);
+  options.unit_depth = kUnitDepth * MedianDepth(problem_, estimate_);
   options.known_bound = lower_bound_;
   options.hopeless_gap = kHopelessGap;
   options.callback = [this, &report](double target) {

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 using Real = long double;
 
 // From here on coordinates cost digits: of 16, three.
-constexpr double kFarAway = 1e3;
+constexpr double kFarOut = 1e3;
 
 // By coordinate; none without positions.
 std::optional<Vector3d> Median(const std::vector<Vector3d>& positions) {
@@ -110,7 +110,7 @@ LocalFrame::LocalFrame(const Model& model, const FixedParts& fixed) {
   if (!middle) return;
   double extent = MedianDistance(positions, *middle);
   if (extent == 0) extent = MedianDistance(Points(model, {}), *middle);
-  if (!(extent > 0) || !(middle->norm() > kFarAway * extent)) return;
+  if (!(extent > 0) || !(middle->norm() > kFarOut * extent)) return;
   // To a power of two beyond the extent: differences to it are exact.
   const double unit = std::exp2(std::ceil(std::log2(extent)));
   origin_ = (*middle / unit).array().round() * unit;

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "krot/base/angle.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/minimax/residual.h"
@@ -28,7 +29,6 @@ constexpr size_t kFewestSightings = 6;
 constexpr int kTurnIterations = 50;
 constexpr double kSmallestTurn = 1e-12;  // rad
 constexpr double kTurnDamping = 1e-9;    // relative
-constexpr double kDegrees = 180 / 3.14159265358979323846;
 
 // An observation of the image, and its point where its camera stands now.
 struct Sighting {
@@ -238,7 +238,7 @@ std::optional<RotationSuspect> FindRotationSuspect(
   suspect.num_above = fit.NumAbove(fit.Fit(/*with_rotation=*/false));
   suspect.num_above_turned = fit.NumAbove(turn);
   const Eigen::AngleAxisd angle_axis(turn.rotation);
-  suspect.angle_deg = angle_axis.angle() * kDegrees;
+  suspect.angle_deg = angle_axis.angle() * kDegreesPerRadian;
   suspect.axis_in_cam = angle_axis.axis();
   return suspect;
 }

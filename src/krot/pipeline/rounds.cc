@@ -28,10 +28,10 @@ constexpr double kKeptPromise = 1e-5;
 constexpr double kWorthProving = 3;
 // Of the gap asked for, what a proof may leave that is sufficient: the rest is
 // for roundings behind it.
-constexpr double kSufficientShare = 0.95;
+constexpr double kProofShare = 0.95;
 // Rows that have lowered the true cost to this share, and whose own is such a
 // share of that, are taken anew before they are solved.
-constexpr double kFarAway = 0.5;
+constexpr double kFarFromRows = 0.5;
 
 class Rounds {
  public:
@@ -85,7 +85,7 @@ class Rounds {
   void Prove();
 
   const Model& model_;
-  const SolveModelOptions& options_;
+  const SolveModelOptions options_;
   const SolveMethod method_;
   const Context& context_;
   const Timer& timer_;
@@ -123,7 +123,7 @@ void Rounds::Prove() {
     }
     proof = ProveInPixels(
         model_, built_, estimate_, options_.norm, std::move(support),
-        (1 - kSufficientShare * options_.joint.relative_gap) * cost_, context_);
+        (1 - kProofShare * options_.joint.relative_gap) * cost_, context_);
   }
   if (proof &&
       (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
@@ -136,7 +136,7 @@ void Rounds::Prove() {
 bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) const {
   if (reprojection_.IsLinear()) return false;
   const double cost = TrueCost(swept);
-  return cost <= kFarAway * cost_ && linear_cost <= kFarAway * cost;
+  return cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost;
 }
 
 // Whether another round may lower the cost.

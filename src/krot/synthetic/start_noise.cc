@@ -4,20 +4,20 @@
 #include <limits>
 #include <vector>
 
+#include "krot/base/angle.h"
 #include "krot/camera/camera_model.h"
 #include "krot/synthetic/rigid_motion.h"
 
 namespace krot {
 namespace {
 
-constexpr double kDegree = 0.017453292519943295;  // radians
-constexpr double kShareOfDepth = 0.45;
+constexpr double kMaxShareOfDepth = 0.45;
 
 Eigen::Matrix3d RandomRotation(double sigma_deg, Random* random) {
   const double angle_deg =
       sigma_deg * std::clamp(random->Gaussian(), -3.0, 3.0);
   const Eigen::Vector3d axis = random->GaussianVector().normalized();
-  return Eigen::AngleAxisd(angle_deg * kDegree, axis).toRotationMatrix();
+  return Eigen::AngleAxisd(angle_deg * (kPi / 180), axis).toRotationMatrix();
 }
 
 // A Gaussian displacement no longer than max_length.
@@ -82,12 +82,12 @@ SceneGeometry PerturbStart(const SceneGeometry& truth,
     pose.translation -=
         pose.Rotation() *
         RandomDisplacement(options.start_translation_noise,
-                           kShareOfDepth * smallest.of_frame[f], random);
+                           kMaxShareOfDepth * smallest.of_frame[f], random);
   }
   for (size_t k = 0; k < start.points.size(); ++k) {
     start.points[k] +=
         RandomDisplacement(options.start_point_noise,
-                           kShareOfDepth * smallest.of_point[k], random);
+                           kMaxShareOfDepth * smallest.of_point[k], random);
   }
   return start;
 }

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/base/angle.h"
 #include "krot/synthetic/rigid_motion.h"
 
 namespace krot {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 // The rotation of a camera that looks along `forward`; world y points down.
 Eigen::Matrix3d LookAlong(const Eigen::Vector3d& forward) {
