@@ -33,6 +33,10 @@ endfunction()
 function(krot_warnings target)
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+  if(EMSCRIPTEN)  # Indices have 64 bits, memory 32; the page is one long text.
+    target_compile_options(${target}
+      PRIVATE -Wno-shorten-64-to-32 -Wno-overlength-strings)
+  endif()
   if(KROT_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
@@ -54,7 +58,8 @@ endfunction()
 # compiled so, and not in an executable beside libraries that are compiled for a
 # module: -fPIE and -fPIC do not go together.
 function(krot_precompiled_headers target kind)
-  if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT KROT_UNITY OR target STREQUAL krot_base)
+  if(CMAKE_CXX_COMPILER_LAUNCHER OR EMSCRIPTEN OR NOT KROT_UNITY
+     OR target STREQUAL krot_base)
     return()
   endif()
   get_target_property(type ${target} TYPE)

@@ -12,7 +12,6 @@
 #include <pybind11/stl.h>
 
 #include "krot/analysis/model_comparison.h"
-#include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_verdict.h"
@@ -26,7 +25,6 @@
 #include "krot/report/adjustment_report.h"
 #include "krot/report/comparison_report.h"
 #include "krot/report/outlier_report.h"
-#include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/version.h"
 #include "python/bindings.h"
@@ -53,15 +51,6 @@ struct Outcome {
 
 OptionTable TableOf(const std::string& function) {
   return {function, "", "docs/cli.md"};
-}
-
-RunRecord Describe(const Timer& timer, int num_threads) {
-  RunRecord run;
-  run.version = KROT_VERSION;
-  run.threads = ResolveNumThreads(num_threads);
-  run.seconds_total = timer.Seconds();
-  run.peak_memory_bytes = PeakMemoryBytes();
-  return run;
 }
 
 // The callbacks take the GIL, which the call itself has released.
@@ -93,7 +82,7 @@ Outcome RunSolve(const ModelPointer& model, TolerantSolveOptions options,
     result = SolveTolerantly(*model, options, context);
   });
   SolveReport report;
-  report.run = Describe(timer, context.num_threads);
+  RecordEnd(timer, context.num_threads, &report.run);
   report.command = command;
   report.method = MethodName(result.summary.method);
   report.summary = std::move(result.summary);
@@ -144,7 +133,7 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
     result = FilterOutliers(*model, options, context);
   });
   OutlierReport report;
-  report.run = Describe(timer, context.num_threads);
+  RecordEnd(timer, context.num_threads, &report.run);
   report.summary = std::move(result.summary);
   Outcome outcome{std::make_shared<Model>(std::move(result.model)),
                   OutlierJson(report), std::nullopt};
@@ -168,7 +157,7 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
     result = AdjustModel(*model, options, {given.num_threads(), &cancel});
   });
   AdjustmentReport report;
-  report.run = Describe(timer, given.num_threads());
+  RecordEnd(timer, given.num_threads(), &report.run);
   report.summary = std::move(result.summary);
   return {std::make_shared<Model>(std::move(result.model)),
           AdjustmentJson(report), std::nullopt};

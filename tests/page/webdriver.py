@@ -28,12 +28,16 @@ def missing_program():
 
 
 class Browser:
-    """One window of `size` (width, height) CSS pixels. A context manager."""
+    """One window of `size` (width, height) CSS pixels; what is downloaded goes
+    to `downloads`. A context manager."""
 
-    def __init__(self, size=(1200, 900), dark=False, scale=1, touch=False):
+    def __init__(self, size=(1200, 900), dark=False, scale=1, touch=False,
+                 downloads=None):
         arguments = _ARGUMENTS + [f"--force-device-scale-factor={scale}",
                                   "--window-size=%d,%d" % size]
         options = {"args": arguments, "binary": shutil.which("chromium")}
+        if downloads:
+            options["prefs"] = {"download.default_directory": str(downloads)}
         if dark:
             arguments.append("--force-dark-mode")
         if touch:
@@ -45,7 +49,8 @@ class Browser:
         self._url = "http://127.0.0.1:%s" % self._wait_for_port()
         value = self._request("POST", "/session", {"capabilities": {
             "alwaysMatch": {"goog:chromeOptions": options,
-                            "goog:loggingPrefs": {"browser": "ALL"}}}})
+                            "goog:loggingPrefs": {"browser": "ALL",
+                                                  "performance": "ALL"}}}})
         self._url += "/session/" + value["sessionId"]
 
     def __enter__(self):
@@ -110,6 +115,11 @@ class Browser:
             {"type": "pointerUp", "button": 0},
         ])
 
+    def choose(self, selector, path):
+        """Gives a file, or a folder, to an <input type=file>."""
+        self._request("POST", "/element/%s/value" % self._element(selector),
+                      {"text": str(path)})
+
     def _element(self, selector):
         return self._request("POST", "/element", {
             "using": "css selector", "value": selector})[_ELEMENT]
@@ -127,6 +137,13 @@ class Browser:
         """What the console said since the last call: (level, message)."""
         entries = self._request("POST", "/se/log", {"type": "browser"})
         return [(entry["level"], entry["message"]) for entry in entries]
+
+    def requests(self):
+        """The addresses that were asked for since the last call."""
+        entries = self._request("POST", "/se/log", {"type": "performance"})
+        events = [json.loads(entry["message"])["message"] for entry in entries]
+        return [event["params"]["request"]["url"] for event in events
+                if event["method"] == "Network.requestWillBeSent"]
 
     def screenshot(self):
         """What the window shows, as PNG bytes."""

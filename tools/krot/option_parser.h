@@ -40,9 +40,6 @@ class OptionParser : public OptionTable {
     bool is_output_file = false;
   };
 
-  std::vector<OptionAssignment> ReadArguments(
-      const std::vector<std::string>& arguments) const;
-  std::vector<OptionAssignment> ReadProjectFile(const std::string& path) const;
   void CheckOutputFiles() const;
 
   std::vector<PathOption> paths_;

@@ -25,10 +25,28 @@ fs::path Resolve(const fs::path& target) {
 
 std::string Reason(int error) { return std::generic_category().message(error); }
 
-bool IsMountPoint(const fs::path& folder) {
+// False where the system does not tell.
+bool IsMountPoint([[maybe_unused]] const fs::path& folder) {
+#ifdef STATX_ATTR_MOUNT_ROOT
   struct statx status;
   return ::statx(AT_FDCWD, folder.c_str(), 0, 0, &status) == 0 &&
          (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0;
+#else
+  return false;
+#endif
+}
+
+// Exchanges two names in one step; false, with errno, where that is not to be
+// had.
+bool ExchangeNames([[maybe_unused]] const fs::path& a,
+                   [[maybe_unused]] const fs::path& b) {
+#ifdef RENAME_EXCHANGE
+  return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(),
+                     RENAME_EXCHANGE) == 0;
+#else
+  errno = ENOSYS;
+  return false;
+#endif
 }
 
 // `path`, or its nearest parent that exists.
@@ -89,10 +107,7 @@ void Carry(const fs::path& from, const fs::path& to) {
 // Exchanges two folders. File systems without RENAME_EXCHANGE need two
 // renames; between them the old folder bears a name of its own.
 void Exchange(const fs::path& staging, const fs::path& target) {
-  if (::renameat2(AT_FDCWD, staging.c_str(), AT_FDCWD, target.c_str(),
-                  RENAME_EXCHANGE) == 0) {
-    return;
-  }
+  if (ExchangeNames(staging, target)) return;
   if (errno != EINVAL && errno != ENOSYS) {
     throw WriteError(target.string() +
                      ": cannot be replaced: " + Reason(errno));

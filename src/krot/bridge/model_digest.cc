@@ -4,15 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <memory>
-#include <new>
 #include <numeric>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include <openssl/evp.h>
-
+#include "krot/bridge/sha256.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -21,13 +18,6 @@ namespace {
 // Collects little-endian bytes and digests them in pieces.
 class Digest {
  public:
-  Digest() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
-    if (!context_ ||
-        EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1) {
-      throw std::bad_alloc();
-    }
-  }
-
   void Integer(uint64_t value) {
     std::array<unsigned char, 8> bytes;
     for (unsigned char& byte : bytes) {
@@ -45,13 +35,10 @@ class Digest {
 
   std::string Hex() {
     Flush();
-    std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
-    unsigned int size = 0;
-    EVP_DigestFinal_ex(context_.get(), digest.data(), &size);
     std::string hex;
-    for (unsigned int n = 0; n < size; ++n) {
-      hex += "0123456789abcdef"[digest[n] >> 4];
-      hex += "0123456789abcdef"[digest[n] & 15];
+    for (const unsigned char byte : sha256_.Finish()) {
+      hex += "0123456789abcdef"[byte >> 4];
+      hex += "0123456789abcdef"[byte & 15];
     }
     return hex;
   }
@@ -65,11 +52,11 @@ class Digest {
   }
 
   void Flush() {
-    EVP_DigestUpdate(context_.get(), buffer_.data(), buffer_.size());
+    sha256_.Append(buffer_.data(), buffer_.size());
     buffer_.clear();
   }
 
-  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+  Sha256 sha256_;
   std::vector<unsigned char> buffer_;
 };
 

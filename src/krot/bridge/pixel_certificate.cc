@@ -195,7 +195,7 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
   }
   std::vector<char> keeps(support.size(), 0);
   for (size_t begin = 0; begin < support.size(); begin += kLinesAtOnce) {
-    const size_t end = std::min(support.size(), begin + kLinesAtOnce);
+    const size_t end = std::min<size_t>(support.size(), begin + kLinesAtOnce);
     ParallelFor(static_cast<int64_t>(end - begin), 1, context.num_threads,
                 [&](int64_t n, int64_t, int) {
                   keeps[begin + n] =

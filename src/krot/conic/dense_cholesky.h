@@ -18,10 +18,7 @@ class DenseCholesky {
 
  private:
   bool FactorizeDiagonal(int64_t k);
-  void DividePanel(int64_t k, int64_t i);
-  void UpdateTile(int64_t k, int64_t i, int64_t j);
-
-  int64_t Size(int64_t tile) const;
+  Eigen::Block<Eigen::MatrixXd> BlockAt(int64_t i, int64_t j);
 
   Eigen::MatrixXd L_;  // lower triangle
 };

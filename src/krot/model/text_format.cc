@@ -1,8 +1,8 @@
-#include <charconv>
 #include <optional>
 #include <string_view>
 #include <utility>
 
+#include "krot/base/number_text.h"
 #include "krot/base/write_file.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/sensor_type.h"
@@ -10,13 +10,6 @@
 
 namespace krot {
 namespace {
-
-template <typename T>
-void AppendNumber(T value, std::string* text) {
-  char digits[32];
-  const auto result = std::to_chars(digits, digits + sizeof(digits), value);
-  text->append(digits, result.ptr);
-}
 
 // Each of the following begins with the blank that separates it.
 

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "krot/base/number_text.h"
 #include "krot/model/file_bytes.h"
 #include "krot/model/model_error.h"
 
@@ -103,15 +103,11 @@ class TextReader {
 
   template <typename T>
   static std::optional<T> ParseNumber(std::string_view word) {
-    // from_chars takes no plus sign, streams do.
+    // Streams take a plus sign.
     if (word.size() > 1 && word[0] == '+' && word[1] != '-') {
       word.remove_prefix(1);
     }
-    T value;
-    const char* end = word.data() + word.size();
-    const auto [stop, error] = std::from_chars(word.data(), end, value);
-    if (error != std::errc() || stop != end) return std::nullopt;
-    return value;
+    return krot::ParseNumber<T>(word);
   }
 
  private:

@@ -2,23 +2,20 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <sstream>
+
+#include "krot/base/number_text.h"
 
 namespace krot {
 namespace {
 
 template <typename Number>
-bool ParseNumber(const std::string& text, Number* value) {
-  const char* const end = text.data() + text.size();
-  Number parsed = 0;
-  const std::from_chars_result result =
-      std::from_chars(text.data(), end, parsed);
-  if (result.ec != std::errc() || result.ptr != end) return false;
-  *value = parsed;
-  return true;
+bool ParseInto(const std::string& text, Number* value) {
+  const std::optional<Number> parsed = ParseNumber<Number>(text);
+  if (parsed) *value = *parsed;
+  return parsed.has_value();
 }
 
 std::string WithUnit(const std::string& text, const std::string& unit) {
@@ -66,16 +63,16 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 }  // namespace
 
 bool ParseInteger(const std::string& text, int* value) {
-  return ParseNumber(text, value);
+  return ParseInto(text, value);
 }
 
 bool ParseInteger(const std::string& text, uint64_t* value) {
-  return ParseNumber(text, value);
+  return ParseInto(text, value);
 }
 
 bool ParseReal(const std::string& text, double* value) {
   double parsed = 0;
-  if (!ParseNumber(text, &parsed) || !std::isfinite(parsed)) return false;
+  if (!ParseInto(text, &parsed) || !std::isfinite(parsed)) return false;
   *value = parsed;
   return true;
 }

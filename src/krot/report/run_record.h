@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "krot/base/timer.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/rotations_file.h"
 
@@ -22,6 +23,9 @@ struct RunRecord {
   int threads = 0;
   uint64_t seed = 0;
 };
+
+// Version, threads, the time since the timer was made, the process's memory.
+void RecordEnd(const Timer& timer, int num_threads, RunRecord* run);
 
 // "Read 0.10 s, MIDDLE, wrote 0.20 s; 1.50 s in all on 2 threads, ...\n".
 std::string RunSentence(const RunRecord& run, const std::string& middle);

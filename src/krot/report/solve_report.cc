@@ -1,10 +1,9 @@
 #include "krot/report/solve_report.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 
+#include "krot/base/number_text.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -74,10 +73,9 @@ std::string MethodName(SolveMethod method) {
 
 std::string NormName(Norm norm) {
   if (std::isinf(norm.p)) return "inf";
-  std::array<char, 32> text;
-  const std::to_chars_result result =
-      std::to_chars(text.data(), text.data() + text.size(), norm.p);
-  return {text.data(), result.ptr};
+  std::string text;
+  AppendNumber(norm.p, &text);
+  return text;
 }
 
 }  // namespace krot

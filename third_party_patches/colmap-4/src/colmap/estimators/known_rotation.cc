@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <krot/base/timer.h>
 #include <krot/options/outlier_filter_options.h>
 #include <krot/options/solver_options.h>
 #include <krot/outliers/outlier_filter.h>
@@ -104,12 +105,13 @@ bool HasResult(const krot::SolveSummary& summary) {
 bool Solve(const krot::TolerantSolveOptions& options,
            krot::Context context,
            Reconstruction& reconstruction) {
+  const krot::Timer timer;
   context.on_note = [](const std::string& note) { LOG(INFO) << note; };
   krot::TolerantSolveResult result =
       krot::SolveTolerantly(ToKrotModel(reconstruction), options, context);
   if (!HasResult(result.summary)) return false;
   krot::SolveReport report;
-  report.run.threads = context.num_threads;
+  krot::RecordEnd(timer, context.num_threads, &report.run);
   report.command = "known_rotation_solver";
   report.method = krot::MethodName(result.summary.method);
   report.summary = std::move(result.summary);
@@ -137,11 +139,13 @@ bool SolveKnownRotation(const KnownRotationOptions& options,
 bool FilterOutliers(const OutlierFilterOptions& options,
                     Reconstruction& reconstruction) {
   return Try([&]() {
+    const krot::Timer timer;
     krot::Context context;
     const krot::OutlierFilterOptions resolved = Resolve(options, context);
     krot::OutlierFilterResult result =
         krot::FilterOutliers(ToKrotModel(reconstruction), resolved, context);
     krot::OutlierReport report;
+    krot::RecordEnd(timer, context.num_threads, &report.run);
     report.summary = std::move(result.summary);
     LOG(INFO) << "\n" << krot::OutlierTable(report);
     UpdateFromKrotModel(result.model, reconstruction);

@@ -1,0 +1,77 @@
+// What a command gave: a sentence, its table, its report page, files to take.
+
+import JSZip from 'jszip';
+
+import { byId, html } from '../krot/report/page/dom.js';
+import { counted, pixels } from '../krot/report/page/format.js';
+
+let urls = [];
+
+function urlOf(parts, type) {
+  urls.push(URL.createObjectURL(new Blob(parts, { type })));
+  return urls.at(-1);
+}
+
+export function textOf(files, path) {
+  const file = files?.find((candidate) => candidate.path === path);
+  return file ? new TextDecoder().decode(file.bytes) : null;
+}
+
+async function zipOf(files) {
+  const zip = new JSZip();
+  for (const { path, bytes } of files) zip.file(path, bytes);
+  return zip.generateAsync({ type: 'uint8array', compression: 'DEFLATE' });
+}
+
+function download(name, bytes) {
+  return html('a', { href: urlOf([bytes], 'application/octet-stream'),
+    download: name }, name);
+}
+
+async function downloads(files) {
+  const model = files.filter(({ path }) => path.startsWith('result/'));
+  const others = files.filter(({ path }) => !path.startsWith('result/'));
+  return [
+    ...(model.length > 0 ? [download('result.zip', await zipOf(model))] : []),
+    ...others.map(({ path, bytes }) => download(path, bytes)),
+  ];
+}
+
+// The levels of an error profile under a slider; onTake gets a bound.
+export function showBounds(profile, onTake) {
+  const levels = profile?.levels ?? [];
+  byId('bounds').hidden = levels.length === 0;
+  if (levels.length === 0) return;
+  const slider = byId('level');
+  const show = () => {
+    const level = levels[slider.value];
+    byId('removed').value = counted(level.num_removed, 'observation') +
+      (level.num_must_go ? ` (at least ${level.num_must_go} must go)` : '');
+    byId('bound').value = `${pixels(level.max_error)} px`;
+    // The next digit: the bound itself must be within reach.
+    byId('take').onclick = () => onTake(level.max_error * (1 + 1e-6));
+  };
+  slider.max = levels.length - 1;
+  slider.value = profile.elbow ?? 0;
+  slider.oninput = show;
+  show();
+}
+
+// `result` as Runner.run gives it.
+export async function showResult(result) {
+  urls.forEach((url) => URL.revokeObjectURL(url));
+  urls = [];
+  const { code, text = '', files = [], failure, last } = result;
+  const isWrong = Boolean(failure) || code !== 0;
+  const page = files.find(({ path }) => path === 'page.html');
+  const verdict = text.match(/^(Maximum|removed|Accepted|accepted|Refused).*$/m);
+  byId('sentence').textContent = failure ? `${failure}; ${last}` :
+    verdict ? verdict[0] : isWrong ? last : text.split('\n')[0];
+  byId('sentence').classList.toggle('wrong', isWrong);
+  byId('table').textContent = text;
+  byId('table').parentElement.hidden = text === '';
+  byId('downloads').replaceChildren(...await downloads(files));
+  byId('report').hidden = !page;
+  byId('report').src = page ? urlOf([page.bytes], 'text/html') : 'about:blank';
+  byId('result').hidden = false;
+}

@@ -1,0 +1,18 @@
+// Where there is no Ceres: nothing can be adjusted.
+
+#include "krot/adjust/bundle_adjustment.h"
+#include "krot/adjust/ceres_log.h"
+#include "krot/base/check.h"
+
+namespace krot {
+
+BundleAdjustmentResult AdjustBundle(const Model&,
+                                    const BundleAdjustmentOptions&,
+                                    const Context&) {
+  throw std::invalid_argument(
+      "bundle adjustment is not in this build, which has no Ceres");
+}
+
+void SilenceCeres() {}
+
+}  // namespace krot

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <charconv>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+
+namespace krot {
+
+// What std::from_chars and std::to_chars do with doubles, for standard
+// libraries that have them for integers alone, by way of the C library.
+namespace number_text_by_c {
+std::optional<double> Parse(std::string_view text);
+std::string Shortest(double value);
+}  // namespace number_text_by_c
+
+#ifdef __cpp_lib_to_chars
+inline constexpr bool kCharconvHasReals = true;
+#else
+inline constexpr bool kCharconvHasReals = false;
+#endif
+
+// The number that the whole of `text` is, as std::from_chars reads it: no
+// blank, no plus sign, whatever the locale; nothing if it is none, or none that
+// `Number` can hold.
+template <typename Number>
+std::optional<Number> ParseNumber(std::string_view text) {
+  if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
+    return number_text_by_c::Parse(text);
+  } else {
+    Number value;
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || stop != end) return std::nullopt;
+    return value;
+  }
+}
+
+// Appends the shortest text that ParseNumber reads as `value`, as std::to_chars
+// has it.
+template <typename Number>
+void AppendNumber(Number value, std::string* text) {
+  if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
+    text->append(number_text_by_c::Shortest(value));
+  } else {
+    char digits[32];
+    const auto result = std::to_chars(digits, digits + sizeof(digits), value);
+    text->append(digits, result.ptr);
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,87 @@
+// By Boost.Program_options.
+
+#include "tools/krot/given_options.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <boost/program_options.hpp>
+
+#include "krot/options/option_error.h"
+
+namespace krot {
+namespace {
+
+namespace po = boost::program_options;
+
+po::options_description Describe(const std::vector<Option>& options) {
+  po::options_description description;
+  for (const Option& option : options) {
+    description.add_options()(option.name.c_str(), po::value<std::string>());
+  }
+  return description;
+}
+
+OptionAssignment ToAssignment(const po::option& option) {
+  const std::string text = option.value.empty() ? "" : option.value.front();
+  if (option.position_key >= 0) {
+    throw OptionError("unexpected argument '" + text +
+                      "'; options read --name value");
+  }
+  const bool is_separate = option.original_tokens.size() > 1;
+  if (is_separate && text.rfind("--", 0) == 0) {
+    throw OptionError("--" + option.string_key + " has no value");
+  }
+  return {option.string_key, text, "--" + option.string_key};
+}
+
+}  // namespace
+
+std::vector<OptionAssignment> GivenOptions(
+    const std::vector<std::string>& arguments,
+    const std::vector<Option>& options) {
+  const po::options_description description = Describe(options);
+  std::vector<OptionAssignment> assignments;
+  try {
+    const po::parsed_options parsed =
+        po::command_line_parser(arguments)
+            .options(description)
+            .style(po::command_line_style::allow_long |
+                   po::command_line_style::long_allow_next |
+                   po::command_line_style::long_allow_adjacent)
+            .allow_unregistered()
+            .run();
+    for (const po::option& option : parsed.options) {
+      assignments.push_back(ToAssignment(option));
+    }
+  } catch (const po::error& error) {
+    throw OptionError(error.what());
+  }
+  return assignments;
+}
+
+std::vector<OptionAssignment> ReadProjectFile(
+    const std::string& path, const std::vector<Option>& options) {
+  std::ifstream stream(path);
+  std::error_code ignored;
+  if (!stream || std::filesystem::is_directory(path, ignored)) {
+    throw OptionError("--project_path = " + path +
+                      ", must be a file that can be read");
+  }
+  const po::options_description description = Describe(options);
+  std::vector<OptionAssignment> assignments;
+  try {
+    const po::parsed_options parsed =
+        po::parse_config_file(stream, description, true);
+    for (const po::option& option : parsed.options) {
+      assignments.push_back({option.string_key,
+                             option.value.empty() ? "" : option.value.front(),
+                             option.string_key + " in " + path});
+    }
+  } catch (const po::error& error) {
+    throw OptionError(path + ": " + error.what());
+  }
+  return assignments;
+}
+
+}  // namespace krot

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "krot/options/option_table.h"
+
+namespace krot {
+
+// What `--name value` and `--name=value` say, in their order; names are not
+// looked up. Throws OptionError for what is neither.
+std::vector<OptionAssignment> GivenOptions(
+    const std::vector<std::string>& arguments,
+    const std::vector<Option>& options);
+
+// What a project file, in COLMAP's INI format, says. Throws OptionError if it
+// cannot be read.
+std::vector<OptionAssignment> ReadProjectFile(
+    const std::string& path, const std::vector<Option>& options);
+
+}  // namespace krot

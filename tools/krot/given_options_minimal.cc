@@ -1,0 +1,37 @@
+// Where there is no Boost: by hand, and no project files.
+
+#include "krot/options/option_error.h"
+#include "tools/krot/given_options.h"
+
+namespace krot {
+
+std::vector<OptionAssignment> GivenOptions(
+    const std::vector<std::string>& arguments, const std::vector<Option>&) {
+  std::vector<OptionAssignment> assignments;
+  for (size_t n = 0; n < arguments.size(); ++n) {
+    const std::string& argument = arguments[n];
+    if (argument.rfind("--", 0) != 0) {
+      throw OptionError("unexpected argument '" + argument +
+                        "'; options read --name value");
+    }
+    const size_t equals = argument.find('=');
+    const std::string name = argument.substr(2, equals - 2);
+    if (equals != std::string::npos) {
+      assignments.push_back({name, argument.substr(equals + 1), "--" + name});
+      continue;
+    }
+    if (n + 1 == arguments.size() || arguments[n + 1].rfind("--", 0) == 0) {
+      throw OptionError("--" + name + " has no value");
+    }
+    assignments.push_back({name, arguments[++n], "--" + name});
+  }
+  return assignments;
+}
+
+std::vector<OptionAssignment> ReadProjectFile(const std::string& path,
+                                              const std::vector<Option>&) {
+  throw OptionError("--project_path = " + path +
+                    ", this build reads no project files");
+}
+
+}  // namespace krot

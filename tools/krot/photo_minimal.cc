@@ -1,0 +1,13 @@
+// Where there are no libraries that read photos: none can be read.
+
+#include "tools/krot/photo.h"
+
+namespace krot {
+
+std::optional<Photo> ReadPhoto(const std::string&) { return std::nullopt; }
+
+Photo CropPhoto(const Photo& photo, int, int, int) { return photo; }
+
+std::vector<uint8_t> EncodeJpeg(const Photo&) { return {}; }
+
+}  // namespace krot
