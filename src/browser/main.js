@@ -51,8 +51,8 @@ async function runAndShow(task) {
 }
 
 function modelSentence(report) {
-  const { num_images: images, num_points3D: points,
-    num_observations: observations } = report;
+  const { num_images: images, num_points: points,
+    num_observations: observations } = report.colmap;
   const time = Math.max(1, Math.round(observations * kSecondsPerObservation));
   const cost = observations > kMostObservations ?
     'more than a browser is likely to hold: take the command line' :

@@ -37,7 +37,11 @@ class Browser:
                                   "--window-size=%d,%d" % size]
         options = {"args": arguments, "binary": shutil.which("chromium")}
         if downloads:
-            options["prefs"] = {"download.default_directory": str(downloads)}
+            options["prefs"] = {
+                "download.default_directory": str(downloads),
+                "profile.default_content_setting_values.automatic_downloads":
+                    1,  # several, without asking
+            }
         if dark:
             arguments.append("--force-dark-mode")
         if touch:
