@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # The recorded runs of docs/reliability.md, on the krot in build/ that
 # tools/run_tests.sh made: prints its tables of faults, kills and folders.
-# Hours, with the defaults; those of the fuzzers are tools/run_fuzzers.sh's.
+# Half an hour, with the defaults; those of the fuzzers are tools/run_fuzzers.sh's.
 #
-# Usage: tools/measure_reliability.sh [FAULTS_PER_KIND [KILLS [ROUNDS]]]
-#   FAULTS_PER_KIND  of each command; 0: the 1st, 2nd, 3rd ... call, all of them
-#   KILLS            of each command, and as many interrupts
-#   ROUNDS           of folders that vanish or are shared
+# Usage: tools/measure_reliability.sh [MEMORY [KILLS [ROUNDS]]]
+#   MEMORY  failures of malloc of each command; 0: the 1st, 2nd, 3rd ... call,
+#           as of all other kinds in any case
+#   KILLS   of each command, and as many interrupts
+#   ROUNDS  of folders that vanish or are shared
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
@@ -19,7 +20,7 @@ run() {
 }
 
 run fault_test.py --library "$root"/build/tests/faults/libkrot_faults.so \
-  --limit "${1:-0}"
+  --memory "${1:-400}"
 run kill_test.py --kills "${2:-60}" --interrupts "${2:-60}"
 run folder_test.py --rounds "${3:-40}" --stride 1
 exit "$status"

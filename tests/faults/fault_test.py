@@ -1,9 +1,10 @@
 """Every call of the system may fail: what a command leaves is whole.
 
-Usage: fault_test.py KROT --library FILE [--limit N] [--seed S]
+Usage: fault_test.py KROT --library FILE [--limit N] [--memory N] [--seed S]
          [--command NAME] [--kind NAME]
 Of each command and each kind of fault in faults.cc the 1st, 2nd, 3rd ... call
 fails until a run passes untouched; with a limit, so many of them by chance.
+--memory is that of malloc, which a command calls tens of thousands of times.
 Prints a table for docs/reliability.md.
 """
 
@@ -81,6 +82,7 @@ def main():
     parser.add_argument("krot")
     parser.add_argument("--library", required=True)
     parser.add_argument("--limit", type=int, default=0)
+    parser.add_argument("--memory", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--command", default="")
     parser.add_argument("--kind", default="")
@@ -96,8 +98,11 @@ def main():
             for kind in KINDS:
                 if options.kind and kind != options.kind:
                     continue
-                injected, refused, wrong = test_kind(injector, kind,
-                                                     options.limit, dice)
+                limit = options.limit
+                if kind == "malloc" and options.memory:
+                    limit = options.memory
+                injected, refused, wrong = test_kind(injector, kind, limit,
+                                                     dice)
                 for line in wrong:
                     print(line, file=sys.stderr, flush=True)
                 for i, count in enumerate((injected, refused, len(wrong))):

@@ -18,7 +18,7 @@ namespace krot {
 namespace {
 
 // Of costs within the gap that is asked for, relative.
-constexpr double kGap = 1e-7;
+constexpr double kGap = 1e-5;
 constexpr double kTolerance = 2 * kGap;
 
 Model Scene() {
