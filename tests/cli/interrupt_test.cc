@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/analysis/pixel_errors.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
@@ -77,6 +78,38 @@ TEST_F(Interrupt, FromTheKeyboardEndsWith130AndWritesNothing) {
 
 TEST_F(Interrupt, ByTerminationDoesTheSame) {
   EXPECT_EQ(SignalAfterFirstSweep(SIGTERM).exit_code, 130);
+  ExpectNothingChanged();
+}
+
+TEST_F(Interrupt, WritesTheBestEstimateSoFarIfAsked) {
+  std::vector<std::string> arguments = Arguments();
+  arguments.insert(arguments.end(), {"--write_on_interrupt", "1"});
+  KrotProcess process(arguments);
+  process.WaitForErrorText("sweep 1:");
+  process.Signal(SIGINT);
+  const KrotResult result = process.Wait();
+  EXPECT_EQ(result.exit_code, 130);
+  EXPECT_THAT(result.err, ::testing::EndsWith(
+                              "interrupted; " + (folder_ / "model").string() +
+                              " holds the best estimate so far\n"));
+  const double before = Summarize(PixelErrors(before_)).max;
+  EXPECT_LT(Summarize(PixelErrors(Load(folder_ / "model"))).max, before);
+  EXPECT_THAT(ReadBytes(folder_ / "report.json"),
+              ::testing::HasSubstr("\"interrupted\""));
+}
+
+TEST_F(Interrupt, BeforeThereIsAnEstimateWritesNothingEvenIfAsked) {
+  KrotProcess process({"solver", "--input_path", folder_ / "model",
+                       "--output_path", folder_ / "model", "--overwrite", "1",
+                       "--Solver.init", "feasible", "--write_on_interrupt",
+                       "1"});
+  process.WaitForErrorText("iteration 1: looking for a start below");
+  process.Signal(SIGTERM);
+  const KrotResult result = process.Wait();
+  EXPECT_EQ(result.exit_code, 130);
+  EXPECT_THAT(result.err,
+              ::testing::EndsWith("before there was an estimate, nothing was "
+                                  "written\n"));
   ExpectNothingChanged();
 }
 

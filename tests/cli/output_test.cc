@@ -1,4 +1,6 @@
-#include <fstream>
+#include <cstdio>
+#include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -131,6 +133,53 @@ TEST_F(Output, KeepsModelAndCertificateWhereTheReportCannotBeWritten) {
             (std::vector<std::string>{"certificate.json", "expected", "input",
                                       "output"}));
   EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "expected")));
+}
+
+// The options of a log that are not defaults, but for where things go.
+std::vector<std::string> LoggedOptions(const std::string& log) {
+  std::istringstream lines(log);
+  std::vector<std::string> options;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("--", 0) != 0) continue;
+    if (line.find("  (default)") != std::string::npos) continue;
+    if (line.rfind("--output_path", 0) == 0) continue;
+    if (line.rfind("--log_path", 0) == 0) continue;
+    options.push_back(line);
+  }
+  return options;
+}
+
+TEST_F(Output, CanBeMadeAgainFromTheLog) {
+  const fs::path file = folder_ / "run.log";
+  ASSERT_EQ(Solve(folder_ / "a", {"--log_path", file, "--log_level", "0",
+                                  "--Solver.finish", "none"})
+                .exit_code,
+            0);
+  const std::string log = ReadBytes(file);
+  EXPECT_THAT(log, ::testing::StartsWith("krot solver, version "));
+  EXPECT_THAT(log, ::testing::HasSubstr("sweep 1: cost "));
+  EXPECT_THAT(log, ::testing::HasSubstr("max error"));
+  EXPECT_THAT(log, ::testing::EndsWith("s  exit code 0\n"));
+
+  std::vector<std::string> again = {"solver", "--output_path", folder_ / "b"};
+  for (const std::string& option : LoggedOptions(log)) again.push_back(option);
+  ASSERT_EQ(RunKrot(again).exit_code, 0);
+  EXPECT_THAT(Load(folder_ / "b"), IsModel(Load(folder_ / "a")));
+}
+
+TEST_F(Output, IsLoggedWithTheDigestsOfWhatWasReadAndTheRefusal) {
+  const fs::path file = folder_ / "run.log";
+  const fs::path images = folder_ / "input/images.bin";
+  const std::unique_ptr<FILE, int (*)(FILE*)> sum(
+      ::popen(("sha256sum < '" + images.string() + "'").c_str(), "r"),
+      &::pclose);
+  char digest[65] = {};
+  ASSERT_EQ(std::fread(digest, 1, 64, sum.get()), 64u);
+  fs::resize_file(folder_ / "input/points3D.bin", 20);
+  EXPECT_EQ(Solve(folder_ / "a", {"--log_path", file}).exit_code, 2);
+  EXPECT_THAT(ReadBytes(file), ::testing::HasSubstr(digest));
+  EXPECT_THAT(ReadBytes(file), ::testing::HasSubstr("krot solver: "));
+  EXPECT_THAT(ReadBytes(file), ::testing::EndsWith("s  exit code 2\n"));
 }
 
 TEST_F(Output, SplitsTablesFromProgress) {

@@ -6,8 +6,8 @@
 
 #include "tools/benchmark/benchmark_options.h"
 #include "tools/benchmark/log_plot.h"
-#include "tools/benchmark/machine.h"
 #include "tools/benchmark/result_table.h"
+#include "tools/krot/machine.h"
 
 namespace krot {
 

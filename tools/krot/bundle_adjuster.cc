@@ -47,7 +47,6 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
   progress.Follow(&options.start, &context);
   AdjustModelResult result = AdjustModel(model, options, context);
   progress.Finish();
-  ThrowIfInterrupted();
   const AdjustModelSummary& summary = result.summary;
   switch (summary.adjustment.termination) {
     case BundleAdjustmentTermination::kNothingToAdjust:
@@ -55,6 +54,11 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
                          NothingToAdjustSentence(summary.adjustment));
     case BundleAdjustmentTermination::kInfeasibleStart:
       throw CommandError(kExitNoStart, NoModelBelowCapSentence(summary));
+    case BundleAdjustmentTermination::kInterrupted:
+      if (summary.adjustment.num_iterations > 0) return result;
+      throw CommandError(
+          kExitInterrupted,
+          "interrupted before the first iteration, nothing was written");
     default:
       return result;
   }
@@ -63,19 +67,20 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
 int Run(const ModelPaths& paths, const CommonOptions& common,
         AdjustModelOptions options, int num_threads) {
   const Timer total_timer;
-  const Context context{num_threads, &CatchInterrupts()};
-  const WriteModelOptions write_options = CheckModelPaths(paths);
+  const WriteModelOptions write_options = CheckModelPaths(paths, common.log);
   AdjustmentReport report;
   report.run.version = KROT_VERSION;
   report.run.threads = ResolveNumThreads(num_threads);
   report.run.seed = common.random_seed;
 
   const Model model = ReadInput(paths, common.log, &report.run);
-  ThrowIfInterrupted();
 
   options.adjustment.fixed = ReadFixedParts(paths, model);
+  Context context{num_threads};
+  if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
   AdjustModelResult result =
       Adjust(model, std::move(options), context, common.log);
+  DeferInterrupts();
   report.summary = std::move(result.summary);
 
   LogLine(common.log, 2, "writing " + paths.output_path);
@@ -87,6 +92,7 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   WriteReports(paths.report_path, paths.html_path, AdjustmentJson(report),
                model, result.model, report.run.threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
+  if (context.IsCancelled()) ThrowInterrupted(paths);
   return kExitDone;
 }
 
@@ -102,6 +108,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                       "frame stays");
   AddModelPaths(&paths, &parser);
   AddFixedPaths(&paths, &parser);
+  AddWriteOnInterrupt(&paths, &parser);
   options.AddTo(&parser);
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers", &common,

@@ -1,5 +1,7 @@
 #include "tools/krot/common_options.h"
 
+#include "tools/krot/run_log.h"
+
 namespace krot {
 
 void AddCommonOptions(const std::string& seed_description,
@@ -12,11 +14,18 @@ void AddCommonOptions(const std::string& seed_description,
   parser->AddInteger("log_level", &options->log.level, Between(0, 2),
                      "What to say on stderr: 0 errors only, 1 progress, 2 "
                      "details");
+  parser->AddOutputFile("log_path", &options->log.path,
+                        "Where a log of this run goes, whatever the level: "
+                        "version, machine, every option, the digests of what "
+                        "was read, each line; all that is needed to repeat it");
   parser->AddBool("log_to_stderr", &options->log.to_stderr,
                   "Send the tables to stderr, too, and leave stdout empty");
   parser->AddPath("project_path", &options->project_path, false, "an .ini file",
                   "Options in COLMAP's manner: name = value, groups in "
                   "[Sections]; explicit flags win");
+  parser->OnParsed([options, parser] {
+    if (!options->log.path.empty()) BeginRunLog(options->log.path, *parser);
+  });
 }
 
 }  // namespace krot

@@ -1,14 +1,20 @@
 #pragma once
 
+#include <string>
+
 #include "krot/base/progress.h"
 
 namespace krot {
 
-// From now on the first SIGINT or SIGTERM sets the returned flag; a second
-// one ends the process at once.
-const CancelFlag& CatchInterrupts();
+// What SIGINT and SIGTERM do.
 
-// Throws CommandError (kExitInterrupted) if the flag is set.
-void ThrowIfInterrupted();
+// From now on they end the process at once, with a sentence of `who` and
+// kExitInterrupted: for as long as nothing has been written.
+void EndOnInterrupt(const std::string& who);
+
+// From now on the first one sets the returned flag, so that what has begun is
+// completed, or cut short by who looks at it; a second one ends the process at
+// once.
+const CancelFlag& DeferInterrupts();
 
 }  // namespace krot

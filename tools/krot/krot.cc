@@ -1,10 +1,15 @@
 // krot COMMAND [options]: the command table, and what becomes of exceptions.
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cstdlib>
+#include <exception>
 #include <functional>
 #include <iostream>
 #include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "krot/adjust/ceres_log.h"
@@ -16,6 +21,9 @@
 #include "tools/krot/command.h"
 #include "tools/krot/command_error.h"
 #include "tools/krot/help_pages.h"
+#include "tools/krot/interrupt.h"
+#include "tools/krot/log.h"
+#include "tools/krot/run_log.h"
 
 namespace krot {
 namespace {
@@ -64,7 +72,7 @@ constexpr char kExitCodes[] =
     "    3  nothing to solve\n"
     "    4  a certificate was refused\n"
     "    5  the output cannot be written\n"
-    "    6  out of memory, or an error in KROT itself\n"
+    "    6  out of memory or threads, or an error in KROT itself\n"
     "    7  no estimate below the error that a start may have\n"
     "    8  no better estimate: the model is written as it was read\n"
     "  130  interrupted by SIGINT or SIGTERM\n";
@@ -151,15 +159,12 @@ int RunCommand(const std::vector<std::string>& arguments) {
 // One line on stderr, whatever the message holds.
 int Fail(const std::string& who, std::string message, int exit_code) {
   std::replace(message.begin(), message.end(), '\n', ' ');
-  std::cerr << who << ": " << message << std::endl;
+  LogLine({}, 0, who + ": " + message);
   return exit_code;
 }
 
-int Main(const std::vector<std::string>& arguments) {
-  const std::string who =
-      arguments.empty() || FindCommand(arguments.front()) == nullptr
-          ? "krot"
-          : "krot " + arguments.front();
+int RunOrFail(const std::string& who,
+              const std::vector<std::string>& arguments) {
   try {
     const int exit_code = RunCommand(arguments);
     if (!std::cout.flush()) {
@@ -176,12 +181,49 @@ int Main(const std::vector<std::string>& arguments) {
     return Fail(who, error.what(), kExitNotWritten);
   } catch (const std::bad_alloc&) {
     return Fail(who, "out of memory", kExitInternal);
+  } catch (const std::system_error& error) {
+    return Fail(who, "refused by the system: " + error.code().message(),
+                kExitInternal);
   } catch (const std::exception& error) {
     return Fail(who, std::string("internal error: ") + error.what(),
                 kExitInternal);
   } catch (...) {
     return Fail(who, "internal error", kExitInternal);
   }
+}
+
+std::string out_of_memory;  // as a sentence, while there is some
+
+// Libraries whose destructors allocate (nlohmann/json) end the process where
+// memory does: with the sentence and the code of any other place, at least.
+[[noreturn]] void EndWithoutUnwinding() {
+  try {
+    if (const std::exception_ptr error = std::current_exception()) {
+      std::rethrow_exception(error);
+    }
+  } catch (const std::bad_alloc&) {
+    if (::write(STDERR_FILENO, out_of_memory.data(), out_of_memory.size()) <
+        0) {
+      std::abort();
+    }
+    ::_exit(kExitInternal);
+  } catch (...) {
+    std::abort();
+  }
+  std::abort();
+}
+
+int Main(const std::vector<std::string>& arguments) {
+  const std::string who =
+      arguments.empty() || FindCommand(arguments.front()) == nullptr
+          ? "krot"
+          : "krot " + arguments.front();
+  EndOnInterrupt(who);
+  out_of_memory = who + ": out of memory\n";
+  std::set_terminate(&EndWithoutUnwinding);
+  const int exit_code = RunOrFail(who, arguments);
+  EndRunLog(exit_code);
+  return exit_code;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
+#include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/same_path.h"
 
@@ -74,6 +75,7 @@ WriteModelOptions CopyOptions(const AnalyzerOptions& options,
   WriteModelOptions write_options;
   write_options.overwrite = options.overwrite;
   write_options.copy_project_from = input_path;
+  write_options.on_note = WarnOn(options.common.log);
   return write_options;
 }
 
@@ -137,6 +139,7 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   const std::string certificate = CertificateText(options, model);
   ModelReport report = AnalyzeModel(model, options.num_worst);
   report.contradictions = contradictions;
+  DeferInterrupts();
   if (!options.error_colors_path.empty()) {
     WriteColoredCopy(options, path, model);
   }

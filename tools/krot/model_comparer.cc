@@ -13,6 +13,7 @@
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
+#include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/same_path.h"
@@ -88,6 +89,7 @@ WriteModelOptions OverlayWriteOptions(const ComparerOptions& options) {
       options.output_type == "TXT" ? ModelFormat::kText : ModelFormat::kBinary;
   write.overwrite = options.overwrite;
   write.copy_project_from = options.input_path1;
+  write.on_note = WarnOn(options.common.log);
   return write;
 }
 
@@ -217,6 +219,7 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
 
   const Model aligned =
       TransformModel(model2, report.summary.world1_from_world2);
+  DeferInterrupts();
   if (!options.overlay_path.empty()) {
     WriteModel(OverlayModels(model1, aligned), options.overlay_path,
                OverlayWriteOptions(options));

@@ -12,6 +12,7 @@
 #include "krot/model/validate.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/report_files.h"
+#include "tools/krot/run_log.h"
 #include "tools/krot/same_path.h"
 
 namespace krot {
@@ -89,13 +90,20 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
                   "3D points that must not move, by id, one per line");
 }
 
+void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
+  parser->AddBool("write_on_interrupt", &paths->write_on_interrupt,
+                  "On the first SIGINT or SIGTERM write the best estimate so "
+                  "far; without, nothing");
+}
+
 void AddOverwrite(bool* overwrite, OptionParser* parser) {
   parser->AddBool("overwrite", overwrite,
                   "Replace the model that the output folder holds; other "
                   "files in it stay");
 }
 
-WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
+WriteModelOptions CheckModelPaths(const ModelPaths& paths,
+                                  const LogOptions& log) {
   CheckSideName("report_path", paths.report_path);
   if (IsSamePath(paths.input_path, paths.output_path) && !paths.overwrite) {
     throw OptionError(
@@ -106,6 +114,7 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths) {
   options.format = OutputFormat(paths);
   options.overwrite = paths.overwrite;
   options.copy_project_from = paths.input_path;
+  options.on_note = WarnOn(log);
   CheckWritable(paths.output_path, options);
   CheckSidePath("report_path", paths.report_path, paths.output_path);
   CheckSidePath("html_path", paths.html_path, paths.output_path);
@@ -117,6 +126,11 @@ void CheckSidePath(const std::string& option, const std::string& path,
   if (path.empty()) return;
   CheckSideName(option, path);
   CheckFileWritable(path, folder_to_come);
+}
+
+void ThrowInterrupted(const ModelPaths& paths) {
+  throw CommandError(kExitInterrupted, "interrupted; " + paths.output_path +
+                                           " holds the best estimate so far");
 }
 
 void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
@@ -131,6 +145,7 @@ void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
 ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log) {
+  LogInput(path);
   ValidModel read;
   read.model = ReadModel(path, DetectModelFormat(path));
   read.contradictions = FindContradictions(read.model);
@@ -155,6 +170,7 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log,
       ReadValidModel(paths.input_path, paths.on_contradiction, log);
   run->contradictions = read.contradictions;
   if (!paths.rotations_path.empty()) {
+    LogInput(paths.rotations_path);
     run->rotations =
         ReplaceRotations(ReadFileBytes(paths.rotations_path), &read.model);
     LogLine(log, 1,
@@ -170,9 +186,11 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log,
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model) {
   FixedParts fixed;
   if (!paths.fixed_images_path.empty()) {
+    LogInput(paths.fixed_images_path);
     fixed.frames = FixedFrames(ReadFileBytes(paths.fixed_images_path), model);
   }
   if (!paths.fixed_points_path.empty()) {
+    LogInput(paths.fixed_points_path);
     fixed.points3D =
         FixedPoints3D(ReadFileBytes(paths.fixed_points_path), model);
   }

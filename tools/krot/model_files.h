@@ -24,6 +24,7 @@ struct ModelPaths {
   std::string fixed_points_path;  // "": all move
   std::string report_path;
   std::string html_path;
+  bool write_on_interrupt = false;
 };
 
 void AddModelPaths(ModelPaths* paths, OptionParser* parser);
@@ -31,13 +32,16 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser);
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
 // Of a command that may hold images and points.
 void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
+// Of a command whose estimate is of use before its end.
+void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
 
 // Throws OptionError where the paths contradict each other, ModelError where
 // no model lies at input_path, WriteError where the output or a report could
 // not be written. Changes nothing and reads no model.
-// Returns how to write.
-WriteModelOptions CheckModelPaths(const ModelPaths& paths);
+// Returns how to write; keeps a reference to `log`.
+WriteModelOptions CheckModelPaths(const ModelPaths& paths,
+                                  const LogOptions& log);
 
 // Whether a file beside the model, a report or a certificate, can be written to
 // `path`, the value of --`option`; "": none is. `folder_to_come` will exist by
@@ -45,6 +49,9 @@ WriteModelOptions CheckModelPaths(const ModelPaths& paths);
 // WriteError if it cannot be written.
 void CheckSidePath(const std::string& option, const std::string& path,
                    const std::string& folder_to_come = "");
+
+// Ends a command that was interrupted and has written what it had by then.
+[[noreturn]] void ThrowInterrupted(const ModelPaths& paths);
 
 // What to do where tracks and images contradict each other; every command that
 // reads a model asks.

@@ -6,6 +6,7 @@
 #include "krot/synthetic/scene.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
+#include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/same_path.h"
 
@@ -168,6 +169,7 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   write_options.format =
       options.output_type == "TXT" ? ModelFormat::kText : ModelFormat::kBinary;
   write_options.overwrite = options.overwrite;
+  write_options.on_note = WarnOn(options.common.log);
   CheckWritable(options.output_path, write_options);
   const bool wants_ground_truth = !options.ground_truth_path.empty();
   if (wants_ground_truth) {
@@ -175,6 +177,7 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   }
 
   const SyntheticScene scene = Synthesize(scene_options);
+  DeferInterrupts();
   WriteModel(scene.model, options.output_path, write_options);
   if (wants_ground_truth) {
     WriteModel(scene.ground_truth, options.ground_truth_path, write_options);

@@ -52,6 +52,7 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
   }
   RequireAll();
   CheckOutputFiles();
+  if (on_parsed_) on_parsed_();
   return true;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "krot/options/option_table.h"
@@ -25,6 +27,11 @@ class OptionParser : public OptionTable {
   void AddOutputFile(const std::string& name, std::string* value,
                      const std::string& description);
 
+  // What to do once all values are set, before the work begins.
+  void OnParsed(std::function<void()> action) {
+    on_parsed_ = std::move(action);
+  }
+
   // Sets the values. Returns false, with nothing set, if the arguments ask
   // for help. Throws OptionError for the first thing wrong.
   bool Parse(const std::vector<std::string>& arguments);
@@ -43,6 +50,7 @@ class OptionParser : public OptionTable {
   void CheckOutputFiles() const;
 
   std::vector<PathOption> paths_;
+  std::function<void()> on_parsed_;
   HelpFormat help_format_ = HelpFormat::kText;
 };
 

@@ -84,13 +84,11 @@ void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
   }
 }
 
-OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
-                           const CancelFlag& cancel) {
+OutlierFilterResult Filter(const OutlierCommand& command, const Model& model) {
   const LogOptions& log = command.common.log;
   OutlierFilterOptions options = command.options;
   options.make_profile = !command.profile_path.empty();
   Context context = command.context;
-  context.cancel = &cancel;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
   progress.Follow(&options.solve, &context);
   options.on_removed = [&](int64_t num_removed) {
@@ -100,14 +98,14 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model,
   };
   OutlierFilterResult result = FilterOutliers(model, options, context);
   progress.Finish();
-  ThrowIfInterrupted();
   return result;
 }
 
 // What can be known before the model is read.
 WriteModelOptions CheckPaths(const OutlierCommand& command) {
   const ModelPaths& paths = command.paths;
-  const WriteModelOptions write_options = CheckModelPaths(paths);
+  const WriteModelOptions write_options =
+      CheckModelPaths(paths, command.common.log);
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   CheckSidePath("outliers_path", command.outliers_path, paths.output_path);
   CheckSidePath("OutlierFilter.profile_path", command.profile_path,
@@ -167,7 +165,6 @@ int Run(const OutlierCommand& command) {
   const Timer total_timer;
   const LogOptions& log = command.common.log;
   const ModelPaths& paths = command.paths;
-  const CancelFlag& cancel = CatchInterrupts();
   const WriteModelOptions write_options = CheckPaths(command);
   OutlierReport report;
   report.run.version = KROT_VERSION;
@@ -175,8 +172,8 @@ int Run(const OutlierCommand& command) {
   report.run.seed = command.common.random_seed;
 
   const Model model = ReadInput(paths, log, &report.run);
-  ThrowIfInterrupted();
-  OutlierFilterResult result = Filter(command, model, cancel);
+  OutlierFilterResult result = Filter(command, model);
+  DeferInterrupts();
   report.summary = std::move(result.summary);
   if (result.model.track_elements.empty()) {
     throw CommandError(kExitNothingToSolve,

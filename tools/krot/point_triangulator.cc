@@ -32,6 +32,7 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
                       "lowest largest reprojection error of its track; the "
                       "frames stay");
   AddModelPaths(&command.paths, &parser);
+  AddWriteOnInterrupt(&command.paths, &parser);
   AddSolveOptions(&command.options.solve, &command.context, &parser);
   RefuseDatabase(&parser);
   AddCommonOptions(

@@ -53,19 +53,17 @@ std::string MemoryWords(const SolveSummary& summary) {
 
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
-Model Solve(const SolveCommand& command, const Model& model,
-            const CancelFlag& cancel, SolveReport* report) {
+Model Solve(const SolveCommand& command, const Model& model, const Context& how,
+            SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
   options.solve.problem.fixed = ReadFixedParts(command.paths, model);
-  Context context = command.context;
-  context.cancel = &cancel;
+  Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
   progress.Follow(&options.solve, &context);
   options.find_conflicts = !command.conflicts_path.empty();
   options.solve.describe_certificate = !command.certificate_path.empty();
   options.solve.on_built = [&](const SolveSummary& summary) {
-    ThrowIfInterrupted();
     if (summary.num_observations == 0) {
       throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
     }
@@ -73,7 +71,6 @@ Model Solve(const SolveCommand& command, const Model& model,
   };
   TolerantSolveResult result = SolveTolerantly(model, options, context);
   progress.Finish();
-  ThrowIfInterrupted();
   report->summary = std::move(result.summary);
   report->outliers = std::move(result.outliers);
   return std::move(result.model);
@@ -127,6 +124,16 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
   }
 }
 
+// What an interrupted solve has to show for itself: an estimate of a round, of
+// all observations.
+void ThrowIfNothingSoFar(const SolveReport& report) {
+  if (report.summary.termination != SolveTermination::kInterrupted) return;
+  if (!report.outliers && !report.summary.rounds.empty()) return;
+  throw CommandError(
+      kExitInterrupted,
+      "interrupted before there was an estimate, nothing was written");
+}
+
 void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   const LogOptions& log = command.common.log;
   if (summary.method == SolveMethod::kResInt) return;
@@ -158,21 +165,23 @@ int RunSolveCommand(const SolveCommand& command) {
   const Timer total_timer;
   const LogOptions& log = command.common.log;
   const ModelPaths& paths = command.paths;
-  const CancelFlag& cancel = CatchInterrupts();
-  const WriteModelOptions write_options = CheckModelPaths(paths);
+  const WriteModelOptions write_options = CheckModelPaths(paths, log);
   CheckSidePath("certificate_path", command.certificate_path,
                 paths.output_path);
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
   const Model model = ReadInput(paths, log, &report.run);
-  ThrowIfInterrupted();
 
-  const Model solved = Solve(command, model, cancel, &report);
+  Context context = command.context;
+  if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
+  const Model solved = Solve(command, model, context, &report);
+  DeferInterrupts();
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);
   }
   ThrowIfNoStart(command, report);
+  ThrowIfNothingSoFar(report);
 
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, solved);
@@ -188,6 +197,7 @@ int RunSolveCommand(const SolveCommand& command) {
   WriteReports(paths.report_path, paths.html_path, SolveJson(report), model,
                solved, command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
+  if (context.IsCancelled()) ThrowInterrupted(paths);
   WarnOfMissedGap(command, report.summary);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;
   return is_copy ? kExitGivenBack : kExitDone;

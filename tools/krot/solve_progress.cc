@@ -104,11 +104,12 @@ void SolveProgress::Enter(Stage stage) {
 }
 
 void SolveProgress::Show(double fraction, const std::string& words) {
-  if (log_.level < 1) return;
   if (style_ == Style::kLines) {
     LogLine(log_, 1, words);
     return;
   }
+  LogToSink(words);
+  if (log_.level < 1) return;
   constexpr int kBarWidth = 30;
   fraction_ = std::clamp(fraction, fraction_, 1.0);
   const int filled = static_cast<int>(std::lround(kBarWidth * fraction_));

@@ -31,6 +31,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
                       "model, and proves it; rotations, intrinsics and the "
                       "coordinate frame stay");
   AddModelPaths(&command.paths, &parser);
+  AddWriteOnInterrupt(&command.paths, &parser);
   AddRotationsPath(&command.paths, &parser);
   AddFixedPaths(&command.paths, &parser);
   parser.AddOutputFile("certificate_path", &command.certificate_path,

@@ -6,9 +6,12 @@
 
 #include <cerrno>
 #include <cstdio>
+#include <new>
 #include <string>
 #include <system_error>
+#include <utility>
 
+#include "krot/base/folder_tree.h"
 #include "krot/base/write_file.h"
 
 namespace krot {
@@ -93,8 +96,8 @@ void Carry(const fs::path& from, const fs::path& to) {
                        "choose another folder");
     }
     fs::create_directory(to, from);  // with its permissions
-    for (const auto& entry : fs::directory_iterator(from)) {
-      Carry(entry.path(), to / entry.path().filename());
+    for (const fs::path& name : FolderEntries(from)) {
+      Carry(from / name, to / name);
     }
     return;
   }
@@ -104,10 +107,11 @@ void Carry(const fs::path& from, const fs::path& to) {
   fs::copy(from, to, fs::copy_options::copy_symlinks);
 }
 
-// Exchanges two folders. File systems without RENAME_EXCHANGE need two
-// renames; between them the old folder bears a name of its own.
-void Exchange(const fs::path& staging, const fs::path& target) {
-  if (ExchangeNames(staging, target)) return;
+// Exchanges two folders; returns where the old one is now. File systems without
+// RENAME_EXCHANGE need two renames; between them the old folder bears a name of
+// its own, which it keeps.
+fs::path Exchange(const fs::path& staging, const fs::path& target) {
+  if (ExchangeNames(staging, target)) return staging;
   if (errno != EINVAL && errno != ENOSYS) {
     throw WriteError(target.string() +
                      ": cannot be replaced: " + Reason(errno));
@@ -121,7 +125,7 @@ void Exchange(const fs::path& staging, const fs::path& target) {
     throw WriteError(target.string() +
                      ": cannot be replaced: " + error.message());
   }
-  fs::rename(old, staging);
+  return old;
 }
 
 }  // namespace
@@ -145,11 +149,13 @@ void CheckSwappable(const fs::path& target) {
   CheckFolderIsWritable(existing);
 }
 
-FolderSwap::FolderSwap(const fs::path& target) : FolderSwap() {
+FolderSwap::FolderSwap(const fs::path& target, Note note) : FolderSwap() {
+  note_ = std::move(note);
   CheckSwappable(target);
   const fs::path resolved = Resolve(target);
   target_ = resolved;
   while (!fs::exists(target_.parent_path())) target_ = target_.parent_path();
+  is_new_ = !fs::exists(target_);
   sibling_ = CreateSibling(target_);
   staging_ = sibling_;
   if (target_ != resolved) staging_ /= resolved.lexically_relative(target_);
@@ -157,23 +163,62 @@ FolderSwap::FolderSwap(const fs::path& target) : FolderSwap() {
 }
 
 FolderSwap::~FolderSwap() {
-  std::error_code ignored;
-  if (!sibling_.empty()) fs::remove_all(sibling_, ignored);
+  if (sibling_.empty()) return;
+  const std::error_code error = RemoveTree(sibling_);
+  if (!error || !note_) return;
+  try {
+    note_(sibling_.string() + " cannot be removed: " + error.message());
+  } catch (const std::bad_alloc&) {
+    // Nothing is left to say it with.
+  }
+}
+
+// The new folder is in place: what fails now is only worth a note.
+void FolderSwap::SyncPlace() const {
+  try {
+    SyncFolder(target_.parent_path());
+  } catch (const WriteError& error) {
+    if (note_) note_(error.what());
+  }
+}
+
+// Of a target that did not exist. Where others have made some of its parents
+// meanwhile, what those still lack.
+void FolderSwap::MoveIntoPlace() {
+  const fs::path inner = staging_.lexically_relative(sibling_);
+  fs::path from = sibling_;
+  fs::path to = target_;
+  auto next = inner.begin();
+  for (;;) {
+    std::error_code error;
+    fs::rename(from, to, error);
+    if (!error) break;
+    const bool is_taken = error == std::errc::directory_not_empty ||
+                          error == std::errc::file_exists;
+    if (!is_taken || from == staging_) {
+      throw WriteError(to.string() + ": cannot be created: " + error.message());
+    }
+    from /= *next;
+    to /= *next++;
+  }
+  SyncPlace();
 }
 
 void FolderSwap::Commit(
     const std::function<bool(const fs::path& file_name)>& is_replaced) {
-  if (!fs::exists(target_)) {
-    fs::rename(sibling_, target_);
+  if (is_new_) {
+    SyncFolder(staging_);
+    MoveIntoPlace();
     return;
   }
-  for (const auto& entry : fs::directory_iterator(target_)) {
-    const fs::path name = entry.path().filename();
+  for (const fs::path& name : FolderEntries(target_)) {
     if (is_replaced(name) || fs::exists(staging_ / name)) continue;
-    Carry(entry.path(), staging_ / name);
+    Carry(target_ / name, staging_ / name);
   }
   fs::permissions(staging_, fs::status(target_).permissions());
-  Exchange(staging_, target_);
+  SyncFolder(staging_);
+  sibling_ = Exchange(staging_, target_);
+  SyncPlace();
 }
 
 }  // namespace krot

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 
 namespace krot {
 
@@ -25,9 +26,13 @@ void CheckSwappable(const std::filesystem::path& target);
 // then.
 class FolderSwap {
  public:
+  using Note = std::function<void(const std::string& sentence)>;
+
   // Creates the staging folder. Parents that the target lacks are created in
-  // it and come into place with it.
-  explicit FolderSwap(const std::filesystem::path& target);
+  // it and come into place with it. `note` takes a sentence
+  // where the old folder could not be removed in the end, or the new one's name
+  // not be forced to the disk; may be empty.
+  explicit FolderSwap(const std::filesystem::path& target, Note note = {});
   // Removes the old folder after Commit, the new one without.
   ~FolderSwap();
   FolderSwap(const FolderSwap&) = delete;
@@ -37,15 +42,20 @@ class FolderSwap {
 
   // Carries the old folder's entries over into the new one (files as hard
   // links where possible), except those for which `is_replaced` is true or
-  // that the new folder has already; then swaps.
+  // that the new folder has already; then forces the new one's to the disk, and
+  // swaps.
   void Commit(const std::function<bool(const std::filesystem::path& file_name)>&
                   is_replaced);
 
  private:
   FolderSwap() = default;
+  void MoveIntoPlace();
+  void SyncPlace() const;
 
-  // What is renamed: the target, or its topmost parent that does not exist.
+  Note note_;
+  // What is renamed: the target, or its topmost parent that did not exist.
   std::filesystem::path target_;
+  bool is_new_ = false;  // it did not exist
   // The new folder beside target_; after Commit the old one, if there was one.
   std::filesystem::path sibling_;
   // sibling_, or the folder in it that will become the target.

@@ -34,6 +34,11 @@ Failure FailureOf(const char* action) {
   return {action, std::generic_category().message(errno)};
 }
 
+// File systems without fsync answer EINVAL.
+bool Sync(const FileDescriptor& descriptor) {
+  return ::fsync(descriptor.get()) == 0 || errno == EINVAL;
+}
+
 std::optional<Failure> TryToWrite(const fs::path& file,
                                   std::string_view contents) {
   FileDescriptor descriptor(::open(
@@ -46,11 +51,8 @@ std::optional<Failure> TryToWrite(const fs::path& file,
     if (result < 0) return FailureOf("written");
     contents.remove_prefix(static_cast<size_t>(result));
   }
-  // Some file systems know only now that there is no space. Those without
-  // fsync answer EINVAL.
-  if (::fsync(descriptor.get()) != 0 && errno != EINVAL) {
-    return FailureOf("written");
-  }
+  // Some file systems know only now that there is no space.
+  if (!Sync(descriptor)) return FailureOf("written");
   if (!descriptor.Close()) return FailureOf("written");
   return std::nullopt;
 }
@@ -89,9 +91,12 @@ void WriteFile(const fs::path& file, std::string_view contents) {
 void WriteFileAtomically(const fs::path& file, std::string_view contents) {
   fs::path temporary = file;
   temporary += ".new-" + std::to_string(getpid());
-  const auto fail = [&](const std::string& why) {
+  const auto fail = [&](std::string why) {
     std::error_code ignored;
     fs::remove(temporary, ignored);
+    if (fs::exists(temporary, ignored)) {
+      why += "; " + temporary.string() + " is left";
+    }
     throw WriteError(file.string() + " cannot be written: " + why);
   };
 
@@ -101,6 +106,15 @@ void WriteFileAtomically(const fs::path& file, std::string_view contents) {
   std::error_code error;
   fs::rename(temporary, file, error);
   if (error) fail(error.message());
+  SyncFolder(ParentFolder(file));
+}
+
+void SyncFolder(const fs::path& folder) {
+  FileDescriptor descriptor(
+      ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!descriptor.is_open() || Sync(descriptor)) return;
+  throw WriteError(folder.string() + ": cannot be written: " +
+                   std::generic_category().message(errno));
 }
 
 }  // namespace krot

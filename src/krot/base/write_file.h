@@ -30,4 +30,9 @@ void WriteFile(const std::filesystem::path& file, std::string_view contents);
 void WriteFileAtomically(const std::filesystem::path& file,
                          std::string_view contents);
 
+// Forces the names that a folder holds to the disk, as a rename needs it to
+// outlast a power cut; a folder that may not be read is left to the system.
+// Throws WriteError.
+void SyncFolder(const std::filesystem::path& folder);
+
 }  // namespace krot

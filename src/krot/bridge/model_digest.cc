@@ -33,6 +33,10 @@ class Digest {
     Integer(bits);
   }
 
+  void Bytes(std::string_view bytes) {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
+
   std::string Hex() {
     Flush();
     std::string hex;
@@ -150,6 +154,12 @@ std::string ModelSha256(const Model& model) {
     AddPlace(model, geometries[n], &digest);
     AddObservations(image, observations, &digest);
   }
+  return digest.Hex();
+}
+
+std::string Sha256(std::string_view bytes) {
+  Digest digest;
+  digest.Bytes(bytes);
   return digest.Hex();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "krot/model/model.h"
 
@@ -12,5 +13,8 @@ namespace krot {
 // or the order of the files. The bytes are defined in docs/formats.md.
 // Requires a valid model. O(2D points); keeps no copy of the bytes.
 std::string ModelSha256(const Model& model);
+
+// Of any bytes, written likewise.
+std::string Sha256(std::string_view bytes);
 
 }  // namespace krot

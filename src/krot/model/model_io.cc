@@ -195,7 +195,7 @@ void WriteModel(const Model& model, const fs::path& folder,
                 const WriteModelOptions& options) {
   CheckWritable(folder, options);
   Translating<WriteError>(folder, "written", [&] {
-    FolderSwap swap(folder);
+    FolderSwap swap(folder, options.on_note);
     WriteModelFiles(model, options.format, swap.staging());
     const fs::path project = options.copy_project_from / kProjectFile;
     if (!options.copy_project_from.empty() && fs::exists(project)) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,8 @@ struct WriteModelOptions {
   bool overwrite = false;
   // project.ini is copied from this folder, if there is one.
   std::filesystem::path copy_project_from;  // empty: nothing is copied
+  // As FolderSwap's note: what is left behind, and why; may be empty.
+  std::function<void(const std::string&)> on_note = {};
 };
 
 // Throws WriteError if WriteModel would refuse this folder: it holds a model

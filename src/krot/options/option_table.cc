@@ -1,6 +1,7 @@
 #include "krot/options/option_table.h"
 
 #include <algorithm>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -104,7 +105,9 @@ void OptionTable::Assign(const std::vector<OptionAssignment>& assignments) {
                         ", must be " + option.range);
     }
   }
-  given_.insert(names.begin(), names.end());
+  for (const OptionAssignment& assignment : assignments) {
+    given_.emplace(assignment.name, assignment.text);  // the first stays
+  }
 }
 
 void OptionTable::RequireAll() const {
@@ -118,6 +121,12 @@ void OptionTable::RequireAll() const {
 
 bool OptionTable::IsGiven(const std::string& name) const {
   return given_.count(name) > 0;
+}
+
+std::string OptionTable::Text(const std::string& name) const {
+  const auto given = given_.find(name);
+  if (given != given_.end()) return given->second;
+  return Find({name, "", name}).default_text;
 }
 
 const Option& OptionTable::Find(const OptionAssignment& assignment) const {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <functional>
-#include <set>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -69,6 +69,9 @@ class OptionTable {
   // Whether it was set.
   bool IsGiven(const std::string& name) const;
 
+  // The value as it was given, the default if it was not.
+  std::string Text(const std::string& name) const;
+
   // Throws OptionError if it is given: it "has no effect `why`".
   void Refuse(const std::string& name, const std::string& why) const;
 
@@ -88,7 +91,7 @@ class OptionTable {
   std::string summary_;
   std::string list_;
   std::vector<Option> options_;
-  std::set<std::string> given_;
+  std::map<std::string, std::string> given_;  // name -> text
 };
 
 template <typename T>

@@ -1,4 +1,4 @@
-#include "tools/benchmark/machine.h"
+#include "tools/krot/machine.h"
 
 #include <stdlib.h>
 

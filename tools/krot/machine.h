@@ -4,7 +4,7 @@
 
 namespace krot {
 
-// Where a measurement was made. Times mean nothing without it.
+// Where something was run: times mean nothing without it.
 struct Machine {
   std::string cpu;  // model name; "unknown" where the system does not say
   int cores = 0;    // hardware threads

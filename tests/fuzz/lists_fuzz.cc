@@ -1,0 +1,43 @@
+// The lists beside a model: rotations, and what must not move.
+
+#include "krot/model/fixed_parts.h"
+#include "krot/model/model_error.h"
+#include "krot/model/rotations_file.h"
+#include "krot/model/validate.h"
+#include "tests/fuzz/fuzz.h"
+
+namespace krot {
+namespace {
+
+void Read(ByteSource source) {
+  static const Model model = FuzzScene().model;
+  const uint8_t kind = source.Byte();
+  const FileBytes file = source.Rest("file");
+  try {
+    switch (kind % 3) {
+      case 0: {
+        Model turned = model;
+        ReplaceRotations(file, &turned);
+        ValidateModel(turned);
+        break;
+      }
+      case 1:
+        Require(FixedFrames(file, model).size() == model.frames.size(),
+                "a flag of every frame");
+        break;
+      default:
+        Require(FixedPoints3D(file, model).size() == model.points3D.size(),
+                "a flag of every point");
+        break;
+    }
+  } catch (const ModelError&) {
+  }
+}
+
+}  // namespace
+}  // namespace krot
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  krot::Read({data, size});
+  return 0;
+}

@@ -1,0 +1,167 @@
+// Valid models whose structure is changed, and what solver, filter and adjuster
+// make of them: a valid model whose largest error has not risen, and a bound
+// that is not above it.
+
+#include <algorithm>
+#include <cmath>
+
+#include "krot/model/model_error.h"
+#include "krot/model/validate.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/pipeline/adjust_model.h"
+#include "krot/pipeline/solve_model.h"
+#include "tests/fuzz/fuzz.h"
+
+namespace krot {
+namespace {
+
+constexpr double kRounding = 1e-6;  // relative
+
+template <typename T>
+T& Pick(std::vector<T>* records, ByteSource* source) {
+  return (*records)[source->Byte() % records->size()];
+}
+
+// A number that does harm: any, a small change, or a power of ten.
+double Number(double old, ByteSource* source) {
+  switch (source->Byte() % 4) {
+    case 0:
+      return source->Take<double>();
+    case 1:
+      return old + static_cast<int8_t>(source->Byte()) / 64.0;
+    case 2:
+      return old * std::pow(10, static_cast<int8_t>(source->Byte()) / 8);
+    default:
+      return static_cast<int8_t>(source->Byte());
+  }
+}
+
+void Change(Model* model, ByteSource* source) {
+  if (model->track_elements.empty()) return;
+  Image& image = Pick(&model->images, source);
+  Frame& frame = Pick(&model->frames, source);
+  Point3D& point = Pick(&model->points3D, source);
+  Camera& camera = Pick(&model->cameras, source);
+  const int axis = source->Byte() % 3;
+  const auto change = [&](double* value) { *value = Number(*value, source); };
+  switch (source->Byte() % 11) {
+    case 0:
+      change(&point.xyz[axis]);
+      break;
+    case 1:
+      change(&frame.rig_from_world.translation[axis]);
+      break;
+    case 2:
+      change(&frame.rig_from_world.quaternion_wxyz[axis]);
+      break;
+    case 3:
+      change(&camera.params[axis % camera.params.size()]);
+      break;
+    case 4:
+      if (!image.points2D.empty()) {
+        Point2D& pixel = Pick(&image.points2D, source);
+        change(axis == 0 ? &pixel.x : &pixel.y);
+      }
+      break;
+    case 5:
+      point.xyz = Pick(&model->points3D, source).xyz;
+      break;
+    case 6:  // two frames in one place
+      frame.rig_from_world = Pick(&model->frames, source).rig_from_world;
+      break;
+    case 7: {  // an observation of another image, or twice
+      TrackElement& element = Pick(&model->track_elements, source);
+      element = Pick(&model->track_elements, source);
+      break;
+    }
+    case 8: {  // a track is cut, its rest goes to the next
+      Point3D& last = model->points3D.back();
+      if (&last != &point && point.track_end > point.track_begin) {
+        Point3D& next = *(&point + 1);
+        --point.track_end;
+        --next.track_begin;
+      }
+      break;
+    }
+    case 9: {
+      Rig& rig = Pick(&model->rigs, source);
+      if (!rig.sensors.empty() && rig.sensors[0].sensor_from_rig) {
+        change(&rig.sensors[0].sensor_from_rig->translation[axis]);
+      }
+      break;
+    }
+    default:
+      for (Point2D& pixel : image.points2D) pixel.x = std::round(pixel.x);
+      break;
+  }
+}
+
+double Largest(const PixelErrorStatistics& errors) { return errors.max; }
+
+void Solve(const Model& model, uint8_t kind) {
+  SolveModelOptions options;
+  options.res_int.max_sweeps = 5;
+  options.joint.max_iterations = 100;
+  if (kind & 1) options.init = SolveInit::kFeasible;
+  if (kind & 2) options.finish.finish = Finish::kNone;
+  const SolveModelResult result = SolveModel(model, options, {1});
+  ValidateModel(result.model);
+  const SolveSummary& summary = result.summary;
+  if (summary.lower_bound && std::isfinite(summary.cost_final)) {
+    Require(*summary.lower_bound <= summary.cost_final * (1 + kRounding),
+            "no bound above the cost");
+  }
+  const PixelErrorStatistics& before = summary.pixel_error_before;
+  const PixelErrorStatistics& after = summary.pixel_error_after;
+  Require(after.not_finite <= before.not_finite,
+          "no error that was finite is lost");
+  Require(before.not_finite > 0 ||
+              Largest(after) <= Largest(before) * (1 + kRounding),
+          "no larger error");
+}
+
+void Run(ByteSource source) {
+  static const Model valid = FuzzScene().model;
+  const uint8_t kind = source.Byte();
+  Model model = valid;
+  while (!source.IsEmpty()) Change(&model, &source);
+  try {
+    ValidateModel(model);
+  } catch (const ModelError&) {
+    return;
+  }
+  switch (kind % 4) {
+    case 0: {
+      OutlierFilterOptions options;
+      options.max_error = 2;
+      options.solve.joint.max_iterations = 100;
+      const OutlierFilterResult result = FilterOutliers(model, options, {1});
+      ValidateModel(result.model);
+      Require(result.summary.num_proved <=
+                  static_cast<int64_t>(result.summary.removed.size()),
+              "not more proved than removed");
+      break;
+    }
+    case 1: {
+      AdjustModelOptions options;
+      options.adjustment.max_num_iterations = 5;
+      if (kind & 16) options.adjustment.max_error = 50;
+      try {
+        ValidateModel(AdjustModel(model, options, {1}).model);
+      } catch (const ModelError&) {
+      }
+      break;
+    }
+    default:
+      Solve(model, kind / 4);
+      break;
+  }
+}
+
+}  // namespace
+}  // namespace krot
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  krot::Run({data, size});
+  return 0;
+}

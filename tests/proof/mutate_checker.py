@@ -1,0 +1,156 @@
+"""Changes the certificate checker in one place at a time; its tests must notice.
+
+Usage: mutate_checker.py BUILD [--count N] [--seed S]
+BUILD is a build folder with proof_test (Ninja). Each mutant is one operator,
+bound or constant of the checker's sources that becomes another; it is compiled,
+linked into proof_test and run. Prints the mutants that no test notices, with
+their line, and a summary for docs/reliability.md.
+"""
+
+import argparse
+import concurrent.futures
+import pathlib
+import random
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROOF = ROOT / "src" / "krot" / "proof"
+# What judges, as opposed to what makes certificates.
+CHECKER = ("certificate_check.cc", "certificate_input.cc", "force_balance.cc",
+           "fixed_constants.cc", "observation_force.cc")
+TIMEOUT = 120  # seconds of a test: what takes longer hangs, and is noticed
+
+# Operators stand between blanks, template brackets do not.
+CHANGES = [
+    (r" < ", " <= "), (r" <= ", " < "), (r" > ", " >= "), (r" >= ", " > "),
+    (r" < ", " > "), (r" == ", " != "), (r" != ", " == "),
+    (r" \+ ", " - "), (r" - ", " + "), (r" \* ", " / "), (r" / ", " * "),
+    (r" \+= ", " -= "), (r" -= ", " += "), (r" && ", " || "),
+    (r" \|\| ", " && "), (r"if \(!", "if ("), (r"\btrue\b", "false"),
+    (r"\bfalse\b", "true"), (r"std::max\b", "std::min"),
+    (r"std::min\b", "std::max"), (r"\b1e-(\d+)\b", r"1e-1\1"),
+    (r"(?<![\w.])1(?![\w.])", "2"), (r"(?<![\w.])0(?![\w.])", "1"),
+    (r"(?<![\w.])2(?![\w.>])", "1"), (r"(= |\()-(?=\w)", r"\1"),
+    (r"\.cwiseAbs\(\)", ""), (r"std::abs\(", "("),
+]
+SKIPPED = re.compile(r"^\s*(//|#|static_assert|using|namespace)")
+
+
+def mutants():
+    """Every place and change: file, line number, the line as it becomes."""
+    for name in CHECKER:
+        for number, line in enumerate((PROOF / name).read_text().splitlines()):
+            code = line.split("//")[0]
+            if SKIPPED.match(line) or '"' in code:
+                continue
+            for pattern, replacement in CHANGES:
+                for match in re.finditer(pattern, code):
+                    changed = (code[:match.start()] +
+                               match.expand(replacement) + code[match.end():])
+                    yield name, number, changed
+
+
+class Bench:
+    """Compiles and links proof_test with other checkers."""
+
+    def __init__(self, build, scratch):
+        self.build = build
+        self.scratch = scratch
+        commands = subprocess.run(
+            ["ninja", "-C", build, "-t", "commands", "tests/proof_test"],
+            check=True, capture_output=True, text=True).stdout.splitlines()
+        link = commands[-1].removeprefix(": && ").removesuffix(" && :")
+        self.link = shlex.split(link)
+        compile_line = next(line for line in commands if "krot_proof.dir" in
+                            line and " -c " in line)
+        words = shlex.split(compile_line)
+        self.flags = [word for i, word in enumerate(words)
+                      if word.startswith(("-I", "-D", "-std"))
+                      or word == "-isystem" or words[i - 1] == "-isystem"]
+        self.header = scratch / "all.h"
+        self.header.write_text(
+            "#include <Eigen/LU>\n#include <algorithm>\n#include <cmath>\n"
+            "#include <functional>\n#include <limits>\n#include <numeric>\n"
+            "#include <optional>\n#include <queue>\n#include <sstream>\n"
+            "#include <tuple>\n#include <utility>\n#include <vector>\n")
+        self.compile(self.header, scratch / "all.h.gch",
+                     ["-x", "c++-header"], [])
+        self.objects = {}
+        for source in sorted(PROOF.glob("*.cc")):
+            target = scratch / (source.name + ".o")
+            self.compile(source, target)
+            self.objects[source.name] = target
+
+    def compile(self, source, target, before=(), header=None):
+        include = ["-include", self.header] if header is None else header
+        subprocess.run(["g++", *self.flags, "-O0", "-w", *include, *before,
+                        "-c", source, "-o", target], cwd=self.build, check=True,
+                       capture_output=True)
+
+    def is_noticed(self, mutant, number):
+        """Whether proof_test fails; None if it does not compile."""
+        name, line, text = mutant
+        lines = (PROOF / name).read_text().splitlines()
+        lines[line] = text
+        source = self.scratch / f"{number}.cc"
+        source.write_text("\n".join(lines) + "\n")
+        target = self.scratch / f"{number}.o"
+        try:
+            self.compile(source, target)
+        except subprocess.CalledProcessError:
+            return None
+        program = self.scratch / f"{number}.test"
+        objects = [str(file) for key, file in self.objects.items()
+                   if key != name] + [str(target)]
+        words = []
+        for word in self.link:
+            words += objects if "libkrot_proof.a" in word else [word]
+        words[words.index("-o") + 1] = str(program)
+        subprocess.run(words, cwd=self.build, check=True, capture_output=True)
+        try:
+            return subprocess.run(
+                [program, "--gtest_brief=1", "--gtest_fail_fast"],
+                capture_output=True, timeout=TIMEOUT,
+                check=False).returncode != 0
+        except subprocess.TimeoutExpired:
+            return True
+        finally:
+            program.unlink()
+            target.unlink()
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("build")
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=1)
+    options = parser.parse_args()
+    chosen = list(mutants())
+    random.Random(options.seed).shuffle(chosen)
+    noticed = 0
+    unnoticed = []
+    with tempfile.TemporaryDirectory(prefix="krot-mutants-") as folder, \
+            concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        bench = Bench(pathlib.Path(options.build).resolve(),
+                      pathlib.Path(folder))
+        todo = chosen[:options.count]
+        for mutant, result in zip(todo, pool.map(bench.is_noticed, todo,
+                                                 range(len(todo)))):
+            if result:
+                noticed += 1
+            elif result is not None:
+                unnoticed.append(mutant)
+                name, line, text = mutant
+                print(f"{name}:{line + 1}: {text.strip()}", flush=True)
+    print(f"{noticed + len(unnoticed)} mutants, of {len(chosen)} possible "
+          f"changes: {noticed} noticed, {len(unnoticed)} not")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
