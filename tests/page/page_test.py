@@ -1,11 +1,15 @@
 """The report page in a real browser: what it shows is what report.json says.
 
 Usage: page_test.py KROT   (the executable; exit code 77: no browser here)
+
+With KROT_SAMPLE_PHOTOS, the folder images/ of tools/sample/render.sh, outliers
+planted in the sample are looked for in its photos, too.
 """
 
 import itertools
 import json
 import math
+import os
 import pathlib
 import shutil
 import struct
@@ -16,6 +20,7 @@ import time
 import unittest
 import zlib
 
+import plant
 import webdriver
 
 KROT = None
@@ -73,6 +78,14 @@ return [...document.querySelectorAll('#suspects img')].map((image, i) => {
   return [...context.getImageData(x, y, 1, 1).data];
 });
 """
+
+
+def step_heights(browser, chart):
+    """Of a chart's steps, from the top."""
+    return browser.run("""
+        return [...document.querySelectorAll(
+            arguments[0] + ' circle.after.step')].map(
+                (step) => Number(step.getAttribute('cy')))""", chart)
 
 
 def run_krot(*arguments):
@@ -321,10 +334,7 @@ class OtherCommandsTest(unittest.TestCase):
                     "--overwrite", 1, *cap)
                 costs = [report["cost_initial"]] + [
                     step["cost"] for step in report["iterations"]]
-                heights = self.browser.run("""
-                    return [...document.querySelectorAll(
-                        '#convergence circle.after.step')].map(
-                            (step) => Number(step.getAttribute('cy')))""")
+                heights = step_heights(self.browser, "#convergence")
                 self.assertEqual(len(heights), len(costs))
                 self.assertEqual(len(heights), report["num_iterations"] + 1)
                 for i, j in itertools.permutations(range(len(costs)), 2):
@@ -432,13 +442,8 @@ class FilterTest(unittest.TestCase):
         self.assertEqual(
             self.browser.texts("#profile tbody td:nth-child(3)"),
             [pixels(level["max_error"]) for level in levels])
-        self.assertEqual(self.browser.run(
-            "return document.querySelectorAll('#profile-chart "
-            "circle.after.step').length"), len(levels))
-        heights = self.browser.run("""
-            return [...document.querySelectorAll(
-                '#profile-chart circle.after.step')].map(
-                    (step) => Number(step.getAttribute('cy')))""")
+        heights = step_heights(self.browser, "#profile-chart")
+        self.assertEqual(len(heights), len(levels))
         self.assertEqual(heights, sorted(heights))
 
     def test_crops_show_the_place_of_the_observation(self):
@@ -462,6 +467,53 @@ class FilterTest(unittest.TestCase):
         self.assertEqual(
             self.browser.texts(".info h3"),
             [worst["image_name"], "Point %d" % worst["point3D_id"]])
+
+
+@unittest.skipUnless("KROT_SAMPLE_PHOTOS" in os.environ,
+                     "KROT_SAMPLE_PHOTOS is not set")
+class RenderedSceneTest(unittest.TestCase):
+    """The sample, with observations moved by dozens of pixels, in its rendered
+    photos."""
+
+    def test_planted_outliers_are_shown_in_their_photos(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            sample = pathlib.Path(__file__).parents[2] / "tools/sample/model"
+            run_krot("solver", "--input_path", sample, "--output_path",
+                     root / "input", "--output_type", "TXT")
+            planted = plant.plant_outliers(root / "input", 12)
+            run_krot("outlier_filter", "--input_path", root / "input",
+                     "--output_path", root / "output", "--image_path",
+                     os.environ["KROT_SAMPLE_PHOTOS"],
+                     "--OutlierFilter.max_error", 3.3, "--report_path",
+                     root / "report.json", "--html_path", root / "page.html")
+            report = json.loads((root / "report.json").read_text())
+            removed = {(seen["image_name"], seen["point2D_idx"])
+                       for seen in report["removed"]}
+            self.assertLessEqual(set(planted), removed)
+            self.assertLessEqual(report["num_must_go"], len(planted))
+            with webdriver.Browser((1200, 1300)) as browser:
+                browser.open((root / "page.html").as_uri())
+                crops = json.loads(browser.text("#krot-crops"))
+                sizes = browser.run("""
+                    return [...document.querySelectorAll('#suspects img')].map(
+                        (image) => image.naturalWidth);""")
+                self.assertEqual(browser.console(), [])
+            shown = {(crop["image_name"], crop["point2D_idx"])
+                     for crop in crops}
+            self.assertLessEqual(set(planted), shown)
+            self.assertEqual(len(sizes),
+                             sum(len(crop["views"]) for crop in crops))
+            self.assertGreater(min(sizes), 0)
+            for crop in crops:
+                seen = crop["views"][0]
+                if (crop["image_name"], crop["point2D_idx"]) not in planted:
+                    continue
+                x, y = planted[crop["image_name"], crop["point2D_idx"]]
+                self.assertAlmostEqual(
+                    math.dist(seen["crop"]["observed"],
+                              seen["crop"]["projected"]),
+                    math.hypot(x, y), delta=4)
 
 
 class RotationSuspectTest(unittest.TestCase):

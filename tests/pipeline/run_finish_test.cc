@@ -74,6 +74,18 @@ TEST(RunFinish, LeavesAModelThatItMadeNoWorse) {
               1e-3 * once.summary.pixel_error_after.rms);
 }
 
+TEST(RunFinish, UsesTheRoomThatACapLeavesAboveTheStart) {
+  const SolveModelResult once = SolveModel(NoisyModel(4), {});
+  SolveModelOptions options;
+  options.finish.max_error = 1.1 * once.summary.pixel_error_after.max;
+  const SolveSummary summary = SolveModel(once.model, options).summary;
+  EXPECT_FALSE(summary.is_given_back);
+  ASSERT_TRUE(summary.finish.has_value());
+  EXPECT_EQ(summary.finish->cap, *options.finish.max_error);
+  EXPECT_LE(summary.pixel_error_after.max, *options.finish.max_error);
+  EXPECT_LT(summary.pixel_error_after.rms, once.summary.pixel_error_after.rms);
+}
+
 TEST(RunFinish, LeavesOutWhatACapBelowTheLowestMaximumForbids) {
   SolveModelOptions options;
   options.finish.max_error = 1e-3;

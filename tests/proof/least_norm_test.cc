@@ -1,5 +1,6 @@
 #include "krot/proof/least_norm.h"
 
+#include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -67,6 +68,27 @@ TEST(LeastNormSolver, FindsWhatAnOrthogonalDecompositionFinds) {
       EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
     }
   }
+}
+
+// With reflections, that is; the frames' normal equations are not.
+TEST(LeastNormSolver, IsAsAccurateAsInLongDoubleWhereMultipliersSpanDecades) {
+  LeastNormProblem problem = RandomProblem(true);
+  for (size_t i = 0; i < problem.columns.size(); ++i) {
+    const double scale = std::pow(10, -static_cast<double>(i % 9));
+    problem.columns[i].point_rows *= scale;
+    problem.columns[i].frame_rows *= scale;
+    problem.columns[i].last_row *= scale;
+  }
+  using MatrixXr = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+  using VectorXr = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
+  const MatrixXr M = Dense(problem).cast<long double>();
+  const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
+  const VectorXr expected =
+      M.completeOrthogonalDecomposition().solve(rhs.cast<long double>());
+  LeastNormSolver solver;
+  ASSERT_TRUE(solver.Factorize(problem));
+  const VectorXr x = solver.Solve(rhs).cast<long double>();
+  EXPECT_LE((x - expected).norm(), 1e-11L * expected.norm());
 }
 
 TEST(LeastNormSolver, LeavesOutTheEquationsOfFixedPoints) {

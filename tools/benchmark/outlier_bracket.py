@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """How few observations `krot outlier_filter` removes, and how many must go.
 
-    outlier_bracket.py KROT DATA [NAME...]
+    outlier_bracket.py KROT DATA [NAME[=PIXELS]...]
 
 For every model NAME of the folder DATA (all of them if none is named) and
-bounds of 0.9, 0.75 and 0.5 times its optimum: what the conflicts' method
-removes, what it proves, their ratio, what the threshold's method removes, and
-the seconds of both. Every proof is judged by certificate_checker.
+bounds of 0.9, 0.75 and 0.5 times its optimum, or that of so many pixels: what
+the conflicts' method removes, what it proves, their ratio, what the threshold's
+method removes, and the seconds of both. Every proof is judged by
+certificate_checker. What takes more than ten minutes is given up, and said so.
 """
 
 import json
@@ -18,14 +19,21 @@ import tempfile
 import time
 
 SHARES = (0.9, 0.75, 0.5)
+LIMIT_SECONDS = 600
 
 
 def run(krot, *arguments):
+    """Return code, None if it took too long; its words; seconds."""
     start = time.monotonic()
-    done = subprocess.run([krot, *arguments, "--log_level", "0"],
-                          capture_output=True, text=True, errors="replace",
-                          check=False)
-    return done, time.monotonic() - start
+    try:
+        done = subprocess.run([krot, *arguments, "--log_level", "0"],
+                              capture_output=True, text=True,
+                              errors="replace", check=False,
+                              timeout=LIMIT_SECONDS)
+        code, words = done.returncode, done.stderr.strip()
+    except subprocess.TimeoutExpired:
+        code, words = None, f"more than {LIMIT_SECONDS} s"
+    return code, words, time.monotonic() - start
 
 
 def filter_model(krot, model, folder, max_error, method):
@@ -37,45 +45,51 @@ def filter_model(krot, model, folder, max_error, method):
                  "--report_path", str(report)]
     if method == "conflicts":
         arguments += ["--conflicts_path", str(folder / "proof.json")]
-    done, seconds = run(krot, *arguments)
-    if done.returncode != 0:
-        return None, seconds, done.stderr.strip()
+    code, words, seconds = run(krot, *arguments)
+    if code != 0:
+        return None, seconds, words
     return json.loads(report.read_text()), seconds, ""
 
 
 def optimum(krot, model, folder):
     report = folder / "optimum.json"
-    done, _ = run(krot, "solver", "--input_path", str(model),
-                  "--output_path", str(folder / "optimum"),
-                  "--overwrite", "1", "--report_path", str(report))
-    if done.returncode not in (0, 8):
+    code, _, _ = run(krot, "solver", "--input_path", str(model),
+                     "--output_path", str(folder / "optimum"),
+                     "--overwrite", "1", "--report_path", str(report))
+    if code not in (0, 8):
         return None
     return json.loads(report.read_text())["cost_final"]
 
 
-def measure(krot, model, folder):
-    """Yields a row per bound."""
+def bounds_of(krot, model, pixels, folder):
+    if pixels:
+        return [float(pixels)]
     cost = optimum(krot, model, folder)
     if not cost or cost < 1e-6:
-        return
-    for share in SHARES:
-        few, seconds, error = filter_model(krot, model, folder, share * cost,
+        return []
+    return [share * cost for share in SHARES]
+
+
+def measure(krot, model, pixels, folder):
+    """Yields a row per bound."""
+    for bound in bounds_of(krot, model, pixels, folder):
+        few, seconds, error = filter_model(krot, model, folder, bound,
                                            "conflicts")
         if few is None:
-            print(f"{model.name} {share}: {error}", flush=True)
+            print(f"{model.name:20} {bound:8.4f} {error}", flush=True)
             continue
-        plain, plain_seconds, _ = filter_model(krot, model, folder,
-                                               share * cost, "threshold")
-        checked, _ = run(krot, "certificate_checker", "--input_path",
+        plain, plain_seconds, _ = filter_model(krot, model, folder, bound,
+                                               "threshold")
+        code, _, _ = run(krot, "certificate_checker", "--input_path",
                          str(model), "--certificate_path",
                          str(folder / "proof.json"))
-        yield {"model": model.name, "bound": share * cost,
+        yield {"model": model.name, "bound": bound,
                "observations": few["num_observations"],
                "removed": few["num_removed"], "must": few["num_must_go"],
                "threshold": plain["num_removed"] if plain else None,
                "seconds": seconds, "threshold_seconds": plain_seconds,
                "within": few["is_within"],
-               "checked": checked.returncode == 0}
+               "checked": code == 0}
 
 
 def main():
@@ -88,8 +102,10 @@ def main():
     print(f"{'model':20} {'bound':>8} {'of':>8} {'removed':>8} {'must':>6} "
           f"{'ratio':>6} {'threshold':>9} {'s':>7} {'thr. s':>7}  proof")
     for name in names:
+        name, _, pixels = name.partition("=")
         with tempfile.TemporaryDirectory() as folder:
-            for row in measure(krot, data / name, pathlib.Path(folder)):
+            for row in measure(krot, data / name, pixels,
+                               pathlib.Path(folder)):
                 ratio = row["removed"] / max(1, row["must"])
                 ratios.append(ratio)
                 state = "holds" if row["checked"] else "REFUSED"

@@ -1,6 +1,6 @@
 """Pictures of a report page; see screenshots.sh.
 
-Usage: screenshots.py PAGE.html FILTERED.html FOLDER
+Usage: screenshots.py PAGE.html FILTERED.html SUSPECTS.html FOLDER
 """
 
 import pathlib
@@ -20,7 +20,8 @@ def show_worst(browser):
 def main():
     page = pathlib.Path(sys.argv[1]).resolve().as_uri()
     filtered = pathlib.Path(sys.argv[2]).resolve().as_uri()
-    folder = pathlib.Path(sys.argv[3])
+    suspects = pathlib.Path(sys.argv[3]).resolve().as_uri()
+    folder = pathlib.Path(sys.argv[4])
     # The height includes what a window has around the page.
     with Browser((1100, 1180)) as browser:
         browser.open(page)
@@ -31,6 +32,11 @@ def main():
             "document.getElementById('profile-section').scrollIntoView()")
         time.sleep(1)
         (folder / "page_profile.png").write_bytes(browser.screenshot())
+    with Browser((1000, 760)) as browser:
+        browser.open(suspects)
+        browser.run("document.getElementById('suspects').scrollIntoView()")
+        time.sleep(1)
+        (folder / "page_suspects.png").write_bytes(browser.screenshot())
     with Browser((400, 860), dark=True, touch=True) as browser:
         browser.open(page)
         show_worst(browser)

@@ -115,7 +115,11 @@ Removal OutlierFilter::MakeProfile(const BuiltProblem& built,
   const size_t last = profile.levels.size() - 1;
   const size_t chosen =
       options_.max_error ? last : profile.elbow.value_or(last);
-  if (!options_.max_error) bound_.max_error = profile.levels[chosen].max_error;
+  if (!options_.max_error) {
+    // With room for the least squares, as above every lowest maximum.
+    bound_.max_error =
+        (1 + options_.solve.finish.slack) * profile.levels[chosen].max_error;
+  }
   for (Conflict& conflict : profile.conflicts) {
     if (conflict.proof.lower_bound > bound_.max_error) {
       found->push_back(std::move(conflict));

@@ -27,8 +27,9 @@ enum class OutlierMethod {
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
   // The bound, true pixels; > 0. It may be missing: with a profile it is then
-  // the largest error of the profile's elbow, or of its last level; otherwise,
-  // from nothing, ten times the median error of the start.
+  // the largest error of the profile's elbow, or of its last level, and the
+  // room that solve.finish.slack leaves above it; otherwise, from nothing, ten
+  // times the median error of the start.
   std::optional<double> max_error;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // kConflicts: the proof, most of the time

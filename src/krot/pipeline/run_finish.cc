@@ -32,9 +32,8 @@ void FinishByLeastSquares(const Reprojection& reprojection,
       lower_bound && finish.lowest_cost - *lower_bound <=
                          options.joint.relative_gap * finish.lowest_cost;
   const double lowest = is_lowest_known ? *lower_bound : finish.lowest_cost;
-  finish.cap = std::min(
-      options.finish.max_error.value_or((1 + options.finish.slack) * lowest),
-      summary->cost_initial);
+  finish.cap = options.finish.max_error.value_or(std::min(
+      (1 + options.finish.slack) * lowest, summary->cost_initial));
   if (!(finish.lowest_cost < (1 - kLeastRoom) * finish.cap)) return;
 
   BoundedOptions bounded;

@@ -10,10 +10,10 @@ namespace krot {
 // Takes an estimate whose largest true error is as low as it gets to the end
 // that the options ask for:
 //
-//   least squares   of true errors, below a cap of (1 + slack) times the lowest
-//                   maximum, or max_error: `lower_bound` if the gap asked for
-//                   is reached, else the estimate's own; no error rises above
-//                   the start's largest
+//   least squares   of true errors, below a cap: max_error or, if there is
+//                   none, (1 + slack) times the lowest maximum (`lower_bound`
+//                   if the gap asked for is reached, else the estimate's own),
+//                   but no more than the start's largest
 //   sweeps          two, that do not raise the largest true error; they count
 //                   among the summary's
 //

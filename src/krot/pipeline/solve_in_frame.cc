@@ -163,11 +163,11 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
-// Whether an error that was finite is now above the largest that was; both in
-// the norm of the solve.
+// Whether an error that was finite is now above the largest that was, and above
+// what may be; all in the norm of the solve.
 bool IsWorse(const std::vector<double>& errors_before_px,
-             const std::vector<double>& errors_after_px) {
-  double largest = 0;
+             const std::vector<double>& errors_after_px, double allowed_px) {
+  double largest = allowed_px;
   for (const double error : errors_before_px) {
     if (std::isfinite(error)) largest = std::max(largest, error);
   }
@@ -238,8 +238,8 @@ SolveModelResult SolveInFrame(const Model& model,
       PixelErrors(model, num_threads, options.norm);
   CarryLeftOutPoints(model, before_px, options.norm, start.built,
                      options.problem.fixed, summary.cost_final, &result.model);
-  if (IsWorse(before_px,
-              PixelErrors(result.model, num_threads, options.norm))) {
+  if (IsWorse(before_px, PixelErrors(result.model, num_threads, options.norm),
+              options.finish.max_error.value_or(0))) {
     summary.is_given_back = true;
     summary.finish.reset();
     result.model = model;

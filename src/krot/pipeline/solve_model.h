@@ -103,8 +103,8 @@ struct SolveSummary {
   std::optional<CertificateFile> certificate;  // if asked for
 
   // No estimate was found whose largest error in the p-norm, over all
-  // observations that had a finite one, is not above the input's: the input is
-  // what is given back.
+  // observations that had a finite one, is not above the input's, or above
+  // finish.max_error: the input is what is given back.
   bool is_given_back = false;
 
   // The finish by least squares, if there was one: it gives up (cost_final -

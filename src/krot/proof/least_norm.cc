@@ -1,6 +1,6 @@
 #include "krot/proof/least_norm.h"
 
-#include <limits>
+#include <algorithm>
 #include <utility>
 
 namespace krot {
@@ -38,44 +38,58 @@ bool LeastNormSolver::Factorize(LeastNormProblem problem) {
 }
 
 VectorXd LeastNormSolver::Solve(const VectorXd& rhs) const {
-  if (elimination_) return SolveByPoints(rhs);
-  const int64_t rows = scale_.size();
-  VectorXd padded = VectorXd::Zero(qr_.rows());
-  padded.head(rows) = qr_.matrixQR()
-                          .topRows(rows)
-                          .triangularView<Eigen::Upper>()
-                          .transpose()
-                          .solve(rhs.cwiseProduct(scale_));
-  return qr_.householderQ() * padded;
+  return elimination_ ? SolveByPoints(rhs) : qr_->SolveLeastNorm(rhs);
+}
+
+// The rows of a point's observations, of the transposed equations.
+void LeastNormSolver::AppendPoint(size_t begin, size_t end) {
+  std::vector<int32_t> frames;
+  for (size_t i = begin; i < end; ++i) {
+    if (problem_.columns[i].frame > 0) {
+      frames.push_back(problem_.columns[i].frame);
+    }
+  }
+  std::sort(frames.begin(), frames.end());
+  frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+  std::vector<int64_t> columns;
+  for (const int32_t f : frames) {
+    for (int c = 0; c < 3; ++c) columns.push_back(3 * int64_t{f - 1} + c);
+  }
+  if (problem_.has_last_row) columns.push_back(3 * (problem_.num_frames - 1));
+
+  const int64_t num_rows = 3 * static_cast<int64_t>(end - begin);
+  const bool is_fixed = problem_.IsFixedPoint(problem_.columns[begin].point);
+  MatrixXd own(num_rows, is_fixed ? 0 : 3);
+  MatrixXd shared =
+      MatrixXd::Zero(num_rows, static_cast<int64_t>(columns.size()));
+  for (size_t i = begin; i < end; ++i) {
+    const LeastNormProblem::Columns& c = problem_.columns[i];
+    const int64_t row = 3 * static_cast<int64_t>(i - begin);
+    if (!is_fixed) own.middleRows<3>(row) = c.point_rows;
+    if (c.frame > 0) {
+      const int64_t n =
+          std::lower_bound(frames.begin(), frames.end(), c.frame) -
+          frames.begin();
+      shared.block<3, 3>(row, 3 * n) = c.frame_rows;
+    }
+    if (problem_.has_last_row) {
+      shared.rightCols<1>().segment<3>(row) = c.last_row;
+    }
+  }
+  qr_->Append(own, std::move(columns), shared);
 }
 
 bool LeastNormSolver::FactorizeDense() {
-  const int64_t num_rows = problem_.num_rows();
-  MatrixXd transposed = MatrixXd::Zero(
-      3 * static_cast<int64_t>(problem_.columns.size()), num_rows);
-  const std::vector<int64_t> of_point = problem_.EquationsOfPoints();
-  const int64_t num_free_points = problem_.num_free_points();
-  int64_t i = 0;
-  for (const LeastNormProblem::Columns& c : problem_.columns) {
-    if (!problem_.IsFixedPoint(c.point)) {
-      transposed.block<3, 3>(i, of_point[c.point]) = c.point_rows;
-    }
-    if (c.frame > 0) {
-      transposed.block<3, 3>(i, 3 * (num_free_points + c.frame - 1)) =
-          c.frame_rows;
-    }
-    if (problem_.has_last_row) {
-      transposed.block<3, 1>(i, num_rows - 1) = c.last_row;
-    }
-    i += 3;
+  qr_.emplace(3 * int64_t{problem_.num_frames - 1} + problem_.has_last_row);
+  const size_t count = problem_.columns.size();
+  int32_t num_points = 0;
+  for (size_t begin = 0, end = 0; begin < count; begin = end) {
+    const int32_t k = problem_.columns[begin].point;
+    while (end < count && problem_.columns[end].point == k) ++end;
+    AppendPoint(begin, end);
+    if (!problem_.IsFixedPoint(k)) ++num_points;
   }
-  scale_ = transposed.colwise().norm().cwiseInverse();
-  if (!scale_.allFinite()) return false;
-  transposed *= scale_.asDiagonal();
-  qr_.compute(transposed);
-  const VectorXd diagonal = qr_.matrixQR().diagonal().cwiseAbs();
-  return diagonal.minCoeff() >
-         std::numeric_limits<double>::epsilon() * diagonal.maxCoeff();
+  return num_points == problem_.num_free_points() && qr_->Factorize();
 }
 
 // With A = M', its points' columns orthogonalised: A (A'A)^-1 rhs.

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include "krot/conic/block_structure.h"
 #include "krot/conic/point_elimination.h"
+#include "krot/proof/block_angular_qr.h"
 
 namespace krot {
 
@@ -59,15 +60,15 @@ struct LeastNormProblem {
 //   obs 3  [      P         |            F   | l ]   l: last_row, 3 x 1
 //   obs 4  [           P    |  F             | l ]
 //
-// Dense, by Householder's reflections, where that is affordable, as their
-// multipliers span many decades; beyond `max_dense_rows` by eliminating points,
-// which leaves the columns of the frames, and of the last one its part outside
-// of the span of all others.
+// By Householder's reflections (block_angular_qr.h), where that is affordable,
+// as their multipliers span many decades; beyond `max_dense_rows` by
+// eliminating points, which leaves the normal equations of the frames, and of
+// the last column its part outside of the span of all others.
 //
 // Factorize once and then, if it succeeded, Solve as often as needed.
 class LeastNormSolver {
  public:
-  // The cost of the dense way grows with the cube of the rows.
+  // The cost of the dense way grows with the rows and the frames' square.
   explicit LeastNormSolver(int64_t max_dense_rows = 1500)
       : max_dense_rows_(max_dense_rows) {}
 
@@ -79,14 +80,14 @@ class LeastNormSolver {
 
  private:
   bool FactorizeDense();
+  void AppendPoint(size_t begin, size_t end);
   bool FactorizeByPoints();
   Eigen::VectorXd SolveByPoints(const Eigen::VectorXd& rhs) const;
 
   const int64_t max_dense_rows_;
   LeastNormProblem problem_;
-  // Dense: QR of the transposed equations, each of which is scaled to length 1.
-  Eigen::VectorXd scale_;
-  Eigen::HouseholderQR<Eigen::MatrixXd> qr_;
+  // Dense: of the transposed equations.
+  std::optional<BlockAngularQr> qr_;
   // By points.
   BlockStructure structure_;
   std::unique_ptr<PointElimination<3>> elimination_;
