@@ -60,7 +60,7 @@ class Digest {
     buffer_.clear();
   }
 
-  Sha256 sha256_;
+  Sha256Stream sha256_;
   std::vector<unsigned char> buffer_;
 };
 

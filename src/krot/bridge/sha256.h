@@ -16,9 +16,9 @@ namespace krot {
 #ifdef KROT_WITH_OPENSSL
 
 // As PortableSha256, by OpenSSL. Throws std::bad_alloc.
-class Sha256 {
+class Sha256Stream {
  public:
-  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+  Sha256Stream() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
     if (!context_ ||
         EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1) {
       throw std::bad_alloc();
@@ -41,7 +41,7 @@ class Sha256 {
 
 #else
 
-using Sha256 = PortableSha256;
+using Sha256Stream = PortableSha256;
 
 #endif
 

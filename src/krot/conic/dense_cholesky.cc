@@ -7,7 +7,6 @@
 #include <Eigen/Cholesky>
 
 #include "krot/base/parallel_for.h"
-#include "krot/conic/blas_threads.h"
 #include "krot/conic/tile_products.h"
 
 namespace krot {
@@ -17,14 +16,15 @@ constexpr int64_t kTile = 192;
 
 }  // namespace
 
-Eigen::Block<Eigen::MatrixXd> DenseCholesky::BlockAt(int64_t i, int64_t j) {
-  return L_.block(i * kTile, j * kTile, std::min(kTile, L_.rows() - i * kTile),
-                  std::min(kTile, L_.cols() - j * kTile));
+Tile DenseCholesky::TileAt(int64_t i, int64_t j) {
+  return {&L_(i * kTile, j * kTile), std::min(kTile, L_.rows() - i * kTile),
+          std::min(kTile, L_.cols() - j * kTile), L_.rows()};
 }
 
 // A_kk = L_kk L_kk'.
 bool DenseCholesky::FactorizeDiagonal(int64_t k) {
-  auto tile = BlockAt(k, k);
+  const int64_t size = TileAt(k, k).rows;
+  auto tile = L_.block(k * kTile, k * kTile, size, size);
   const Eigen::LLT<Eigen::MatrixXd> llt(tile);
   if (llt.info() != Eigen::Success) return false;
   tile.triangularView<Eigen::Lower>() = llt.matrixLLT();
@@ -32,14 +32,13 @@ bool DenseCholesky::FactorizeDiagonal(int64_t k) {
 }
 
 bool DenseCholesky::Factorize(const Eigen::MatrixXd& matrix, int num_threads) {
-  UseOneBlasThread();
   L_ = matrix;
   const int64_t num_tiles = NumChunks(L_.rows(), kTile);
   for (int64_t k = 0; k < num_tiles; ++k) {
     if (!FactorizeDiagonal(k)) return false;
     const int64_t num_below = num_tiles - k - 1;
     ParallelFor(num_below, 1, num_threads, [&](int64_t below, int64_t, int) {
-      DivideByTransposed(BlockAt(k, k), BlockAt(k + 1 + below, k));
+      DivideByTransposed(TileAt(k, k), TileAt(k + 1 + below, k));
     });
     std::vector<std::pair<int64_t, int64_t>> tiles;
     for (int64_t i = k + 1; i < num_tiles; ++i) {
@@ -49,10 +48,9 @@ bool DenseCholesky::Factorize(const Eigen::MatrixXd& matrix, int num_threads) {
                 [&](int64_t tile, int64_t, int) {
                   const auto [i, j] = tiles[tile];
                   if (i == j) {
-                    SubtractSquare(BlockAt(i, k), BlockAt(i, i));
+                    SubtractSquare(TileAt(i, k), TileAt(i, i));
                   } else {
-                    SubtractProduct(BlockAt(i, k), BlockAt(j, k),
-                                    BlockAt(i, j));
+                    SubtractProduct(TileAt(i, k), TileAt(j, k), TileAt(i, j));
                   }
                 });
   }

@@ -2,11 +2,13 @@
 
 #include <Eigen/Core>
 
+#include "krot/conic/tile_products.h"
+
 namespace krot {
 
 // The Cholesky factor of a dense symmetric positive definite matrix, by tiles:
-// the products of tiles are BLAS calls on one thread each, shared out to
-// `num_threads` threads of our own. The same bits at any number of threads.
+// the products of tiles are shared out to `num_threads` threads. The same bits
+// at any number of threads.
 class DenseCholesky {
  public:
   // Reads the lower triangle. False if the matrix is not positive definite up
@@ -18,7 +20,7 @@ class DenseCholesky {
 
  private:
   bool FactorizeDiagonal(int64_t k);
-  Eigen::Block<Eigen::MatrixXd> BlockAt(int64_t i, int64_t j);
+  Tile TileAt(int64_t i, int64_t j);
 
   Eigen::MatrixXd L_;  // lower triangle
 };

@@ -1,21 +1,28 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <cstdint>
 
 namespace krot {
 
-// The products of a Cholesky factorization by tiles, on the calling thread: by
-// BLAS, or by Eigen where there is none (KROT_WITH_BLAS).
-using Tile = Eigen::Ref<Eigen::MatrixXd>;
-using ConstTile = Eigen::Ref<const Eigen::MatrixXd>;
+// A rectangle of a matrix, by columns, `stride` apart.
+struct Tile {
+  double* data;
+  int64_t rows, cols;
+  int64_t stride;
+};
+
+// The products of a Cholesky factorization by tiles, on the calling thread, by
+// Eigen; any number of threads may call them. Not by BLAS: the serial OpenBLAS of
+// Debian 12 lets two threads use one buffer, and on a busy machine one of some
+// 3,000 factorizations was wrong.
 
 // A := A L'^-1, of L's lower triangle.
-void DivideByTransposed(const ConstTile& L, Tile A);
+void DivideByTransposed(const Tile& L, const Tile& A);
 
 // C := C - A A', the lower triangle alone.
-void SubtractSquare(const ConstTile& A, Tile C);
+void SubtractSquare(const Tile& A, const Tile& C);
 
 // C := C - A B'.
-void SubtractProduct(const ConstTile& A, const ConstTile& B, Tile C);
+void SubtractProduct(const Tile& A, const Tile& B, const Tile& C);
 
 }  // namespace krot
