@@ -178,7 +178,8 @@ class Place:
             wrong.append(f"exit code {result.returncode}")
         if result.returncode > 0:
             last = result.stderr.splitlines()[-1:] or [""]
-            if not last[0].startswith(f"krot {command.name}: "):
+            speakers = (f"krot {command.name}: ", "krot: ")
+            if not last[0].startswith(speakers):
                 wrong.append("no sentence")
             if "internal error" in last[0]:
                 wrong.append("internal error")

@@ -229,7 +229,9 @@ int Main(const std::vector<std::string>& arguments) {
 }  // namespace
 }  // namespace krot
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   krot::SilenceCeres();
   return krot::Main({argv + std::min(argc, 1), argv + argc});
+} catch (const std::bad_alloc&) {
+  return krot::Fail("krot", "out of memory", krot::kExitInternal);
 }
