@@ -527,7 +527,7 @@ class ToleranceTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         root = pathlib.Path(folder.name)
         run_krot("model_synthesizer", "--output_path", root / "input",
-                 "--Scene.num_frames", 4, "--Scene.num_points", 30,
+                 "--Scene.num_frames", 6, "--Scene.num_points", 30,
                  "--Scene.pixel_noise", 0.3)
         run_krot("tolerance_analyzer", "--input_path", root / "input",
                  "--ToleranceAnalyzer.max_error", 3, "--report_path",
