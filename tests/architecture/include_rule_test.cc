@@ -35,8 +35,9 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"bridge", {"model", "proof"}},
       {"pipeline", {"bridge", "joint", "finish", "analysis", "adjust"}},
       {"outliers", {"pipeline"}},
-      {"options", {"outliers"}},
-      {"report", {"outliers", "pipeline", "analysis"}},
+      {"tolerance", {"pipeline"}},
+      {"options", {"outliers", "tolerance"}},
+      {"report", {"outliers", "tolerance", "pipeline", "analysis"}},
   };
   return kDependencies;
 }

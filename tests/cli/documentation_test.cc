@@ -73,8 +73,9 @@ TEST_P(Documentation, SaysWhatHelpSays) {
 INSTANTIATE_TEST_SUITE_P(
     Commands, Documentation,
     ::testing::Values("solver", "point_triangulator", "bundle_adjuster",
-                      "outlier_filter", "model_analyzer", "model_comparer",
-                      "certificate_checker", "model_synthesizer"),
+                      "outlier_filter", "tolerance_analyzer", "model_analyzer",
+                      "model_comparer", "certificate_checker",
+                      "model_synthesizer"),
     [](const auto& test) { return std::string(test.param); });
 
 TEST(DocumentationOfKrot, ListsTheExitCodesOfHelp) {

@@ -22,11 +22,14 @@ SceneOptions SmallScene() {
   return options;
 }
 
-Model SmallLegacyModel() {
+Model SmallRigModel(int sensors_per_rig) {
   SceneOptions options = SmallScene();
-  options.has_rigs = false;
+  options.has_rigs = sensors_per_rig > 1;
+  options.sensors_per_rig = sensors_per_rig;
   return SynthesizeScene(options).model;
 }
+
+Model SmallLegacyModel() { return SmallRigModel(1); }
 
 void Save(const Model& model, const std::filesystem::path& folder,
           ModelFormat format) {
@@ -109,6 +112,20 @@ Model WithShortTracks(const Model& model, uint64_t length) {
     result.points3D.push_back(point);
   }
   return result;
+}
+
+Model FarAway(const Model& model, const Eigen::Vector3d& shift) {
+  const auto move = [&](Pose* pose) {
+    using Real = long double;
+    pose->translation = (100 * pose->translation.cast<Real>() -
+                         pose->Rotation().cast<Real>() * shift.cast<Real>())
+                            .cast<double>();
+  };
+  Model far = model;
+  for (Frame& frame : far.frames) move(&frame.rig_from_world);
+  for (Image& image : far.images) move(&image.cam_from_world);
+  for (Point3D& point : far.points3D) point.xyz = 100 * point.xyz + shift;
+  return far;
 }
 
 }  // namespace krot

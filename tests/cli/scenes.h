@@ -14,6 +14,9 @@ namespace krot {
 // A few hundred observations, noisy, off their optimum.
 SceneOptions SmallScene();
 
+// SmallScene with so many cameras on its rig; one: without rigs and frames.
+Model SmallRigModel(int sensors_per_rig);
+
 // SmallScene without rigs and frames.
 Model SmallLegacyModel();
 
@@ -32,5 +35,8 @@ Model WithoutTranslations(const Model& model);
 
 // With the first `length` observations of every track only; 0: no points.
 Model WithShortTracks(const Model& model, uint64_t length);
+
+// 100 times as large and `shift` away, as in UTM or ECEF coordinates.
+Model FarAway(const Model& model, const Eigen::Vector3d& shift);
 
 }  // namespace krot

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -21,5 +22,16 @@ namespace krot {
 std::optional<double> OptimalCostByBisection(
     const KnownRotationProblem& problem, Norm norm, double upper_bound,
     double min_depth);
+
+// The largest h'x over all estimates of no residual above `bound`, pixels, for
+// p = 1 or infinity, by the simplex method of CLP: what the problem fixes is
+// fixed, and e'x = `kept` if there is an e. x and h stand as points, then
+// frames, three numbers each. Infinity if there is no largest.
+//
+// None if the tests were built without CLP.
+std::optional<double> LargestByLp(const KnownRotationProblem& problem,
+                                  Norm norm, double bound,
+                                  const std::vector<double>& h,
+                                  const std::vector<double>& e, double kept);
 
 }  // namespace krot

@@ -573,6 +573,32 @@ class RotationSuspectTest(unittest.TestCase):
         self.assertEqual(self.browser.console(), [])
 
 
+class ToleranceTest(unittest.TestCase):
+    def test_boxes_are_listed_and_shown(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        root = pathlib.Path(folder.name)
+        run_krot("model_synthesizer", "--output_path", root / "input",
+                 "--Scene.num_frames", 6, "--Scene.num_points", 30,
+                 "--Scene.pixel_noise", 0.3)
+        run_krot("tolerance_analyzer", "--input_path", root / "input",
+                 "--ToleranceAnalyzer.max_error", 3, "--report_path",
+                 root / "report.json", "--html_path", root / "page.html")
+        boxes = json.loads((root / "report.json").read_text())["boxes"]
+        browser = self.enterContext(webdriver.Browser((1200, 1300)))
+        browser.open((root / "page.html").as_uri())
+        self.assertEqual(browser.texts("#boxes tbody td:first-child"),
+                         [box["image_name"] for box in boxes])
+        width = boxes[0]["high"]["proved"][0] - boxes[0]["low"]["proved"][0]
+        self.assertAlmostEqual(
+            float(browser.texts("#boxes tbody td:nth-child(2)")[0]), width,
+            delta=1e-3 * width)
+        self.assertIn("are proved", browser.text("#verdict"))
+        browser.run("document.querySelector('#boxes tbody tr').click()")
+        self.assertEqual(browser.texts(".info h3"), [boxes[0]["image_name"]])
+        self.assertEqual(browser.console(), [])
+
+
 class PathTest(unittest.TestCase):
     def test_page_does_not_take_the_place_of_the_report(self):
         run = subprocess.run(

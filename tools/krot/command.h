@@ -11,6 +11,7 @@ int RunSolver(const std::vector<std::string>& arguments);
 int RunBundleAdjuster(const std::vector<std::string>& arguments);
 int RunPointTriangulator(const std::vector<std::string>& arguments);
 int RunOutlierFilter(const std::vector<std::string>& arguments);
+int RunToleranceAnalyzer(const std::vector<std::string>& arguments);
 int RunModelAnalyzer(const std::vector<std::string>& arguments);
 int RunModelComparer(const std::vector<std::string>& arguments);
 int RunCertificateChecker(const std::vector<std::string>& arguments);

@@ -44,6 +44,8 @@ constexpr Command kCommands[] = {
      &RunBundleAdjuster},
     {"outlier_filter", "remove few observations, and prove how many must go",
      &RunOutlierFilter},
+    {"tolerance_analyzer", "show everywhere that cameras and points may be",
+     &RunToleranceAnalyzer},
     {"model_analyzer", "show what a model's errors look like",
      &RunModelAnalyzer},
     {"model_comparer", "show how two models differ", &RunModelComparer},

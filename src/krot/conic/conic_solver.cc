@@ -27,6 +27,11 @@ constexpr double kSmallestSigma = 1e-6;
 constexpr double kDamping = 0.98;
 constexpr double kBacktracking = 0.7;
 constexpr double kSmallestStep = 1e-8;
+// Linear programme: mu at the start, beside ObjectiveLength; how much longer a
+// change that balances the multipliers could be, and one that is small.
+constexpr double kMuPerLength = 2;
+constexpr double kBalancingRoom = 1.25;
+constexpr double kSmallChange = 1e3;
 
 void Move(const BlockVector& direction, double step, Estimate* x) {
   for (size_t k = 0; k < x->points.size(); ++k) {
@@ -54,13 +59,13 @@ ConicSolver<Cone>::ConicSolver(const KnownRotationProblem& problem,
       best_(start),
       multipliers_(problem.observations.size()) {
   now_.x = start;
-  now_.scalar = scalar;
+  now_.scalar = start_ = scalar;
   now_.viewed.resize(problem.observations.size());
   now_.z.resize(problem.observations.size());
   trial_ = now_;
   ViewAll(&now_);
   CentreMultipliers();
-  best_cost_ = now_.cost;
+  best_cost_ = program_.IsLinear() ? scalar : now_.cost;
 }
 
 template <typename Cone>
@@ -72,13 +77,21 @@ void ConicSolver<Cone>::ViewAll(State* state) const {
       [&](int64_t i) { return -ResidualOf(state->viewed[i], options_.norm); });
 }
 
-// z = mu s^-1: perfectly centred, scaled so that the row of g holds.
+// z = mu s^-1: perfectly centred. Scaled so that the row of g holds or, in the
+// linear programme, so that from the middle of the cones they are soon
+// balanced.
 template <typename Cone>
 void ConicSolver<Cone>::CentreMultipliers() {
   system_.loop().ForEach([&](int64_t i) {
     now_.z[i] = Cone::Divide(system_.Slack(now_.viewed[i], now_.scalar),
                              Cone::Identity());
   });
+  if (program_.IsLinear()) {
+    if (!Factorize()) return;
+    const double mu = kMuPerLength * system_.ObjectiveLength();
+    system_.loop().ForEach([&](int64_t i) { now_.z[i] *= mu; });
+    return;
+  }
   const double sum = system_.loop().Sum([&](int64_t i) {
     return system_.ToMultiplier(now_.z[i])[0] *
            program_.TopPerScalar(now_.viewed[i].depth);
@@ -90,7 +103,7 @@ void ConicSolver<Cone>::CentreMultipliers() {
 // dz of the predictor.
 template <typename Cone>
 void ConicSolver<Cone>::FindDirection(bool only_centre) {
-  double sigma = kCentring;
+  double sigma = program_.IsLinear() && !is_balanced_ ? 1 : kCentring;
   if (!only_centre) {
     system_.Solve([](int64_t) -> Vector { return Vector::Zero(); }, 0);
     sigma = AffineSigma();
@@ -193,31 +206,65 @@ void ConicSolver<Cone>::ExportMultipliers() {
   });
 }
 
+// Factorises at the iterate. The linear programme's multipliers take the least
+// change, in the scaling, that balances them, if that stays well inside of the
+// cones; the second one is for what rounding left.
+template <typename Cone>
+bool ConicSolver<Cone>::FactorizeBalanced() {
+  if (!Factorize()) return false;
+  for (int change = 0; change < 2; ++change) {
+    system_.SolveForBalance(now_.z);
+    const double room = system_.loop().Min([&](int64_t i) {
+      return Cone::MaxStep(system_.lambda()[i], system_.direction().dz[i],
+                           kSmallChange);
+    });
+    const bool is_inside = room >= kBalancingRoom;
+    if (change == 0) is_balanced_ = is_inside;
+    if (!is_inside) return true;
+    system_.loop().ForEach(
+        [&](int64_t i) { now_.z[i] += system_.UnscaledDz(i); });
+    if (room < kSmallChange && !Factorize()) return false;
+  }
+  return true;
+}
+
+// The linear programme's is relative to the way from the start to the dual's.
+template <typename Cone>
+double ConicSolver<Cone>::RelativeGap() const {
+  if (!program_.IsLinear()) return now_.gap / now_.scalar;
+  return now_.gap / std::max(now_.gap, start_ - now_.scalar + now_.gap);
+}
+
 // Why the run ends with this iteration, if it does.
 template <typename Cone>
 std::optional<InteriorPointTermination> ConicSolver<Cone>::Iterate(
     InteriorPointSummary* summary) {
   using Termination = InteriorPointTermination;
   if (context_.IsCancelled()) return Termination::kInterrupted;
-  if (!system_.Factorize(now_.viewed, now_.scalar, now_.z)) {
-    return Termination::kSingular;
-  }
-  FindDirection(/*only_centre=*/step_ < kShortStep);
+  if (!is_factorized_ && !Factorize()) return Termination::kSingular;
+  FindDirection(/*only_centre=*/step_ < kShortStep ||
+                (program_.IsLinear() && !is_balanced_));
   step_ = TakeStep();
   ++summary->iterations;
   if (!(step_ > 0)) return Termination::kNoProgress;
+  if (program_.IsLinear()) {
+    if (!FactorizeBalanced()) return Termination::kSingular;
+    is_factorized_ = true;
+  }
   ExportMultipliers();
   summary->gamma = now_.scalar;
-  summary->gap = now_.gap / now_.scalar;
-  if (now_.cost < best_cost_) {
-    best_cost_ = now_.cost;
+  summary->gap = RelativeGap();
+  const double reached = program_.IsLinear() ? now_.scalar : now_.cost;
+  if (reached < best_cost_) {
+    best_cost_ = reached;
     best_ = now_.x;
   }
   const ConicIterate iterate{summary->iterations, now_.scalar, now_.cost,
                              summary->gap,        step_,       &now_.x,
                              &multipliers_};
   if (options_.stop && options_.stop(iterate)) return Termination::kStopped;
-  if (!program_.IsCost() && now_.cost < program_.bound) {
+  if (program_.kind == ConeProgram::Kind::kFeasibility &&
+      now_.cost < program_.bound) {
     best_ = now_.x;
     return Termination::kFeasible;
   }

@@ -59,6 +59,11 @@ class ConicSolver {
 
   void ViewAll(State* state) const;
   void CentreMultipliers();
+  bool Factorize() {
+    return system_.Factorize(now_.viewed, now_.scalar, now_.z);
+  }
+  bool FactorizeBalanced();
+  double RelativeGap() const;
   void FindDirection(bool only_centre);
   double AffineSigma() const;
   StepLengths MaxSteps(double damping) const;
@@ -75,10 +80,15 @@ class ConicSolver {
   NewtonSystem<Cone> system_;
   State now_;
   State trial_;
+  bool is_factorized_ = false;  // system_, at now_
+  // Linear programme: stationarity holds up to rounding. Until then steps only
+  // centre: where nothing is active it would be missed by as much as there is.
+  bool is_balanced_ = false;
+  double start_ = 0;        // g there
   double step_ = 1;         // that led to now_
   std::vector<Vector> dz_;  // not scaled
   Estimate best_;
-  double best_cost_ = 0;
+  double best_cost_ = 0;  // or the lowest h'x
   std::vector<Multiplier> multipliers_;
 };
 

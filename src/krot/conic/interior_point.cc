@@ -21,7 +21,7 @@ InteriorPointSummary Run(const KnownRotationProblem& problem,
                          std::vector<Multiplier>* multipliers) {
   ConicSolver<Cone> solver(problem, options, context, program, start, scalar);
   const InteriorPointSummary summary = solver.Run();
-  if (program.IsCost() ||
+  if (program.kind != ConeProgram::Kind::kFeasibility ||
       summary.termination == InteriorPointTermination::kFeasible) {
     *estimate = solver.best();
   }
@@ -90,6 +90,26 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                         unit_depth);
   }
   return RunForNorm(problem, options, context, program, origin, scalar + 1,
+                    estimate, multipliers);
+}
+
+InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
+                                    const InteriorPointOptions& options,
+                                    const Context& context, double bound,
+                                    const LinearObjective& objective,
+                                    Estimate* estimate,
+                                    std::vector<Multiplier>* multipliers) {
+  const double cost =
+      Cost(problem, *estimate, options.norm, context.num_threads);
+  CheckArgument(cost < bound, "cost of the start", cost, "below the bound");
+  ConeProgram program;
+  program.kind = ConeProgram::Kind::kLinear;
+  program.bound = bound;
+  program.unit_depth = 0;
+  program.linear = &objective;
+  const double start =
+      objective.h.Dot({estimate->points, estimate->translations});
+  return RunForNorm(problem, options, context, program, *estimate, start,
                     estimate, multipliers);
 }
 

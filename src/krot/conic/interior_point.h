@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/conic/cone_program.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
@@ -19,7 +20,7 @@ struct Multiplier {
 // What an iteration has reached.
 struct ConicIterate {
   int iteration = 0;
-  double gamma = 0;  // every residual is below it, pixels
+  double gamma = 0;  // every residual is below it, pixels; MinimizeLinear: h'x
   double cost = 0;   // the largest residual, pixels
   // Complementarity relative to gamma. Not a bound: see certificate.h.
   double gap = 0;
@@ -83,6 +84,25 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   const Context& context, double bound,
                                   double unit_depth, Estimate* estimate,
                                   std::vector<Multiplier>* multipliers);
+
+// How far estimates whose residuals are all at most `bound` > 0, pixels, reach
+// in one direction:
+//
+//   min h'x   subject to   ||v_i||_p <= bound w_i,   e'x as at the start,
+//
+// from `*estimate`, whose residuals must all be below the bound (throws
+// std::invalid_argument otherwise) and which becomes the one with the lowest
+// h'x that was met. The problem must be connected and something in it fixed.
+// Soon the multipliers' forces balance h but for rounding and a multiple of e,
+// and then they prove what krot/proof/extent_check.h says.
+// The gap is relative to how far it is from the start to the end that they
+// prove.
+InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
+                                    const InteriorPointOptions& options,
+                                    const Context& context, double bound,
+                                    const LinearObjective& objective,
+                                    Estimate* estimate,
+                                    std::vector<Multiplier>* multipliers);
 
 // What MinimizeJointly will allocate beyond the problem, bytes. O(problem).
 int64_t EstimateInteriorPointMemory(const KnownRotationProblem& problem,

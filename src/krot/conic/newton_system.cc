@@ -1,6 +1,7 @@
 #include "krot/conic/newton_system.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <Eigen/LU>
 
@@ -85,7 +86,11 @@ bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
   // What the border needs of the factorised part.
   BlockVector zero;
   zero.SetZero(problem_.num_points, problem_.num_frames);
-  elimination_.Solve(zero, border_[0].data(), &x_border_);
+  if (program_.IsLinear()) {
+    elimination_.Solve(program_.linear->h, nullptr, &x_border_);
+  } else {
+    elimination_.Solve(zero, border_[0].data(), &x_border_);
+  }
   FindGauge(viewed);
   elimination_.Solve(gauge_, nullptr, &x_gauge_);
   elimination_.Multiply(x_border_, rest_[0].data());
@@ -99,6 +104,7 @@ bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
 template <typename Cone>
 void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
   gauge_.SetZero(problem_.num_points, problem_.num_frames);
+  if (program_.IsLinear() && program_.linear->e) gauge_ = *program_.linear->e;
   if (!program_.IsCost()) return;
   small_depth_ = kSmallDepth * MedianDepth(viewed);
   for (int64_t i = 0; i < loop_.count(); ++i) {
@@ -113,11 +119,23 @@ void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
   }
 }
 
+template <typename Cone>
+double NewtonSystem<Cone>::ObjectiveLength() const {
+  double squared = program_.linear->h.Dot(x_border_);
+  if (program_.linear->e) {
+    const double along = gauge_.Dot(x_border_);
+    squared -= along * along / gauge_.Dot(x_gauge_);
+  }
+  return std::sqrt(std::max(0.0, squared));
+}
+
 // The direction for the targets f, and the multipliers'. The first row of the
 // system is dx = Xf - Xb dg - Xe nu; put into the other two, it leaves
 //
 //   [ (b - A Xb)'b   -b'A Xe         ] [ dg ]   [ b'(f - A Xf) - 1 ]
 //   [ -e'Xb          -e'Xe  (- 1/mu) ] [ nu ] = [ -e'Xf  (- sigma) ]
+//
+// In the linear programme 1 takes the place of dg there, as Xb = H^-1 h.
 template <typename Cone>
 void NewtonSystem<Cone>::SolveForTarget(double sigma) {
   BlockVector zero;
@@ -132,10 +150,14 @@ void NewtonSystem<Cone>::SolveForTarget(double sigma) {
   M(1, 0) = -gauge_.Dot(x_border_);
   M(1, 1) = -gauge_.Dot(x_gauge_);
   rhs[1] = -gauge_.Dot(x_target_);
-  if (!program_.IsCost()) {
+  if (program_.IsLinear()) {
+    M(0, 0) = rhs[0] = 1;
+    M(0, 1) = 0;
+  }
+  if (program_.IsLinear() ? !program_.linear->e : !program_.IsCost()) {
     M(0, 1) = M(1, 0) = rhs[1] = 0;
     M(1, 1) = 1;
-  } else if (!has_free_scale_) {
+  } else if (program_.IsCost() && !has_free_scale_) {
     M(1, 1) -= 1 / mu_;
     rhs[1] -= sigma;
   }
@@ -145,11 +167,35 @@ void NewtonSystem<Cone>::SolveForTarget(double sigma) {
   d.dx = x_target_;
   d.dx.Add(-d.dscalar, x_border_);
   d.dx.Add(-solution[1], x_gauge_);
+  if (program_.IsLinear()) d.dscalar = program_.linear->h.Dot(d.dx);
   elimination_.Multiply(d.dx, d.ds[0].data());
   loop_.ForEach([&](int64_t i) {
     d.ds[i] += d.dscalar * border_[i];
     d.dz[i] = target_[i] - lambda_[i] - d.ds[i];
   });
+}
+
+// dz = W^-2 A H^-1 (h - A'z + nu e), nu such that what is missing has no part
+// in e: it is small then, and so is what the solution costs in digits.
+template <typename Cone>
+void NewtonSystem<Cone>::SolveForBalance(const std::vector<Vector>& z) {
+  BlockVector missing = program_.linear->h;
+  for (int64_t i = 0; i < loop_.count(); ++i) {
+    const Observation& o = problem_.observations[i];
+    const View& view = problem_.views[o.view];
+    Vector3d multiplier = ToMultiplier(z[i]);
+    multiplier[0] *= program_.bound;
+    const Vector3d force = o.E.transpose() * multiplier;
+    missing.points[o.point] -= view.cam_from_world_rotation.transpose() * force;
+    missing.frames[view.frame] -=
+        view.cam_from_rig_rotation.transpose() * force;
+  }
+  if (program_.linear->e) {
+    missing.Add(-gauge_.Dot(missing) / gauge_.Dot(gauge_), gauge_);
+  }
+  BlockVector x;
+  elimination_.Solve(missing, nullptr, &x);
+  elimination_.Multiply(x, direction_.dz[0].data());
 }
 
 template <typename Cone>

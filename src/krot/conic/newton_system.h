@@ -29,7 +29,8 @@ namespace krot {
 //
 // where baselines set the scale: depths are only kept from growing without
 // bound, less and less. Where the scale is free, 0 stands for -1/mu and for
-// sigma. In the feasibility programme there is no e.
+// sigma. In the feasibility programme there is no e. In the linear programme b
+// is 0, and the right-hand side of dx is A'f - h.
 //
 // For the cost programme, top = g w is bilinear. Its second-order term is left
 // out, so that the system is that of a Dinkelbach step based at the iterate,
@@ -67,9 +68,16 @@ class NewtonSystem {
     SolveForTarget(sigma);
   }
 
+  // Linear programme: the least change of z, in the scaling, after which the
+  // forces balance, A'z = h but for a multiple of e; as the direction's dz.
+  void SolveForBalance(const std::vector<Vector>& z);
+
   const ObservationLoop& loop() const { return loop_; }
   double gap() const { return gap_; }  // sum s'z = sum |lambda|^2
   double mu() const { return mu_; }    // of each pair, on the central path
+  // Linear programme: how much h'x may change within the ellipsoid |A dx| <= 1
+  // along the gauge.
+  double ObjectiveLength() const;
   // Cost programme: depths below it are small beside the others.
   double small_depth() const { return small_depth_; }
   const std::vector<Vector>& lambda() const { return lambda_; }
@@ -110,7 +118,7 @@ class NewtonSystem {
   std::vector<Vector> rest_;    // b - A Xb
   std::vector<Vector> target_;  // f
   BlockVector gauge_;           // e
-  BlockVector x_border_;        // Xb = H^-1 A'b
+  BlockVector x_border_;        // Xb = H^-1 A'b; linear programme: H^-1 h
   BlockVector x_gauge_;         // Xe = H^-1 e
   BlockVector x_target_;        // Xf = H^-1 A'f
   Direction direction_;

@@ -19,7 +19,8 @@ constexpr double kSweepTolerance = 1e-3;
 constexpr double kExcessLeft = 0.8;
 constexpr int kMaxSweeps = 10;
 
-// Places the points outside the set; whether none is behind a camera.
+}  // namespace
+
 bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
                  Norm norm, const Context& context, double level,
                  Estimate* estimate) {
@@ -43,8 +44,6 @@ bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
   part.Replace(placed, estimate);
   return !is_behind;
 }
-
-}  // namespace
 
 bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
                     Norm norm, const Context& context, double level,

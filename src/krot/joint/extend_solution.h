@@ -7,6 +7,13 @@
 
 namespace krot {
 
+// Lowers the largest residual of every point outside the set that is above
+// `level`, pixels, as the frames stand, to its optimum; points behind a camera
+// stay. Whether there are none of those. O(observations).
+bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
+                 Norm norm, const Context& context, double level,
+                 Estimate* estimate);
+
 // Extends the solution of a working set, whose cost is `level`, to the points
 // outside, so that no residual exceeds `highest` >= level, pixels. Points stay
 // where they are if that is good enough, and otherwise take their own optimum

@@ -67,6 +67,10 @@ void WorkingSet::AddTies(int count) {
   }
 }
 
+void WorkingSet::AddPoint(int32_t point) {
+  if (!Contains(point)) Add(point);
+}
+
 void WorkingSet::AddAll() {
   std::fill(contains_.begin(), contains_.end(), 1);
   num_points_ = problem_.num_points;

@@ -26,6 +26,7 @@ class WorkingSet {
   // observations in the set or all it has. O(observations).
   void AddTies(int count);
 
+  void AddPoint(int32_t point);
   void AddAll();
 
   bool Contains(int32_t point) const { return contains_[point] != 0; }

@@ -40,6 +40,14 @@ void CheckAscending(const KnownRotationProblem& problem,
   }
 }
 
+// Where `value` stands among ascending ones.
+std::optional<int32_t> FindAscending(const std::vector<int32_t>& values,
+                                     int32_t value) {
+  const auto found = std::lower_bound(values.begin(), values.end(), value);
+  if (found == values.end() || *found != value) return std::nullopt;
+  return static_cast<int32_t>(found - values.begin());
+}
+
 int32_t FrameOf(const KnownRotationProblem& problem, int64_t observation) {
   return problem.views[problem.observations[observation].view].frame;
 }
@@ -70,14 +78,13 @@ ProblemSubset::ProblemSubset(const KnownRotationProblem& whole,
 void ProblemSubset::Copy(const std::vector<char>& has_point,
                          const std::vector<char>& has_view,
                          const std::vector<char>& has_frame) {
-  std::vector<int32_t> view_of;
   const std::vector<int32_t> new_point = Renumber(has_point, &point_of_);
-  const std::vector<int32_t> new_view = Renumber(has_view, &view_of);
+  const std::vector<int32_t> new_view = Renumber(has_view, &view_of_);
   const std::vector<int32_t> new_frame = Renumber(has_frame, &frame_of_);
   copy_ = std::make_unique<KnownRotationProblem>();
   copy_->num_points = static_cast<int32_t>(point_of_.size());
   copy_->num_frames = static_cast<int32_t>(frame_of_.size());
-  for (const int32_t v : view_of) {
+  for (const int32_t v : view_of_) {
     copy_->views.push_back(whole_.views[v]);
     copy_->views.back().frame = new_frame[whole_.views[v].frame];
   }
@@ -98,6 +105,14 @@ void ProblemSubset::Copy(const std::vector<char>& has_point,
     observation.point = new_point[observation.point];
   }
   IndexObservations(copy_.get());
+}
+
+std::optional<int32_t> ProblemSubset::FindView(int32_t view) const {
+  return IsWhole() ? view : FindAscending(view_of_, view);
+}
+
+std::optional<int32_t> ProblemSubset::FindPoint(int32_t point) const {
+  return IsWhole() ? point : FindAscending(point_of_, point);
 }
 
 std::vector<int64_t> ProblemSubset::InWhole(

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "krot/problem/known_rotation_problem.h"
@@ -31,6 +32,10 @@ class ProblemSubset {
   }
   std::vector<int64_t> InWhole(std::vector<int64_t> observations) const;
 
+  // What the whole's view or point is called here; none if it is not.
+  std::optional<int32_t> FindView(int32_t view) const;
+  std::optional<int32_t> FindPoint(int32_t point) const;
+
   // The part of an estimate of the whole problem that the subset sees.
   Estimate Restrict(const Estimate& whole) const;
 
@@ -47,6 +52,7 @@ class ProblemSubset {
   std::unique_ptr<KnownRotationProblem> copy_;
   std::vector<int64_t> observation_of_;
   std::vector<int32_t> point_of_;
+  std::vector<int32_t> view_of_;
   std::vector<int32_t> frame_of_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -10,6 +11,9 @@
 #include "krot/proof/certificate_check.h"
 
 namespace krot {
+
+inline constexpr double kUnitRoundoff =
+    std::numeric_limits<double>::epsilon() / 2;
 
 // What CheckCertificate asks of its input before it proves anything. Each
 // returns why the input is refused, one sentence without its full stop, or

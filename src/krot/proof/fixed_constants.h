@@ -31,6 +31,9 @@ class FixedConstants {
   // Keeps a reference to the problem.
   explicit FixedConstants(const KnownRotationProblem& problem);
 
+  const Vector3& origin() const { return origin_; }  // O
+  Real origin_size() const { return origin_size_; }
+
   // Whether OfFrame, and not the place of its views in it, is all there is.
   bool IsAwayFromOrigin(int32_t frame) const {
     return problem_.IsFixedFrame(frame) && frame != origin_frame_;

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <vector>
 
+#include "krot/report/csv_text.h"
 #include "krot/report/error_rows.h"
 #include "krot/report/report_json.h"
 #include "krot/report/solve_report.h"
@@ -257,12 +258,8 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
   csv << "image_id,image_name,point2D_idx,point3D_id,error_before_px,"
          "error_after_px,conflict\n";
   for (const RemovedObservation& o : summary.removed) {
-    csv << o.image_id << ",\"";
-    for (const char c : o.image_name) {
-      if (c == '"') csv << c;
-      csv << c;
-    }
-    csv << "\"," << o.point2D_idx << ',' << o.point3D_id << ',';
+    csv << o.image_id << ',' << CsvText(o.image_name) << ',' << o.point2D_idx
+        << ',' << o.point3D_id << ',';
     if (std::isfinite(o.error_before_px)) csv << o.error_before_px;
     csv << ',';
     if (std::isfinite(o.error_after_px)) csv << o.error_after_px;

@@ -5,8 +5,8 @@
 # each other, so that the imports and the word `export` can go.
 cmake_minimum_required(VERSION 3.22)
 
-set(modules dom format data errors_table verdict facts lists axes curves
-    convergence profile suspects vectors frusta colors framing orbit shaders renderer layers
+set(modules dom format data vectors boxes errors_table verdict facts lists axes curves
+    convergence profile suspects frusta colors framing orbit shaders renderer layers
     picking selection viewer controls main)
 
 set(script "")

@@ -1,5 +1,6 @@
 // Puts the page together.
 
+import { boxesNote, boxesTable } from './boxes.js';
 import { viewerControls, viewerNotes } from './controls.js';
 import { convergenceChart } from './convergence.js';
 import { histogramChart, imagesChart, tailChart } from './curves.js';
@@ -69,6 +70,13 @@ function showProfile({ profile }) {
   byId('profile').append(profileTable(profile));
 }
 
+function showBoxes(report, show) {
+  byId('boxes-section').hidden = !report.boxes;
+  if (!report.boxes) return;
+  byId('boxes-note').textContent = boxesNote(report);
+  byId('boxes').append(boxesTable(report.boxes, show));
+}
+
 function showDifferences(report) {
   byId('differences-section').hidden = !isComparison(report);
   if (isComparison(report)) {
@@ -93,7 +101,11 @@ function showPage(report, models) {
   showDifferences(report);
   showCourse(report);
   const show = showViewer(
-    { models, labels, support, sharesPoints: !isComparison(report) });
+    {
+      models, labels, support, boxes: report.boxes ?? [],
+      sharesPoints: !isComparison(report),
+    });
+  showBoxes(report, show);
   showSupport(support, show);
   showSuspects(report, readJson('krot-crops'), show);
   const showImage = (imageName) => show({ imageName });

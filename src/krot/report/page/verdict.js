@@ -1,3 +1,4 @@
+import { boxesVerdict } from './boxes.js';
 import {
   costIsLargestError, isComparison, isFilter, isMinimax, modelErrors,
 } from './data.js';
@@ -56,6 +57,7 @@ export function verdict(report) {
       `of model 2 ${after.max.toFixed(2)} px.`;
   }
   if (isFilter(report)) return filterVerdict(report);
+  if (report.boxes) return boxesVerdict(report);
   if (!isMinimax(report)) return adjustmentVerdict(report, before, after);
   if (report.is_given_back) {
     return 'No better estimate was found: the model is the one that was read.' +

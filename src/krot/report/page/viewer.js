@@ -1,6 +1,7 @@
 // The interactive view of both models.
 
 import { byId, html } from './dom.js';
+import { boxLines } from './boxes.js';
 import { styleColor, uniformColors } from './colors.js';
 import {
   findImage, largestError, pointIndex, pointPlace,
@@ -21,9 +22,10 @@ function usualPointSize(numPoints) {
 
 export class Viewer {
   // `stage`: the element to fill; `support`: the report's, [] if none;
-  // `sharesPoints`: whether the models' point ids mean the same points. Throws
+  // `boxes`: likewise, in the second model; `sharesPoints`: whether the models'
+  // point ids mean the same points. Throws
   // where the browser has no WebGL 2.
-  constructor(stage, { models, labels, support, sharesPoints }) {
+  constructor(stage, { models, labels, support, boxes, sharesPoints }) {
     const canvas = html('canvas', {
       tabindex: 0, 'aria-label': '3D view of cameras and points',
     });
@@ -34,7 +36,7 @@ export class Viewer {
     this.panels = html('div', { class: 'panels' });
     stage.append(canvas, this.panels);
     Object.assign(this,
-      { stage, canvas, models, labels, support, sharesPoints });
+      { stage, canvas, models, labels, support, boxes, sharesPoints });
     this.renderer = new Renderer(gl);
     const { target, radius, front } = frame(models[1]);
     this.size = cameraSize(models[1], radius);
@@ -87,6 +89,9 @@ export class Viewer {
     for (const i of this.visible()) {
       const model = this.models[i];
       if (this.hasSupport) lines.push(...this.supportLines(model));
+      if (i === 1) {
+        lines.push(...this.boxes.flatMap((box) => boxLines(box, model.origin)));
+      }
       const { imageName, pointId } = this.selected;
       const image = findImage(model, imageName);
       if (image?.center) {

@@ -1,0 +1,102 @@
+#include "krot/proof/extent_check.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "krot/problem/components.h"
+#include "krot/problem/fixed.h"
+#include "krot/problem/subset.h"
+#include "krot/proof/certificate_input.h"
+
+namespace krot {
+namespace {
+
+using Real = ForceChecker::Real;
+using Vector3 = ForceChecker::Vector3;
+
+// Of the last sums in long double and their cast to double.
+constexpr Real kCastError = 2 * std::numeric_limits<double>::epsilon();
+
+// Whether forces that balance wherever something moves need not balance where
+// they are left over: each component has something fixed.
+bool HoldsFixed(const KnownRotationProblem& problem,
+                const Certificate& certificate) {
+  std::vector<int64_t> support;
+  for (const CertifiedObservation& o : certificate.observations) {
+    support.push_back(o.observation);
+  }
+  for (auto& component : SplitIntoComponents(problem, std::move(support))) {
+    if (!HasFixed(ProblemSubset(problem, std::move(component)).problem())) {
+      return false;
+    }
+  }
+  return true;
+}
+
+ExtentCheck Refused(const std::string& refusal) {
+  ExtentCheck check;
+  check.refusal = refusal;
+  return check;
+}
+
+}  // namespace
+
+ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
+                        const ExtentCertificate& certificate) {
+  const Certificate rows{certificate.bound, 0, certificate.observations};
+  if (auto refusal = RefuseNumbers(problem, norm, rows)) {
+    return Refused(*refusal);
+  }
+  if (!HoldsFixed(problem, rows)) return Refused("nothing fixed holds it");
+  ForceChecker checker(problem, norm, rows, certificate.pulls);
+  if (auto refusal = checker.Balance()) return Refused(*refusal);
+  ExtentCheck check;
+  const std::optional<double> rho = checker.BoundRho(&check.refusal);
+  if (!rho) return check;
+  if (!(*rho <= 1)) {
+    return Refused(
+        Sentence("balance takes y to ", *rho, " times the length of lambda"));
+  }
+  // kappa bounds the positions' distances from the origin.
+  const ForceChecker::Constants constants = checker.SumConstants();
+  Real extent = constants.value + constants.error;
+  Real terms = std::abs(constants.value);
+  for (const Pull& pull : certificate.pulls) {
+    const Vector3 direction = pull.direction.cast<Real>();
+    extent += direction.dot(constants.origin);
+    terms += direction.cwiseAbs().dot(constants.origin.cwiseAbs());
+    extent += direction.cwiseAbs().sum() * constants.origin_error;
+  }
+  check.extent = static_cast<double>(extent + kCastError * terms);
+  check.is_accepted = std::isfinite(check.extent);
+  if (!check.is_accepted) check.refusal = "its extent is no finite number";
+  return check;
+}
+
+double BalancingPull(const KnownRotationProblem& problem,
+                     const ExtentCertificate& certificate, int32_t view,
+                     const Eigen::Vector3d& direction) {
+  const int32_t frame = problem.views[view].frame;
+  Vector3 sum = Vector3::Zero();
+  for (const CertifiedObservation& o : certificate.observations) {
+    const Observation& observation = problem.observations[o.observation];
+    const View& own = problem.views[observation.view];
+    if (own.frame != frame) continue;
+    sum += own.cam_from_world_rotation.transpose().cast<Real>() *
+           MakeForce(observation, o.y.cast<Real>(),
+                     Real{certificate.bound} * o.lambda)
+               .sum;
+  }
+  for (const Pull& pull : certificate.pulls) {
+    if (pull.kind != Pull::Kind::kView ||
+        problem.views[pull.index].frame != frame) {
+      continue;
+    }
+    sum -= pull.direction.cast<Real>();
+  }
+  const Vector3 n = direction.cast<Real>();
+  return static_cast<double>(n.dot(sum) / n.squaredNorm());
+}
+
+}  // namespace krot

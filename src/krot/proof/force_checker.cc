@@ -1,0 +1,264 @@
+#include "krot/proof/force_checker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/LU>
+
+#include "krot/proof/certificate_input.h"
+#include "krot/proof/fixed_constants.h"
+
+namespace krot {
+namespace {
+
+using Real = ForceChecker::Real;
+using Matrix3 = Eigen::Matrix<Real, 3, 3>;
+using Vector2 = ForceChecker::Vector2;
+using Vector3 = ForceChecker::Vector3;
+
+constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
+constexpr Real kRootTwo = 1.4142135623730951L;  // above it
+// Smaller multipliers, relative, might underflow.
+constexpr double kSmallestShare = 1e-100;
+// No lambda may have to change by more, relative.
+constexpr Real kLargestChange = 0.5L;
+
+// The forces at a point or frame, their uncertainty, and what they sum up.
+struct NodeBalance {
+  Vector3 sum = Vector3::Zero();
+  Vector3 terms = Vector3::Zero();
+  Real rotation_error = 0;
+};
+
+std::vector<int64_t> ObservationsOf(const Certificate& certificate) {
+  std::vector<int64_t> observations;
+  for (const CertifiedObservation& o : certificate.observations) {
+    observations.push_back(o.observation);
+  }
+  return observations;
+}
+
+}  // namespace
+
+ForceChecker::ForceChecker(const KnownRotationProblem& problem, Norm norm,
+                           const Certificate& certificate,
+                           std::vector<Pull> pulls)
+    : whole_(problem),
+      norm_(norm),
+      certificate_(certificate),
+      pulls_(std::move(pulls)),
+      part_(problem, ObservationsOf(certificate)) {}
+
+std::optional<std::string> ForceChecker::ScaleMultipliers() {
+  double largest = 0;
+  for (const CertifiedObservation& o : certificate_.observations) {
+    largest = std::max(largest, o.lambda);
+  }
+  std::frexp(largest, &exponent_);
+  for (const CertifiedObservation& o : certificate_.observations) {
+    if (o.lambda < kSmallestShare * largest) {
+      return "its multipliers differ by more than 100 decades";
+    }
+    const Observation& observation = whole_.observations[o.observation];
+    lambda_.push_back(std::ldexp(Real{o.lambda}, -exponent_));
+    y_.push_back({std::ldexp(Real{o.y[0]}, -exponent_),
+                  std::ldexp(Real{o.y[1]}, -exponent_)});
+    forces_.push_back(MakeForce(observation, y_.back(),
+                                certificate_.lower_bound * lambda_.back()));
+    compliances_.push_back(MakeCompliance(observation));
+    if (!forces_.back().terms.allFinite() ||
+        !std::isfinite(compliances_.back().y) ||
+        !std::isfinite(compliances_.back().delta_lambda)) {
+      return "a ray of its observations is no finite number";
+    }
+  }
+  return RefuseRotations(part_.problem());
+}
+
+// What the whole calls a view or point is called otherwise in the support.
+std::optional<std::string> ForceChecker::PlacePulls() {
+  for (Pull& pull : pulls_) {
+    if (!pull.direction.allFinite()) return "a pull is no finite number";
+    const int64_t count = pull.kind == Pull::Kind::kPoint
+                              ? whole_.num_points
+                              : static_cast<int64_t>(whole_.views.size());
+    if (pull.index < 0 || pull.index >= count) {
+      return "it pulls at what is not there";
+    }
+    const std::optional<Pull> placed = InPart(part_, pull);
+    if (!placed) return "its support does not hold what is pulled";
+    pull = *placed;
+  }
+  return std::nullopt;
+}
+
+Real ForceChecker::SumError() const {
+  return (static_cast<Real>(lambda_.size() + pulls_.size()) + 12) *
+         kRealRoundoff;
+}
+
+// Of forces turned into the world by rotations known to kRotationError.
+Imbalance ForceChecker::BoundImbalance() const {
+  const KnownRotationProblem& problem = part_.problem();
+  std::vector<NodeBalance> of_point(problem.num_points);
+  std::vector<NodeBalance> of_frame(problem.num_frames);
+  for (size_t i = 0; i < forces_.size(); ++i) {
+    const Observation& observation = problem.observations[i];
+    const View& view = problem.views[observation.view];
+    const Matrix3 world_from_cam =
+        view.cam_from_world_rotation.transpose().cast<Real>();
+    const Vector3 force = world_from_cam * forces_[i].sum;
+    const Vector3 terms = world_from_cam.cwiseAbs() * forces_[i].terms;
+    for (NodeBalance* balance :
+         {&of_point[observation.point], &of_frame[view.frame]}) {
+      balance->sum += force;
+      balance->terms += terms;
+      balance->rotation_error += kRotationError * forces_[i].terms.sum();
+    }
+  }
+  const Real scale = std::ldexp(Real{1}, -exponent_);
+  for (const Pull& pull : pulls_) {
+    const Vector3 direction = scale * pull.direction.cast<Real>();
+    const bool is_view = pull.kind == Pull::Kind::kView;
+    NodeBalance* balance = is_view ? &of_frame[problem.views[pull.index].frame]
+                                   : &of_point[pull.index];
+    balance->sum += is_view ? Vector3(-direction) : direction;
+    balance->terms += direction.cwiseAbs();
+  }
+  const auto bound = [&](const NodeBalance& balance) -> Real {
+    const Vector3 sum = balance.sum.cwiseAbs() + SumError() * balance.terms +
+                        Vector3::Constant(balance.rotation_error);
+    return sum.norm() * kOutward;
+  };
+  Imbalance imbalance;
+  for (const NodeBalance& b : of_point) imbalance.of_point.push_back(bound(b));
+  for (const NodeBalance& b : of_frame) imbalance.of_frame.push_back(bound(b));
+  return imbalance;
+}
+
+void ForceChecker::FindCorrections() {
+  std::vector<Real> strength;
+  for (size_t i = 0; i < lambda_.size(); ++i) {
+    const Compliance& compliance = compliances_[i];
+    strength.push_back(lambda_[i] /
+                       std::max(compliance.y, compliance.delta_lambda /
+                                                  certificate_.lower_bound));
+  }
+  corrections_ = BoundCorrections(part_.problem(), strength, BoundImbalance());
+}
+
+std::optional<std::string> ForceChecker::Balance() {
+  if (auto refusal = ScaleMultipliers()) return refusal;
+  if (auto refusal = PlacePulls()) return refusal;
+  FindCorrections();
+  return std::nullopt;
+}
+
+std::vector<int32_t> ForceChecker::FirstViews() const {
+  const KnownRotationProblem& problem = part_.problem();
+  std::vector<int32_t> first_views(problem.num_frames, -1);
+  for (const Observation& observation : problem.observations) {
+    int32_t& first = first_views[problem.views[observation.view].frame];
+    if (first < 0) first = observation.view;
+  }
+  return first_views;
+}
+
+ForceChecker::Offset ForceChecker::FromFirstView(int32_t view,
+                                                 int32_t first) const {
+  if (view == first) return {};
+  const View& own = part_.problem().views[view];
+  const View& reference = part_.problem().views[first];
+  const Vector3 t = own.cam_from_rig_translation.cast<Real>();
+  const Vector3 t_first = reference.cam_from_rig_translation.cast<Real>();
+  return {
+      t - own.cam_from_rig_rotation.cast<Real>() *
+              Matrix3(reference.cam_from_rig_rotation.cast<Real>()).inverse() *
+              t_first,
+      t.cwiseAbs().sum() + t_first.cwiseAbs().sum()};
+}
+
+ForceChecker::Constants ForceChecker::SumConstants() const {
+  const KnownRotationProblem& problem = part_.problem();
+  const FixedConstants fixed(problem);
+  const std::vector<int32_t> first_views = FirstViews();
+  Constants constants;
+  constants.origin = fixed.origin();
+  constants.origin_error = 16 * kRotationError * fixed.origin_size();
+  for (size_t i = 0; i < forces_.size(); ++i) {
+    const Observation& observation = problem.observations[i];
+    const View& view = problem.views[observation.view];
+    const FixedConstants::Part of_point =
+        fixed.OfPoint(view, observation.point);
+    Vector3 offset = of_point.x_cam;
+    Real size = of_point.size;
+    if (fixed.IsAwayFromOrigin(view.frame)) {
+      const FixedConstants::Part of_frame = fixed.OfFrame(view);
+      offset += of_frame.x_cam;
+      size += of_frame.size;
+    } else {
+      const Offset in_frame =
+          FromFirstView(observation.view, first_views[view.frame]);
+      offset += in_frame.x_cam;
+      size += in_frame.size;
+    }
+    const Real offset_error = 16 * kRotationError * size;
+    constants.value += forces_[i].sum.dot(offset);
+    constants.error +=
+        forces_[i].terms.sum() * offset_error +
+        forces_[i].terms.dot(offset.cwiseAbs()) * SumError() +
+        corrections_[i] * (offset.cwiseAbs().sum() + offset_error);
+  }
+  const Real scale = std::ldexp(Real{1}, -exponent_);
+  for (const Pull& pull : pulls_) {
+    if (pull.kind != Pull::Kind::kView) continue;
+    const View& view = problem.views[pull.index];
+    const Offset in_frame = FromFirstView(pull.index, first_views[view.frame]);
+    const Vector3 direction =
+        scale * (view.cam_from_world_rotation.cast<Real>() *
+                 pull.direction.cast<Real>());
+    constants.value -= direction.dot(in_frame.x_cam);
+    constants.error +=
+        32 * kRotationError * in_frame.size * direction.cwiseAbs().sum();
+  }
+  constants.value = std::ldexp(constants.value, exponent_);
+  constants.error = std::ldexp(constants.error * kOutward, exponent_);
+  return constants;
+}
+
+// A vector of some length has the longest dual norm along the diagonal, for
+// p = infinity: sqrt(2) of it.
+std::optional<double> ForceChecker::BoundRho(std::string* refusal) const {
+  const Real per_length = norm_.p == 1 || norm_.p == 2 ? 1 : kRootTwo;
+  Real rho = 0;
+  for (size_t i = 0; i < lambda_.size(); ++i) {
+    const Real correction = corrections_[i] / lambda_[i] * kOutward;
+    const Real change =
+        correction * compliances_[i].delta_lambda / certificate_.lower_bound;
+    if (!(change < kLargestChange)) {
+      *refusal = "its multipliers do not balance at a point or a frame";
+      return std::nullopt;
+    }
+    const Real length = DualNorm(y_[i], norm_) / lambda_[i];
+    const Real longer = correction * compliances_[i].y * per_length;
+    rho = std::max(rho, (length + longer) / (1 - change));
+  }
+  return static_cast<double>(rho) * (1 + 4 * kUnitRoundoff);
+}
+
+std::vector<MultiplierChange> ForceChecker::Changes() const {
+  std::vector<MultiplierChange> changes;
+  for (size_t i = 0; i < lambda_.size(); ++i) {
+    const Real unit = certificate_.observations[i].lambda / lambda_[i];
+    const Real correction = corrections_[i] * kOutward * kOutward;
+    changes.push_back(
+        {static_cast<double>(correction * unit * compliances_[i].y),
+         static_cast<double>(correction * compliances_[i].delta_lambda /
+                             (lambda_[i] * certificate_.lower_bound))});
+  }
+  return changes;
+}
+
+}  // namespace krot

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+namespace krot {
+
+// In quotes, with those that it holds twice.
+inline std::string CsvText(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += c;
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+}  // namespace krot

@@ -1,0 +1,217 @@
+#include "krot/report/tolerance_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <vector>
+
+#include "krot/report/csv_text.h"
+#include "krot/report/report_json.h"
+#include "krot/report/solve_report.h"
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+constexpr const char* kAxes[] = {"x", "y", "z"};
+constexpr int kMaxDecimals = 12;
+
+// So that the narrowest interval has three digits.
+int DecimalsFor(const std::vector<ToleranceBox>& boxes) {
+  double narrowest = 0;
+  for (const ToleranceBox& box : boxes) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double width =
+          box.box.high[axis].reached - box.box.low[axis].reached;
+      if (width > 0 && (narrowest == 0 || width < narrowest)) narrowest = width;
+    }
+  }
+  if (narrowest == 0) return 6;
+  return std::clamp(2 - static_cast<int>(std::floor(std::log10(narrowest))), 0,
+                    kMaxDecimals);
+}
+
+std::string EndText(const BoxEnd& end, int decimals) {
+  return end.proved ? FormatNumber(*end.proved, decimals) : "-";
+}
+
+// How far beyond what was reached the worst proved end is, relative to the way
+// there from the position.
+struct Agreement {
+  int64_t num_ends = 0;
+  int64_t num_proved = 0;
+  double worst = 0;
+};
+
+Agreement Compare(const std::vector<ToleranceBox>& boxes) {
+  Agreement agreement;
+  for (const ToleranceBox& box : boxes) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const BoxEnd* end : {&box.box.low[axis], &box.box.high[axis]}) {
+        ++agreement.num_ends;
+        if (!end->proved) continue;
+        ++agreement.num_proved;
+        const double way = std::abs(*end->proved - box.position[axis]);
+        if (!(way > 0)) continue;
+        agreement.worst = std::max(agreement.worst,
+                                   std::abs(*end->proved - end->reached) / way);
+      }
+    }
+  }
+  return agreement;
+}
+
+const char* ToleranceTerminationName(ToleranceTermination termination) {
+  switch (termination) {
+    case ToleranceTermination::kNotRun:
+      return "not_run";
+    case ToleranceTermination::kNothingToSolve:
+      return "nothing_to_solve";
+    case ToleranceTermination::kNoEstimate:
+      return "no_estimate";
+    case ToleranceTermination::kDone:
+      return "done";
+    case ToleranceTermination::kInterrupted:
+      return "interrupted";
+  }
+  return "";
+}
+
+std::string GaugeSentence(const ToleranceSummary& summary) {
+  if (summary.gauge_images.empty()) {
+    return "Place and scale are those of " +
+           Counted(summary.num_fixed_frames, "fixed frame") + " and " +
+           Counted(summary.num_fixed_points, "fixed point") + ".\n";
+  }
+  const std::string first = summary.gauge_images.front() + " stands still";
+  if (summary.gauge_images.size() == 1) return first + ".\n";
+  return first + "; " + summary.gauge_images.back() +
+         " keeps its distance along the line between the two.\n";
+}
+
+Json EndsJson(const std::array<BoxEnd, 3>& ends) {
+  Json proved = Json::array();
+  Json reached = Json::array();
+  for (const BoxEnd& end : ends) {
+    proved.push_back(NumberOrNull(end.proved));
+    reached.push_back(end.reached);
+  }
+  return {{"proved", std::move(proved)}, {"reached", std::move(reached)}};
+}
+
+Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
+  Json json = Json::array();
+  for (const ToleranceBox& box : boxes) {
+    Json one = box.is_image
+                   ? Json{{"image_id", box.id}, {"image_name", box.name}}
+                   : Json{{"point3D_id", box.id}};
+    one["position"] = VectorJson(box.position);
+    one["is_free"] = box.is_free;
+    one["low"] = EndsJson(box.box.low);
+    one["high"] = EndsJson(box.box.high);
+    json.push_back(std::move(one));
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string ToleranceTable(const ToleranceReport& report) {
+  const ToleranceSummary& summary = report.summary;
+  const int decimals = DecimalsFor(summary.boxes);
+  std::string text =
+      "What all estimates within " + FormatNumber(summary.max_error, 4) +
+      " px have in common; rotations and intrinsics as given.\n" +
+      GaugeSentence(summary) + "\nNo such estimate lies outside (proved)\n";
+  TextTable table;
+  table.AddRow({"", "x from", "to", "y from", "to", "z from", "to"});
+  for (const ToleranceBox& box : summary.boxes) {
+    std::vector<std::string> row = {
+        box.is_image ? box.name : "point " + std::to_string(box.id)};
+    for (int axis = 0; axis < 3; ++axis) {
+      row.push_back(EndText(box.box.low[axis], decimals));
+      row.push_back(EndText(box.box.high[axis], decimals));
+    }
+    table.AddRow(std::move(row));
+  }
+  const Agreement agreement = Compare(summary.boxes);
+  text += table.ToString() + "\n" + Counted(agreement.num_proved, "end") +
+          " of " + std::to_string(agreement.num_ends) +
+          " proved; estimates that were met reach them to within " +
+          FormatNumber(100 * agreement.worst, 1) +
+          " % of the way from the model.\n";
+  if (agreement.num_proved < agreement.num_ends) {
+    text +=
+        "Where there is no end, -, none was found, or nothing holds what is "
+        "asked for.\n";
+  }
+  return text + "\n" +
+         RunSentence(report.run,
+                     "analyzed " + FormatNumber(summary.seconds, 2) + " s (" +
+                         Counted(summary.num_programmes, "cone programme") +
+                         ")");
+}
+
+std::string ToleranceJson(const ToleranceReport& report) {
+  const ToleranceSummary& summary = report.summary;
+  const Json json = {
+      {"version", report.run.version},
+      {"command", "tolerance_analyzer"},
+      {"norm", NormName(summary.norm)},
+      {"max_error", summary.max_error},
+      {"termination", ToleranceTerminationName(summary.termination)},
+      {"largest_error", summary.cost},
+      {"is_solved", summary.is_solved},
+      {"lower_bound", NumberOrNull(summary.lower_bound)},
+      {"gauge",
+       {{"images", summary.gauge_images},
+        {"num_fixed_frames", summary.num_fixed_frames},
+        {"num_fixed_points", summary.num_fixed_points}}},
+      {"num_frames", summary.num_frames},
+      {"num_points", summary.num_points},
+      {"num_observations", summary.num_observations},
+      {"num_without_region", summary.num_rowless},
+      {"num_far_points", summary.num_far_points},
+      {"num_programmes", summary.num_programmes},
+      {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"rotations", RotationsJson(report.run.rotations)},
+      {"pixel_error",
+       {{"before", ErrorJson(report.pixel_error_before)},
+        {"after", ErrorJson(report.pixel_error_after)}}},
+      {"boxes", BoxesJson(summary.boxes)},
+      {"seconds",
+       {{"read", report.run.seconds_read},
+        {"analysis", summary.seconds},
+        {"total", report.run.seconds_total}}},
+      {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"threads", report.run.threads},
+      {"seed", report.run.seed},
+  };
+  return ReportText(json);
+}
+
+std::string ToleranceCsv(const ToleranceSummary& summary) {
+  std::ostringstream csv;
+  csv.precision(17);
+  csv << "image_id,image_name,point3D_id,axis,position,low_proved,low_reached,"
+         "high_reached,high_proved\n";
+  for (const ToleranceBox& box : summary.boxes) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (box.is_image) {
+        csv << box.id << ',' << CsvText(box.name) << ",,";
+      } else {
+        csv << ",," << box.id << ',';
+      }
+      const BoxEnd& low = box.box.low[axis];
+      const BoxEnd& high = box.box.high[axis];
+      csv << kAxes[axis] << ',' << box.position[axis] << ',';
+      if (low.proved) csv << *low.proved;
+      csv << ',' << low.reached << ',' << high.reached << ',';
+      if (high.proved) csv << *high.proved;
+      csv << '\n';
+    }
+  }
+  return csv.str();
+}
+
+}  // namespace krot

@@ -1,0 +1,99 @@
+#include "krot/tolerance/extent.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "krot/conic/interior_point.h"
+
+namespace krot {
+namespace {
+
+// Where p'x has gone farther than so many times the size of the scene there is
+// no end to find.
+constexpr double kFarAway = 1e4;
+// A gap so many times the tolerance is worth a proof: a better one may fail.
+constexpr double kFirstProof = 20;
+// Of the few operations behind the last check.
+constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
+
+// What multipliers prove of p'x, if anything.
+std::optional<double> Prove(const KnownRotationProblem& problem,
+                            const Pull& pull,
+                            const std::optional<ScaleRow>& scale,
+                            const ExtentOptions& options, const Estimate& start,
+                            const std::vector<Multiplier>& multipliers) {
+  ExtentCertificate certificate;
+  certificate.bound = options.bound;
+  certificate.pulls = {pull};
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    certificate.observations.push_back(
+        {static_cast<int64_t>(i), multipliers[i].lambda, multipliers[i].y});
+  }
+  double kept = 0;
+  if (scale) {
+    Pull keeper = *scale;
+    keeper.direction *=
+        BalancingPull(problem, certificate, scale->index, scale->direction);
+    certificate.pulls.push_back(keeper);
+    kept = Along(problem, start, keeper);
+  }
+  const ExtentCheck check = CheckExtent(problem, options.norm, certificate);
+  if (!check.is_accepted) return std::nullopt;
+  return check.extent - kept +
+         kRounding * (std::abs(check.extent) + std::abs(kept));
+}
+
+// The largest distance of a frame or a point from the pull's position.
+double SizeOf(const KnownRotationProblem& problem, const Estimate& estimate,
+              const Pull& pull) {
+  const Eigen::Vector3d x = PositionOf(problem, estimate, pull);
+  double size = 0;
+  for (size_t v = 0; v < problem.views.size(); ++v) {
+    const Pull other{Pull::Kind::kView, static_cast<int32_t>(v)};
+    size = std::max(size, (PositionOf(problem, estimate, other) - x).norm());
+  }
+  for (const Eigen::Vector3d& point : estimate.points) {
+    size = std::max(size, (point - x).norm());
+  }
+  return size;
+}
+
+}  // namespace
+
+Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
+                  const std::optional<ScaleRow>& scale,
+                  const ExtentOptions& options, const Context& context,
+                  const Estimate& start) {
+  Extent extent;
+  extent.estimate = start;
+  LinearObjective objective;
+  objective.h.SetZero(problem.num_points, problem.num_frames);
+  objective.h.Add(-1, CoefficientsOf(problem, pull));
+  if (scale) objective.e = CoefficientsOf(problem, *scale);
+  const double at_start = Along(problem, start, pull);
+  const double far_away = kFarAway * SizeOf(problem, start, pull);
+
+  InteriorPointOptions interior_point;
+  interior_point.norm = options.norm;
+  interior_point.max_iterations = options.max_iterations;
+  interior_point.stop = [&](const ConicIterate& iterate) {
+    const double reached = Along(problem, *iterate.estimate, pull);
+    if (reached - at_start > far_away) return true;
+    if (iterate.gap > kFirstProof * options.tolerance) return false;
+    const std::optional<double> proved =
+        Prove(problem, pull, scale, options, start, *iterate.multipliers);
+    if (!proved) return false;
+    extent.proved = std::min(*proved, extent.proved.value_or(*proved));
+    return *extent.proved - reached <=
+           options.tolerance * (*extent.proved - at_start);
+  };
+  std::vector<Multiplier> multipliers;
+  extent.iterations =
+      MinimizeLinear(problem, interior_point, context, options.bound, objective,
+                     &extent.estimate, &multipliers)
+          .iterations;
+  return extent;
+}
+
+}  // namespace krot

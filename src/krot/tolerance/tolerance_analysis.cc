@@ -1,0 +1,237 @@
+#include "krot/tolerance/tolerance_analysis.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "krot/base/check.h"
+#include "krot/base/parallel_for.h"
+#include "krot/base/timer.h"
+#include "krot/model/local_frame.h"
+#include "krot/problem/components.h"
+#include "krot/problem/fixed.h"
+
+namespace krot {
+namespace {
+
+// A model whose largest error is no larger a share of the bound is taken as it
+// is.
+constexpr double kFitShare = 0.95;
+
+// Where each of the model's is in the problem; -1: nowhere.
+std::vector<int32_t> Inverse(const std::vector<int32_t>& of, size_t count) {
+  std::vector<int32_t> inverse(count, -1);
+  for (size_t n = 0; n < of.size(); ++n) {
+    inverse[of[n]] = static_cast<int32_t>(n);
+  }
+  return inverse;
+}
+
+double TrueCostOf(const Model& model, const BuiltProblem& built, Norm norm,
+                  const Context& context) {
+  return Reprojection(model, built)
+      .TrueCost(built.start, norm, context.num_threads);
+}
+
+// Finds an estimate within the bound; false if there is none.
+bool FindModel(const ToleranceOptions& options, const Context& context,
+               BuiltProblem* built, ToleranceResult* result) {
+  ToleranceSummary& summary = result->summary;
+  const Norm norm = options.solve.norm;
+  *built = BuildProblem(result->model, options.solve.problem);
+  if (!built->problem.observations.empty()) {
+    summary.cost = TrueCostOf(result->model, *built, norm, context);
+    if (summary.cost <= kFitShare * options.max_error) return true;
+  }
+  SolveModelOptions solve = options.solve;
+  solve.finish.finish = Finish::kNone;
+  SolveModelResult solved = SolveModel(result->model, solve, context);
+  result->model = std::move(solved.model);
+  summary.is_solved = true;
+  summary.lower_bound = solved.summary.lower_bound;
+  *built = BuildProblem(result->model, options.solve.problem);
+  if (built->problem.observations.empty()) return false;
+  summary.cost = TrueCostOf(result->model, *built, norm, context);
+  return summary.cost < options.max_error;
+}
+
+ToleranceGauge GaugeFor(const ToleranceOptions& options,
+                        const BuiltProblem& built,
+                        const std::vector<int32_t>& view_of) {
+  if (HasFixed(built.problem)) return {};
+  if (options.gauge_images.empty()) {
+    return ChooseGauge(built.problem, built.start);
+  }
+  ToleranceGauge gauge;
+  const Components components = FindComponents(built.problem);
+  std::vector<int32_t> of_component;
+  std::vector<int32_t> frames;
+  for (const int32_t image : options.gauge_images) {
+    const int32_t view = view_of[image];
+    CheckArgument(view >= 0, "gauge_images", image,
+                  "images of the optimisation");
+    (gauge.first ? gauge.second : gauge.first) = view;
+    frames.push_back(built.problem.views[view].frame);
+    of_component.push_back(components.of_frame[frames.back()]);
+  }
+  CheckArgument(frames.size() == 2 && frames[0] != frames[1] &&
+                    of_component[0] == of_component[1],
+                "gauge_images", options.gauge_images.size(),
+                "two images of different frames that share tracks");
+  return gauge;
+}
+
+std::vector<ToleranceBox> EmptyBoxes(const Model& model,
+                                     const ToleranceOptions& options) {
+  std::vector<ToleranceBox> boxes;
+  for (const int32_t i : options.images) {
+    ToleranceBox box;
+    box.is_image = true;
+    box.id = model.images[i].id;
+    box.name = model.images[i].name;
+    boxes.push_back(std::move(box));
+  }
+  for (const int32_t k : options.points) {
+    ToleranceBox box;
+    box.id = model.points3D[k].id;
+    box.position = model.points3D[k].xyz;
+    boxes.push_back(std::move(box));
+  }
+  return boxes;
+}
+
+void FillBoxes(const ToleranceOptions& options, const ToleranceProblem& problem,
+               const std::vector<int32_t>& view_of, const Context& context,
+               ToleranceSummary* summary) {
+  const std::vector<int32_t> point_of =
+      Inverse(problem.built().point_of, problem.model().points3D.size());
+  const auto num_boxes = static_cast<int64_t>(summary->boxes.size());
+  Context inner = context;
+  if (num_boxes > 1) inner.num_threads = 1;
+  std::atomic<int64_t> num_done = 0;
+  ParallelFor(num_boxes, 1, context.num_threads, [&](int64_t n, int64_t, int) {
+    if (context.IsCancelled()) return;
+    ToleranceBox& box = summary->boxes[n];
+    const auto num_images = static_cast<int64_t>(options.images.size());
+    const int32_t index = box.is_image
+                              ? view_of[options.images[n]]
+                              : point_of[options.points[n - num_images]];
+    box.is_free = index < 0;
+    if (!box.is_free) {
+      const Pull target{box.is_image ? Pull::Kind::kView : Pull::Kind::kPoint,
+                        index};
+      box.position = PositionOf(problem.problem(), problem.centre(), target);
+      box.is_free = !IsFixedPosition(problem.problem(), target) &&
+                    !problem.UsablePart(target);
+      box.box = FindBox(problem, target, options.tolerance, inner);
+    }
+    if (options.on_box) options.on_box(++num_done);
+  });
+  for (const ToleranceBox& box : summary->boxes) {
+    summary->num_programmes += box.box.num_programmes;
+  }
+}
+
+ToleranceResult AnalyzeInFrame(const Model& model,
+                               const ToleranceOptions& options,
+                               const Context& context) {
+  const Timer timer;
+  ToleranceResult result;
+  result.model = model;
+  ToleranceSummary& summary = result.summary;
+  summary.max_error = options.max_error;
+  summary.norm = options.solve.norm;
+  BuiltProblem built;
+  const bool has_model = FindModel(options, context, &built, &result);
+  const KnownRotationProblem& problem = built.problem;
+  summary.num_frames = problem.num_frames;
+  summary.num_points = problem.num_points;
+  summary.num_observations = static_cast<int64_t>(problem.observations.size());
+  if (context.IsCancelled()) {
+    summary.termination = ToleranceTermination::kInterrupted;
+    return result;
+  }
+  if (!has_model) {
+    summary.termination = problem.observations.empty()
+                              ? ToleranceTermination::kNothingToSolve
+                              : ToleranceTermination::kNoEstimate;
+    return result;
+  }
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    summary.num_fixed_frames += problem.IsFixedFrame(f);
+  }
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    summary.num_fixed_points += problem.IsFixedPoint(k);
+  }
+  const std::vector<int32_t> view_of =
+      Inverse(built.image_of, result.model.images.size());
+  const ToleranceGauge gauge = GaugeFor(options, built, view_of);
+  for (const std::optional<int32_t>& view : {gauge.first, gauge.second}) {
+    if (!view) continue;
+    summary.gauge_images.push_back(
+        result.model.images[built.image_of[*view]].name);
+  }
+  const Estimate centre = built.start;
+  const ToleranceProblem shared(result.model, &built, centre, gauge,
+                                options.solve.norm, options.max_error, context);
+  summary.num_rowless = shared.num_rowless();
+  summary.num_far_points = shared.num_far_points();
+  summary.boxes = EmptyBoxes(result.model, options);
+  FillBoxes(options, shared, view_of, context, &summary);
+  summary.termination = context.IsCancelled()
+                            ? ToleranceTermination::kInterrupted
+                            : ToleranceTermination::kDone;
+  summary.seconds = timer.Seconds();
+  return result;
+}
+
+// Into a frame whose origin lies elsewhere; outwards.
+void Shift(const Eigen::Vector3d& by, ToleranceBox* box) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  box->position += by;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (auto [end, outwards] : {std::pair(&box->box.low[axis], -kInfinity),
+                                 std::pair(&box->box.high[axis], kInfinity)}) {
+      end->reached += by[axis];
+      if (!end->proved) continue;
+      end->proved = std::nextafter(*end->proved + by[axis], outwards);
+    }
+  }
+}
+
+void CheckOptions(const Model& model, const ToleranceOptions& options) {
+  CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
+  CheckArgument(options.tolerance > 0, "tolerance", options.tolerance, "> 0");
+  CheckArgument(options.solve.norm.p == 2 || options.solve.norm.IsPolyhedral(),
+                "norm.p", options.solve.norm.p, "1, 2 or infinity");
+  const auto check = [](const char* name, const std::vector<int32_t>& indices,
+                        size_t count) {
+    for (const int32_t index : indices) {
+      CheckArgument(index >= 0 && static_cast<size_t>(index) < count, name,
+                    index, "an index of the model");
+    }
+  };
+  check("images", options.images, model.images.size());
+  check("gauge_images", options.gauge_images, model.images.size());
+  check("points", options.points, model.points3D.size());
+}
+
+}  // namespace
+
+ToleranceResult AnalyzeTolerances(const Model& model,
+                                  const ToleranceOptions& options,
+                                  const Context& context) {
+  CheckOptions(model, options);
+  const FixedParts& fixed = options.solve.problem.fixed;
+  const Eigen::Vector3d origin = LocalFrame(model, fixed).origin();
+  ToleranceResult result = InLocalFrame(model, fixed, [&](const Model& local) {
+    return AnalyzeInFrame(local, options, context);
+  });
+  if (origin.isZero(0)) return result;
+  for (ToleranceBox& box : result.summary.boxes) Shift(origin, &box);
+  return result;
+}
+
+}  // namespace krot

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/model/model.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/tolerance/box_search.h"
+
+namespace krot {
+
+// What the data allow: not the position of a camera or a point, but all of
+// them, over all estimates whose errors are within a bound; rotations and
+// intrinsics as given. What `krot tolerance_analyzer` does between reading and
+// writing.
+
+struct ToleranceOptions {
+  double max_error = 0;     // epsilon, pixels; > 0
+  double tolerance = 0.01;  // of an end, relative to how far it is; > 0
+  // Indices in Model::images and Model::points3D whose boxes are wanted.
+  std::vector<int32_t> images;
+  std::vector<int32_t> points;
+  // Two images that hold place and scale, indices; empty: chosen, or what
+  // solve.problem.fixed marks.
+  std::vector<int32_t> gauge_images;
+  // Of the problem, and of the solve that finds estimates within the bound
+  // where the model is not one.
+  SolveModelOptions solve;
+  // Called after every box with how many there are by now; may be empty, must
+  // be safe to call from several threads.
+  std::function<void(int64_t num_boxes)> on_box;
+};
+
+enum class ToleranceTermination {
+  kNotRun,
+  kNothingToSolve,  // every observation was left out
+  kNoEstimate,      // none was found whose errors are within the bound
+  kDone,
+  kInterrupted,
+};
+
+// All that an image's centre or a point may be.
+struct ToleranceBox {
+  bool is_image = false;
+  uint64_t id = 0;
+  std::string name;  // of an image
+  Eigen::Vector3d position =
+      Eigen::Vector3d::Zero();  // in the model given back
+  // Nothing holds it: it takes no part in the optimisation, or does not hang
+  // together with what holds place and scale.
+  bool is_free = false;
+  PositionBox box;
+};
+
+struct ToleranceSummary {
+  ToleranceTermination termination = ToleranceTermination::kNotRun;
+  double max_error = 0;  // as asked for, pixels
+  Norm norm;
+  double cost = 0;  // the largest error of the model given back, pixels
+  // Where the model had to be solved first: what that proves, pixels.
+  bool is_solved = false;
+  std::optional<double> lower_bound;
+  int64_t num_frames = 0;
+  int64_t num_points = 0;
+  int64_t num_observations = 0;
+  int64_t num_rowless = 0;     // that no region of their lens allows to use
+  int64_t num_far_points = 0;  // that say nothing about where cameras stand
+  int64_t num_programmes = 0;
+  int64_t num_fixed_frames = 0;  // by options, not by the gauge
+  int64_t num_fixed_points = 0;
+  std::vector<std::string> gauge_images;  // none where options fix what holds
+  std::vector<ToleranceBox> boxes;        // images, then points, as asked for
+  double seconds = 0;
+};
+
+struct ToleranceResult {
+  Model model;  // the input, or the solved one: the boxes stand around it
+  ToleranceSummary summary;
+};
+
+// Requires a valid model (ValidateModel). Throws std::invalid_argument for
+// options out of range, as for gauge images that hold nothing together. The
+// same bits at any number of threads.
+ToleranceResult AnalyzeTolerances(const Model& model,
+                                  const ToleranceOptions& options,
+                                  const Context& context = {});
+
+}  // namespace krot

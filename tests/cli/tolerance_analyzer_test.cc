@@ -1,0 +1,145 @@
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "krot/analysis/pixel_errors.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+using Json = nlohmann::json;
+
+class ToleranceAnalyzer : public ::testing::Test {
+ protected:
+  ToleranceAnalyzer() : model_(SynthesizeScene(Scene()).model) {
+    Save(model_, folder_ / "input");
+    max_error_ = std::to_string(1.2 * Summarize(PixelErrors(model_)).max);
+  }
+
+  static SceneOptions Scene() {
+    SceneOptions options = SmallScene();
+    options.start_translation_noise = options.start_point_noise = 0;
+    return options;
+  }
+  KrotResult Analyze(const std::vector<std::string>& more,
+                     const std::string& input = "input") const {
+    std::vector<std::string> arguments = {"tolerance_analyzer",
+                                          "--input_path",
+                                          folder_ / input,
+                                          "--report_path",
+                                          folder_ / "r.json",
+                                          "--ToleranceAnalyzer.max_error",
+                                          max_error_};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  }
+  Json Report() const { return Json::parse(ReadBytes(folder_ / "r.json")); }
+
+  TempFolder folder_;
+  Model model_;
+  std::string max_error_;
+};
+
+TEST_F(ToleranceAnalyzer, TellsTheSameInTableReportCsvAndPage) {
+  const std::string point = std::to_string(model_.points3D[3].id);
+  const KrotResult result = Analyze(
+      {"--csv_path", folder_ / "boxes.csv", "--html_path", folder_ / "p.html",
+       "--ToleranceAnalyzer.images",
+       model_.images[1].name + "," + std::to_string(model_.images[2].id),
+       "--ToleranceAnalyzer.points", point});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr(model_.images[1].name));
+  EXPECT_THAT(result.out, HasSubstr("point " + point));
+  const Json report = Report();
+  ASSERT_EQ(report["boxes"].size(), 3u);
+  EXPECT_EQ(report["boxes"][1]["image_id"], model_.images[2].id);
+  EXPECT_EQ(report["boxes"][2]["point3D_id"], model_.points3D[3].id);
+  EXPECT_EQ(report["gauge"]["images"].size(), 2u);
+  std::istringstream csv(ReadBytes(folder_ / "boxes.csv"));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line,
+            "image_id,image_name,point3D_id,axis,position,low_proved,"
+            "low_reached,high_reached,high_proved");
+  for (const Json& box : report["boxes"]) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double position = box["position"][axis];
+      EXPECT_LE(box["low"]["proved"][axis], box["low"]["reached"][axis]);
+      EXPECT_LE(box["low"]["reached"][axis], position);
+      EXPECT_LE(position, box["high"]["reached"][axis]);
+      EXPECT_LE(box["high"]["reached"][axis], box["high"]["proved"][axis]);
+      ASSERT_TRUE(std::getline(csv, line));
+      const std::string last = line.substr(line.rfind(',') + 1);
+      EXPECT_EQ(std::stod(last), box["high"]["proved"][axis]);
+    }
+  }
+  EXPECT_FALSE(std::getline(csv, line));
+  EXPECT_THAT(ReadBytes(folder_ / "p.html"), HasSubstr("boxes-section"));
+}
+
+TEST_F(ToleranceAnalyzer, ShiftsItsBoxesWithTheModel) {
+  const Eigen::Vector3d shift(5e6, -4e6, 3e6);
+  Save(FarAway(model_, Eigen::Vector3d::Zero()), folder_ / "near");
+  Save(FarAway(model_, shift), folder_ / "far");
+  ASSERT_EQ(Analyze({}, "near").exit_code, 0);
+  const Json here = Report();
+  ASSERT_EQ(Analyze({}, "far").exit_code, 0);
+  const Json there = Report();
+  ASSERT_EQ(here["boxes"].size(), model_.images.size());
+  for (size_t n = 0; n < model_.images.size(); ++n) {
+    for (const char* side : {"low", "high"}) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double a = here["boxes"][n][side]["proved"][axis];
+        const double b = there["boxes"][n][side]["proved"][axis];
+        EXPECT_NEAR(a + shift[axis], b, 1e-6);
+      }
+    }
+  }
+}
+
+TEST_F(ToleranceAnalyzer, RefusesWhatTheModelDoesNotHave) {
+  for (const auto& [option, value] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"images", "nobody.jpg"},
+           {"points", "123456789"},
+           {"gauge_images", model_.images[0].name},
+       }) {
+    const KrotResult result = Analyze({"--ToleranceAnalyzer." + option, value});
+    EXPECT_EQ(result.exit_code, 1) << option;
+    EXPECT_THAT(result.err, HasSubstr("--ToleranceAnalyzer." + option));
+    EXPECT_THAT(result.err, HasSubstr(value));
+  }
+}
+
+TEST_F(ToleranceAnalyzer, ProvesThatNoEstimateIsWithinABoundThatIsTooLow) {
+  const KrotResult result =
+      RunKrot({"tolerance_analyzer", "--input_path", folder_ / "input",
+               "--ToleranceAnalyzer.max_error", "0.01"});
+  EXPECT_EQ(result.exit_code, 7);
+  EXPECT_THAT(result.err, HasSubstr("is proved to be at least"));
+  EXPECT_EQ(result.out, "");
+}
+
+TEST_F(ToleranceAnalyzer, KeepsWhatIsFixedAndTakesItForTheGauge) {
+  std::ofstream(folder_ / "fixed.txt") << model_.images[0].name << '\n'
+                                       << model_.images.back().name << '\n';
+  const KrotResult result =
+      Analyze({"--fixed_images_path", folder_ / "fixed.txt"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Report();
+  EXPECT_EQ(report["gauge"]["num_fixed_frames"], 2);
+  EXPECT_TRUE(report["gauge"]["images"].empty());
+  EXPECT_EQ(report["boxes"][0]["low"], report["boxes"][0]["high"]);
+  EXPECT_NE(report["boxes"][1]["low"], report["boxes"][1]["high"]);
+}
+
+}  // namespace
+}  // namespace krot

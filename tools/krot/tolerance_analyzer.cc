@@ -1,0 +1,147 @@
+#include <atomic>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "krot/base/parallel_for.h"
+#include "krot/base/timer.h"
+#include "krot/base/write_file.h"
+#include "krot/options/tolerance_options.h"
+#include "krot/report/peak_memory.h"
+#include "krot/report/text_table.h"
+#include "krot/report/tolerance_report.h"
+#include "krot/version.h"
+#include "tools/krot/command.h"
+#include "tools/krot/common_options.h"
+#include "tools/krot/interrupt.h"
+#include "tools/krot/model_files.h"
+#include "tools/krot/report_files.h"
+
+namespace krot {
+namespace {
+
+struct ToleranceCommand {
+  ModelPaths paths;  // without an output
+  std::string csv_path;
+  Context context;
+  ToleranceArguments arguments;
+  CommonOptions common;
+};
+
+void AddCommandOptions(ToleranceCommand* command, OptionParser* parser) {
+  ModelPaths* paths = &command->paths;
+  parser->AddPath("input_path", &paths->input_path, true, "a folder",
+                  "The COLMAP model to read, binary or text");
+  AddToleranceOptions(&command->arguments, &command->context, parser);
+  AddRotationsPath(paths, parser);
+  AddFixedPaths(paths, parser);
+  parser->AddOutputFile("report_path", &paths->report_path,
+                        "Where the report goes, as JSON");
+  parser->AddOutputFile("csv_path", &command->csv_path,
+                        "Where the boxes go, as CSV");
+  AddHtmlPath(&paths->html_path, parser);
+  AddOnContradiction(&paths->on_contradiction, parser);
+  AddCommonOptions(
+      "Recorded in the report; this command draws no random numbers",
+      &command->common, parser);
+}
+
+void CheckPairs(const OptionParser& parser) {
+  for (const char* name : {"fixed_images_path", "fixed_points_path"}) {
+    if (!parser.IsGiven(name)) continue;
+    parser.Refuse("ToleranceAnalyzer.gauge_images",
+                  "with --" + std::string(name) + ", which holds the rest");
+  }
+}
+
+[[noreturn]] void ThrowWithoutEstimate(const ToleranceSummary& summary) {
+  const std::string bound = "--ToleranceAnalyzer.max_error " +
+                            FormatNumber(summary.max_error, 6) + " px";
+  if (summary.lower_bound && *summary.lower_bound >= summary.max_error) {
+    throw CommandError(kExitNoStart,
+                       "no estimate is within " + bound +
+                           ": its largest error is proved to be at least " +
+                           FormatNumber(*summary.lower_bound, 6) + " px");
+  }
+  throw CommandError(kExitNoStart, "no estimate was found below " + bound +
+                                       "; the best one has " +
+                                       FormatNumber(summary.cost, 6) + " px");
+}
+
+ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
+  const LogOptions& log = command.common.log;
+  ToleranceOptions options = ResolveToleranceOptions(command.arguments, model);
+  options.solve.problem.fixed = ReadFixedParts(command.paths, model);
+  const auto num_boxes =
+      static_cast<int64_t>(options.images.size() + options.points.size());
+  options.on_box = [&](int64_t num_done) {
+    LogLine(
+        log, 2,
+        "box " + std::to_string(num_done) + " of " + std::to_string(num_boxes));
+  };
+  Context context = command.context;
+  context.cancel = &CatchInterrupts();
+  LogLine(log, 1, "looking for " + Counted(6 * num_boxes, "end"));
+  ToleranceResult result = AnalyzeTolerances(model, options, context);
+  ThrowIfInterrupted();
+  switch (result.summary.termination) {
+    case ToleranceTermination::kNothingToSolve:
+      throw CommandError(kExitNothingToSolve,
+                         "nothing to analyze: no observation can be used");
+    case ToleranceTermination::kNoEstimate:
+      ThrowWithoutEstimate(result.summary);
+    default:
+      return result;
+  }
+}
+
+int Run(const ToleranceCommand& command) {
+  const Timer total_timer;
+  const LogOptions& log = command.common.log;
+  const ModelPaths& paths = command.paths;
+  CheckSidePath("report_path", paths.report_path);
+  CheckSidePath("csv_path", command.csv_path);
+  CheckSidePath("html_path", paths.html_path);
+  ToleranceReport report;
+  report.run.version = KROT_VERSION;
+  report.run.threads = ResolveNumThreads(command.context.num_threads);
+  report.run.seed = command.common.random_seed;
+  const Model model = ReadInput(paths, log, &report.run);
+  ThrowIfInterrupted();
+  ToleranceResult result = Analyze(command, model);
+  report.summary = std::move(result.summary);
+  const int num_threads = command.context.num_threads;
+  report.pixel_error_before = Summarize(PixelErrors(model, num_threads));
+  report.pixel_error_after = Summarize(PixelErrors(result.model, num_threads));
+  report.run.seconds_total = total_timer.Seconds();
+  report.run.peak_memory_bytes = PeakMemoryBytes();
+  if (!command.csv_path.empty()) {
+    LogLine(log, 2, "writing " + command.csv_path);
+    WriteFileAtomically(command.csv_path, ToleranceCsv(report.summary));
+  }
+  WriteReports(paths.report_path, paths.html_path, ToleranceJson(report), model,
+               result.model, num_threads, log);
+  PrintTable(log, ToleranceTable(report));
+  return kExitDone;
+}
+
+}  // namespace
+
+int RunToleranceAnalyzer(const std::vector<std::string>& arguments) {
+  ToleranceCommand command;
+  OptionParser parser(
+      "tolerance_analyzer",
+      "shows not where cameras and points are, but everywhere they may be: the "
+      "smallest and the largest value of each coordinate over all estimates "
+      "within a bound, proved; rotations and intrinsics as given. It is no "
+      "covariance, and says nothing about rotations that are wrong");
+  AddCommandOptions(&command, &parser);
+  if (!parser.Parse(arguments)) {
+    PrintTable(command.common.log, parser.Help());
+    return kExitDone;
+  }
+  CheckPairs(parser);
+  return Run(command);
+}
+
+}  // namespace krot
