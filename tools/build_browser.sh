@@ -9,6 +9,8 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 install_missing cmake:cmake ninja:ninja-build emcc:emscripten esbuild:esbuild \
   node-jszip libeigen3-dev nlohmann-json3-dev
+# For a Node.js that is not Debian's.
+export NODE_PATH=/usr/share/nodejs
 cd "$root"
 cmake --preset wasm
 cmake --build --preset wasm

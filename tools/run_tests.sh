@@ -2,7 +2,8 @@
 # Builds krot and its tests into build/ and runs all of them, installing what is
 # missing first (with sudo if not root). COLMAP and CLP serve as test oracles,
 # Chromium looks at the report page, POV-Ray takes the photos that go through
-# COLMAP and back; pykrot is for Debian's own Python.
+# COLMAP and back; pykrot is for Debian's own Python. krot.html is built and
+# tested where emscripten is installed.
 # Set KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
 # Tests that are skipped are listed in the end, each with its reason; with
 # KROT_NO_SKIPS=1 there must be none.
@@ -22,8 +23,16 @@ install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
   coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
   chromium:chromium chromedriver:chromium-driver povray:povray jq:jq \
   pkg-config:pkgconf shellcheck:shellcheck pybind11-dev python3-dev python3-numpy python3-pytest
+browser_page=
+if command -v emcc >/dev/null && command -v esbuild >/dev/null; then
+  "$root/tools/build_browser.sh"
+  browser_page=$root/build-wasm/krot.html
+else
+  say "No emscripten here: krot.html is neither built nor tested"
+fi
 build_krot "$root/build" -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=OFF \
-  -DKROT_BUILD_PYTHON=ON -DPYTHON_EXECUTABLE=/usr/bin/python3
+  -DKROT_BUILD_PYTHON=ON -DPYTHON_EXECUTABLE=/usr/bin/python3 \
+  -DKROT_BROWSER_PAGE="$browser_page"
 
 say "Testing"
 closing=$root/build/ctest.out
