@@ -79,11 +79,8 @@ ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
         log, 2,
         "box " + std::to_string(num_done) + " of " + std::to_string(num_boxes));
   };
-  Context context = command.context;
-  context.cancel = &CatchInterrupts();
   LogLine(log, 1, "looking for " + Counted(6 * num_boxes, "end"));
-  ToleranceResult result = AnalyzeTolerances(model, options, context);
-  ThrowIfInterrupted();
+  ToleranceResult result = AnalyzeTolerances(model, options, command.context);
   switch (result.summary.termination) {
     case ToleranceTermination::kNothingToSolve:
       throw CommandError(kExitNothingToSolve,
@@ -107,8 +104,8 @@ int Run(const ToleranceCommand& command) {
   report.run.threads = ResolveNumThreads(command.context.num_threads);
   report.run.seed = command.common.random_seed;
   const Model model = ReadInput(paths, log, &report.run);
-  ThrowIfInterrupted();
   ToleranceResult result = Analyze(command, model);
+  DeferInterrupts();
   report.summary = std::move(result.summary);
   const int num_threads = command.context.num_threads;
   report.pixel_error_before = Summarize(PixelErrors(model, num_threads));
