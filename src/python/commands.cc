@@ -19,6 +19,7 @@
 #include "krot/options/outlier_filter_options.h"
 #include "krot/options/solve_options.h"
 #include "krot/options/solver_options.h"
+#include "krot/options/tolerance_options.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/outliers/tolerant_solve.h"
 #include "krot/pipeline/adjust_model.h"
@@ -26,9 +27,11 @@
 #include "krot/report/comparison_report.h"
 #include "krot/report/outlier_report.h"
 #include "krot/report/solve_report.h"
+#include "krot/report/tolerance_report.h"
 #include "krot/version.h"
 #include "python/bindings.h"
 #include "python/keywords.h"
+#include "python/known_files.h"
 #include "python/run.h"
 
 namespace krot {
@@ -37,6 +40,7 @@ namespace {
 namespace py = pybind11;
 
 using ModelPointer = std::shared_ptr<Model>;
+using ConstModelPointer = std::shared_ptr<const Model>;
 
 // stage, largest error or None, lower bound or None.
 using Progress = std::function<void(const std::string&, std::optional<double>,
@@ -70,7 +74,7 @@ void Follow(const Progress& progress, SolveModelOptions* options) {
   };
 }
 
-Outcome RunSolve(const ModelPointer& model, TolerantSolveOptions options,
+Outcome RunSolve(const ConstModelPointer& model, TolerantSolveOptions options,
                  Context context, const Progress& progress,
                  const std::string& command) {
   const Timer timer;
@@ -101,9 +105,14 @@ Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
   Context context;
   OptionTable table = TableOf("pykrot.solve");
   AddSolverOptions(&options, &context, &table);
+  KnownFiles known;
+  known.AddRotationsTo(&table);
+  known.AddFixedTo(&table);
   AssignKeywords(keywords, &table);
   ResolveSolverOptions(table, &options.solve);
-  return RunSolve(model, options, context, progress, "solver");
+  const ConstModelPointer input = known.WithRotations(model);
+  options.solve.problem.fixed = known.Fixed(*input);
+  return RunSolve(input, options, context, progress, "solver");
 }
 
 Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
@@ -125,12 +134,15 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
   Context context;
   OptionTable table = TableOf("pykrot.filter");
   AddOutlierFilterOptions(&options, &context, &table);
+  KnownFiles known;
+  known.AddRotationsTo(&table);
   AssignKeywords(keywords, &table);
+  const ConstModelPointer input = known.WithRotations(model);
   Follow(progress, &options.solve);
   OutlierFilterResult result;
   RunInterruptibly([&](const CancelFlag& cancel) {
     context.cancel = &cancel;
-    result = FilterOutliers(*model, options, context);
+    result = FilterOutliers(*input, options, context);
   });
   OutlierReport report;
   RecordEnd(timer, context.num_threads, &report.run);
@@ -161,6 +173,37 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
   report.summary = std::move(result.summary);
   return {std::make_shared<Model>(std::move(result.model)),
           AdjustmentJson(report), std::nullopt};
+}
+
+Outcome ToleranceCommand(const ModelPointer& model, const Progress& progress,
+                         const py::dict& keywords) {
+  const Timer timer;
+  ToleranceArguments arguments;
+  Context context;
+  OptionTable table = TableOf("pykrot.tolerances");
+  AddToleranceOptions(&arguments, &context, &table);
+  KnownFiles known;
+  known.AddRotationsTo(&table);
+  known.AddFixedTo(&table);
+  AssignKeywords(keywords, &table);
+  const ConstModelPointer input = known.WithRotations(model);
+  ToleranceOptions options = ResolveToleranceOptions(arguments, *input);
+  options.solve.problem.fixed = known.Fixed(*input);
+  Follow(progress, &options.solve);
+  ToleranceResult result;
+  ToleranceReport report;
+  RunInterruptibly([&](const CancelFlag& cancel) {
+    context.cancel = &cancel;
+    result = AnalyzeTolerances(*input, options, context);
+    report.pixel_error_before =
+        Summarize(PixelErrors(*input, context.num_threads));
+    report.pixel_error_after =
+        Summarize(PixelErrors(result.model, context.num_threads));
+  });
+  report.run = Describe(timer, context.num_threads);
+  report.summary = std::move(result.summary);
+  return {std::make_shared<Model>(std::move(result.model)),
+          ToleranceJson(report), std::nullopt};
 }
 
 // None where the models share too little to be aligned.
@@ -225,6 +268,7 @@ void BindCommands(py::module_* module) {
   define("triangulate", &TriangulateCommand);
   define("filter", &FilterCommand);
   define("bundle_adjust", &AdjustCommand);
+  define("tolerances", &ToleranceCommand);
   module->def("compare", &CompareCommand, py::arg("model1"), py::arg("model2"),
               py::arg("alignment"), py::arg("num_worst"));
   module->def("check_certificate", &CheckCommand, py::arg("model"),

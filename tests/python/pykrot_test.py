@@ -1,6 +1,7 @@
 """What pykrot promises: the command line's results, its sentences, and arrays."""
 
 import filecmp
+import json
 import gc
 import os
 import signal
@@ -61,6 +62,19 @@ def test_gives_the_bits_of_the_command(scene, tmp_path, command, function,
     result = function(pykrot.Model.read(scene), **keywords)
     result.model.write(tmp_path / "python")
     assert_same_files(tmp_path / "command", tmp_path / "python")
+
+
+def test_tolerances_are_those_of_the_command(scene, tmp_path):
+    run_krot("tolerance_analyzer", "--input_path", scene,
+             "--ToleranceAnalyzer.max_error", "3", "--ToleranceAnalyzer.images",
+             "2,3", "--ToleranceAnalyzer.points", "5", "--report_path",
+             tmp_path / "r.json")
+    result = pykrot.tolerances(pykrot.Model.read(scene), 3, images=[2, 3],
+                               points=[5])
+    expected = json.loads((tmp_path / "r.json").read_text())
+    assert result.report["boxes"] == expected["boxes"]
+    with pytest.raises(pykrot.NoSolutionError):
+        pykrot.tolerances(pykrot.Model.read(scene), 0.01)
 
 
 def test_the_sample_ends_where_the_command_ends(tmp_path):

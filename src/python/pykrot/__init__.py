@@ -26,11 +26,11 @@ __all__ = [
     "Model", "ModelError", "NoSolutionError", "OptionError", "Problem",
     "Result", "Verdict", "WriteError", "bundle_adjust", "check_certificate",
     "compare", "filter", "from_pycolmap", "solve", "to_pycolmap",
-    "triangulate"
+    "tolerances", "triangulate"
 ]
 
 _WITHOUT_RESULT = ("nothing_to_solve", "nothing_to_adjust", "infeasible",
-                   "infeasible_start", "no_start")
+                   "infeasible_start", "no_start", "no_estimate")
 
 
 class NoSolutionError(RuntimeError):
@@ -116,6 +116,20 @@ def filter(model, max_error, *, progress=None, options=None, **keywords):
 def bundle_adjust(model, *, progress=None, options=None, **keywords):
     """Least squares over everything, below a cap if max_error is given."""
     return _run(_core.bundle_adjust, model, progress, options, keywords)
+
+
+def tolerances(model, max_error, *, images=(), points=(), progress=None,
+               options=None, **keywords):
+    """Everywhere that positions may be with all errors within `max_error` px.
+
+    Of all images, unless some are named (by name or id) or points (by id).
+    report["boxes"] holds them; `model` is the one around which they stand.
+    """
+    named = {name: ",".join(map(str, values))
+             for name, values in (("images", images), ("points", points))
+             if len(values) > 0}
+    return _run(_core.tolerances, model, progress, options,
+                {"max_error": max_error, **named, **keywords})
 
 
 def compare(model1, model2, *, alignment="frame", num_worst=10):

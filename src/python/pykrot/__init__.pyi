@@ -106,6 +106,12 @@ def bundle_adjust(model: Union[Model, Problem], *,
                   progress: Optional[Progress] = ...,
                   options: Optional[Mapping[str, Any]] = ...,
                   **keywords: Any) -> Result: ...
+def tolerances(model: Union[Model, Problem], max_error: float, *,
+               images: Sequence[Union[str, int]] = ...,
+               points: Sequence[int] = ...,
+               progress: Optional[Progress] = ...,
+               options: Optional[Mapping[str, Any]] = ...,
+               **keywords: Any) -> Result: ...
 def compare(model1: Model, model2: Model, *, alignment: str = "frame",
             num_worst: int = 10) -> Dict[str, Any]: ...
 def check_certificate(model: Union[Model, Problem],

@@ -1,0 +1,46 @@
+#include "python/known_files.h"
+
+#include "krot/model/file_bytes.h"
+#include "krot/model/rotations_file.h"
+
+namespace krot {
+namespace {
+
+void AddFile(const std::string& name, std::string* path, OptionTable* table) {
+  table->Add({name, "", "a file", "", false, [path](const std::string& text) {
+                *path = text;
+                return !text.empty();
+              }});
+}
+
+}  // namespace
+
+void KnownFiles::AddRotationsTo(OptionTable* table) {
+  AddFile("rotations_path", &rotations_path_, table);
+}
+
+void KnownFiles::AddFixedTo(OptionTable* table) {
+  AddFile("fixed_images_path", &fixed_images_path_, table);
+  AddFile("fixed_points_path", &fixed_points_path_, table);
+}
+
+std::shared_ptr<const Model> KnownFiles::WithRotations(
+    const std::shared_ptr<Model>& model) const {
+  if (rotations_path_.empty()) return model;
+  auto turned = std::make_shared<Model>(*model);
+  ReplaceRotations(ReadFileBytes(rotations_path_), turned.get());
+  return turned;
+}
+
+FixedParts KnownFiles::Fixed(const Model& model) const {
+  FixedParts fixed;
+  if (!fixed_images_path_.empty()) {
+    fixed.frames = FixedFrames(ReadFileBytes(fixed_images_path_), model);
+  }
+  if (!fixed_points_path_.empty()) {
+    fixed.points3D = FixedPoints3D(ReadFileBytes(fixed_points_path_), model);
+  }
+  return fixed;
+}
+
+}  // namespace krot
