@@ -200,7 +200,7 @@ Outcome ToleranceCommand(const ModelPointer& model, const Progress& progress,
     report.pixel_error_after =
         Summarize(PixelErrors(result.model, context.num_threads));
   });
-  report.run = Describe(timer, context.num_threads);
+  RecordEnd(timer, context.num_threads, &report.run);
   report.summary = std::move(result.summary);
   return {std::make_shared<Model>(std::move(result.model)),
           ToleranceJson(report), std::nullopt};
