@@ -103,8 +103,8 @@ void AddIncluded(const std::string& file, std::set<std::string>* included) {
 // What judges a proof has nothing in common with what finds it.
 TEST(IncludeRule, TheCertificatesCheckerSeesNothingOfTheSolvers) {
   std::set<std::string> included;
-  for (const char* name :
-       {"certificate_check", "certificate_input", "force_balance"}) {
+  for (const char* name : {"certificate_check", "certificate_input",
+                           "extent_check", "force_balance", "force_checker"}) {
     for (const char* extension : {".h", ".cc"}) {
       AddIncluded(std::string("krot/proof/") + name + extension, &included);
     }

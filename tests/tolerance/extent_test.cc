@@ -8,6 +8,7 @@
 
 #include "krot/problem/cost.h"
 #include "krot/problem/fixed.h"
+#include "krot/tolerance/pull_coefficients.h"
 #include "tests/oracle/lp_oracle.h"
 #include "tests/problem/random_problem.h"
 

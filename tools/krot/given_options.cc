@@ -39,7 +39,8 @@ OptionAssignment ToAssignment(const po::option& option) {
 
 std::vector<OptionAssignment> GivenOptions(
     const std::vector<std::string>& arguments,
-    const std::vector<Option>& options) {
+    const std::vector<Option>& options,
+    const std::function<void(const OptionAssignment&)>& check) {
   const po::options_description description = Describe(options);
   std::vector<OptionAssignment> assignments;
   try {
@@ -53,6 +54,7 @@ std::vector<OptionAssignment> GivenOptions(
             .run();
     for (const po::option& option : parsed.options) {
       assignments.push_back(ToAssignment(option));
+      check(assignments.back());
     }
   } catch (const po::error& error) {
     throw OptionError(error.what());

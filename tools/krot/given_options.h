@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -7,11 +8,12 @@
 
 namespace krot {
 
-// What `--name value` and `--name=value` say, in their order; names are not
-// looked up. Throws OptionError for what is neither.
+// What `--name value` and `--name=value` say, in their order; `check` sees each
+// before the next is looked at. Throws OptionError for what is neither.
 std::vector<OptionAssignment> GivenOptions(
     const std::vector<std::string>& arguments,
-    const std::vector<Option>& options);
+    const std::vector<Option>& options,
+    const std::function<void(const OptionAssignment&)>& check);
 
 // What a project file, in COLMAP's INI format, says. Throws OptionError if it
 // cannot be read.

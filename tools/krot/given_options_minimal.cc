@@ -6,7 +6,8 @@
 namespace krot {
 
 std::vector<OptionAssignment> GivenOptions(
-    const std::vector<std::string>& arguments, const std::vector<Option>&) {
+    const std::vector<std::string>& arguments, const std::vector<Option>&,
+    const std::function<void(const OptionAssignment&)>& check) {
   std::vector<OptionAssignment> assignments;
   for (size_t n = 0; n < arguments.size(); ++n) {
     const std::string& argument = arguments[n];
@@ -18,12 +19,13 @@ std::vector<OptionAssignment> GivenOptions(
     const std::string name = argument.substr(2, equals - 2);
     if (equals != std::string::npos) {
       assignments.push_back({name, argument.substr(equals + 1), "--" + name});
-      continue;
-    }
-    if (n + 1 == arguments.size() || arguments[n + 1].rfind("--", 0) == 0) {
+    } else if (n + 1 == arguments.size() ||
+               arguments[n + 1].rfind("--", 0) == 0) {
       throw OptionError("--" + name + " has no value");
+    } else {
+      assignments.push_back({name, arguments[++n], "--" + name});
     }
-    assignments.push_back({name, arguments[++n], "--" + name});
+    check(assignments.back());
   }
   return assignments;
 }

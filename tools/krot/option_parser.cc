@@ -41,9 +41,9 @@ bool OptionParser::Parse(const std::vector<std::string>& arguments) {
     help_format_ = *asked;
     return false;
   }
-  const std::vector<OptionAssignment> assignments =
-      GivenOptions(arguments, options());
-  for (const OptionAssignment& assignment : assignments) Find(assignment);
+  const std::vector<OptionAssignment> assignments = GivenOptions(
+      arguments, options(),
+      [this](const OptionAssignment& assignment) { Find(assignment); });
   Assign(assignments);
   for (const OptionAssignment& assignment : assignments) {
     if (assignment.name == kProjectPath) {

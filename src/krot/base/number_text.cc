@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <limits>
 
-namespace krot::number_text_by_c {
+namespace krot {
 namespace {
 
 std::string Print(const char* format, int decimals, double value) {
@@ -21,7 +21,7 @@ std::string Print(const char* format, int decimals, double value) {
 
 // strtod is more generous at the beginning, takes hexadecimal digits, and gives
 // infinity or zero for what is out of range.
-std::optional<double> Parse(std::string_view text) {
+std::optional<double> ParseRealByC(std::string_view text) {
   const std::string copy(text);
   const bool is_negative = !copy.empty() && copy[0] == '-';
   const char first = copy.c_str()[is_negative ? 1 : 0];
@@ -39,7 +39,7 @@ std::optional<double> Parse(std::string_view text) {
   return value;
 }
 
-std::string Shortest(double value) {
+std::string ShortestTextByC(double value) {
   if (std::isnan(value)) return std::signbit(value) ? "-nan" : "nan";
   if (std::isinf(value)) return value < 0 ? "-inf" : "inf";
   constexpr int kMaxDecimals = std::numeric_limits<double>::max_digits10 - 1;
@@ -55,4 +55,4 @@ std::string Shortest(double value) {
   return fixed.size() <= scientific.size() ? fixed : scientific;
 }
 
-}  // namespace krot::number_text_by_c
+}  // namespace krot

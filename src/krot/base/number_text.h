@@ -11,10 +11,8 @@ namespace krot {
 
 // What std::from_chars and std::to_chars do with doubles, for standard
 // libraries that have them for integers alone, by way of the C library.
-namespace number_text_by_c {
-std::optional<double> Parse(std::string_view text);
-std::string Shortest(double value);
-}  // namespace number_text_by_c
+std::optional<double> ParseRealByC(std::string_view text);
+std::string ShortestTextByC(double value);
 
 #ifdef __cpp_lib_to_chars
 inline constexpr bool kCharconvHasReals = true;
@@ -28,7 +26,7 @@ inline constexpr bool kCharconvHasReals = false;
 template <typename Number>
 std::optional<Number> ParseNumber(std::string_view text) {
   if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
-    return number_text_by_c::Parse(text);
+    return ParseRealByC(text);
   } else {
     Number value;
     const char* const end = text.data() + text.size();
@@ -43,7 +41,7 @@ std::optional<Number> ParseNumber(std::string_view text) {
 template <typename Number>
 void AppendNumber(Number value, std::string* text) {
   if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
-    text->append(number_text_by_c::Shortest(value));
+    text->append(ShortestTextByC(value));
   } else {
     char digits[32];
     const auto result = std::to_chars(digits, digits + sizeof(digits), value);

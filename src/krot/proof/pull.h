@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 
-#include "krot/conic/block_structure.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 
@@ -27,10 +26,6 @@ Eigen::Vector3d PositionOf(const KnownRotationProblem& problem,
                            const Estimate& estimate, const Pull& pull);
 double Along(const KnownRotationProblem& problem, const Estimate& estimate,
              const Pull& pull);
-
-// By how much p'x changes with the unknowns; 0 where they are fixed.
-BlockVector CoefficientsOf(const KnownRotationProblem& problem,
-                           const Pull& pull);
 
 // The same pull in a part of the problem; none if that does not hold it.
 std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull);

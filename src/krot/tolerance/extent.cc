@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "krot/conic/interior_point.h"
+#include "krot/tolerance/pull_coefficients.h"
 
 namespace krot {
 namespace {
