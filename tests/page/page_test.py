@@ -16,7 +16,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 import zlib
 
@@ -253,9 +252,18 @@ class PageTest(unittest.TestCase):
             self.browser.texts(".info h3"),
             [worst["image_name"], "Point %d" % worst["point3D_id"]])
 
+    def wait_until_it_stands(self):
+        """The page scrolls to its view smoothly."""
+        self.browser.run("""
+            const top = () => document.querySelector('#scene canvas')
+                .getBoundingClientRect().top;
+            const pause = () => new Promise((done) => setTimeout(done, 300));
+            for (let last = NaN; last !== top(); await pause()) last = top();
+            """)
+
     def test_click_beside_everything_closes_the_numbers(self):
         self.browser.click("#support tbody tr:first-child td:first-child")
-        time.sleep(1)  # the page scrolls there smoothly
+        self.wait_until_it_stands()
         self.browser.click("#scene canvas", -500, -200)
         self.assertEqual(self.browser.texts(".info"), [])
 
