@@ -13,7 +13,8 @@ namespace {
 using Matrix = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
 
 Matrix MatrixOf(const Tile& tile) {
-  return {tile.data, tile.rows, tile.cols, Eigen::OuterStride<>(tile.stride)};
+  return Matrix(tile.data, tile.rows, tile.cols,
+                Eigen::OuterStride<>(tile.stride));
 }
 
 }  // namespace
