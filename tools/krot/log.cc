@@ -22,8 +22,8 @@ void LogLine(const LogOptions& options, int level, const std::string& line) {
 }
 
 std::function<void(const std::string&)> WarnOn(const LogOptions& options) {
-  return [&options](const std::string& sentence) {
-    LogLine(options, 0, "warning: " + sentence);
+  return [&options](const std::string& text) {
+    LogLine(options, 0, "warning: " + text);
   };
 }
 
