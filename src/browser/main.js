@@ -8,7 +8,7 @@ import { Runner } from './runner.js';
 import { analyze, check, compare, filter, solve } from './tasks.js';
 
 // Measured on sparse models from the web: docs/browser.md.
-const kSecondsPerObservation = 3e-5;
+const kSecondsPerObservation = 6e-5;
 const kMostObservations = 4e6;
 
 const runner = new Runner(byId('krot-wasm').textContent,
