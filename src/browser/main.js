@@ -44,7 +44,7 @@ async function run(task) {
 async function runAndShow(task) {
   const result = await run(task);
   if (!result) return;
-  await showResult(result);
+  await showResult(result, task.verdict);
   const profile = textOf(result.files, 'profile.json');
   showBounds(profile && JSON.parse(profile),
     (bound) => runAndShow(filter(model, bound)));
@@ -87,6 +87,7 @@ async function take(reading) {
 function onDrop(event) {
   event.preventDefault();
   byId('drop').classList.remove('over');
+  if (byId('drop').inert) return;  // a command runs
   take(modelFromDrop(event.dataTransfer, 'model/'));
 }
 

@@ -57,16 +57,21 @@ export function showBounds(profile, onTake) {
   show();
 }
 
-// `result` as Runner.run gives it.
-export async function showResult(result) {
+// What it says in one sentence, and whether something is wrong.
+function conclude({ code, text = '', failure, last }, verdict) {
+  if (failure) return { sentence: `${failure}; ${last}`, isWrong: true };
+  if (code !== 0) return { sentence: last, isWrong: true };
+  return { sentence: verdict(text), isWrong: false };
+}
+
+// `result` as Runner.run gives it, of a task with that verdict.
+export async function showResult(result, verdict) {
   urls.forEach((url) => URL.revokeObjectURL(url));
   urls = [];
-  const { code, text = '', files = [], failure, last } = result;
-  const isWrong = Boolean(failure) || code !== 0;
+  const { text = '', files = [] } = result;
   const page = files.find(({ path }) => path === 'page.html');
-  const verdict = text.match(/^(Maximum|removed|Accepted|accepted|Refused).*$/m);
-  byId('sentence').textContent = failure ? `${failure}; ${last}` :
-    verdict ? verdict[0] : isWrong ? last : text.split('\n')[0];
+  const { sentence, isWrong } = conclude(result, verdict);
+  byId('sentence').textContent = sentence;
   byId('sentence').classList.toggle('wrong', isWrong);
   byId('table').textContent = text;
   byId('table').parentElement.hidden = text === '';

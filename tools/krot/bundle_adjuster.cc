@@ -2,14 +2,11 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/options/adjustment_options.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/adjustment_report.h"
-#include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
-#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
@@ -69,8 +66,6 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   const Timer total_timer;
   const WriteModelOptions write_options = CheckModelPaths(paths, common.log);
   AdjustmentReport report;
-  report.run.version = KROT_VERSION;
-  report.run.threads = ResolveNumThreads(num_threads);
   report.run.seed = common.random_seed;
 
   const Model model = ReadInput(paths, common.log, &report.run);
@@ -87,10 +82,9 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   const Timer write_timer;
   WriteModel(result.model, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
-  report.run.seconds_total = total_timer.Seconds();
-  report.run.peak_memory_bytes = PeakMemoryBytes();
+  RecordEnd(total_timer, num_threads, &report.run);
   WriteReports(paths.report_path, paths.html_path, AdjustmentJson(report),
-               model, result.model, report.run.threads, common.log);
+               model, result.model, num_threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
   if (context.IsCancelled()) ThrowInterrupted(paths);
   return kExitDone;

@@ -3,16 +3,13 @@
 #include <vector>
 
 #include "krot/analysis/overlay.h"
-#include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
 #include "krot/options/outlier_filter_options.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/outliers/suspect_colors.h"
 #include "krot/report/outlier_report.h"
-#include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
-#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
@@ -167,8 +164,6 @@ int Run(const OutlierCommand& command) {
   const ModelPaths& paths = command.paths;
   const WriteModelOptions write_options = CheckPaths(command);
   OutlierReport report;
-  report.run.version = KROT_VERSION;
-  report.run.threads = ResolveNumThreads(command.context.num_threads);
   report.run.seed = command.common.random_seed;
 
   const Model model = ReadInput(paths, log, &report.run);
@@ -184,8 +179,7 @@ int Run(const OutlierCommand& command) {
   const Timer write_timer;
   WriteModel(result.model, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
-  report.run.seconds_total = total_timer.Seconds();
-  report.run.peak_memory_bytes = PeakMemoryBytes();
+  RecordEnd(total_timer, command.context.num_threads, &report.run);
   WriteSideFiles(command, report);
   WriteViews(command, report.summary, write_options, model, result.model);
   const std::string report_json = OutlierJson(report);

@@ -3,13 +3,10 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
-#include "krot/report/peak_memory.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
-#include "krot/version.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
@@ -19,10 +16,8 @@ namespace {
 
 SolveReport DescribeRun(const SolveCommand& command) {
   SolveReport report;
-  report.run.version = KROT_VERSION;
   report.command = command.name;
   report.method = command.method_name;
-  report.run.threads = ResolveNumThreads(command.context.num_threads);
   report.run.seed = command.common.random_seed;
   return report;
 }
@@ -190,8 +185,7 @@ int RunSolveCommand(const SolveCommand& command) {
   const Timer write_timer;
   WriteModel(solved, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
-  report.run.seconds_total = total_timer.Seconds();
-  report.run.peak_memory_bytes = PeakMemoryBytes();
+  RecordEnd(total_timer, command.context.num_threads, &report.run);
   WriteCertificate(command, report.summary);
   WriteConflicts(command, report);
   WriteReports(paths.report_path, paths.html_path, SolveJson(report), model,

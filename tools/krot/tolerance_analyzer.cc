@@ -3,14 +3,11 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
 #include "krot/options/tolerance_options.h"
-#include "krot/report/peak_memory.h"
 #include "krot/report/text_table.h"
 #include "krot/report/tolerance_report.h"
-#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
@@ -100,8 +97,6 @@ int Run(const ToleranceCommand& command) {
   CheckSidePath("csv_path", command.csv_path);
   CheckSidePath("html_path", paths.html_path);
   ToleranceReport report;
-  report.run.version = KROT_VERSION;
-  report.run.threads = ResolveNumThreads(command.context.num_threads);
   report.run.seed = command.common.random_seed;
   const Model model = ReadInput(paths, log, &report.run);
   ToleranceResult result = Analyze(command, model);
@@ -110,8 +105,7 @@ int Run(const ToleranceCommand& command) {
   const int num_threads = command.context.num_threads;
   report.pixel_error_before = Summarize(PixelErrors(model, num_threads));
   report.pixel_error_after = Summarize(PixelErrors(result.model, num_threads));
-  report.run.seconds_total = total_timer.Seconds();
-  report.run.peak_memory_bytes = PeakMemoryBytes();
+  RecordEnd(total_timer, num_threads, &report.run);
   if (!command.csv_path.empty()) {
     LogLine(log, 2, "writing " + command.csv_path);
     WriteFileAtomically(command.csv_path, ToleranceCsv(report.summary));

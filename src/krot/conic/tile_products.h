@@ -13,8 +13,7 @@ struct Tile {
 
 // The products of a Cholesky factorization by tiles, on the calling thread, by
 // Eigen; any number of threads may call them. Not by BLAS: the serial OpenBLAS of
-// Debian 12 lets two threads use one buffer, and on a busy machine one of some
-// 3,000 factorizations was wrong.
+// Debian 12 lets two threads use one buffer.
 
 // A := A L'^-1, of L's lower triangle.
 void DivideByTransposed(const Tile& L, const Tile& A);
