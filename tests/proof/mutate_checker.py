@@ -20,8 +20,9 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROOF = ROOT / "src" / "krot" / "proof"
 # What judges, as opposed to what makes certificates.
-CHECKER = ("certificate_check.cc", "certificate_input.cc", "force_balance.cc",
-           "fixed_constants.cc", "observation_force.cc")
+CHECKER = ("certificate_check.cc", "certificate_input.cc", "extent_check.cc",
+           "fixed_constants.cc", "force_balance.cc", "force_checker.cc",
+           "observation_force.cc", "pull.cc")
 TIMEOUT = 120  # seconds of a test: what takes longer hangs, and is noticed
 
 # Operators stand between blanks, template brackets do not.

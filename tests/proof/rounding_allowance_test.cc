@@ -1,0 +1,108 @@
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "krot/proof/fixed_constants.h"
+#include "krot/proof/force_checker.h"
+#include "tests/problem/random_problem.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Rotations are known to kRotationError: whatever is computed from them must
+// allow for what another rotation as near gives. Offsets whose entries cancel
+// are those that a wrong sum of absolute values would lose.
+const Vector3d kFar(1e6, -1e6, 0);
+const Matrix3d kTurned =
+    (Matrix3d() << 1, -1e-15, 0, 1e-15, 1, 0, 0, 0, 1).finished();
+
+View ViewAt(const Vector3d& cam_from_rig_translation, int32_t frame) {
+  return {Matrix3d::Identity(), Matrix3d::Identity(), cam_from_rig_translation,
+          frame};
+}
+
+void Turn(View* view) {
+  view->cam_from_world_rotation = kTurned;
+  view->cam_from_rig_rotation = kTurned;
+}
+
+// Two sensors in one place, far from the rig's origin, see one point at rays
+// that differ.
+KnownRotationProblem TwoSensorsInOnePlace() {
+  KnownRotationProblem problem;
+  problem.num_frames = problem.num_points = 1;
+  problem.views = {ViewAt(kFar, 0), ViewAt(kFar, 0)};
+  const Eigen::Matrix2d J = 1000 * Eigen::Matrix2d::Identity();
+  problem.observations = {{RowAtRay({-0.001, 0}, J), 0, 0},
+                          {RowAtRay({0.001, 0}, J), 1, 0}};
+  IndexObservations(&problem);
+  return problem;
+}
+
+TEST(RoundingAllowance, CoversOffsetsOfSensorsThatAreFarFromTheirFrame) {
+  const Certificate certificate = {1, 1e-9, {{0, 1, {-1, 0}}, {1, 1, {1, 0}}}};
+  const auto constants = [&](const KnownRotationProblem& problem) {
+    ForceChecker checker(problem, Norm::L2(), certificate);
+    EXPECT_FALSE(checker.Balance());
+    return checker.SumConstants();
+  };
+  KnownRotationProblem problem = TwoSensorsInOnePlace();
+  const ForceChecker::Constants before = constants(problem);
+  EXPECT_EQ(before.value, 0);
+  Turn(&problem.views[1]);
+  const ForceChecker::Constants after = constants(problem);
+  EXPECT_GT(std::abs(after.value), 1e-7L);
+  EXPECT_LE(std::abs(after.value), before.error);
+}
+
+TEST(RoundingAllowance, CoversOffsetsOfWhatIsPulled) {
+  const Certificate certificate = {1, 1e-9, {{0, 1, {-1, 0}}, {1, 1, {1, 0}}}};
+  const Pull pull{Pull::Kind::kView, 1, {1, -1, 0}};
+  const auto constants = [&](const KnownRotationProblem& problem,
+                             const std::vector<Pull>& pulls) {
+    ForceChecker checker(problem, Norm::L2(), certificate, pulls);
+    EXPECT_FALSE(checker.Balance());
+    return checker.SumConstants();
+  };
+  KnownRotationProblem problem = TwoSensorsInOnePlace();
+  const auto by_pull = [&](auto part) {
+    return constants(problem, {pull}).*part - constants(problem, {}).*part;
+  };
+  const auto allowed = by_pull(&ForceChecker::Constants::error);
+  problem.views[1].cam_from_rig_rotation = kTurned;
+  EXPECT_LE(std::abs(by_pull(&ForceChecker::Constants::value)), allowed);
+}
+
+TEST(RoundingAllowance, CoversWhereFixedFramesAndPointsStand) {
+  KnownRotationProblem problem;
+  problem.num_frames = problem.num_points = 2;
+  problem.views = {ViewAt(Vector3d::Zero(), 0), ViewAt(kFar, 1)};
+  problem.fixed_translations = {Vector3d(-kFar), Vector3d(-3 * kFar)};
+  problem.fixed_points = {Vector3d(3 * kFar), std::nullopt};
+  const Eigen::Matrix2d J = Eigen::Matrix2d::Identity();
+  problem.observations = {{RowAtRay({0, 0}, J), 0, 0},
+                          {RowAtRay({0, 0}, J), 1, 1}};
+  IndexObservations(&problem);
+
+  const FixedConstants fixed(problem);
+  EXPECT_EQ(fixed.origin(), kFar.cast<FixedConstants::Real>());
+  EXPECT_FALSE(fixed.IsAwayFromOrigin(0));
+  ASSERT_TRUE(fixed.IsAwayFromOrigin(1));
+  View turned = problem.views[1];
+  Turn(&turned);
+  const auto expect_covered = [](const FixedConstants::Part& before,
+                                 const FixedConstants::Part& after) {
+    const auto change = (after.x_cam - before.x_cam).cwiseAbs().sum();
+    EXPECT_GT(change, 0);
+    EXPECT_LE(change, kRotationError * before.size);
+  };
+  expect_covered(fixed.OfFrame(problem.views[1]), fixed.OfFrame(turned));
+  expect_covered(fixed.OfPoint(problem.views[1], 0), fixed.OfPoint(turned, 0));
+  EXPECT_EQ(fixed.OfPoint(problem.views[1], 1).size, 0);
+}
+
+}  // namespace
+}  // namespace krot
