@@ -102,25 +102,29 @@ function(krot_native_kernel file)
     COMPILE_OPTIONS "${kernel_flags}" SKIP_PRECOMPILE_HEADERS ON)
 endfunction()
 
-# krot_test(<name> [SLOW] SOURCES file... DEPENDS target...)
+# krot_test(<name> [SLOW filter] SOURCES file... DEPENDS target...)
 #
 # A GoogleTest executable whose every TEST is one CTest test, labelled quick for
-# the daily round unless the whole takes longer than some ten seconds.
+# the daily round unless SLOW, a GoogleTest filter, names it.
 function(krot_test name)
-  cmake_parse_arguments(ARG "SLOW" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "SLOW" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   krot_warnings(${name})
   krot_cold(${name})
   krot_precompiled_headers(${name} TEST)
-  set(label quick)
-  if(ARG_SLOW)
-    set(label slow)
-  endif()
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name}
     PRIVATE ${ARG_DEPENDS} Eigen3::Eigen GTest::gmock GTest::gtest_main)
   set_target_properties(${name} PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
-    PROPERTIES TIMEOUT 600 LABELS ${label})
+  if(ARG_SLOW)
+    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+      TEST_FILTER "${ARG_SLOW}" TEST_LIST ${name}_slow
+      PROPERTIES TIMEOUT 600 LABELS slow)
+  endif()
+  if(NOT ARG_SLOW STREQUAL "*")
+    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
+      TEST_FILTER "-${ARG_SLOW}"
+      PROPERTIES TIMEOUT 600 LABELS quick)
+  endif()
 endfunction()

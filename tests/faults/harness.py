@@ -67,6 +67,11 @@ COMMANDS = [
             ["--output_path", "@out", "--overwrite", "1", "--Scene.num_frames",
              "4", "--Scene.num_points", "30", "--Scene.track_length", "3"],
             ("out",)),
+    Command("tolerance_analyzer",
+            ["--input_path", "@input", "--ToleranceAnalyzer.max_error", "4",
+             "--ToleranceAnalyzer.points", "1", "--report_path",
+             "@report.json", "--csv_path", "@boxes.csv"],
+            (), ("report.json", "boxes.csv")),
     Command("certificate_checker",
             ["--input_path", "@input", "--certificate_path", "@valid.json"]),
 ]
@@ -148,7 +153,7 @@ class Place:
         words = [str(self.folder / word[1:]) if word.startswith("@") else word
                  for word in self.command.words]
         group = {"solver": "Solver", "point_triangulator": "Solver",
-                 "outlier_filter": "Solver",
+                 "outlier_filter": "Solver", "tolerance_analyzer": "Solver",
                  "bundle_adjuster": "BundleAdjustmentCeres"}
         if self.command.name in group:
             words += [f"--{group[self.command.name]}.num_threads",
