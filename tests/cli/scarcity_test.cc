@@ -43,6 +43,21 @@ TEST_F(Scarcity, OfMemoryEndsWithASentence) {
   EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"input"});
 }
 
+TEST_F(Scarcity, OfWhatASolveNeedsIsSeenBeforeItBegins) {
+  SceneOptions options = SmallScene();
+  options.num_points = 60000;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
+               folder_ / "output", "--Solver.init", "feasible"},
+              250 * kMegabyte);
+  EXPECT_EQ(result.exit_code, 6);
+  EXPECT_THAT(result.err,
+              ::testing::HasSubstr("out of memory before it began"));
+  EXPECT_THAT(result.err, ::testing::HasSubstr(" are free"));
+  EXPECT_EQ(FileNames(folder_.path()), std::vector<std::string>{"input"});
+}
+
 TEST_F(Scarcity, OfThreadsChangesNothing) {
   SceneOptions options = SmallScene();
   options.num_points = 1000;
