@@ -3,7 +3,7 @@
 # missing first (with sudo if not root). COLMAP and CLP serve as test oracles,
 # Chromium looks at the report page, POV-Ray takes the photos that go through
 # COLMAP and back; pykrot is for Debian's own Python. krot.html is built and
-# tested where emscripten is installed.
+# tested, in Firefox too, where emscripten is installed.
 # Set KROT_REAL_MODELS to a folder of COLMAP models to test on those as well.
 # Tests that are skipped are listed in the end, each with its reason; with
 # KROT_NO_SKIPS=1 there must be none.
@@ -25,6 +25,7 @@ install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
   pkg-config:pkgconf shellcheck:shellcheck pybind11-dev python3-dev python3-numpy python3-pytest
 browser_page=
 if command -v emcc >/dev/null && command -v esbuild >/dev/null; then
+  install_missing firefox-esr:firefox-esr
   "$root/tools/build_browser.sh"
   browser_page=$root/build-wasm/krot.html
 else

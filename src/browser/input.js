@@ -9,34 +9,51 @@ function named(name, blob) {
   return { name, read: async () => new Uint8Array(await blob.arrayBuffer()) };
 }
 
-async function unzip(blob) {
-  const zip = await JSZip.loadAsync(blob);
+async function unzip({ name, read }) {
+  const zip = await JSZip.loadAsync(await read()).catch(() => {
+    throw new Error(`${name}: found no zip archive, or a damaged one`);
+  });
   return Object.values(zip.files).filter((entry) => !entry.dir).map((entry) => ({
     name: entry.name, read: () => entry.async('uint8array'),
   }));
 }
 
 // Of files and folders of a drop; its items must be read before the event ends.
+// From file://, Chromium opens no file of an entry; others have no handles.
 function entriesOf(transfer) {
-  return [...transfer.items].filter((item) => item.kind === 'file').map((item) =>
-    item.webkitGetAsEntry?.() ?? item.getAsFile()).filter((entry) => entry);
+  return Promise.all([...transfer.items].filter(({ kind }) => kind === 'file')
+    .map((item) => item.getAsFileSystemHandle?.() ?? item.webkitGetAsEntry()));
 }
 
-async function walk(entry, folder = '') {
-  if (entry instanceof File) return [named(entry.name, entry)];
-  const name = folder + entry.name;
-  if (entry.isFile) {
-    const file = await new Promise((done, fail) => entry.file(done, fail));
-    return [named(name, file)];
+// A handle's or an entry's: it alone, or all that the folder holds.
+async function fileOf(entry) {
+  return entry.getFile?.() ??
+    new Promise((done, fail) => entry.file(done, fail));
+}
+
+async function childrenOf(entry) {
+  const children = [];
+  if (entry.values) {
+    for await (const child of entry.values()) children.push(child);
+    return children;
   }
   const reader = entry.createReader();
-  const found = [];
   for (;;) {
     const some = await new Promise((done, fail) =>
       reader.readEntries(done, fail));
-    if (some.length === 0) return found;
-    for (const child of some) found.push(...await walk(child, `${name}/`));
+    if (some.length === 0) return children;
+    children.push(...some);
   }
+}
+
+async function walk(entry, folder = '') {
+  const name = folder + entry.name;
+  if (entry.isFile || entry.kind === 'file') {
+    return [named(name, await fileOf(entry))];
+  }
+  const children = await childrenOf(entry);
+  return (await Promise.all(children.map((child) =>
+    walk(child, `${name}/`)))).flat();
 }
 
 // The files of the one model among them, under `folder`. Throws an Error with a
@@ -45,7 +62,7 @@ async function modelOf(files, folder) {
   const unpacked = [];
   for (const file of files) {
     if (/\.zip$/i.test(file.name)) {
-      unpacked.push(...await unzip(await file.read()));
+      unpacked.push(...await unzip(file));
     } else {
       unpacked.push(file);
     }
@@ -70,7 +87,7 @@ async function modelOf(files, folder) {
 }
 
 export async function modelFromDrop(transfer, folder) {
-  const entries = entriesOf(transfer);
+  const entries = await entriesOf(transfer);
   const files = await Promise.all(entries.map((entry) => walk(entry)));
   return modelOf(files.flat(), folder);
 }

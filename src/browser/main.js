@@ -26,6 +26,7 @@ async function run(task) {
   byId('line').textContent = '';
   byId('run').hidden = false;
   byId('result').hidden = true;
+  const focused = document.activeElement;  // what is inert loses it
   byId('tasks').inert = true;
   byId('drop').inert = true;
   showTime();
@@ -38,6 +39,7 @@ async function run(task) {
     byId('run').hidden = true;
     byId('tasks').inert = false;
     byId('drop').inert = false;
+    focused.focus();
   }
 }
 
@@ -103,10 +105,9 @@ function onSubmit(id, task) {
 }
 
 for (const id of ['choose-folder', 'choose-files']) {
-  byId(id).addEventListener('change', () =>
-    take(modelFromFiles(byId(id).files, 'model/')));
-  byId(id).parentElement.addEventListener('keydown', (event) => {
-    if (event.key === 'Enter' || event.key === ' ') byId(id).click();
+  byId(id).addEventListener('change', () => {
+    take(modelFromFiles(byId(id).files, 'model/'));
+    byId(id).value = '';  // so that the same may be chosen again, mended
   });
 }
 document.addEventListener('dragover', (event) => {

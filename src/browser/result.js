@@ -50,10 +50,13 @@ export function showBounds(profile, onTake) {
     byId('bound').value = `${pixels(level.max_error)} px`;
     // The next digit: the bound itself must be within reach.
     byId('take').onclick = () => onTake(level.max_error * (1 + 1e-6));
+    // The report marks the points in 3D.
+    byId('report').contentWindow.postMessage({ level: slider.value }, '*');
   };
   slider.max = levels.length - 1;
   slider.value = profile.elbow ?? 0;
   slider.oninput = show;
+  byId('report').onload = show;
   show();
 }
 

@@ -130,6 +130,12 @@ TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
   const double largest = chosen["max_error"].get<double>();
   EXPECT_DOUBLE_EQ(report["max_error"].get<double>(), 1.0005 * largest);
   EXPECT_EQ(report["num_removed"], chosen["num_removed"]);
+  std::set<uint64_t> points;
+  for (const Json& removed : report["removed"]) {
+    points.insert(removed["point3D_id"].get<uint64_t>());
+  }
+  EXPECT_EQ(chosen["point3D_ids"], Json(points));
+  EXPECT_EQ(levels[0]["point3D_ids"], Json::array());
   EXPECT_GE(report["num_must_go"], chosen["num_must_go"]);
   EXPECT_TRUE(report["is_within"]);
   EXPECT_LE(levels.back()["max_error"].get<double>(),

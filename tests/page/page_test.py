@@ -19,8 +19,8 @@ import tempfile
 import unittest
 import zlib
 
+from chromium import Chromium
 import plant
-import webdriver
 
 KROT = None
 SKIPPED = 77
@@ -123,7 +123,7 @@ class PageTest(unittest.TestCase):
         for end, model in (("before", "input"), ("after", "output")):
             cls.analyze(end, root / model)
         cls.page = (root / "page.html").as_uri()
-        cls.browser = cls.enterClassContext(webdriver.Browser((1200, 1300)))
+        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
 
     @staticmethod
     def rename_an_image(file):
@@ -306,7 +306,7 @@ class OtherCommandsTest(unittest.TestCase):
                  "--ground_truth_path", cls.root / "truth",
                  "--Scene.num_frames", 8, "--Scene.num_points", 60,
                  "--Scene.pixel_noise", 1, "--Scene.start_point_noise", 0.002)
-        cls.browser = cls.enterClassContext(webdriver.Browser())
+        cls.browser = cls.enterClassContext(Chromium())
 
     def open_page_of(self, *arguments):
         page = self.root / "page.html"
@@ -431,7 +431,7 @@ class FilterTest(unittest.TestCase):
                  "--html_path", root / "page.html")
         cls.report = json.loads((root / "report.json").read_text())
         cls.page = (root / "page.html").as_uri()
-        cls.browser = cls.enterClassContext(webdriver.Browser((1200, 1300)))
+        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
 
     def setUp(self):
         self.browser.open(self.page)
@@ -453,6 +453,20 @@ class FilterTest(unittest.TestCase):
         heights = step_heights(self.browser, "#profile-chart")
         self.assertEqual(len(heights), len(levels))
         self.assertEqual(heights, sorted(heights))
+
+    def test_each_level_marks_its_points(self):
+        levels = self.report["profile"]["levels"]
+        self.browser.run(
+            "document.querySelector('input[value=before]').click()")
+        areas = []
+        for level in (0, len(levels) - 1):
+            self.browser.run("window.postMessage({level: arguments[0]}, '*');"
+                             "await new Promise(requestAnimationFrame)", level)
+            self.assertIn("%d observation" % levels[level]["num_removed"],
+                          self.browser.text("#scene output"))
+            areas.append(len(self.browser.run(DRAWN, "--mark")))
+        self.assertEqual(areas[0], 0)
+        self.assertGreater(areas[1], 0)
 
     def test_crops_show_the_place_of_the_observation(self):
         crops = json.loads(self.browser.text("#krot-crops"))
@@ -500,7 +514,7 @@ class RenderedSceneTest(unittest.TestCase):
                        for seen in report["removed"]}
             self.assertLessEqual(set(planted), removed)
             self.assertLessEqual(report["num_must_go"], len(planted))
-            with webdriver.Browser((1200, 1300)) as browser:
+            with Chromium((1200, 1300)) as browser:
                 browser.open((root / "page.html").as_uri())
                 crops = json.loads(browser.text("#krot-crops"))
                 sizes = browser.run("""
@@ -545,7 +559,7 @@ class RotationSuspectTest(unittest.TestCase):
         cls.suspect = json.loads(
             (root / "report.json").read_text())["rotation_suspect"]
         cls.page = (root / "page.html").as_uri()
-        cls.browser = cls.enterClassContext(webdriver.Browser((1200, 1300)))
+        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
 
     @staticmethod
     def turned(text, row, first):
@@ -593,7 +607,7 @@ class ToleranceTest(unittest.TestCase):
                  "--ToleranceAnalyzer.max_error", 3, "--report_path",
                  root / "report.json", "--html_path", root / "page.html")
         boxes = json.loads((root / "report.json").read_text())["boxes"]
-        browser = self.enterContext(webdriver.Browser((1200, 1300)))
+        browser = self.enterContext(Chromium((1200, 1300)))
         browser.open((root / "page.html").as_uri())
         self.assertEqual(browser.texts("#boxes tbody td:first-child"),
                          [box["image_name"] for box in boxes])
@@ -621,7 +635,7 @@ class PathTest(unittest.TestCase):
 def main():
     global KROT
     KROT = sys.argv.pop(1)
-    program = webdriver.missing_program()
+    program = Chromium.missing_program()
     if program is not None:
         print(f"skipped: there is no {program}")
         return SKIPPED

@@ -7,7 +7,7 @@ import pathlib
 import sys
 import time
 
-from webdriver import Browser
+from chromium import Chromium
 
 
 def show_worst(browser):
@@ -23,21 +23,21 @@ def main():
     suspects = pathlib.Path(sys.argv[3]).resolve().as_uri()
     folder = pathlib.Path(sys.argv[4])
     # The height includes what a window has around the page.
-    with Browser((1100, 1180)) as browser:
+    with Chromium((1100, 1180)) as browser:
         browser.open(page)
         (folder / "page_desk.png").write_bytes(browser.screenshot())
-    with Browser((1000, 760)) as browser:
+    with Chromium((1000, 760)) as browser:
         browser.open(filtered)
         browser.run(
             "document.getElementById('profile-section').scrollIntoView()")
         time.sleep(1)
         (folder / "page_profile.png").write_bytes(browser.screenshot())
-    with Browser((1000, 760)) as browser:
+    with Chromium((1000, 760)) as browser:
         browser.open(suspects)
         browser.run("document.getElementById('suspects').scrollIntoView()")
         time.sleep(1)
         (folder / "page_suspects.png").write_bytes(browser.screenshot())
-    with Browser((400, 860), dark=True, touch=True) as browser:
+    with Chromium((400, 860), dark=True, touch=True) as browser:
         browser.open(page)
         show_worst(browser)
         (folder / "page_phone.png").write_bytes(browser.screenshot())

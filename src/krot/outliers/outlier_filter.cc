@@ -1,6 +1,7 @@
 #include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 
 #include "krot/base/check.h"
@@ -23,6 +24,17 @@ namespace {
 // What rounding may add to an error on its way into a model, relative.
 constexpr double kWithin = 1e-9;
 constexpr int kMaxThresholdSolves = 50;
+
+// Of the points that these observations are of; ascending.
+std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
+                               const std::vector<int64_t>& observations) {
+  std::set<uint64_t> ids;
+  for (const int64_t i : observations) {
+    const int32_t point = built.problem.observations[i].point;
+    ids.insert(model.points3D[built.point_of[point]].id);
+  }
+  return {ids.begin(), ids.end()};
+}
 
 class OutlierFilter {
  public:
@@ -108,7 +120,8 @@ Removal OutlierFilter::MakeProfile(const BuiltProblem& built,
   for (const ProfileLevel& level : profile.levels) {
     summary.levels.push_back(
         {static_cast<int64_t>(level.removal.observations.size()),
-         level.max_error, level.lower_bound, level.num_proved});
+         level.max_error, level.lower_bound, level.num_proved,
+         PointIds(model_, built, level.removal.observations)});
   }
   summary.elbow = profile.elbow;
   summary.seconds = timer.Seconds();

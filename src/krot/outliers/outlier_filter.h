@@ -70,6 +70,7 @@ struct ErrorProfileSummary {
     double max_error = 0;  // of all others, true pixels
     std::optional<double> lower_bound;
     int64_t num_proved = 0;
+    std::vector<uint64_t> point_ids;  // that lose observations; ascending
   };
 
   std::vector<Level> levels;

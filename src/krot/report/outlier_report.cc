@@ -118,7 +118,8 @@ Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
     levels.push_back({{"num_removed", level.num_removed},
                       {"max_error", level.max_error},
                       {"lower_bound", NumberOrNull(level.lower_bound)},
-                      {"num_must_go", level.num_proved}});
+                      {"num_must_go", level.num_proved},
+                      {"point3D_ids", level.point_ids}});
   }
   return {{"levels", std::move(levels)},
           {"elbow", profile.elbow ? Json(*profile.elbow) : Json()}};

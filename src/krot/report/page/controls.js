@@ -2,7 +2,7 @@
 
 import { errorGradient } from './colors.js';
 import { html } from './dom.js';
-import { count } from './format.js';
+import { count, counted, pixels } from './format.js';
 
 // One of `choices`, [value, text] each.
 function choice(name, choices, value, onChange) {
@@ -31,6 +31,27 @@ function slider(text, [min, max, step], value, onChange) {
   return html('label', {}, `${text} `, input);
 }
 
+// Without which observations every error is below what. The page around this one
+// may choose, too.
+function levelSlider(levels, onChange) {
+  const output = html('output', {});
+  const choose = (level) => {
+    const { num_removed: removed, max_error: error } = levels[level];
+    output.value = `${counted(removed, 'observation')}: ${pixels(error)} px`;
+    onChange(level);
+  };
+  const label = slider('Without', [0, levels.length - 1, 1], 0, choose);
+  label.append(' ', output);
+  addEventListener('message', ({ data }) => {
+    const level = Number(data?.level);
+    if (!levels[level]) return;
+    label.querySelector('input').value = level;
+    choose(level);
+  });
+  choose(0);
+  return label;
+}
+
 function errorScale(top) {
   return html('div', { class: 'scale' },
     html('div', { class: 'bar', style: `background: ${errorGradient()}` }),
@@ -57,6 +78,9 @@ export function viewerControls(viewer) {
   ];
   if (viewer.support.length > 0) {
     controls.push(checkbox('Support', viewer.hasSupport, set('hasSupport')));
+  }
+  if (viewer.levels.length > 0) {
+    controls.push(levelSlider(viewer.levels, set('level')));
   }
   controls.push(html('button', {
     type: 'button',

@@ -103,6 +103,7 @@ function showPage(report, models) {
   const show = showViewer(
     {
       models, labels, support, boxes: report.boxes ?? [],
+      levels: report.profile?.levels ?? [],
       sharesPoints: !isComparison(report),
     });
   showBoxes(report, show);

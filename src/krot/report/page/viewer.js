@@ -22,10 +22,10 @@ function usualPointSize(numPoints) {
 
 export class Viewer {
   // `stage`: the element to fill; `support`: the report's, [] if none;
-  // `boxes`: likewise, in the second model; `sharesPoints`: whether the models'
-  // point ids mean the same points. Throws
-  // where the browser has no WebGL 2.
-  constructor(stage, { models, labels, support, boxes, sharesPoints }) {
+  // `boxes`: likewise, in the second model; `levels`: of the error profile, [] if
+  // none; `sharesPoints`: whether the models' point ids mean the same points.
+  // Throws where the browser has no WebGL 2.
+  constructor(stage, { models, labels, support, boxes, levels, sharesPoints }) {
     const canvas = html('canvas', {
       tabindex: 0, 'aria-label': '3D view of cameras and points',
     });
@@ -36,7 +36,7 @@ export class Viewer {
     this.panels = html('div', { class: 'panels' });
     stage.append(canvas, this.panels);
     Object.assign(this,
-      { stage, canvas, models, labels, support, boxes, sharesPoints });
+      { stage, canvas, models, labels, support, boxes, levels, sharesPoints });
     this.renderer = new Renderer(gl);
     const { target, radius, front } = frame(models[1]);
     this.size = cameraSize(models[1], radius);
@@ -49,6 +49,7 @@ export class Viewer {
     this.mode = 'rgb';
     this.pointSize = usualPointSize(models[1].points.num);
     this.hasSupport = support.length > 0;
+    this.level = 0;
     this.marks = [];
     this.selected = {};
     attachControls(canvas, this.orbit, {
@@ -79,19 +80,22 @@ export class Viewer {
     this.redraw();
   }
 
-  // Lines between the support's cameras and points, and what is selected.
+  // Lines between the support's cameras and points, the points that lose
+  // observations at the level, and what is selected.
   updateMarks() {
     this.marks.forEach((batch) => this.renderer.deleteBatch(batch));
     this.marks = [];
     const { gl } = this.renderer;
     const lines = [];
     const points = [];
+    const suspects = [];
     for (const i of this.visible()) {
       const model = this.models[i];
       if (this.hasSupport) lines.push(...this.supportLines(model));
       if (i === 1) {
         lines.push(...this.boxes.flatMap((box) => boxLines(box, model.origin)));
       }
+      suspects.push(...this.suspectPlaces(model));
       const { imageName, pointId } = this.selected;
       const image = findImage(model, imageName);
       if (image?.center) {
@@ -102,6 +106,7 @@ export class Viewer {
       if (index >= 0) points.push(...pointPlace(model, index));
     }
     this.mark(gl.LINES, lines);
+    this.mark(gl.POINTS, suspects, 2 * this.pointSize);
     this.mark(gl.POINTS, points);
   }
 
@@ -110,12 +115,12 @@ export class Viewer {
     return this.sharesPoints || i === this.selected.modelIndex;
   }
 
-  mark(mode, places) {
+  mark(mode, places, pointSize = 10) {
     if (places.length === 0) return;
     const batch = this.renderer.createBatch(mode, new Float32Array(places));
     this.renderer.setColors(batch,
       uniformColors(styleColor('--mark'), batch.count));
-    batch.pointSize = 10 * devicePixelRatio;
+    batch.pointSize = pointSize * devicePixelRatio;
     this.marks.push(batch);
   }
 
@@ -126,6 +131,12 @@ export class Viewer {
       if (!center || index < 0) return [];
       return [...subtract(center, model.origin), ...pointPlace(model, index)];
     });
+  }
+
+  suspectPlaces(model) {
+    const ids = this.levels[this.level]?.point3D_ids ?? [];
+    return ids.map((id) => pointIndex(model, id)).filter((index) => index >= 0)
+      .flatMap((index) => pointPlace(model, index));
   }
 
   redraw() {

@@ -10,6 +10,8 @@ import shutil
 import subprocess
 import urllib.request
 
+from browser import Browser
+
 # Software WebGL, so that no graphics card is needed.
 _ARGUMENTS = [
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
@@ -19,17 +21,11 @@ _ARGUMENTS = [
 _ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
 
 
-def missing_program():
-    """The name of a program that is needed and not there; None if all are."""
-    for program in ("chromium", "chromedriver"):
-        if shutil.which(program) is None:
-            return program
-    return None
-
-
-class Browser:
+class Chromium(Browser):
     """One window of `size` (width, height) CSS pixels; what is downloaded goes
-    to `downloads`. A context manager."""
+    to `downloads`."""
+
+    PROGRAMS = ("chromium", "chromedriver")
 
     def __init__(self, size=(1200, 900), dark=False, scale=1, touch=False,
                  downloads=None):
@@ -57,10 +53,7 @@ class Browser:
                                                   "performance": "ALL"}}}})
         self._url += "/session/" + value["sessionId"]
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
+    def close(self):
         try:
             self._request("DELETE", "")
         finally:
@@ -89,66 +82,46 @@ class Browser:
         self._request("POST", "/url", {"url": url})
 
     def run(self, script, *arguments):
-        """The value of the body of an async function, of which `arguments` are
-        the arguments."""
         body = "return (async function () {%s}).apply(null, arguments)"
         return self._request("POST", "/execute/sync", {
             "script": body % script, "args": list(arguments)})
 
-    def text(self, selector):
-        return self.run(
-            "return document.querySelector(arguments[0]).textContent", selector)
-
-    def texts(self, selector):
-        return self.run("return [...document.querySelectorAll(arguments[0])]"
-                        ".map((element) => element.textContent)", selector)
-
-    def click(self, selector, x=0, y=0):
-        """A mouse click, (x, y) CSS pixels from the element's centre."""
-        self._pointer([
-            self._move(selector, x, y),
-            {"type": "pointerDown", "button": 0},
-            {"type": "pointerUp", "button": 0},
-        ])
-
-    def drag(self, selector, by):
-        self._pointer([
-            self._move(selector, 0, 0),
-            {"type": "pointerDown", "button": 0},
-            self._move(selector, by[0], by[1]),
-            {"type": "pointerUp", "button": 0},
-        ])
-
     def choose(self, selector, path):
-        """Gives a file, or a folder, to an <input type=file>."""
         self._request("POST", "/element/%s/value" % self._element(selector),
                       {"text": str(path)})
+
+    def drop(self, selector, path):
+        x, y = self.run("""
+            const box = document.querySelector(arguments[0])
+                .getBoundingClientRect();
+            return [box.x + box.width / 2, box.y + box.height / 2];""", selector)
+        # https://chromedevtools.github.io/devtools-protocol/
+        for kind in ("dragEnter", "dragOver", "drop"):
+            self._request("POST", "/goog/cdp/execute", {
+                "cmd": "Input.dispatchDragEvent", "params": {
+                    "type": kind, "x": x, "y": y, "data": {
+                        "items": [], "files": [str(path)],
+                        "dragOperationsMask": 1}}})
 
     def _element(self, selector):
         return self._request("POST", "/element", {
             "using": "css selector", "value": selector})[_ELEMENT]
 
-    def _move(self, selector, x, y):
-        return {"type": "pointerMove", "duration": 0, "x": x, "y": y,
-                "origin": {_ELEMENT: self._element(selector)}}
+    def _origin(self, selector):
+        return {_ELEMENT: self._element(selector)}
 
-    def _pointer(self, actions):
-        self._request("POST", "/actions", {"actions": [{
-            "type": "pointer", "id": "mouse",
-            "parameters": {"pointerType": "mouse"}, "actions": actions}]})
+    def _perform(self, source):
+        self._request("POST", "/actions", {"actions": [source]})
 
     def console(self):
-        """What the console said since the last call: (level, message)."""
         entries = self._request("POST", "/se/log", {"type": "browser"})
         return [(entry["level"], entry["message"]) for entry in entries]
 
     def requests(self):
-        """The addresses that were asked for since the last call."""
         entries = self._request("POST", "/se/log", {"type": "performance"})
         events = [json.loads(entry["message"])["message"] for entry in entries]
         return [event["params"]["request"]["url"] for event in events
                 if event["method"] == "Network.requestWillBeSent"]
 
     def screenshot(self):
-        """What the window shows, as PNG bytes."""
         return base64.b64decode(self._request("GET", "/screenshot"))

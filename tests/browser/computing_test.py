@@ -1,0 +1,107 @@
+"""What the page computes is what the command line does."""
+
+import json
+
+import krot_page
+from krot_page import KrotPage, krot, zipped
+
+
+class Computing(KrotPage):
+
+    def test_tells_what_the_model_is(self):
+        self.give(krot_page.SAMPLE)
+        self.assertIn("24 images, 6,718 points, 30,978 observations; largest "
+                      "error 3.7419 px", self.browser.text("#model"))
+
+    def test_solves_the_sample_as_the_command_line_does(self):
+        self.give(krot_page.SAMPLE)
+        sentence = self.submit("#solve")
+        self.assertRegex(sentence, r"^Maximum 3\.209\d px, proved to be within")
+        model = self.unpack(self.download("result.zip"))
+        self.assertEqual({file.name for file in model.iterdir()},
+                         {file.name for file in krot_page.SAMPLE.glob("*.bin")})
+        code, _, _ = krot("certificate_checker", "--input_path", model,
+                          "--certificate_path",
+                          self.download("certificate.json"))
+        self.assertEqual(code, 0, "a proof that the native checker refuses")
+        report = json.loads(self.download("report.json").read_text())
+        self.assertEqual(report["termination"], "gap_reached")
+        self.assertIn("KROT: ", self.browser.run(
+            "return await new Promise((done) => setTimeout(() => done("
+            "document.querySelector('#report').contentDocument?.title ?? "
+            "'KROT: (another origin)'), 500))"))
+
+    def test_reads_a_zip_and_writes_text_for_text(self):
+        self.give(zipped(self.root / "scene", self.root / "scene.zip"),
+                  "#choose-files")
+        self.assertIn("12 images", self.browser.text("#model"))
+        self.submit("#solve")
+        model = self.unpack(self.download("result.zip"))
+        self.assertTrue((model / "images.txt").exists())
+        _, native, _ = krot("model_analyzer", "--path", self.root / "native")
+        _, here, _ = krot("model_analyzer", "--path", model)
+        largest = [float(text.split("True reprojection errors, pixels")[1]
+                         .split()[5 + 2]) for text in (native, here)]
+        self.assertAlmostEqual(largest[0], largest[1], delta=2e-3 * largest[0])
+
+    def test_solves_dropped_rigs(self):
+        scene = self.root / "rigs"
+        krot("model_synthesizer", "--output_path", scene, "--output_type", "TXT",
+             "--Scene.num_frames", 6, "--Scene.num_points", 100,
+             "--Scene.pixel_noise", 1, "--Scene.has_rigs", 1,
+             "--Scene.sensors_per_rig", 2)
+        self.browser.drop("#drop", scene)
+        self.wait_until_read()
+        self.assertIn("12 images, 100 points", self.browser.text("#model"))
+        self.submit("#solve")
+        model = self.unpack(self.download("result.zip"))
+        self.assertEqual((model / "rigs.txt").read_bytes(),
+                         (scene / "rigs.txt").read_bytes())
+        code, _, _ = krot("certificate_checker", "--input_path", scene,
+                          "--certificate_path",
+                          self.download("certificate.json"))
+        self.assertEqual(code, 0)
+
+    def test_finds_wrong_observations_and_offers_every_bound(self):
+        self.give(self.root / "scene")
+        sentence = self.submit("#filter")
+        self.assertRegex(sentence, r"^removed \d+ of [\d,]+; at least \d+ must go")
+        self.browser.run("""
+            const slider = document.querySelector('#level');
+            slider.value = 1;
+            slider.dispatchEvent(new Event('input'));
+            document.querySelector('#take').click();""")
+        self.wait_for("document.querySelector('#result').hidden")
+        self.assertRegex(self.wait_for_result(), r"^removed \d+ of")
+        code, _, _ = krot("certificate_checker", "--input_path",
+                          self.root / "scene", "--certificate_path",
+                          self.download("conflicts.json"))
+        self.assertEqual(code, 0)
+
+    def test_judges_proofs_as_the_command_line_does(self):
+        self.give(self.root / "scene")
+        native = self.root / "native.json"
+        wrong, broken = self.root / "wrong.json", self.root / "broken.json"
+        bound = str(json.loads(native.read_text())["lower_bound"])
+        wrong.write_text(native.read_text().replace(
+            bound, str(1.5 * float(bound))))
+        broken.write_text("{")
+        for file in (native, wrong, broken):
+            self.browser.choose("#check input", file)
+            sentence = self.submit("#check")
+            code, table, last = krot("certificate_checker", "--input_path",
+                                     self.root / "scene", "--certificate_path",
+                                     file)
+            said = " ".join(table.split()) if code == 0 else last.replace(
+                str(file), "proof/certificate.json")
+            self.assertTrue(said.startswith(sentence), (said, sentence))
+            self.assertEqual(self.is_wrong("#sentence"), code != 0)
+
+    def test_compares_two_models(self):
+        self.give(self.root / "native")
+        self.browser.choose("#compare input", zipped(
+            self.root / "scene", self.root / "scene.zip"))
+        self.assertEqual(self.submit("#compare"),
+                         "How the two differ stands in the report.")
+        self.assertIn("True reprojection errors, pixels",
+                      self.browser.text("#table"))
