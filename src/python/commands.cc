@@ -108,10 +108,12 @@ Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
   KnownFiles known;
   known.AddRotationsTo(&table);
   known.AddFixedTo(&table);
+  known.AddPositionsTo(&table);
   AssignKeywords(keywords, &table);
   ResolveSolverOptions(table, &options.solve);
   const ConstModelPointer input = known.WithRotations(model);
   options.solve.problem.fixed = known.Fixed(*input);
+  options.solve.problem.positions = known.Positions(*input);
   return RunSolve(input, options, context, progress, "solver");
 }
 

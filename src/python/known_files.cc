@@ -24,6 +24,10 @@ void KnownFiles::AddFixedTo(OptionTable* table) {
   AddFile("fixed_points_path", &fixed_points_path_, table);
 }
 
+void KnownFiles::AddPositionsTo(OptionTable* table) {
+  AddFile("positions_path", &positions_path_, table);
+}
+
 std::shared_ptr<const Model> KnownFiles::WithRotations(
     const std::shared_ptr<Model>& model) const {
   if (rotations_path_.empty()) return model;
@@ -41,6 +45,11 @@ FixedParts KnownFiles::Fixed(const Model& model) const {
     fixed.points3D = FixedPoints3D(ReadFileBytes(fixed_points_path_), model);
   }
   return fixed;
+}
+
+std::vector<KnownPosition> KnownFiles::Positions(const Model& model) const {
+  if (positions_path_.empty()) return {};
+  return ReadPositions(ReadFileBytes(positions_path_), model);
 }
 
 }  // namespace krot

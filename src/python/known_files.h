@@ -2,9 +2,11 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
+#include "krot/model/positions_file.h"
 #include "krot/options/option_table.h"
 
 namespace krot {
@@ -15,16 +17,19 @@ class KnownFiles {
  public:
   void AddRotationsTo(OptionTable* table);
   void AddFixedTo(OptionTable* table);
+  void AddPositionsTo(OptionTable* table);
 
   // The model, or a copy with the file's rotations.
   std::shared_ptr<const Model> WithRotations(
       const std::shared_ptr<Model>& model) const;
   FixedParts Fixed(const Model& model) const;
+  std::vector<KnownPosition> Positions(const Model& model) const;
 
  private:
   std::string rotations_path_;
   std::string fixed_images_path_;
   std::string fixed_points_path_;
+  std::string positions_path_;
 };
 
 }  // namespace krot

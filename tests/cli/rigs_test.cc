@@ -6,22 +6,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
 
 #include "krot/geometry/rigid_transform.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
 #include "krot/model/validate.h"
-#include "tests/cli/krot_process.h"
+#include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/model_matchers.h"
 
 // Rigs of three sensors: what is calibrated stays to the bit, and the same
 // scene in other rigs has the same optimum.
 
 namespace krot {
 namespace {
-
-using Json = nlohmann::json;
 
 SceneOptions ThreeSensors() {
   SceneOptions options = SmallScene();
@@ -33,33 +31,31 @@ SceneOptions ThreeSensors() {
   return options;
 }
 
-class Rigs : public ::testing::Test {
+class Rigs : public Known {
  protected:
   // Runs a command on a model and checks what has to hold of every result.
   Model Run(const Model& model, std::vector<std::string> command) {
     ValidateModel(model);
     Save(model, folder_ / "input");
-    command.insert(
-        command.end(),
-        {"--input_path", folder_ / "input", "--output_path", folder_ / "output",
-         "--report_path", folder_ / "r.json", "--overwrite", "1"});
+    command.insert(command.end(),
+                   {"--input_path", folder_ / "input", "--output_path",
+                    folder_ / "output", "--overwrite", "1"});
     const KrotResult result = RunKrot(command);
     EXPECT_EQ(result.exit_code, 0) << result.err;
-    const Model after = Load(folder_ / "output");
-    ExpectSameRigs(model, after);
-    ExpectImagesFollow(after);
-    return after;
+    return CheckedOutput(model);
   }
-  Json Report() const { return Json::parse(ReadBytes(folder_ / "r.json")); }
 
   // The certified solve of a model.
   Json Solve(const Model& model) {
-    Run(model, {"solver", "--certificate_path", folder_ / "c.json"});
-    const KrotResult check =
-        RunKrot({"certificate_checker", "--input_path", folder_ / "output",
-                 "--certificate_path", folder_ / "c.json"});
+    ValidateModel(model);
+    Save(model, folder_ / "input");
+    const KrotResult result =
+        Known::Solve("input", "output", {"--overwrite", "1"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    CheckedOutput(model);
+    const KrotResult check = Check("output", "output");
     EXPECT_EQ(check.exit_code, 0) << check.err;
-    const Json report = Report();
+    const Json report = Report("output");
     EXPECT_EQ(report["termination"], "gap_reached");
     return report;
   }
@@ -73,17 +69,12 @@ class Rigs : public ::testing::Test {
     EXPECT_LE(b["relative_gap"], 1e-3);
   }
 
-  static void ExpectSameRigs(const Model& before, const Model& after) {
-    ASSERT_EQ(before.rigs.size(), after.rigs.size());
-    for (size_t r = 0; r < before.rigs.size(); ++r) {
-      ASSERT_EQ(before.rigs[r].sensors.size(), after.rigs[r].sensors.size());
-      for (size_t s = 0; s < before.rigs[r].sensors.size(); ++s) {
-        const Pose& a = *before.rigs[r].sensors[s].sensor_from_rig;
-        const Pose& b = *after.rigs[r].sensors[s].sensor_from_rig;
-        EXPECT_EQ(a.quaternion_wxyz, b.quaternion_wxyz);
-        EXPECT_EQ(a.translation, b.translation);
-      }
-    }
+ private:
+  Model CheckedOutput(const Model& before) const {
+    const Model after = Load(folder_ / "output");
+    EXPECT_THAT(after, HasRigsOf(before));
+    ExpectImagesFollow(after);
+    return after;
   }
 
   static void ExpectImagesFollow(const Model& model) {
@@ -97,8 +88,6 @@ class Rigs : public ::testing::Test {
                 1e-12);
     }
   }
-
-  TempFolder folder_;
 };
 
 // The rig as another sensor, or another place, sees it.

@@ -42,7 +42,7 @@ class Scripts : public ::testing::Test {
 
 TEST_F(Scripts, SayHowTheyAreUsed) {
   for (const char* name : {"mapper_then_krot.sh", "compare_linf_with_ba.sh",
-                           "strecha_to_colmap.sh"}) {
+                           "strecha_to_colmap.sh", "bal_to_colmap.sh"}) {
     const ScriptResult result = RunScript(name, {"-h"});
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out,
@@ -53,7 +53,7 @@ TEST_F(Scripts, SayHowTheyAreUsed) {
 
 TEST_F(Scripts, RefuseWhatTheyDoNotUnderstand) {
   for (const char* name : {"mapper_then_krot.sh", "compare_linf_with_ba.sh",
-                           "strecha_to_colmap.sh"}) {
+                           "strecha_to_colmap.sh", "bal_to_colmap.sh"}) {
     ExpectRefused(name, {}, "is required");
     ExpectRefused(name, {"sparse"}, "'sparse' is not an option");
     ExpectRefused(name, {"--output_path"}, "--output_path needs a value");
@@ -92,6 +92,9 @@ TEST_F(Scripts, CheckTheirPathsFirst) {
   ExpectRefused("strecha_to_colmap.sh",
                 {"--input_path", model, "--output_path", output},
                 "holds no *.camera");
+  ExpectRefused("bal_to_colmap.sh",
+                {"--input_path", missing, "--output_path", output},
+                "is not a file");
 }
 
 TEST_F(Scripts, PassShellcheck) {
@@ -218,6 +221,95 @@ TEST_F(Scripts, RefuseSurveyedCamerasThatTheyCannotRepresent) {
     const ScriptResult result =
         RunScript("strecha_to_colmap.sh",
                   {"--input_path", survey, "--output_path", output});
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_THAT(result.err, ::testing::HasSubstr(part));
+    EXPECT_FALSE(fs::exists(output));
+  }
+}
+
+// A problem of Bundle Adjustment in the Large, and its errors by the definition
+// of its authors: P = R X + t, p = -P / P.z, f (1 + k1 |p|^2 + k2 |p|^4) p.
+struct BalProblem {
+  std::string text;
+  std::vector<double> errors;  // in the order of the points' tracks
+};
+
+BalProblem MakeBalProblem(int num_cameras, int num_points) {
+  Random random(5);
+  std::ostringstream text, cameras;
+  text << std::setprecision(17);
+  cameras << std::setprecision(17);
+  text << num_cameras << ' ' << num_points << ' ' << num_cameras * num_points
+       << '\n';
+  std::vector<Eigen::Vector3d> points;
+  for (int k = 0; k < num_points; ++k)
+    points.push_back(random.GaussianVector());
+  BalProblem problem;
+  problem.errors.resize(num_cameras * num_points);
+  for (int c = 0; c < num_cameras; ++c) {
+    // One is not turned at all.
+    const Eigen::Vector3d r = (c == 0 ? 0.0 : 1.5) * random.GaussianVector();
+    const Eigen::Vector3d t =
+        0.3 * random.GaussianVector() - Eigen::Vector3d(0, 0, 10);
+    const double f = 500 + c, k1 = -0.1, k2 = 0.02;
+    for (const double number :
+         {r[0], r[1], r[2], t[0], t[1], t[2], f, k1, k2}) {
+      cameras << number << '\n';
+    }
+    for (int k = 0; k < num_points; ++k) {
+      const double angle = r.norm();
+      const Eigen::Vector3d axis =
+          angle > 0 ? Eigen::Vector3d(r / angle) : Eigen::Vector3d::UnitX();
+      const Eigen::Vector3d P = Eigen::AngleAxisd(angle, axis) * points[k] + t;
+      const Eigen::Vector2d p = -P.head<2>() / P[2];
+      const double n = p.squaredNorm();
+      const Eigen::Vector2d error = random.GaussianVector().head<2>();
+      const Eigen::Vector2d observed =
+          f * (1 + k1 * n + k2 * n * n) * p + error;
+      text << c << ' ' << k << "     " << observed[0] << ' ' << observed[1]
+           << '\n';
+      problem.errors[k * num_cameras + c] = error.norm();
+    }
+  }
+  text << cameras.str();
+  for (const Eigen::Vector3d& x : points) {
+    text << x[0] << '\n' << x[1] << '\n' << x[2] << '\n';
+  }
+  problem.text = text.str();
+  return problem;
+}
+
+TEST_F(Scripts, TakeBundleAdjustmentInTheLargeToColmapWithItsErrors) {
+  const BalProblem problem = MakeBalProblem(4, 12);
+  WriteBytes(folder_ / "problem.txt", problem.text);
+  const ScriptResult result =
+      RunScript("bal_to_colmap.sh", {"--input_path", folder_ / "problem.txt",
+                                     "--output_path", folder_ / "bal"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Model model = Load(folder_ / "bal");
+  EXPECT_EQ(model.images.size(), 4u);
+  const std::vector<double> errors = PixelErrors(model);
+  ASSERT_EQ(errors.size(), problem.errors.size());
+  for (size_t i = 0; i < errors.size(); ++i) {
+    EXPECT_NEAR(errors[i], problem.errors[i], 1e-9) << i;
+  }
+}
+
+TEST_F(Scripts, RefuseWhatIsNoProblemOfBundleAdjustmentInTheLarge) {
+  const std::string text = MakeBalProblem(2, 3).text;
+  int i = 0;
+  for (const auto& [file, part] :
+       std::vector<std::pair<std::string, std::string>>{
+           {text + "5\n", "more numbers than"},
+           {text.substr(0, text.size() / 2), "numbers found"},
+           {"", "numbers found"},
+           {"2 3 6\n0 3 1 1\n", "observation 0 is of point 3, of 3"},
+           {"2 3 6\n0 x 1 1\n", "'x' is no number"}}) {
+    const fs::path path = folder_ / ("problem" + std::to_string(++i) + ".txt");
+    WriteBytes(path, file);
+    const fs::path output = folder_ / ("output" + std::to_string(i));
+    const ScriptResult result = RunScript(
+        "bal_to_colmap.sh", {"--input_path", path, "--output_path", output});
     EXPECT_NE(result.exit_code, 0);
     EXPECT_THAT(result.err, ::testing::HasSubstr(part));
     EXPECT_FALSE(fs::exists(output));

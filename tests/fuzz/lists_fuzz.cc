@@ -1,7 +1,8 @@
-// The lists beside a model: rotations, and what must not move.
+// The lists beside a model: rotations, positions, and what must not move.
 
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model_error.h"
+#include "krot/model/positions_file.h"
 #include "krot/model/rotations_file.h"
 #include "krot/model/validate.h"
 #include "tests/fuzz/fuzz.h"
@@ -14,13 +15,19 @@ void Read(ByteSource source) {
   const uint8_t kind = source.Byte();
   const FileBytes file = source.Rest("file");
   try {
-    switch (kind % 3) {
+    switch (kind % 4) {
       case 0: {
         Model turned = model;
         ReplaceRotations(file, &turned);
         ValidateModel(turned);
         break;
       }
+      case 3:
+        for (const KnownPosition& position : ReadPositions(file, model)) {
+          Require(position.radius > 0 && position.xyz.allFinite(),
+                  "a ball of a radius above zero");
+        }
+        break;
       case 1:
         Require(FixedFrames(file, model).size() == model.frames.size(),
                 "a flag of every frame");

@@ -40,6 +40,11 @@ class ModelComparison {
     List("track_elements", a.track_elements, b.track_elements);
     return difference_;
   }
+  // The same of their rigs alone.
+  std::string FirstDifferenceOfRigs(const Model& a, const Model& b) {
+    List("rigs", a.rigs, b.rigs);
+    return difference_;
+  }
 
  private:
   template <typename T>
@@ -167,6 +172,14 @@ MATCHER_P2(IsModel, expected, ignoring, "equals the expected model") {
 }
 inline auto IsModel(const Model& expected) {
   return IsModel(expected, Ignoring());
+}
+
+// The same of what is calibrated: EXPECT_THAT(model, HasRigsOf(expected)).
+MATCHER_P(HasRigsOf, expected, "has the expected model's rigs") {
+  const std::string difference =
+      ModelComparison(Ignoring()).FirstDifferenceOfRigs(arg, expected);
+  *result_listener << difference;
+  return difference.empty();
 }
 
 // The message of the Error that `action` throws; "" if it throws none.

@@ -90,6 +90,12 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
                   "3D points that must not move, by id, one per line");
 }
 
+void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
+  parser->AddPath("positions_path", &paths->positions_path, false, "a file",
+                  "Where cameras are known to be: per line an image's name and "
+                  "X Y Z RADIUS, in the model's frame and unit");
+}
+
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
   parser->AddBool("write_on_interrupt", &paths->write_on_interrupt,
                   "On the first SIGINT or SIGTERM write the best estimate so "
@@ -195,6 +201,13 @@ FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model) {
         FixedPoints3D(ReadFileBytes(paths.fixed_points_path), model);
   }
   return fixed;
+}
+
+std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
+                                              const Model& model) {
+  if (paths.positions_path.empty()) return {};
+  LogInput(paths.positions_path);
+  return ReadPositions(ReadFileBytes(paths.positions_path), model);
 }
 
 }  // namespace krot

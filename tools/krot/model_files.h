@@ -1,11 +1,13 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "krot/model/contradictions.h"
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 #include "krot/model/model_io.h"
+#include "krot/model/positions_file.h"
 #include "krot/report/run_record.h"
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
@@ -22,6 +24,7 @@ struct ModelPaths {
   std::string rotations_path;     // "": the model's own
   std::string fixed_images_path;  // "": all move
   std::string fixed_points_path;  // "": all move
+  std::string positions_path;     // "": none is known
   std::string report_path;
   std::string html_path;
   bool write_on_interrupt = false;
@@ -32,6 +35,9 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser);
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
 // Of a command that may hold images and points.
 void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
+// Of a command that keeps cameras within a radius of where they are known to
+// be.
+void AddPositionsPath(ModelPaths* paths, OptionParser* parser);
 // Of a command whose estimate is of use before its end.
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
@@ -75,5 +81,7 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run);
 
 // What paths.fixed_*_path name of the model. Throws ModelError.
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model);
+std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
+                                              const Model& model);
 
 }  // namespace krot

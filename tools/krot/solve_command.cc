@@ -1,5 +1,6 @@
 #include "tools/krot/solve_command.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -36,7 +37,10 @@ std::string ProblemWords(const SolveSummary& summary) {
          (summary.num_components > 1
               ? " in " + std::to_string(summary.num_components) + " components"
               : std::string()) +
-         FixedWords(summary);
+         FixedWords(summary) +
+         (summary.num_positions > 0
+              ? ", " + Counted(summary.num_positions, "known position")
+              : std::string());
 }
 
 std::string MemoryWords(const SolveSummary& summary) {
@@ -70,6 +74,7 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
   options.solve.problem.fixed = ReadFixedParts(command.paths, model);
+  options.solve.problem.positions = ReadKnownPositions(command.paths, model);
   Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
   progress.Follow(&options.solve, &context);
@@ -104,6 +109,24 @@ void WriteCertificate(const SolveCommand& command,
                       CertificateJson(*summary.certificate));
 }
 
+// "; in conflict are the positions of a.jpg, b.jpg and 12 observations".
+std::string PositionsConflictWords(const SolveSummary& summary) {
+  constexpr size_t kMost = 5;
+  const std::vector<SupportPosition>& positions = summary.support_positions;
+  std::string names;
+  for (size_t n = 0; n < std::min(kMost, positions.size()); ++n) {
+    names += (n == 0 ? "" : ", ") + positions[n].image_name;
+  }
+  if (positions.size() > kMost) {
+    names += " and " + std::to_string(positions.size() - kMost) + " others";
+  }
+  return positions.empty()
+             ? "; no position is part of the conflict"
+             : "; in conflict are the positions of " + names + " and " +
+                   Counted(static_cast<int64_t>(summary.support.size()),
+                           "observation");
+}
+
 // Where no model can be written: all that is left is a proof, maybe.
 void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
   const SolveSummary& summary = report.summary;
@@ -128,7 +151,10 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
                        FormatNumber(*summary.lower_bound, 6) + " px, above "
                  : std::string("no estimate is below ")) +
             "Problem.init_max_error = " + bound +
-            "; --Solver.max_error leaves out what does not fit");
+            (summary.num_positions > 0
+                 ? PositionsConflictWords(summary)
+                 : std::string(
+                       "; --Solver.max_error leaves out what does not fit")));
   }
   if (summary.termination == SolveTermination::kNoStart) {
     throw CommandError(kExitNoStart,

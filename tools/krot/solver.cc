@@ -34,6 +34,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
   AddWriteOnInterrupt(&command.paths, &parser);
   AddRotationsPath(&command.paths, &parser);
   AddFixedPaths(&command.paths, &parser);
+  AddPositionsPath(&command.paths, &parser);
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");

@@ -47,6 +47,9 @@ Estimate OwnEstimate(const Model& model, const BuiltProblem& built) {
   for (const int32_t point : built.point_of) {
     estimate.points.push_back(model.points3D[point].xyz);
   }
+  for (const BuiltPosition& position : built.positions) {
+    estimate.points.push_back(position.xyz);
+  }
   return estimate;
 }
 
@@ -55,9 +58,9 @@ Model ApplyEstimate(const Model& model, const BuiltProblem& built,
   CheckArgument(estimate.translations.size() == built.frame_of.size(),
                 "estimate.translations.size()", estimate.translations.size(),
                 "the number of frames");
-  CheckArgument(estimate.points.size() == built.point_of.size(),
-                "estimate.points.size()", estimate.points.size(),
-                "the number of points");
+  CheckArgument(
+      estimate.points.size() == built.point_of.size() + built.positions.size(),
+      "estimate.points.size()", estimate.points.size(), "the number of points");
 
   Model result = model;
   for (size_t k = 0; k < built.point_of.size(); ++k) {

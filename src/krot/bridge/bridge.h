@@ -6,6 +6,7 @@
 
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
+#include "krot/model/positions_file.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -45,6 +46,16 @@ struct BuildProblemOptions {
   bool ignore_translations = false;
   SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
   FixedParts fixed = {};                    // what must not move, of that model
+  // Of that model's images; what is fixed, or has no observation, needs none.
+  std::vector<KnownPosition> positions = {};
+};
+
+// Where a view's camera is known to be, as rows of the problem
+// (position_rows.h).
+struct BuiltPosition {
+  int32_t view = 0;
+  Eigen::Vector3d xyz;
+  double radius = 0;  // scene units
 };
 
 // The problem, its start, and where each unknown lives in the model. All stand
@@ -61,11 +72,22 @@ struct BuiltProblem {
   std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
   std::vector<Eigen::Vector2d> pixels;  // of the observations
+  // Behind what the model has, the problem holds a point for each of these, and
+  // kRowsPerPosition views and observations, which have no place in the arrays
+  // above. At the radius the residual of their rows is `position_level`,
+  // pixels.
+  std::vector<BuiltPosition> positions;
+  double position_level = 1;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
   // Tracks with several usable observations of one image, whatever becomes of
   // them.
   int64_t num_same_image_tracks = 0;
+
+  // Whether an observation is one of the model, and not a position's row.
+  bool HasPixel(int64_t observation) const {
+    return observation < static_cast<int64_t>(pixels.size());
+  }
 };
 
 // The problem of all observations that can be used: the unknowns are the
@@ -73,7 +95,7 @@ struct BuiltProblem {
 // whether or not it sees a point, so that the gauge knows all cameras.
 //
 // What options.fixed marks stands still in the problem, and a fixed point is
-// part of it for one usable observation.
+// part of it for one usable observation. options.positions add rows.
 //
 // An observation is left out for the first of these reasons: its image has no
 // pose; neither that nor its point may move; its point does not project and its

@@ -11,6 +11,7 @@
 #include "krot/bridge/frames_and_views.h"
 #include "krot/bridge/order_of_ids.h"
 #include "krot/bridge/point_repair.h"
+#include "krot/bridge/position_rows.h"
 #include "krot/bridge/same_image.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
@@ -284,6 +285,7 @@ BuiltProblem BuildProblem(const Model& model,
   Compact(ProcessPoints(sources, options, &built), &built);
   AddFramesAndViews(model, sources.geometries, &built);
   FixPositions(options.fixed, &built);
+  AddPositions(options.positions, &built);
   IndexObservations(&built.problem);
   return built;
 }

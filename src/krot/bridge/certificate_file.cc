@@ -3,9 +3,11 @@
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "krot/bridge/certificate_json.h"
 #include "krot/bridge/model_digest.h"
+#include "krot/bridge/position_rows.h"
 #include "krot/model/model_error.h"
 
 namespace krot {
@@ -35,6 +37,8 @@ CertificateFile ReadCertificate(const JsonReader& reader, const Json& json) {
       reader.ReadSupport(member("observations"), file.version, "observations");
   const auto fixed = json.find("fixed");
   if (fixed != json.end()) reader.ReadFixed(*fixed, &file);
+  const auto positions = json.find("positions");
+  if (positions != json.end()) reader.ReadPositions(*positions, &file);
   return file;
 }
 
@@ -46,6 +50,7 @@ std::vector<CertificateFile::SupportObservation> DescribeSupport(
   std::vector<CertificateFile::SupportObservation> support;
   for (size_t n = 0; n < certificate.bearings.size(); ++n) {
     const CertifiedObservation& certified = certificate.rows.observations[n];
+    if (!built.HasPixel(certified.observation)) continue;
     const Observation& observation =
         built.problem.observations[certified.observation];
     CertificateFile::SupportObservation o;
@@ -70,6 +75,7 @@ void DescribeFixed(const Model& model, const BuiltProblem& built,
   std::set<int32_t> frames;
   std::set<int32_t> points;
   for (const CertifiedObservation& certified : certificate.rows.observations) {
+    if (!built.HasPixel(certified.observation)) continue;
     const Observation& observation =
         problem.observations[certified.observation];
     const int32_t frame = problem.views[observation.view].frame;
@@ -87,6 +93,28 @@ void DescribeFixed(const Model& model, const BuiltProblem& built,
   }
 }
 
+// The positions in the support; rows ascend, so that a position's stand
+// together.
+void DescribePositions(const Model& model, const BuiltProblem& built,
+                       const PixelCertificate& certificate,
+                       CertificateFile* file) {
+  int64_t last = -1;
+  for (size_t n = 0; n < certificate.bearings.size(); ++n) {
+    const CertifiedObservation& certified = certificate.rows.observations[n];
+    if (built.HasPixel(certified.observation)) continue;
+    const int64_t index = PositionOf(built, certified.observation);
+    if (index != std::exchange(last, index)) {
+      const BuiltPosition& position = built.positions[index];
+      file->positions.push_back({model.images[built.image_of[position.view]].id,
+                                 position.xyz,
+                                 position.radius,
+                                 {}});
+    }
+    file->positions.back().rows.push_back(
+        {certificate.bearings[n], certified.lambda, certified.y});
+  }
+}
+
 }  // namespace
 
 CertificateFile DescribeCertificate(const Model& model,
@@ -100,6 +128,7 @@ CertificateFile DescribeCertificate(const Model& model,
   file.model_sha256 = ModelSha256(model);
   file.observations = DescribeSupport(model, built, certificate);
   DescribeFixed(model, built, certificate, &file);
+  DescribePositions(model, built, certificate, &file);
   return file;
 }
 
@@ -113,6 +142,7 @@ std::string CertificateJson(const CertificateFile& file) {
   if (!file.fixed_images.empty() || !file.fixed_points.empty()) {
     json["fixed"] = FixedJson(file);
   }
+  if (!file.positions.empty()) json["positions"] = PositionsJson(file);
   json["observations"] = SupportJson(file.observations, file.version);
   return json.dump(1) + "\n";
 }

@@ -45,6 +45,19 @@ struct CertificateFile {
     Eigen::Vector3d xyz;
   };
 
+  // Where a camera is known to be, and the rows of that in the support.
+  struct Position {
+    struct Row {
+      Eigen::Vector3d apex;  // p of position_rows.h
+      double lambda = 0;
+      Eigen::Vector2d y = Eigen::Vector2d::Zero();
+    };
+    ImageId image_id = 0;
+    Eigen::Vector3d xyz;
+    double radius = 0;
+    std::vector<Row> rows;
+  };
+
   int version = kCertificateVersion;
   Norm norm;
   double lower_bound = 0;  // true pixels; version 1: of the rows
@@ -55,10 +68,11 @@ struct CertificateFile {
   // Of the support; the first image of a frame.
   std::vector<FixedImage> fixed_images;
   std::vector<FixedPoint> fixed_points;
+  std::vector<Position> positions;
 };
 
-// Its support in terms of the model's ids; `certificate` must be one of
-// built.problem.
+// The observations in its support in terms of the model's ids; `certificate`
+// must be one of built.problem.
 std::vector<CertificateFile::SupportObservation> DescribeSupport(
     const Model& model, const BuiltProblem& built,
     const PixelCertificate& certificate);

@@ -10,6 +10,8 @@ namespace {
 
 using Json = CertificateFileJson;
 
+Json TripleJson(const Eigen::Vector3d& x) { return {x[0], x[1], x[2]}; }
+
 // Version 1: u and J.
 void ReadRow(const JsonReader& reader, const Json& u, const Json& J,
              const std::string& place,
@@ -153,19 +155,59 @@ void JsonReader::ReadFixed(const Json& fixed, CertificateFile* file) const {
   }
 }
 
+void JsonReader::ReadPositions(const Json& positions,
+                               CertificateFile* file) const {
+  Array(positions, "positions");
+  for (size_t n = 0; n < positions.size(); ++n) {
+    const std::string place = "positions[" + std::to_string(n) + "]";
+    const auto member = [&](const char* key) -> const Json& {
+      return Member(positions[n], place, key);
+    };
+    CertificateFile::Position position;
+    position.image_id =
+        static_cast<ImageId>(Id(member("image_id"), place + ".image_id",
+                                std::numeric_limits<uint32_t>::max()));
+    position.xyz = Triple(member("xyz"), place + ".xyz");
+    position.radius = Number(member("radius"), place + ".radius");
+    const Json& rows = Array(member("rows"), place + ".rows");
+    for (size_t k = 0; k < rows.size(); ++k) {
+      const std::string row = place + ".rows[" + std::to_string(k) + "]";
+      position.rows.push_back(
+          {Triple(Member(rows[k], row, "apex"), row + ".apex"),
+           Number(Member(rows[k], row, "lambda"), row + ".lambda"),
+           Pair(Member(rows[k], row, "y"), row + ".y")});
+    }
+    file->positions.push_back(std::move(position));
+  }
+}
+
+CertificateFileJson PositionsJson(const CertificateFile& file) {
+  Json positions = Json::array();
+  for (const CertificateFile::Position& position : file.positions) {
+    Json rows = Json::array();
+    for (const CertificateFile::Position::Row& row : position.rows) {
+      rows.push_back({{"apex", TripleJson(row.apex)},
+                      {"lambda", row.lambda},
+                      {"y", {row.y[0], row.y[1]}}});
+    }
+    positions.push_back({{"image_id", position.image_id},
+                         {"xyz", TripleJson(position.xyz)},
+                         {"radius", position.radius},
+                         {"rows", rows}});
+  }
+  return positions;
+}
+
 CertificateFileJson FixedJson(const CertificateFile& file) {
-  const auto triple = [](const Eigen::Vector3d& x) -> Json {
-    return {x[0], x[1], x[2]};
-  };
   Json images = Json::array();
   for (const CertificateFile::FixedImage& image : file.fixed_images) {
     images.push_back({{"image_id", image.image_id},
-                      {"translation", triple(image.translation)}});
+                      {"translation", TripleJson(image.translation)}});
   }
   Json points = Json::array();
   for (const CertificateFile::FixedPoint& point : file.fixed_points) {
     points.push_back(
-        {{"point3D_id", point.point3D_id}, {"xyz", triple(point.xyz)}});
+        {{"point3D_id", point.point3D_id}, {"xyz", TripleJson(point.xyz)}});
   }
   return {{"images", images}, {"points3D", points}};
 }

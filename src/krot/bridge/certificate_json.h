@@ -40,6 +40,8 @@ class JsonReader {
       const Json& observations, int version, const std::string& place) const;
   // Fills in what does not move.
   void ReadFixed(const Json& fixed, CertificateFile* file) const;
+  // Fills in where cameras are known to be.
+  void ReadPositions(const Json& positions, CertificateFile* file) const;
 
  private:
   const std::string file_name_;
@@ -47,6 +49,7 @@ class JsonReader {
 
 CertificateFileJson NormJson(Norm norm);
 CertificateFileJson FixedJson(const CertificateFile& file);
+CertificateFileJson PositionsJson(const CertificateFile& file);
 CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& observations,
     int version);

@@ -1,7 +1,9 @@
 #include "krot/bridge/certificate_support.h"
 
 #include <algorithm>
+#include <map>
 
+#include "krot/bridge/position_rows.h"
 #include "krot/bridge/same_image.h"
 #include "krot/problem/cost.h"
 
@@ -17,6 +19,42 @@ bool HasImageTwice(const KnownRotationProblem& problem, int32_t point) {
 
 }  // namespace
 
+std::vector<SupportPosition> ListSupportPositions(
+    const Model& model, const BuiltProblem& built, const Estimate& estimate,
+    const PixelCertificate& certificate) {
+  // By index, the force of all its rows on the camera.
+  std::map<int64_t, Eigen::Vector3d> pulls;
+  const Certificate& rows = certificate.rows;
+  KnownRotationProblem problem = built.problem;
+  for (size_t n = 0; n < rows.observations.size(); ++n) {
+    const CertifiedObservation& o = rows.observations[n];
+    if (built.HasPixel(o.observation) ||
+        !PutPositionRow(built, o.observation, certificate.bearings[n],
+                        rows.lower_bound, &problem)) {
+      continue;
+    }
+    const Observation& own = problem.observations[o.observation];
+    pulls.emplace(PositionOf(built, o.observation), Eigen::Vector3d::Zero())
+        .first->second +=
+        own.E.transpose() *
+        Eigen::Vector3d(rows.lower_bound * o.lambda, o.y[0], o.y[1]);
+  }
+  double sum = 0;
+  for (const auto& [position, pull] : pulls) sum += pull.norm();
+  std::vector<SupportPosition> support;
+  for (const auto& [n, pull] : pulls) {
+    const BuiltPosition& position = built.positions[n];
+    const Image& image = model.images[built.image_of[position.view]];
+    support.push_back({image.id, image.name, pull.norm() / sum,
+                       OffsetOf(built, estimate, position).norm(),
+                       position.radius});
+  }
+  std::stable_sort(
+      support.begin(), support.end(),
+      [](const auto& a, const auto& b) { return a.share > b.share; });
+  return support;
+}
+
 std::vector<SupportObservation> ListSupport(const Model& model,
                                             const BuiltProblem& built,
                                             const Estimate& estimate, Norm norm,
@@ -27,6 +65,7 @@ std::vector<SupportObservation> ListSupport(const Model& model,
   }
   std::vector<SupportObservation> support;
   for (const CertifiedObservation& o : certificate.observations) {
+    if (!built.HasPixel(o.observation)) continue;
     const Observation& observation = built.problem.observations[o.observation];
     const Image& image = model.images[built.image_of[observation.view]];
     support.push_back(

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/pixel_certificate.h"
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
 #include "krot/proof/certificate_check.h"
@@ -24,7 +25,24 @@ struct SupportObservation {
   bool has_image_twice = false;  // its track, in the problem
 };
 
-// The support of a certificate of built.problem, worst first.
+// A known position in the support: with all others and the observations it sets
+// the maximum.
+struct SupportPosition {
+  ImageId image_id = 0;
+  std::string image_name;
+  double share = 0;     // of what the positions' rows pull in all
+  double distance = 0;  // of the camera from it, scene units
+  double radius = 0;
+};
+
+// Those of a certificate, whose rows those of built.problem are, with the
+// largest share first.
+std::vector<SupportPosition> ListSupportPositions(
+    const Model& model, const BuiltProblem& built, const Estimate& estimate,
+    const PixelCertificate& certificate);
+
+// The observations in the support of a certificate of built.problem, worst
+// first.
 std::vector<SupportObservation> ListSupport(const Model& model,
                                             const BuiltProblem& built,
                                             const Estimate& estimate, Norm norm,

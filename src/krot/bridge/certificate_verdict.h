@@ -26,6 +26,8 @@ struct CertificateVerdict {
   // Of those whose positions it takes as fixed.
   int64_t num_fixed_images = 0;
   int64_t num_fixed_points = 0;
+  // Those that it takes as known to a radius, where this model has the cameras.
+  std::vector<SupportPosition> positions;
   double defect = 0;  // what rounding takes from the stated bound
   std::vector<SupportObservation> support;  // worst first
 };
@@ -37,7 +39,8 @@ struct CertificateVerdict {
 // of the file's u and J. Translations and points do not enter into that:
 // where they keep BuildProblem from using an observation of the certificate,
 // it ignores them. But what the file takes as fixed has to stand where it says,
-// to the bit. Requires a valid model; throws what BuildProblem does.
+// to the bit; and of positions within a radius it speaks as the file has them.
+// Requires a valid model; throws what BuildProblem does.
 // O(observations), and the check.
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);

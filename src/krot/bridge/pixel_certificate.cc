@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "krot/base/parallel_for.h"
+#include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/camera/remainder_bound.h"
@@ -23,6 +24,7 @@ constexpr double kMargin = 1e-9;
 constexpr int64_t kLinesAtOnce = 32;
 
 std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
+  if (!built.HasPixel(i)) return "a position";
   return "observation " + std::to_string(built.point2D_of[i]) + " of image " +
          std::to_string(
              model.images[built.image_of[built.problem.observations[i].view]]
@@ -35,6 +37,9 @@ double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
               const std::vector<Eigen::Vector3d>& bearings, int64_t n,
               double gamma, double sufficient) {
   const CertifiedObservation& o = rows.observations[n];
+  if (!built.HasPixel(o.observation)) {
+    return o.y.norm() / (o.lambda * (1 + kPositionSlack));
+  }
   const Reprojection::Source& source = reprojection.SourceOf(o.observation);
   const double unit = rows.lower_bound * o.lambda;
   const std::optional<double> largest =
@@ -70,6 +75,10 @@ bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
                     Norm norm, const PixelCertificate& certificate,
                     const MultiplierChange& change, size_t n) {
   const CertifiedObservation& o = certificate.rows.observations[n];
+  if (!built.HasPixel(o.observation)) {
+    return o.y.norm() + change.y <=
+           o.lambda * (1 - change.depth) * (1 + kPositionSlack / 2);
+  }
   const Reprojection::Source& source = reprojection.SourceOf(o.observation);
   const double gamma = certificate.lower_bound;
   const std::optional<double> kappa = RemainderBound(
@@ -96,7 +105,9 @@ std::vector<Eigen::Vector3d> BearingsOfPoints(const Model& model,
   std::vector<Eigen::Vector3d> bearings;
   for (const CertifiedObservation& o : rows.observations) {
     bearings.push_back(
-        reprojection.InCamera(x_hat, o.observation).normalized());
+        built.HasPixel(o.observation)
+            ? reprojection.InCamera(x_hat, o.observation).normalized()
+            : ApexAt(built, x_hat, o.observation));
   }
   return bearings;
 }
@@ -107,6 +118,10 @@ std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
   const Reprojection reprojection(model, built);
   std::vector<Eigen::Vector3d> bearings;
   for (const CertifiedObservation& o : rows.observations) {
+    if (!built.HasPixel(o.observation)) {
+      bearings.push_back(ApexOfStart(built, o.observation));
+      continue;
+    }
     const Reprojection::Source& source = reprojection.SourceOf(o.observation);
     bearings.push_back(PixelBearing(source.model_id, source.params,
                                     built.pixels[o.observation])
@@ -175,6 +190,14 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
     const int64_t i = support[n].observation;
     if (i < 0 || i >= static_cast<int64_t>(problem.observations.size())) {
       check.refusal = "it names an observation that is not there";
+      return check;
+    }
+    if (!built.HasPixel(i)) {
+      if (PutPositionRow(built, i, certificate.bearings[n],
+                         certificate.rows.lower_bound, &problem)) {
+        continue;
+      }
+      check.refusal = "an apex is too near to its position, or too far";
       return check;
     }
     const Reprojection::Source& source = reprojection.SourceOf(i);

@@ -31,10 +31,15 @@ namespace krot {
 // lens does, it enters by the support function of S_i in the one direction
 // -y_i; at an optimum that direction is the error's own, its supporting line
 // touches S_i where the point projects, and gamma = delta.
+//
+// Where positions are known, z is of estimates that keep them alone: their rows
+// are those of `level` delta (position_rows.h), within which every camera in
+// its ball is seen.
 struct PixelCertificate {
   // Of the problem whose row i is RowAtProjection at bearings[i].
   Certificate rows;
-  // In the cameras' frames, one per observation of the support.
+  // In the cameras' frames, one per observation of the support; of a
+  // position's row its p, in the world's.
   std::vector<Eigen::Vector3d> bearings;
   double lower_bound = 0;  // gamma, true pixels; <= rows.lower_bound
 };

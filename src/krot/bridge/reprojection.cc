@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "krot/base/parallel_for.h"
+#include "krot/bridge/position_rows.h"
 #include "krot/camera/models.h"
 #include "krot/camera/projection_row.h"
 #include "krot/minimax/residual.h"
@@ -23,7 +24,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
 Reprojection::Reprojection(const Model& model, const BuiltProblem& built)
-    : built_(built) {
+    : built_(built), is_linear_(built.positions.empty()) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (const int32_t image : built.image_of) {
     const Camera& camera = model.cameras[geometries[image].camera];
@@ -81,10 +82,18 @@ double Reprojection::TrueCost(const Estimate& estimate, Norm norm,
   return cost;
 }
 
+double Reprojection::LevelledCost(const Estimate& estimate, Norm norm,
+                                  int num_threads) const {
+  return std::max(
+      TrueCost(estimate, norm, num_threads),
+      built_.position_level * LargestPositionRatio(built_, estimate));
+}
+
 bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                             KnownRotationProblem* problem) const {
   if (is_linear_) return true;
-  const int64_t count = static_cast<int64_t>(problem->observations.size());
+  TakePositionRows(built_, estimate, problem);
+  const int64_t count = static_cast<int64_t>(built_.pixels.size());
   std::vector<char> do_project(NumChunks(count, kObservationsPerChunk), 1);
   ParallelFor(count, kObservationsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {

@@ -13,7 +13,8 @@ namespace krot {
 
 // The true residuals of a built problem, through the full cameras: what its
 // linear rows stand for. The problem's Cost is that of the rows; TrueCost is
-// what the user measures.
+// what the user measures, and LevelledCost counts in how well positions are
+// kept.
 class Reprojection {
  public:
   // Keeps references.
@@ -23,22 +24,34 @@ class Reprojection {
   // TrueCost differ by rounding alone.
   bool IsLinear() const { return is_linear_; }
 
-  // ||pi(x_cam) - pixel||_p of observation i, pixels, and what the last digits
-  // of the coordinates may add to it: an estimate whose points lie closer to a
-  // camera than its coordinates resolve is not as good as it seems. Infinity
-  // where the point does not project, as behind its camera.
+  int64_t num_observations() const {  // of the model
+    return static_cast<int64_t>(built_.pixels.size());
+  }
+
+  // ||pi(x_cam) - pixel||_p of observation i, which is one of the model, and
+  // what the last digits of the coordinates may add to it: an estimate whose
+  // points lie closer to a camera than its coordinates resolve is not as good
+  // as it seems. Infinity where the point does not project, as behind its
+  // camera.
   double Error(const Estimate& estimate, Norm norm, int64_t i) const;
 
   // The largest error, pixels; 0 without observations. O(observations); the
   // same bits at any number of threads.
   double TrueCost(const Estimate& estimate, Norm norm, int num_threads) const;
 
+  // The same or, if that is more, the level of the positions times the largest
+  // ratio of a camera's distance from its position to the radius: what the rows
+  // are of, all of them.
+  double LevelledCost(const Estimate& estimate, Norm norm,
+                      int num_threads) const;
+
   // Takes every row where its point projects at the estimate: exact there, and
-  // to first order around. Whether all do; a row that does not stays.
+  // to first order around; likewise those of positions. Whether all do; a row
+  // that does not stays.
   bool TakeRows(const Estimate& estimate, int num_threads,
                 KnownRotationProblem* problem) const;
 
-  // The camera of observation i.
+  // The camera of observation i of the model.
   struct Source {
     int model_id;
     const double* params;
@@ -56,7 +69,7 @@ class Reprojection {
 
   const BuiltProblem& built_;
   std::vector<Source> sources_;  // per view
-  bool is_linear_ = true;
+  bool is_linear_;
 };
 
 }  // namespace krot

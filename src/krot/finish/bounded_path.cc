@@ -65,7 +65,7 @@ BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
       options_(options),
       context_(context),
       system_(problem, Cap(options.norm, options.cap), options.loss,
-              context.num_threads),
+              NumErrors(), context.num_threads),
       multipliers_(problem.observations.size()) {
   now_.x = start;
   now_.viewed.resize(problem.observations.size());
@@ -85,13 +85,15 @@ bool BoundedPath<Cap>::View(State* state) {
       Totals{std::numeric_limits<double>::infinity(), 0, {}},
       [&](int64_t i) -> Totals {
         const ViewedPoint viewed =
-            ViewPoint(problem_, observations()[i], state->x);
+            ViewPoint(rows(), observations()[i], state->x);
         if (!(viewed.depth > 0)) return {-1, 0, {}};
         const Eigen::Vector2d e = viewed.v / viewed.depth;
         state->viewed[i] = {e, viewed.depth};
         const Vector h = system_.cap().Slacks(e);
         if (!(h.minCoeff() > 0)) return {-1, 0, {}};
-        return {h.minCoeff(), options_.loss.Value(e.squaredNorm()) / 2,
+        const double loss =
+            i < NumErrors() ? options_.loss.Value(e.squaredNorm()) : 0;
+        return {h.minCoeff(), loss / 2,
                 LogProduct(system_.cap().RelativeSlack(h))};
       },
       [](const Totals& a, const Totals& b) {

@@ -50,8 +50,15 @@ class BoundedPath {
   };
 
   // Of the state viewed last.
+  const KnownRotationProblem& rows() const {
+    return options_.take_rows ? rows_ : problem_;
+  }
   const std::vector<Observation>& observations() const {
-    return options_.take_rows ? rows_.observations : problem_.observations;
+    return rows().observations;
+  }
+  int64_t NumErrors() const {
+    return options_.num_errors.value_or(
+        static_cast<int64_t>(problem_.observations.size()));
   }
   bool TakeRows(const Estimate& x) {
     return !options_.take_rows || options_.take_rows(x, &rows_);

@@ -28,10 +28,11 @@ std::vector<Matrix3d> FrameRotations(const KnownRotationProblem& problem) {
 template <typename Cap>
 BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
                                   const Cap& cap, const ErrorLoss& loss,
-                                  int num_threads)
+                                  int64_t num_errors, int num_threads)
     : problem_(problem),
       cap_(cap),
       loss_(loss),
+      num_errors_(num_errors),
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       structure_(AnchoredStructure(problem)),
       frame_rotations_(FrameRotations(problem)),
@@ -49,7 +50,7 @@ typename BoundedSystem<Cap>::Root BoundedSystem<Cap>::RootOf(int64_t i) const {
   const Vector h = cap_.Slacks(e);
   const Vector stiffness = l.cwiseQuotient(h);
   const Eigen::Matrix<double, 2, Cap::kNum> n = cap_.Normals(e);
-  const double own = loss_.Weight(e.squaredNorm()) + Cap::kBend * l.sum();
+  const double own = WeightOf(i) + Cap::kBend * l.sum();
   const Vector nx2 = n.row(0).cwiseAbs2(), ny2 = n.row(1).cwiseAbs2();
   const double xx = stiffness.dot(nx2), yy = stiffness.dot(ny2);
   double xy = 0;
@@ -94,7 +95,7 @@ Vector2d BoundedSystem<Cap>::PullOf(int64_t i) const {
   const Correction c = CorrectionOf(i);
   const Vector target =
       Vector::Constant(mu_) - c.product + c.slack * (*multipliers_)[i];
-  return loss_.Weight(e.squaredNorm()) * e +
+  return WeightOf(i) * e +
          cap_.Normals(e) * target.cwiseQuotient(cap_.Slacks(e));
 }
 

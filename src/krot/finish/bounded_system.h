@@ -40,9 +40,10 @@ class BoundedSystem {
  public:
   using Vector = typename Cap::Vector;
 
-  // Keeps a reference to `problem`, but for its observations' rows.
+  // Keeps a reference to `problem`, but for its observations' rows. Those
+  // behind the first `num_errors` are bounds alone.
   BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
-                const ErrorLoss& loss, int num_threads);
+                const ErrorLoss& loss, int64_t num_errors, int num_threads);
 
   // The system at an iterate, whose rows are those of `observations`; errors
   // and multipliers must outlive the calls below. False if there is no factor.
@@ -94,6 +95,10 @@ class BoundedSystem {
     double gap, by_primal, by_dual, by_both;
   };
 
+  // rho' of an observation's error.
+  double WeightOf(int64_t i) const {
+    return i < num_errors_ ? loss_.Weight((*viewed_)[i].e.squaredNorm()) : 0;
+  }
   Root RootOf(int64_t i) const;
   Correction CorrectionOf(int64_t i) const {
     return is_corrected_ ? correction_[i] : Correction{Vector::Zero(), 0};
@@ -106,6 +111,7 @@ class BoundedSystem {
   const KnownRotationProblem& problem_;
   const Cap cap_;
   const ErrorLoss loss_;
+  const int64_t num_errors_;
   const ObservationLoop loop_;
   const BlockStructure structure_;
   // R_rw of the frames that an observation has.

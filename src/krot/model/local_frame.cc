@@ -67,13 +67,15 @@ std::vector<Vector3d> Points(const Model& model,
   return points;
 }
 
-std::vector<Vector3d> Positions(const Model& model, const FixedParts& fixed) {
+std::vector<Vector3d> Positions(const Model& model, const FixedParts& fixed,
+                                const std::vector<KnownPosition>& known) {
   std::vector<Vector3d> positions;
   if (!fixed.frames.empty()) positions = Centres(model, fixed.frames);
   if (!fixed.points3D.empty()) {
     const std::vector<Vector3d> points = Points(model, fixed.points3D);
     positions.insert(positions.end(), points.begin(), points.end());
   }
+  for (const KnownPosition& position : known) positions.push_back(position.xyz);
   if (positions.empty()) positions = Centres(model, {});
   if (positions.empty()) positions = Points(model, {});
   return positions;
@@ -104,8 +106,9 @@ void ShiftBack(const Vector3d& origin, const Pose& was, Pose* pose) {
 
 }  // namespace
 
-LocalFrame::LocalFrame(const Model& model, const FixedParts& fixed) {
-  const std::vector<Vector3d> positions = Positions(model, fixed);
+LocalFrame::LocalFrame(const Model& model, const FixedParts& fixed,
+                       const std::vector<KnownPosition>& known) {
+  const std::vector<Vector3d> positions = Positions(model, fixed, known);
   const std::optional<Vector3d> middle = Median(positions);
   if (!middle) return;
   double extent = MedianDistance(positions, *middle);
@@ -123,6 +126,12 @@ Model LocalFrame::ToLocal(const Model& model) const {
   for (Image& image : local.images) Shift(origin_, &image.cam_from_world);
   for (Point3D& point : local.points3D) point.xyz -= origin_;
   return local;
+}
+
+std::vector<KnownPosition> LocalFrame::ToLocal(
+    std::vector<KnownPosition> known) const {
+  for (KnownPosition& position : known) position.xyz -= origin_;
+  return known;
 }
 
 Model LocalFrame::FromLocal(const Model& before, const Model& local) const {

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
+#include "krot/model/positions_file.h"
 
 namespace krot {
 
@@ -13,17 +16,19 @@ namespace krot {
 // t_local = t + R O is rounded once.
 class LocalFrame {
  public:
-  // O is near the median of what is fixed or else of all finite camera centres,
-  // or else of the points; zero, and all below are copies, unless that is more
-  // than 1000 times as far from the origin as half of these are from it.
-  // Requires a valid model. O(images + points).
-  explicit LocalFrame(const Model& model, const FixedParts& fixed = {});
+  // O is near the median of what is fixed or known, or else of all finite
+  // camera centres, or else of the points; zero, and all below are copies,
+  // unless that is more than 1000 times as far from the origin as half of these
+  // are from it. Requires a valid model. O(images + points).
+  explicit LocalFrame(const Model& model, const FixedParts& fixed = {},
+                      const std::vector<KnownPosition>& known = {});
 
   const Eigen::Vector3d& origin() const { return origin_; }
   bool IsModels() const { return origin_.isZero(0); }
 
   // The model in the local frame.
   Model ToLocal(const Model& model) const;
+  std::vector<KnownPosition> ToLocal(std::vector<KnownPosition> known) const;
 
   // What became of ToLocal(before) in the frame of `before`. What is there as
   // it was keeps the bits that it has in `before`. Requires the same images and
@@ -36,9 +41,8 @@ class LocalFrame {
 
 // solve(model), whose result has the new `model`, by way of the local frame.
 template <typename Solve>
-auto InLocalFrame(const Model& model, const FixedParts& fixed,
+auto InLocalFrame(const LocalFrame& frame, const Model& model,
                   const Solve& solve) {
-  const LocalFrame frame(model, fixed);
   if (frame.IsModels()) return solve(model);
   auto result = solve(frame.ToLocal(model));
   result.model = frame.FromLocal(model, result.model);

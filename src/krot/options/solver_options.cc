@@ -89,7 +89,8 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     table.Refuse("Solver.finish_slack", why);
     table.Refuse("Problem.init_max_error",
                  "with --Solver.max_error, which needs no such start");
-    for (const char* name : {"fixed_images_path", "fixed_points_path"}) {
+    for (const char* name :
+         {"fixed_images_path", "fixed_points_path", "positions_path"}) {
       table.Refuse(name, "with --Solver.max_error, which moves everything");
     }
   } else {
@@ -104,6 +105,13 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   }
   if (!has_joint_norm && options.init == SolveInit::kFeasible) {
     throw OptionError("--Solver.init feasible needs --Solver.norm 1, 2 or inf");
+  }
+  if (options.norm.p != 2 || method == SolveMethod::kResInt ||
+      options.polish != Polish::kNone ||
+      options.finish.finish == Finish::kSweeps) {
+    table.Refuse("positions_path",
+                 "but with --Solver.norm 2, the joint solver, and neither a "
+                 "polish nor a finish of sweeps");
   }
   if (method == SolveMethod::kResInt) {
     const char* why =

@@ -284,9 +284,11 @@ OutlierFilterResult FilterOutliers(const Model& model,
       "make_profile", options.make_profile, "false with this method");
   CheckArgument(options.solve.norm.p == 2, "norm.p", options.solve.norm.p,
                 "2, that of pixel errors");
+  CheckArgument(options.solve.problem.positions.empty(),
+                "solve.problem.positions", "some", "none");
   CheckArgument(!options.solve.problem.fixed.Any(), "solve.problem.fixed",
                 "something", "empty: everything moves");
-  return InLocalFrame(model, {}, [&](const Model& local) {
+  return InLocalFrame(LocalFrame(model), model, [&](const Model& local) {
     return OutlierFilter(local, options, context).Run();
   });
 }

@@ -10,7 +10,7 @@ namespace {
 bool NeedsRemoval(const SolveModelOptions& options,
                   const SolveSummary& summary) {
   return summary.termination == SolveTermination::kNothingToSolve &&
-         !options.problem.fixed.Any() &&
+         !options.problem.fixed.Any() && options.problem.positions.empty() &&
          EffectiveMethod(options) == SolveMethod::kAuto && options.norm.p == 2;
 }
 

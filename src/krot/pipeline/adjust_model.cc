@@ -107,9 +107,10 @@ AdjustModelResult AdjustModel(const Model& model,
     CheckArgument(*options.max_error_factor > 1, "max_error_factor",
                   *options.max_error_factor, "> 1");
   }
-  return InLocalFrame(model, options.adjustment.fixed, [&](const Model& local) {
-    return AdjustInFrame(local, options, context);
-  });
+  return InLocalFrame(LocalFrame(model, options.adjustment.fixed), model,
+                      [&](const Model& local) {
+                        return AdjustInFrame(local, options, context);
+                      });
 }
 
 }  // namespace krot

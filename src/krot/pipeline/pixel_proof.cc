@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/bridge/position_rows.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/subset.h"
 
@@ -40,6 +41,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     for (CertifiedObservation& o : certificate.observations) {
       o.y /= widths[o.observation];
     }
+    LevelPositions(built, &certificate);
     const std::vector<Eigen::Vector3d> bearings =
         BearingsOfPoints(model, built, x_hat, certificate);
     const std::optional<PixelCertificate> candidate = MakePixelCertificate(
@@ -61,6 +63,10 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     for (size_t n = 0; n < lines.size(); ++n) {
       if (!std::isfinite(lines[n])) continue;
       const int64_t i = certificate.observations[n].observation;
+      if (!built.HasPixel(i)) {  // whatever the bound, its row is the ball's
+        support.push_back(i);
+        continue;
+      }
       const double wider =
           std::max(1.0, lines[n] * certificate.lower_bound / level);
       widths[i] *= wider;
@@ -69,6 +75,17 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     }
   }
   return best;
+}
+
+std::vector<int64_t> SupportOf(const Certificate& certificate,
+                               const std::vector<int64_t>& observation_of) {
+  std::vector<int64_t> support;
+  for (const CertifiedObservation& o : certificate.observations) {
+    const int64_t i =
+        observation_of.empty() ? o.observation : observation_of[o.observation];
+    if (i >= 0) support.push_back(i);
+  }
+  return support;
 }
 
 }  // namespace krot

@@ -28,4 +28,9 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               double sufficient,
                                               const Context& context);
 
+// The observations of a certificate, by what they are called: `observation_of`,
+// or as they are if that is empty. Those that are -1 there are left out.
+std::vector<int64_t> SupportOf(const Certificate& certificate,
+                               const std::vector<int64_t>& observation_of);
+
 }  // namespace krot

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "krot/bridge/reprojection.h"
+#include "krot/pipeline/kept_positions.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/schedule.h"
 #include "krot/pipeline/segment.h"
@@ -32,6 +33,8 @@ constexpr double kProofShare = 0.95;
 // Rows that have lowered the true cost to this share, and whose own is such a
 // share of that, are taken anew before they are solved.
 constexpr double kFarFromRows = 0.5;
+// Where positions are known, rows are solved to this share of the gap.
+constexpr double kShareWithPositions = 0.05;
 
 class Rounds {
  public:
@@ -40,6 +43,7 @@ class Rounds {
          BuiltProblem* built, Estimate* estimate, SolveSummary* summary)
       : model_(model),
         options_(options),
+        rows_options_(options),
         method_(method),
         context_(context),
         timer_(timer),
@@ -47,7 +51,12 @@ class Rounds {
         built_(*built),
         estimate_(*estimate),
         summary_(*summary),
-        cost_(TrueCost(estimate_)) {}
+        positions_(model, options_, context_, reprojection_, estimate_, built),
+        cost_(LevelledCost(estimate_)) {
+    if (positions_.Any()) {
+      rows_options_.joint.relative_gap *= kShareWithPositions;
+    }
+  }
 
   void Run();
   std::optional<PixelCertificate> certificate() && {
@@ -59,9 +68,21 @@ class Rounds {
     return reprojection_.TrueCost(estimate, options_.norm,
                                   context_.num_threads);
   }
+  double LevelledCost(const Estimate& estimate) const {
+    return reprojection_.LevelledCost(estimate, options_.norm,
+                                      context_.num_threads);
+  }
+  double PixelCost() const {
+    return positions_.Any() ? TrueCost(estimate_) : cost_;
+  }
+  // Of what would be the result.
+  double ReachedCost() const {
+    return positions_.Any() ? positions_.cost() : cost_;
+  }
   bool IsGapReached() const {
-    return certificate_ && cost_ - certificate_->lower_bound <=
-                               options_.joint.relative_gap * cost_;
+    return certificate_ && std::isfinite(ReachedCost()) &&
+           ReachedCost() - certificate_->lower_bound <=
+               options_.joint.relative_gap * ReachedCost();
   }
   // Whether the true cost is so near to what is proved of the rows that its own
   // proof may reach the gap.
@@ -69,6 +90,9 @@ class Rounds {
     return rows_certificate_ &&
            cost_ - rows_certificate_->lower_bound <=
                kWorthProving * options_.joint.relative_gap * cost_;
+  }
+  bool IsRefuted() const {
+    return summary_.termination == SolveTermination::kInfeasible;
   }
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
@@ -83,9 +107,11 @@ class Rounds {
   bool HaveRowsServed(const Estimate& swept, double linear_cost) const;
   bool RunOne();
   void Prove();
+  bool TakeLevel(double optimum);
 
   const Model& model_;
   const SolveModelOptions options_;
+  SolveModelOptions rows_options_;  // of a round's rows
   const SolveMethod method_;
   const Context& context_;
   const Timer& timer_;
@@ -93,7 +119,8 @@ class Rounds {
   BuiltProblem& built_;
   Estimate& estimate_;
   SolveSummary& summary_;
-  double cost_;  // true, pixels
+  KeptPositions positions_;
+  double cost_;  // true, pixels, or by the level of positions if that is more
   TrustRegions trust_;
   int num_idle_rounds_ = 0;
   // Of the last round: the rows' certificate, and what its observations are
@@ -114,16 +141,14 @@ void Rounds::Prove() {
         model_, built_, options_.norm, certificate,
         BearingsOfPoints(model_, built_, estimate_, certificate), context_);
   } else {
-    std::vector<int64_t> support;
-    for (const CertifiedObservation& o : certificate.observations) {
-      const int64_t i = observation_of_.empty()
-                            ? o.observation
-                            : observation_of_[o.observation];
-      if (i >= 0) support.push_back(i);
-    }
-    proof = ProveInPixels(
-        model_, built_, estimate_, options_.norm, std::move(support),
-        (1 - kProofShare * options_.joint.relative_gap) * cost_, context_);
+    const std::vector<int64_t> support =
+        SupportOf(certificate, observation_of_);
+    const double sufficient =
+        (1 - kProofShare * options_.joint.relative_gap) * cost_;
+    proof = positions_.Any()
+                ? positions_.Prove(estimate_, support, sufficient)
+                : ProveInPixels(model_, built_, estimate_, options_.norm,
+                                support, sufficient, context_);
   }
   if (proof &&
       (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
@@ -131,10 +156,29 @@ void Rounds::Prove() {
   }
 }
 
+// Where positions are known: whether the next round has another level, or it is
+// proved that there need not be any.
+bool Rounds::TakeLevel(double optimum) {
+  positions_.Keep(estimate_);
+  if (rows_certificate_) {
+    std::optional<PixelCertificate> refutation =
+        positions_.Refute(estimate_, *rows_certificate_,
+                          SupportOf(*rows_certificate_, observation_of_));
+    if (refutation) {
+      certificate_ = std::move(refutation);
+      summary_.termination = SolveTermination::kInfeasible;
+      return false;
+    }
+  }
+  const bool is_another = positions_.TakeLevel(estimate_, optimum, cost_);
+  if (is_another) cost_ = LevelledCost(estimate_);
+  return is_another;
+}
+
 // Whether sweeps came so far that the rows no longer say what is left to gain:
 // solving them would be in vain.
 bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) const {
-  if (reprojection_.IsLinear()) return false;
+  if (reprojection_.IsLinear() || positions_.Any()) return false;
   const double cost = TrueCost(swept);
   return cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost;
 }
@@ -154,7 +198,7 @@ bool Rounds::RunOne() {
   }
   Estimate solved = estimate_;
   rows_certificate_ = SolveRows(
-      problem, options_, method_, summary_.rounds.empty(),
+      problem, rows_options_, method_, summary_.rounds.empty(),
       [this](const Estimate& swept, double linear_cost) {
         return HaveRowsServed(swept, linear_cost);
       },
@@ -179,7 +223,7 @@ bool Rounds::RunOne() {
                                      options_.norm, context_.num_threads);
     round.step = 1;
   }
-  cost_ = TrueCost(estimate_);
+  cost_ = LevelledCost(estimate_);
   int64_t num_bounded = 0;
   if (round.step < 1) {
     num_bounded =
@@ -189,19 +233,21 @@ bool Rounds::RunOne() {
     trust_.Clear();
   }
   reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
-  if (IsWorthProving()) Prove();
+  const bool has_level = positions_.Any() && TakeLevel(round.linear_cost);
+  if (!has_level && !IsRefuted() && IsWorthProving()) Prove();
 
-  round.cost = cost_;
+  round.cost = PixelCost();
   if (certificate_) round.lower_bound = certificate_->lower_bound;
   round.seconds = timer_.Seconds();
   summary_.rounds.push_back(round);
   // The published algorithms know one linear problem.
   const bool is_as_in_paper =
       options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
-  if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() ||
+  if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() || IsRefuted() ||
       IsInterrupted() || IsGapReached() || IsZeroUpToRounding(cost_)) {
     return false;
   }
+  if (has_level) return true;
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
   num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
   if (num_bounded == 0) return !is_idle;
@@ -209,17 +255,22 @@ bool Rounds::RunOne() {
 }
 
 void Rounds::Run() {
-  summary_.cost_initial = cost_;
-  if (method_ != SolveMethod::kResInt && IsZeroUpToRounding(cost_)) {
+  summary_.cost_initial = PixelCost();
+  if (method_ != SolveMethod::kResInt && IsZeroUpToRounding(ReachedCost())) {
     summary_.termination = SolveTermination::kZeroCost;
-    summary_.cost_final = cost_;
+    summary_.cost_final = ReachedCost();
     return;
   }
   reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
   while (RunOne() && summary_.rounds.size() < kMaxRounds) {
   }
+  if (IsRefuted()) return;
   if (!certificate_ && !IsInterrupted()) Prove();
-  summary_.cost_final = cost_;
+  if (std::isfinite(positions_.cost())) {
+    estimate_ = positions_.estimate();
+    reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
+  }
+  summary_.cost_final = cost_ = PixelCost();
   if (IsZeroUpToRounding(cost_) && method_ != SolveMethod::kResInt &&
       !IsInterrupted()) {
     summary_.termination = SolveTermination::kZeroCost;

@@ -1,9 +1,12 @@
 #include "krot/pipeline/run_finish.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
+#include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/pipeline/position_level.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 
@@ -18,6 +21,9 @@ constexpr double kRounding = 1e-7;
 constexpr int kSweeps = 2;
 // What a sweep may add to the cost by rounding, relative.
 constexpr double kCostRounding = 1e-12;
+// How much of what positions may be off by the finish takes: more than rounds.
+constexpr double kShareOfKept = 0.75;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void FinishByLeastSquares(const Reprojection& reprojection,
                           const SolveModelOptions& options,
@@ -32,15 +38,24 @@ void FinishByLeastSquares(const Reprojection& reprojection,
       lower_bound && finish.lowest_cost - *lower_bound <=
                          options.joint.relative_gap * finish.lowest_cost;
   const double lowest = is_lowest_known ? *lower_bound : finish.lowest_cost;
-  finish.cap = options.finish.max_error.value_or(std::min(
-      (1 + options.finish.slack) * lowest, summary->cost_initial));
-  if (!(finish.lowest_cost < (1 - kLeastRoom) * finish.cap)) return;
+  // The input's errors say nothing where positions hold it back.
+  const double highest =
+      built->positions.empty() ? summary->cost_initial : kInfinity;
+  finish.cap = options.finish.max_error.value_or(
+      std::min((1 + options.finish.slack) * lowest, highest));
+  if (!(finish.lowest_cost < (1 - kLeastRoom) * finish.cap) ||
+      LargestPositionRatio(*built, *estimate) > 1 + kKeptInRounds) {
+    return;
+  }
 
   BoundedOptions bounded;
   bounded.norm = options.norm;
   bounded.cap = (1 - kRounding) * finish.cap;
   bounded.loss = options.finish.loss;
   bounded.callback = options.finish.callback;
+  bounded.num_errors = static_cast<int64_t>(built->pixels.size());
+  built->position_level = bounded.cap / (1 + kShareOfKept * kKeptPosition);
+  TakePositionRows(*built, *estimate, &built->problem);
   if (!reprojection.IsLinear()) {
     bounded.take_rows = [&](const Estimate& x, KnownRotationProblem* rows) {
       return reprojection.TakeRows(x, context.num_threads, rows);
@@ -50,7 +65,10 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   finish.solve = MinimizeBounded(built->problem, bounded, context, &finished);
   const double cost =
       reprojection.TrueCost(finished, options.norm, context.num_threads);
-  if (!(cost <= finish.cap)) return;
+  if (!(cost <= finish.cap) ||
+      LargestPositionRatio(*built, finished) > 1 + kKeptPosition) {
+    return;
+  }
   *estimate = std::move(finished);
   reprojection.TakeRows(*estimate, context.num_threads, &built->problem);
   summary->cost_final = cost;

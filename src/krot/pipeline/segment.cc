@@ -32,11 +32,11 @@ Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
                        const Estimate& to, Norm norm, int num_threads,
                        double* step) {
   Estimate best = from;
-  double best_cost = reprojection.TrueCost(from, norm, num_threads);
+  double best_cost = reprojection.LevelledCost(from, norm, num_threads);
   *step = 0;
   for (double trial = 1; trial >= kShortestStep; trial *= kShorter) {
     Estimate candidate = trial == 1 ? to : Between(from, to, trial);
-    const double cost = reprojection.TrueCost(candidate, norm, num_threads);
+    const double cost = reprojection.LevelledCost(candidate, norm, num_threads);
     if (cost < best_cost) {
       best = std::move(candidate);
       best_cost = cost;

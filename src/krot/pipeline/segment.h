@@ -7,9 +7,9 @@
 namespace krot {
 
 // How far to go along the segment from `from` to `to`, the solution of the
-// linear rows taken at `from`, in true errors: on all of it the rows' cost is
-// at most that at `from` [quasi-convexity], so a short enough step lowers the
-// true one wherever `from` is not stationary.
+// linear rows taken at `from`, in true errors and in how positions are kept: on
+// all of it the rows' cost is at most that at `from` [quasi-convexity], so a
+// short enough step lowers the true one wherever `from` is not stationary.
 
 // The best estimate found, `from` if none is below it; `*step` in [0, 1].
 // O(observations) per trial.

@@ -9,6 +9,7 @@
 #include "krot/base/timer.h"
 #include "krot/bridge/carry_left_out.h"
 #include "krot/bridge/pixel_certificate.h"
+#include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
@@ -27,6 +28,8 @@ namespace {
 constexpr double kGapOfAnswer = 1e-2;
 // What rounding may add to the largest error, relative.
 constexpr double kErrorRounding = 1e-9;
+// Of the bound of a start, the level at which it keeps positions.
+constexpr double kShareOfStart = 0.99;
 
 void CheckOptions(const SolveModelOptions& options) {
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
@@ -38,20 +41,30 @@ void CheckOptions(const SolveModelOptions& options) {
   CheckArgument(
       options.method != SolveMethod::kJoint || HasJointSolver(options.norm),
       "norm.p", options.norm.p, "1, 2 or infinity with this method");
+  if (options.problem.positions.empty()) return;
+  CheckArgument(options.norm.p == 2, "norm.p", options.norm.p,
+                "2 with problem.positions");
+  CheckArgument(EffectiveMethod(options) != SolveMethod::kResInt, "method",
+                "kResInt", "another with problem.positions");
+  CheckArgument(options.polish == Polish::kNone, "polish", "not kNone",
+                "kNone with problem.positions");
+  CheckArgument(options.finish.finish != Finish::kSweeps, "finish", "kSweeps",
+                "another with problem.positions");
 }
 
 void CountProblem(const Model& model, const BuiltProblem& built,
                   SolveSummary* summary) {
   const KnownRotationProblem& problem = built.problem;
   summary->num_frames = problem.num_frames;
-  summary->num_images = static_cast<int64_t>(problem.views.size());
-  summary->num_points = problem.num_points;
-  summary->num_observations = static_cast<int64_t>(problem.observations.size());
+  summary->num_images = static_cast<int64_t>(built.image_of.size());
+  summary->num_points = static_cast<int64_t>(built.point_of.size());
+  summary->num_observations = static_cast<int64_t>(built.pixels.size());
+  summary->num_positions = static_cast<int64_t>(built.positions.size());
   summary->num_components = FindComponents(problem).count;
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     summary->num_fixed_frames += problem.IsFixedFrame(f);
   }
-  for (int32_t k = 0; k < problem.num_points; ++k) {
+  for (int32_t k = 0; k < summary->num_points; ++k) {
     summary->num_fixed_points += problem.IsFixedPoint(k);
   }
   summary->left_out = built.left_out;
@@ -77,6 +90,8 @@ void Certify(const Model& model, const Start& start, const Estimate& estimate,
     summary->lower_bound = check.lower_bound;
     summary->support = ListSupport(model, start.built, estimate, options.norm,
                                    certificate->rows);
+    summary->support_positions =
+        ListSupportPositions(model, start.built, estimate, *certificate);
     if (options.describe_certificate) {
       summary->certificate =
           DescribeCertificate(model, start.built, options.norm, *certificate);
@@ -91,10 +106,12 @@ void CertifyInfeasible(const Model& model, const Start& start,
                        const std::optional<Certificate>& certificate,
                        SolveSummary* summary) {
   if (!certificate) return;
+  Certificate levelled = *certificate;
+  LevelPositions(start.built, &levelled);
   Certify(model, start, start.built.start, options, context,
-          MakePixelCertificate(
-              model, start.built, options.norm, *certificate,
-              BearingsOfPixels(model, start.built, *certificate), context),
+          MakePixelCertificate(model, start.built, options.norm, levelled,
+                               BearingsOfPixels(model, start.built, levelled),
+                               context),
           summary);
 }
 
@@ -120,7 +137,9 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
       summary->termination == SolveTermination::kZeroCost ||
       summary->termination == SolveTermination::kStalled;
   if (!has_ended || summary->method == SolveMethod::kResInt) return;
-  if (IsZeroUpToRounding(summary->cost_final)) {
+  if (summary->largest_position_ratio > 1 + kKeptPosition) {
+    summary->termination = SolveTermination::kUnproved;
+  } else if (IsZeroUpToRounding(summary->cost_final)) {
     summary->termination = SolveTermination::kZeroCost;
   } else if (is_within(wanted_gap)) {
     summary->termination = SolveTermination::kGapReached;
@@ -140,6 +159,9 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
     *estimate = start->built.start;
     return true;
   }
+  // Below the bound that is to be proved, if there is none.
+  TakePositionRowsOfStart(kShareOfStart * options.init_max_error,
+                          &start->built);
   FoundStart found =
       FindFeasibleStart(start->built.problem, options, context,
                         LogIterations(options.joint.callback, timer, summary));
@@ -148,7 +170,8 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
     return true;
   }
   summary->termination = found.termination;
-  const bool was_asked = options.init == SolveInit::kFeasible;
+  const bool was_asked =
+      options.init == SolveInit::kFeasible || !start->built.positions.empty();
   if (found.termination == SolveTermination::kInterrupted || was_asked) {
     CertifyInfeasible(model, *start, options, context, found.certificate,
                       summary);
@@ -218,6 +241,12 @@ SolveModelResult SolveInFrame(const Model& model,
   const std::optional<PixelCertificate> certificate =
       SolveInRounds(model, options, summary.method, context, solve_timer,
                     &start.built, &estimate, &summary);
+  if (summary.termination == SolveTermination::kInfeasible) {
+    Certify(model, start, estimate, options, context, certificate, &summary);
+    summary.seconds_solve = solve_timer.Seconds();
+    result.model = model;
+    return result;
+  }
   if (summary.method == SolveMethod::kAuto &&
       summary.termination != SolveTermination::kInterrupted) {
     RunFinish(
@@ -230,6 +259,7 @@ SolveModelResult SolveInFrame(const Model& model,
                            num_threads, &estimate);
   }
   PutFixed(start.built.problem, &estimate);
+  summary.largest_position_ratio = LargestPositionRatio(start.built, estimate);
   const Reprojection reprojection(model, start.built);
   summary.cost_final =
       reprojection.TrueCost(estimate, options.norm, num_threads);
@@ -238,7 +268,10 @@ SolveModelResult SolveInFrame(const Model& model,
       PixelErrors(model, num_threads, options.norm);
   CarryLeftOutPoints(model, before_px, options.norm, start.built,
                      options.problem.fixed, summary.cost_final, &result.model);
-  if (IsWorse(before_px, PixelErrors(result.model, num_threads, options.norm),
+  // Where positions are known, errors that were lower without them do not
+  // count.
+  if (start.built.positions.empty() &&
+      IsWorse(before_px, PixelErrors(result.model, num_threads, options.norm),
               options.finish.max_error.value_or(0))) {
     summary.is_given_back = true;
     summary.finish.reset();

@@ -26,6 +26,16 @@ void PlaceFixed(const Model& model, CertificateFile* certificate) {
   }
 }
 
+// Likewise, in the model's frame.
+void PlaceKnown(const Model& model, const std::vector<KnownPosition>& known,
+                CertificateFile* certificate) {
+  for (CertificateFile::Position& position : certificate->positions) {
+    for (const KnownPosition& k : known) {
+      if (model.images[k.image].id == position.image_id) position.xyz = k.xyz;
+    }
+  }
+}
+
 }  // namespace
 
 SolveMethod EffectiveMethod(const SolveModelOptions& options) {
@@ -39,12 +49,16 @@ SolveMethod EffectiveMethod(const SolveModelOptions& options) {
 SolveModelResult SolveModel(const Model& model,
                             const SolveModelOptions& options,
                             const Context& context) {
-  SolveModelResult result =
-      InLocalFrame(model, options.problem.fixed, [&](const Model& local) {
-        return SolveInFrame(local, options, context);
-      });
+  const BuildProblemOptions& known = options.problem;
+  const LocalFrame frame(model, known.fixed, known.positions);
+  SolveModelOptions local_options = options;
+  local_options.problem.positions = frame.ToLocal(known.positions);
+  SolveModelResult result = InLocalFrame(frame, model, [&](const Model& local) {
+    return SolveInFrame(local, local_options, context);
+  });
   if (result.summary.certificate) {
     PlaceFixed(model, &*result.summary.certificate);
+    PlaceKnown(model, known.positions, &*result.summary.certificate);
   }
   return result;
 }

@@ -76,6 +76,10 @@ struct SolveSummary {
   int32_t num_components = 0;
   int64_t num_fixed_frames = 0;
   int64_t num_fixed_points = 0;
+  int64_t num_positions = 0;  // that are known
+  // Of a camera's distance from its position to the radius, of the model
+  // written.
+  double largest_position_ratio = 0;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
   int64_t num_same_image_tracks = 0;  // that hold an image more than once
@@ -99,8 +103,9 @@ struct SolveSummary {
   std::optional<double> lower_bound;  // true pixels
   std::optional<double>
       relative_gap;  // (cost_final - lower_bound) / cost_final, if finite
-  std::vector<SupportObservation> support;     // worst first
-  std::optional<CertificateFile> certificate;  // if asked for
+  std::vector<SupportObservation> support;         // worst first
+  std::vector<SupportPosition> support_positions;  // largest share first
+  std::optional<CertificateFile> certificate;      // if asked for
 
   // No estimate was found whose largest error in the p-norm, over all
   // observations that had a finite one, is not above the input's, or above
@@ -173,7 +178,11 @@ struct SolveModelResult {
 // points and all orders stay; so do, per connected component, the centroid of
 // the camera centres and, unless a rig fixes it, their RMS distance to it,
 // where the model has finite ones. What options.problem.fixed marks keeps its
-// bits, and place and scale come from it.
+// bits, and place and scale come from it. Cameras with
+// options.problem.positions come to be within their radii (to 1e-6 of them), at
+// the lowest maximum that leaves; that needs p = 2, a joint solver and no
+// polish. It may be above the input's: what is given back then is not the
+// input.
 //
 // Models far from the origin are solved in a local frame
 // (krot/model/local_frame.h); costs and errors are those before the

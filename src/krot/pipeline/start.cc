@@ -3,6 +3,8 @@
 #include <string>
 #include <utility>
 
+#include "krot/bridge/position_rows.h"
+#include "krot/bridge/reprojection.h"
 #include "krot/geometry/rigid_transform.h"
 #include "krot/joint/initializer.h"
 
@@ -25,10 +27,23 @@ bool CentresCoincide(const BuiltProblem& built) {
   };
   if (built.problem.num_frames < 2) return false;
   const Eigen::Vector3d first = centre(built.problem.views.front());
-  for (const View& view : built.problem.views) {
-    if (centre(view) != first) return false;
+  for (size_t v = 0; v < built.image_of.size(); ++v) {
+    if (centre(built.problem.views[v]) != first) return false;
   }
   return true;
+}
+
+// Whether the cameras are so far from where they are known to be that a start
+// from there is no help.
+bool IsFarFromPositions(const Model& model, const BuiltProblem& own,
+                        const SolveModelOptions& options,
+                        const Context& context) {
+  if (own.positions.empty()) return false;
+  const double cost =
+      Reprojection(model, own)
+          .TrueCost(own.start, options.norm, context.num_threads);
+  return !(cost * LargestPositionRatio(own, own.start) <=
+           options.init_max_error);
 }
 
 std::string NumberOfMissing(const BuiltProblem& all, const BuiltProblem& own) {
@@ -64,7 +79,9 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
   };
   const bool coincide = CentresCoincide(own.built);
   const bool asked = options.init == SolveInit::kFeasible;
-  if (!asked && !coincide && count(LeftOut::kBehind) == 0 &&
+  const bool is_far =
+      !coincide && IsFarFromPositions(model, own.built, options, context);
+  if (!asked && !coincide && !is_far && count(LeftOut::kBehind) == 0 &&
       count(LeftOut::kNoPose) == 0) {
     return own;
   }
@@ -72,6 +89,12 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
   Start all{Build(model, options, context, /*ignore_translations=*/true),
             SolveInit::kFeasible};
   if (asked) return all;
+  if (is_far) {
+    context.Note(
+        "the model's cameras are far from their positions; looking for a start "
+        "that is not");
+    return all;
+  }
   const bool is_larger = IsLarger(all.built, own.built);
   if (!is_larger && !coincide) return own;
   if (method != SolveMethod::kAuto) {

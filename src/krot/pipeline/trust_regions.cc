@@ -38,14 +38,13 @@ int64_t TrustRegions::Shrink(const Reprojection& reprojection,
                              const Estimate& from, const Estimate& to,
                              Norm norm, double level) {
   int64_t count = 0;
-  for (size_t i = 0; i < problem.observations.size(); ++i) {
-    const int64_t index = static_cast<int64_t>(i);
-    if (!(reprojection.Error(to, norm, index) > level)) continue;
+  for (int64_t i = 0; i < reprojection.num_observations(); ++i) {
+    if (!(reprojection.Error(to, norm, i) > level)) continue;
     const Observation& observation = problem.observations[i];
     const Basis basis = BasisAcross(InCamera(problem, from, observation));
     const Vector3d x_cam = InCamera(problem, to, observation);
     const double way = (basis * x_cam).norm() / observation.E.row(0).dot(x_cam);
-    const auto [entry, is_new] = radii_.emplace(index, kShareOfWay * way);
+    const auto [entry, is_new] = radii_.emplace(i, kShareOfWay * way);
     if (!is_new) entry->second = kShareOfWay * std::min(entry->second, way);
     ++count;
   }

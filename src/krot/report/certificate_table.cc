@@ -22,7 +22,33 @@ std::string FixedSentence(const CertificateVerdict& verdict) {
          " as fixed where they stand in this model.\n";
 }
 
+std::string PositionsSentence(const CertificateVerdict& verdict) {
+  if (verdict.positions.empty()) return "";
+  return "It takes " +
+         Counted(static_cast<int64_t>(verdict.positions.size()), "camera") +
+         " to be within the radii below of the positions in its file.\n";
+}
+
 }  // namespace
+
+std::string PositionsTable(const std::vector<SupportPosition>& positions,
+                           int max_positions) {
+  if (positions.empty()) return "";
+  const size_t count =
+      std::min(positions.size(), static_cast<size_t>(max_positions));
+  TextTable table;
+  table.AddRow({"image", "share", "distance", "radius"});
+  for (size_t n = 0; n < count; ++n) {
+    const SupportPosition& p = positions[n];
+    table.AddRow({p.image_name, FormatNumber(p.share, 4),
+                  FormatNumber(p.distance, 6), FormatNumber(p.radius, 6)});
+  }
+  return "\nKnown positions that hold cameras against the support: " +
+         std::to_string(positions.size()) +
+         (count < positions.size() ? "; the first " + std::to_string(count)
+                                   : std::string()) +
+         "\n" + table.ToString();
+}
 
 std::string SupportTable(const std::vector<SupportObservation>& support,
                          int max_observations) {
@@ -56,8 +82,10 @@ std::string CertificateTable(const CertificateVerdict& verdict,
                                      : "-"});
   return "The certificate holds: whatever the translations and points, the "
          "largest error is at least\nthe lower bound, in pixels.\n" +
-         FixedSentence(verdict) + LinearisedSentence(verdict) +
-         bounds.ToString() + SupportTable(verdict.support, max_observations);
+         FixedSentence(verdict) + PositionsSentence(verdict) +
+         LinearisedSentence(verdict) + bounds.ToString() +
+         SupportTable(verdict.support, max_observations) +
+         PositionsTable(verdict.positions, max_observations);
 }
 
 }  // namespace krot

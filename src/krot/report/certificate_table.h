@@ -8,6 +8,10 @@
 namespace krot {
 
 // The `max_observations` worst of a support.
+// The known positions in a support; empty without any.
+std::string PositionsTable(const std::vector<SupportPosition>& positions,
+                           int max_positions);
+
 std::string SupportTable(const std::vector<SupportObservation>& support,
                          int max_observations);
 

@@ -75,6 +75,18 @@ Json SupportJson(const std::vector<SupportObservation>& support) {
   return json;
 }
 
+Json PositionsJson(const std::vector<SupportPosition>& positions) {
+  Json json = Json::array();
+  for (const SupportPosition& position : positions) {
+    json.push_back({{"image_id", position.image_id},
+                    {"image_name", position.image_name},
+                    {"share", position.share},
+                    {"distance", position.distance},
+                    {"radius", position.radius}});
+  }
+  return json;
+}
+
 Json PolishJson(const std::optional<PolishSummary>& polish) {
   if (!polish) return {};
   const BundleAdjustmentSummary& adjustment = polish->adjustment;
@@ -177,6 +189,9 @@ std::string SolveJson(const SolveReport& report) {
       {"fixed",
        {{"num_frames", summary.num_fixed_frames},
         {"num_points", summary.num_fixed_points}}},
+      {"positions",
+       {{"num_known", summary.num_positions},
+        {"largest_ratio", summary.largest_position_ratio}}},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},
@@ -195,6 +210,7 @@ std::string SolveJson(const SolveReport& report) {
       {"sweeps", sweeps},
       {"iterations", JointIterationsJson(summary.iterations)},
       {"support", SupportJson(summary.support)},
+      {"support_positions", PositionsJson(summary.support_positions)},
       {"seconds",
        {{"read", report.run.seconds_read},
         {"build", summary.seconds_build},

@@ -34,7 +34,8 @@ std::string BoundWords(const SolveSummary& summary) {
   const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
   const bool has_fixed =
       summary.num_fixed_frames + summary.num_fixed_points > 0;
-  return (has_fixed ? std::string("with what is fixed, ") : std::string()) +
+  const std::string given = !has_fixed ? "" : "with what is fixed, ";
+  return given + (summary.num_positions > 0 ? "with these positions, " : "") +
          "no translations and points bring all errors below " +
          FormatNumber(bound, 4) + " px";
 }
@@ -192,6 +193,20 @@ std::string SameImageSentence(const SolveSummary& summary) {
   return sentence + ".\n";
 }
 
+// How cameras stand to where they are known to be.
+std::string PositionsKeptSentence(const SolveSummary& summary) {
+  if (summary.num_positions == 0) return "";
+  const std::string ratio =
+      FormatNumber(100 * summary.largest_position_ratio, 2) +
+      " % of its radius.\n";
+  return summary.largest_position_ratio > 1 + 1e-6
+             ? "Not all cameras came to be where they are known to be: one is "
+               "off by " +
+                   ratio
+             : Counted(summary.num_positions, "known position") +
+                   " kept; the farthest camera is off by " + ratio;
+}
+
 // What was left out so that all else is within a bound.
 std::string BracketOf(const SolveReport& report) {
   if (!report.outliers) return "";
@@ -220,9 +235,11 @@ std::string SolveTable(const SolveReport& report) {
          << Counted(summary.num_components, "component")
          << " without observations in common; each is solved.\n";
   }
-  text << SolveEndSentence(summary) << '\n' << Verdict(summary) << '\n';
+  text << PositionsKeptSentence(summary) << SolveEndSentence(summary) << '\n'
+       << Verdict(summary) << '\n';
   if (summary.is_certified) {
-    text << SupportTable(summary.support, kListedSupport);
+    text << SupportTable(summary.support, kListedSupport)
+         << PositionsTable(summary.support_positions, kListedSupport);
   }
   text << (summary.is_certified ? "\n" : "")
        << RunSentence(report.run,

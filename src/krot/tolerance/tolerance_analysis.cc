@@ -226,9 +226,10 @@ ToleranceResult AnalyzeTolerances(const Model& model,
   CheckOptions(model, options);
   const FixedParts& fixed = options.solve.problem.fixed;
   const Eigen::Vector3d origin = LocalFrame(model, fixed).origin();
-  ToleranceResult result = InLocalFrame(model, fixed, [&](const Model& local) {
-    return AnalyzeInFrame(local, options, context);
-  });
+  ToleranceResult result =
+      InLocalFrame(LocalFrame(model, fixed), model, [&](const Model& local) {
+        return AnalyzeInFrame(local, options, context);
+      });
   if (origin.isZero(0)) return result;
   for (ToleranceBox& box : result.summary.boxes) Shift(origin, &box);
   return result;

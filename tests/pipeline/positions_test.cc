@@ -1,0 +1,275 @@
+// Cameras within a radius of where they are known to be. The oracle of a bound
+// is the dual of the balls themselves, which knows no cones, levels and rounds.
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "krot/bridge/certificate_verdict.h"
+#include "krot/bridge/reprojection.h"
+#include "krot/camera/projection_row.h"
+#include "krot/model/id_index.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/local_frame.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kKept = 1e-6;  // of a radius
+
+SceneOptions Options() {
+  SceneOptions options;
+  options.num_frames = 6;
+  options.num_points = 60;
+  options.track_length = 4;
+  options.pixel_noise = 0.5;
+  options.start_point_noise = 0.002;
+  options.random_seed = 3;
+  return options;
+}
+
+Vector3d CentreOf(const Model& model, int32_t image) {
+  return Center(ImageGeometries(model)[image].cam_from_world);
+}
+
+// Half of the images, `radius` around points that are `off` radii from where
+// the model has them.
+std::vector<KnownPosition> Positions(const Model& model, double radius,
+                                     double off, int step) {
+  std::mt19937 generator(7);
+  std::normal_distribution<double> normal;
+  std::vector<KnownPosition> positions;
+  for (size_t n = 0; n < model.images.size(); n += step) {
+    const Vector3d direction =
+        Vector3d(normal(generator), normal(generator), normal(generator))
+            .normalized();
+    const auto image = static_cast<int32_t>(n);
+    positions.push_back(
+        {image, CentreOf(model, image) + off * radius * direction, radius});
+  }
+  return positions;
+}
+
+SolveModelResult Solve(const Model& model,
+                       const std::vector<KnownPosition>& positions) {
+  SolveModelOptions options;
+  options.problem.positions = positions;
+  options.describe_certificate = true;
+  return SolveModel(model, options, {1});
+}
+
+double LargestRatio(const Model& model,
+                    const std::vector<KnownPosition>& positions) {
+  double largest = 0;
+  for (const KnownPosition& p : positions) {
+    largest =
+        std::max(largest, (CentreOf(model, p.image) - p.xyz).norm() / p.radius);
+  }
+  return largest;
+}
+
+// The largest value of sum_i (delta lambda_i w_i + y_i'v_i), over all points
+// and all cameras in their balls, in units of sum_i delta lambda_i r; of a
+// pinhole without rigs. Not above zero, it proves delta. Every camera of the
+// support must have a position.
+double DualValue(const Model& model, const CertificateFile& file) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const IdIndex<ImageId> images(model.images);
+  std::vector<Vector3d> on_camera(model.images.size(), Vector3d::Zero());
+  std::vector<Vector3d> on_point(model.points3D.size(), Vector3d::Zero());
+  const IdIndex<Point3DId> points(model.points3D);
+  double scale = 0;
+  for (const CertificateFile::SupportObservation& o : file.observations) {
+    const int32_t n = *images.Find(o.image_id);
+    const Camera& camera = model.cameras[geometries[n].camera];
+    const Point2D& point2D = model.images[n].points2D[o.point2D_idx];
+    const Eigen::Matrix3d E =
+        *RowAtProjection(camera.model_id, camera.params.data(),
+                         {point2D.x, point2D.y}, o.bearing);
+    const Vector3d force =
+        geometries[n].cam_from_world.rotation.transpose() *
+        (E.transpose() * Vector3d(file.rows_bound * o.lambda, o.y[0], o.y[1]));
+    on_point[*points.Find(o.point3D_id)] += force;
+    on_camera[n] -= force;
+    scale += file.rows_bound * o.lambda;
+  }
+  for (const Vector3d& sum : on_point) EXPECT_LT(sum.norm(), 1e-9 * scale);
+  double value = 0;
+  double radius = 0;
+  for (const CertificateFile::Position& p : file.positions) {
+    Vector3d& pull = on_camera[*images.Find(p.image_id)];
+    value += pull.dot(p.xyz) + p.radius * pull.norm();
+    pull.setZero();
+    radius = std::max(radius, p.radius);
+  }
+  for (const Vector3d& sum : on_camera) EXPECT_LT(sum.norm(), 1e-9 * scale);
+  return value / (scale * radius);
+}
+
+void ExpectProved(const Model& model, const SolveModelResult& result,
+                  const std::vector<KnownPosition>& positions) {
+  const SolveSummary& summary = result.summary;
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
+  EXPECT_LE(LargestRatio(result.model, positions), 1 + kKept);
+  EXPECT_NEAR(summary.largest_position_ratio,
+              LargestRatio(result.model, positions), 1e-6);
+  ASSERT_TRUE(summary.certificate);
+  EXPECT_LE(summary.LowestCost(), (1 + 2e-4) * *summary.lower_bound);
+  const CertificateVerdict verdict =
+      VerifyCertificateFile(model, *summary.certificate);
+  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+}
+
+TEST(Positions, ThatHoldCamerasBackHaveTheOptimumThatTheirDualProves) {
+  SceneOptions options = Options();
+  options.camera_model_id = 0;
+  const Model model = SynthesizeScene(options).model;
+  for (const double radius : {0.003, 0.03, 0.3}) {
+    SCOPED_TRACE(radius);
+    const std::vector<KnownPosition> positions =
+        Positions(model, radius, 1.3, 1);
+    const SolveModelResult result = Solve(model, positions);
+    ExpectProved(model, result, positions);
+    EXPECT_FALSE(result.summary.support_positions.empty());
+    ASSERT_TRUE(result.summary.certificate);
+    EXPECT_LE(DualValue(model, *result.summary.certificate), 1e-6);
+  }
+}
+
+TEST(Positions, ThatHoldNothingBackLeaveTheOptimum) {
+  const Model model = SynthesizeScene(Options()).model;
+  const SolveModelResult free = Solve(model, {});
+  const std::vector<KnownPosition> positions =
+      Positions(free.model, 0.05, 0.2, 2);
+  const SolveModelResult result = Solve(model, positions);
+  ExpectProved(model, result, positions);
+  EXPECT_LE(*result.summary.lower_bound, free.summary.LowestCost());
+  EXPECT_LE(*free.summary.lower_bound, result.summary.LowestCost());
+}
+
+TEST(Positions, BringAModelWithoutTranslationsToTheSameOptimum) {
+  const Model model = SynthesizeScene(Options()).model;
+  const std::vector<KnownPosition> positions = Positions(model, 0.02, 1.2, 1);
+  const SolveModelResult result = Solve(model, positions);
+  Model wiped = model;
+  for (Frame& frame : wiped.frames) frame.rig_from_world.translation.setZero();
+  for (Image& image : wiped.images) image.cam_from_world.translation.setZero();
+  for (Point3D& point : wiped.points3D) point.xyz.setZero();
+  const SolveModelResult from_nothing = Solve(wiped, positions);
+  ExpectProved(wiped, from_nothing, positions);
+  EXPECT_LE(*result.summary.lower_bound, from_nothing.summary.LowestCost());
+  EXPECT_LE(*from_nothing.summary.lower_bound, result.summary.LowestCost());
+}
+
+TEST(Positions, OfRigsAndFarAwayAreKept) {
+  SceneOptions options = Options();
+  options.sensors_per_rig = 2;
+  options.rig_baseline = 0.1;
+  const Model near = SynthesizeScene(options).model;
+  const std::vector<KnownPosition> positions = Positions(near, 0.02, 1.2, 2);
+  const SolveModelResult result = Solve(near, positions);
+  ExpectProved(near, result, positions);
+
+  const Vector3d shift(5e5, -3e5, 4e5);
+  Model far = near;
+  std::vector<KnownPosition> shifted = positions;
+  for (Frame& frame : far.frames) {
+    frame.rig_from_world.translation -= frame.rig_from_world.Rotation() * shift;
+  }
+  for (Image& image : far.images) {
+    image.cam_from_world.translation -= image.cam_from_world.Rotation() * shift;
+  }
+  for (Point3D& point : far.points3D) point.xyz += shift;
+  for (KnownPosition& position : shifted) position.xyz += shift;
+  const SolveModelResult of_far = Solve(far, shifted);
+  EXPECT_EQ(of_far.summary.termination, SolveTermination::kGapReached);
+  EXPECT_LE(LargestRatio(of_far.model, shifted), 1 + 2 * kKept);
+  EXPECT_NEAR(of_far.summary.LowestCost(), result.summary.LowestCost(),
+              3e-4 * result.summary.LowestCost());
+  const CertificateVerdict verdict =
+      VerifyCertificateFile(far, *of_far.summary.certificate);
+  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+}
+
+TEST(Positions, ThatContradictTheObservationsAreNamed) {
+  const Model model = SynthesizeScene(Options()).model;
+  std::vector<KnownPosition> positions = Positions(model, 0.02, 0, 1);
+  positions[3].xyz += Vector3d(0.05, 0.03, 0.02);
+  const SolveModelResult result = Solve(model, positions);
+  ExpectProved(model, result, positions);
+  ASSERT_FALSE(result.summary.support_positions.empty());
+  EXPECT_EQ(result.summary.support_positions[0].image_name,
+            model.images[3].name);
+
+  SolveModelOptions options;
+  options.problem.positions = positions;
+  options.init_max_error = *result.summary.lower_bound / 2;
+  const SolveModelResult refused = SolveModel(model, options, {1});
+  EXPECT_EQ(refused.summary.termination, SolveTermination::kInfeasible);
+  ASSERT_TRUE(refused.summary.is_certified);
+  EXPECT_GT(*refused.summary.lower_bound, options.init_max_error);
+  const auto& named = refused.summary.support_positions;
+  EXPECT_TRUE(std::any_of(named.begin(), named.end(), [&](const auto& p) {
+    return p.image_name == model.images[3].name;
+  }));
+}
+
+TEST(Positions, ThatNoRigCanHaveAreInConflictWithEachOther) {
+  SceneOptions options = Options();
+  options.sensors_per_rig = 2;
+  options.rig_baseline = 0.1;
+  const Model model = SynthesizeScene(options).model;
+  std::vector<KnownPosition> positions = Positions(model, 0.005, 0, 1);
+  // The two cameras of the first rig, twice as far from each other.
+  const Vector3d apart = positions[1].xyz - positions[0].xyz;
+  positions[0].xyz -= apart / 2;
+  positions[1].xyz += apart / 2;
+  const SolveSummary summary = Solve(model, positions).summary;
+  EXPECT_EQ(summary.termination, SolveTermination::kInfeasible);
+  EXPECT_TRUE(summary.is_certified);
+  EXPECT_TRUE(std::any_of(
+      summary.support_positions.begin(), summary.support_positions.end(),
+      [&](const auto& p) { return p.image_name == model.images[0].name; }));
+}
+
+TEST(Positions, OfATamperedCertificateAreRefused) {
+  const Model model = SynthesizeScene(Options()).model;
+  const std::vector<KnownPosition> positions = Positions(model, 0.02, 1.5, 1);
+  const CertificateFile file = *Solve(model, positions).summary.certificate;
+  ASSERT_FALSE(file.positions.empty());
+  ASSERT_TRUE(VerifyCertificateFile(model, file).is_accepted);
+  const auto is_accepted = [&](const auto& change) {
+    CertificateFile tampered = file;
+    change(&tampered);
+    return VerifyCertificateFile(model, tampered).is_accepted;
+  };
+  EXPECT_FALSE(is_accepted([](CertificateFile* f) {
+    f->lower_bound *= 1.001;
+    f->rows_bound *= 1.001;
+  }));
+  EXPECT_FALSE(
+      is_accepted([](CertificateFile* f) { f->positions[0].radius *= 1.1; }));
+  EXPECT_FALSE(is_accepted([](CertificateFile* f) { f->positions.clear(); }));
+  EXPECT_FALSE(is_accepted(
+      [](CertificateFile* f) { f->positions.push_back(f->positions[0]); }));
+  EXPECT_FALSE(is_accepted(
+      [](CertificateFile* f) { f->positions[0].rows[0].apex *= 2; }));
+  EXPECT_FALSE(is_accepted([](CertificateFile* f) {
+    for (CertificateFile::Position& p : f->positions) {
+      for (CertificateFile::Position::Row& row : p.rows) row.y *= 1.01;
+    }
+  }));
+  EXPECT_FALSE(is_accepted(
+      [](CertificateFile* f) { f->positions[0].radius = std::nan(""); }));
+}
+
+}  // namespace
+}  // namespace krot
