@@ -90,6 +90,10 @@ class Seeds:
         self.add("lists", b"\1" + "\n".join(words[0] for words in lines)
                  .encode())
         self.add("lists", b"\2# points\n1\n2\n16\n")
+        positions = "".join(
+            f"{' '.join(words[9:])} {' '.join(words[5:8])} 1e-2\n"
+            for words in lines)
+        self.add("lists", b"\3" + positions.encode())
 
     def options(self):
         table = re.findall(r"^  --(\S+)$.*?Default: (\S*?)\.?$",

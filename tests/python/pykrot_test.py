@@ -77,6 +77,23 @@ def test_tolerances_are_those_of_the_command(scene, tmp_path):
         pykrot.tolerances(pykrot.Model.read(scene), 0.01)
 
 
+def test_keeps_cameras_within_a_radius_of_their_positions(scene, tmp_path):
+    model = pykrot.Model.read(scene)
+    radius = 2e-3
+    off = np.random.default_rng(1).normal(size=model.centers.shape)
+    places = model.centers + 1.5 * radius * off / np.linalg.norm(
+        off, axis=1, keepdims=True)
+    positions = tmp_path / "positions.txt"
+    positions.write_text("".join(
+        f"{name} {x!r} {y!r} {z!r} {radius}\n"
+        for name, (x, y, z) in zip(model.image_names, places.tolist())))
+    result = pykrot.solve(model, positions_path=str(positions))
+    assert result.report["termination"] == "gap_reached"
+    assert result.report["support_positions"]
+    distances = np.linalg.norm(result.model.centers - places, axis=1)
+    assert distances.max() <= (1 + 1e-6) * radius
+
+
 def test_the_sample_ends_where_the_command_ends(tmp_path):
     run_krot("solver", "--input_path", SAMPLE, "--output_path",
              tmp_path / "command", "--output_type", "BIN")

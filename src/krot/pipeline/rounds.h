@@ -20,9 +20,9 @@ namespace krot {
 // The true cost never rises. Where a full step would raise it, the next round
 // bounds how far the observations to blame may move (trust_regions.h).
 //
-// Where positions are known (krot/bridge/position_rows.h) a round solves for a
-// level, too, and what rises or falls is their cost at it; the result is the best
-// estimate that keeps them, or kInfeasible with a proof that none does below
+// Where positions are known (krot/bridge/position_rows.h) every round has a
+// level, and what falls is the cost at that; the result is the best estimate
+// that keeps them, or kInfeasible with a proof that none does below
 // options.init_max_error.
 //
 // Fills in costs, rounds, termination, sweeps and iterations of the summary and

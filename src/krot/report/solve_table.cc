@@ -34,8 +34,11 @@ std::string BoundWords(const SolveSummary& summary) {
   const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
   const bool has_fixed =
       summary.num_fixed_frames + summary.num_fixed_points > 0;
-  const std::string given = !has_fixed ? "" : "with what is fixed, ";
-  return given + (summary.num_positions > 0 ? "with these positions, " : "") +
+  const bool has_positions = summary.num_positions > 0;
+  const std::string given = std::string(has_fixed ? "what is fixed" : "") +
+                            (has_fixed && has_positions ? " and " : "") +
+                            (has_positions ? "these positions" : "");
+  return (given.empty() ? given : "with " + given + ", ") +
          "no translations and points bring all errors below " +
          FormatNumber(bound, 4) + " px";
 }
