@@ -157,6 +157,22 @@ TEST(MinimizeExcess, GivesObservationsWithinTheBoundNoPrice) {
   }
 }
 
+TEST(MinimizeExcess, EndsWithTheGapAskedForHoweverFarApartTheWeightsAre) {
+  for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
+    const RandomScene scene = MakeScene(6);
+    const double cost = Cost(scene.problem, scene.estimate, norm, 1);
+    ExcessOptions options;
+    options.norm = norm;
+    for (size_t i = 0; i < scene.problem.observations.size(); ++i) {
+      options.weights.push_back(i % 5 == 0 ? 1e-7 : 1);
+    }
+    Estimate estimate = scene.estimate;
+    const ExcessSolution solution =
+        MinimizeExcess(scene.problem, 0.2 * cost, options, {}, &estimate);
+    EXPECT_EQ(solution.termination, InteriorPointTermination::kSmallestGap);
+  }
+}
+
 TEST(MinimizeExcess, RefusesOptionsOutOfRange) {
   const RandomScene scene = MakeScene(4);
   Estimate estimate = scene.estimate;

@@ -11,8 +11,11 @@ namespace {
 
 // Of the mean depth.
 constexpr double kMinDepthFromNothing = 0.05;
-// sigma starts this far, of b and the depth, above what it must be.
-constexpr double kExcessMargin = 0.5;
+// Where mu starts, of b. From an estimate it is the lower one: its forces soon
+// balance.
+constexpr double kExcessMuFromNothing = 0.5;
+constexpr double kExcessMu = 0.15;
+constexpr int kExcessSigmaSteps = 8;
 constexpr double kExcessDamping = 0.98;
 constexpr double kExcessNeighbourhood = 1e-3;
 constexpr double kExcessBacktracking = 0.7;
@@ -50,7 +53,30 @@ void ExcessSolver<Cone>::ViewAll(Iterate* iterate) const {
   });
 }
 
-// Centred: z = mu s^-1, zeta = mu / sigma.
+// Where the multipliers of both pairs, centred, add up to the cost,
+//
+//   mu (q's^-1 + 1 / sigma) = c_i,
+//
+// whose left side is convex and falls: Newton's method, from below.
+template <typename Cone>
+double ExcessSolver<Cone>::CentredSigma(const ViewedPoint& viewed, double cost,
+                                        double mu) const {
+  const double least = std::max(0.0, NormOf(viewed.v, options_.norm) -
+                                         bound_ * (viewed.depth - min_depth_));
+  double sigma = least + 0.5 * mu / cost;
+  for (int n = 0; n < kExcessSigmaSteps; ++n) {
+    const Vector inverse =
+        Cone::Divide(system_.Slack(viewed, sigma), Cone::Identity());
+    const double value = mu * (system_.Multiplier(inverse) + 1 / sigma) - cost;
+    const double slope =
+        -mu * (system_.Multiplier(Cone::Product(inverse, inverse)) +
+               1 / (sigma * sigma));
+    sigma -= value / slope;
+  }
+  return sigma;
+}
+
+// Centred, z = mu s^-1 and zeta = mu / sigma, whatever the weights.
 template <typename Cone>
 void ExcessSolver<Cone>::Start(const Estimate& start) {
   const size_t count = problem_.observations.size();
@@ -60,17 +86,14 @@ void ExcessSolver<Cone>::Start(const Estimate& start) {
   now_.zeta.resize(count);
   now_.z.resize(count);
   ViewAll(&now_);
-  const double mu = bound_ * kExcessMargin;
+  const double mu =
+      bound_ * (min_depth_ > 0 ? kExcessMuFromNothing : kExcessMu);
   system_.loop().ForEach([&](int64_t i) {
     const ViewedPoint& viewed = now_.viewed[i];
-    const double unit = kExcessMargin * bound_ * depths_[i];
-    const double weight = costs_[i] * depths_[i];
-    now_.sigma[i] = unit + std::max(0.0, NormOf(viewed.v, options_.norm) -
-                                             bound_ * viewed.depth);
-    now_.zeta[i] = weight * mu / now_.sigma[i];
-    now_.z[i] =
-        weight * mu *
-        Cone::Divide(system_.Slack(viewed, now_.sigma[i]), Cone::Identity());
+    now_.sigma[i] = CentredSigma(viewed, costs_[i], mu);
+    now_.zeta[i] = mu / now_.sigma[i];
+    now_.z[i] = mu * Cone::Divide(system_.Slack(viewed, now_.sigma[i]),
+                                  Cone::Identity());
   });
   trial_ = now_;
 }

@@ -43,6 +43,7 @@ class ExcessSolver {
     return costs;
   }
 
+  double CentredSigma(const ViewedPoint& viewed, double cost, double mu) const;
   void Start(const Estimate& start);
   void ViewAll(Iterate* iterate) const;
   Steps MaxSteps(double damping) const;

@@ -69,6 +69,8 @@ class ExcessSystem {
     return T_ * Eigen::Vector3d(bound_ * (viewed.depth - min_depth_) + sigma,
                                 viewed.v[0], viewed.v[1]);
   }
+  // q'z.
+  double Multiplier(const Vector& z) const { return T_.col(0).dot(z); }
   // `shortfall`: what e'x is to grow by, where the scale is free. False if
   // there is no factor.
   bool Factorize(const Iterate& at, double shortfall);

@@ -11,9 +11,9 @@
 namespace krot {
 namespace {
 
-// One programme is enough where the last level's weights are at hand.
-constexpr int kFirstProgrammes = 2;
-constexpr int kNextProgrammes = 1;
+// Few are enough where the last level's weights are at hand.
+constexpr int kFirstProgrammes = 4;
+constexpr int kNextProgrammes = 2;
 
 class Profiler {
  public:

@@ -18,8 +18,8 @@
 namespace krot {
 namespace {
 
-// More open observations than these are tried in two views only.
-constexpr size_t kMaxForMoreFrames = 2000;
+// Of the open observations so many, the worst, are tried in more frames.
+constexpr size_t kMaxForMoreFrames = 400;
 // More tight observations than these are left alone.
 constexpr size_t kMaxTight = 250;
 // Open observations that look for a conflict at the same time.
@@ -225,15 +225,17 @@ bool Packing::Charge(int64_t i, int num_others) {
   return false;
 }
 
-// Those that are left open found no conflict of their own.
+// Those that are left open found no conflict of their own. Those that barely
+// miss the bound hardly ever find one in more frames.
 void Packing::Charge(std::vector<int64_t>* open) {
   ChargeInTwoViews(open);
   for (const int num_others : {2, 3}) {
-    if (open->size() > kMaxForMoreFrames) return;
     std::vector<int64_t> left;
-    for (const int64_t i : *open) {
-      if (context_.IsCancelled() || IsTaken(i)) continue;
-      if (!Charge(i, num_others)) left.push_back(i);
+    for (size_t n = 0; n < open->size() && !context_.IsCancelled(); ++n) {
+      const int64_t i = (*open)[n];
+      if (IsTaken(i)) continue;
+      const bool is_tried = n + kMaxForMoreFrames >= open->size();
+      if (!is_tried || !Charge(i, num_others)) left.push_back(i);
     }
     *open = std::move(left);
   }

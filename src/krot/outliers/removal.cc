@@ -4,11 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "krot/bridge/built_part.h"
-#include "krot/bridge/reprojection.h"
+#include "krot/base/parallel_for.h"
 #include "krot/conic/excess_program.h"
 #include "krot/outliers/reweighting.h"
-#include "krot/problem/components.h"
 #include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
 
@@ -17,9 +15,11 @@ namespace {
 
 // Of the bound: what the interior point leaves open.
 constexpr double kInside = 1e-3;
-constexpr int kMaxProgrammes = 10;
+constexpr int kMaxProgrammes = 16;
 // So many programmes in a row that remove no fewer are the last but one.
-constexpr int kPatience = 2;
+constexpr int kPatience = 3;
+// Of the bound: what comes nearer is looked at from then on.
+constexpr double kNear = 0.5;
 // Of the bound: less excess is dear.
 constexpr double kDear = 0.03;
 // Where the programmes end, of the bound, and where the last one does.
@@ -29,6 +29,17 @@ constexpr double kFineMu = 1e-5;
 constexpr double kLargestExcess = 100;
 // Observations with less of a multiplier have no say.
 constexpr double kSmallPrice = 1e-2;
+constexpr int64_t kErrorsPerTask = 4096;
+
+// The observations above a bound, by their errors.
+std::vector<int64_t> Above(const std::vector<double>& errors,
+                           double max_error) {
+  std::vector<int64_t> above;
+  for (size_t i = 0; i < errors.size(); ++i) {
+    if (!(errors[i] <= max_error)) above.push_back(static_cast<int64_t>(i));
+  }
+  return above;
+}
 
 }  // namespace
 
@@ -38,58 +49,74 @@ RemovalSearch::RemovalSearch(const Model& model, const BuiltProblem& built,
       norm_(norm),
       context_(context),
       reprojection_(model, built),
-      components_(SplitIntoComponents(built.problem)),
       rows_(built.problem),
-      estimate_(built.start) {}
+      estimate_(built.start),
+      errors_(Errors(estimate_)),
+      near_(built.problem) {}
 
-std::vector<int64_t> RemovalSearch::Above(const Estimate& estimate) const {
-  std::vector<int64_t> above;
-  for (size_t i = 0; i < rows_.observations.size(); ++i) {
-    const int64_t observation = static_cast<int64_t>(i);
-    if (!(Error(estimate, observation) <= max_error_)) {
-      above.push_back(observation);
-    }
-  }
-  return above;
+std::vector<double> RemovalSearch::Errors(const Estimate& estimate) const {
+  std::vector<double> errors(rows_.observations.size());
+  ParallelFor(static_cast<int64_t>(errors.size()), kErrorsPerTask,
+              context_.num_threads, [&](int64_t begin, int64_t end, int) {
+                for (int64_t i = begin; i < end; ++i) {
+                  errors[i] = Error(estimate, i);
+                }
+              });
+  return errors;
 }
 
-std::vector<double> RemovalSearch::WeightsAtStart() const {
+std::vector<double> RemovalSearch::WeightsOfErrors() const {
   std::vector<double> excess;
-  for (size_t i = 0; i < rows_.observations.size(); ++i) {
-    const double error = Error(built_.start, static_cast<int64_t>(i));
+  for (const double error : errors_) {
     excess.push_back(
         std::clamp(error - max_error_, 0.0, kLargestExcess * max_error_));
   }
   return WeightsAgainst(excess, max_error_, kDear);
 }
 
-// Solves a component's programme, with rows as they are, and sets the weights
-// of the next.
-void RemovalSearch::Excess(const std::vector<int64_t>& component,
+// Solves what the part, which hangs together, exceeds the bound by, with rows
+// as they are, and sets the weights of the next programme.
+void RemovalSearch::Excess(const std::vector<int64_t>& part,
                            double smallest_mu) {
-  const ProblemSubset part(rows_, component);
+  const ProblemSubset subset(rows_, part);
   ExcessOptions options;
   options.norm = norm_;
   options.smallest_mu = smallest_mu;
-  for (const int64_t i : component) options.weights.push_back(weights_[i]);
-  Estimate own = part.Restrict(estimate_);
+  for (const int64_t i : part) options.weights.push_back(weights_[i]);
+  Estimate own = subset.Restrict(estimate_);
   const double level = (1 - kInside) * max_error_;
   const ExcessSolution solution =
-      MinimizeExcess(part.problem(), level, options, context_, &own);
-  part.Replace(own, &estimate_);
+      MinimizeExcess(subset.problem(), level, options, context_, &own);
+  subset.Replace(own, &estimate_);
   const std::vector<double> weights =
       WeightsAgainst(solution.excess, level, kDear);
-  for (size_t n = 0; n < component.size(); ++n) {
-    if (solution.price[n] > kSmallPrice) is_tight_[component[n]] = 1;
-    weights_[component[n]] = weights[n];
+  for (size_t n = 0; n < part.size(); ++n) {
+    if (solution.price[n] > kSmallPrice) is_tight_[part[n]] = 1;
+    weights_[part[n]] = weights[n];
   }
 }
 
-void RemovalSearch::Offer(const Estimate& estimate, Removal* best) const {
-  std::vector<int64_t> above = Above(estimate);
+// Of what comes near the bound. Others may have come above it afterwards, and
+// take part in the next with weights for that.
+void RemovalSearch::SolveProgramme(double smallest_mu) {
+  reprojection_.TakeRows(estimate_, context_.num_threads, &rows_);
+  near_.AddAbove(errors_, kNear * max_error_);
+  for (const std::vector<int64_t>& part : near_.Parts()) {
+    Excess(part, smallest_mu);
+  }
+  errors_ = Errors(estimate_);
+  const std::vector<double> weights = WeightsOfErrors();
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (!near_.Contains(static_cast<int64_t>(i))) weights_[i] = weights[i];
+  }
+}
+
+// The last programme's estimate, if it removes fewer.
+void RemovalSearch::Offer(Removal* best) const {
+  std::vector<int64_t> above = Above(errors_, max_error_);
   if (above.size() >= best->observations.size()) return;
   best->observations = std::move(above);
-  best->estimate = estimate;
+  best->estimate = estimate_;
 }
 
 // Every point with observations removed tries to take back that which is
@@ -147,20 +174,18 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   max_error_ = max_error;
   Removal best;
   best.estimate = built_.start;
-  best.observations = Above(built_.start);
-  Offer(estimate_, &best);
+  best.observations = Above(Errors(built_.start), max_error_);
+  Offer(&best);
   is_tight_.assign(rows_.observations.size(), 0);
-  if (weights_.empty()) weights_ = WeightsAtStart();
+  if (weights_.empty()) weights_ = WeightsOfErrors();
   int num_idle = 0;
   for (int n = 0; n < max_programmes && !context_.IsCancelled(); ++n) {
     if (best.observations.empty()) break;
     const bool is_last = num_idle == kPatience || n + 1 == max_programmes;
-    reprojection_.TakeRows(estimate_, context_.num_threads, &rows_);
-    for (const std::vector<int64_t>& component : components_) {
-      Excess(component, is_last ? kFineMu : kRoughMu);
-    }
+    if (n == 1) near_ = NearSet(built_.problem);  // the start's says little
+    SolveProgramme(is_last ? kFineMu : kRoughMu);
     const size_t before = best.observations.size();
-    Offer(estimate_, &best);
+    Offer(&best);
     if (is_last) break;
     const bool is_idle = n > 0 && best.observations.size() >= before;
     num_idle = is_idle ? num_idle + 1 : 0;

@@ -9,6 +9,7 @@
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
 #include "krot/outliers/decision.h"
+#include "krot/outliers/near_set.h"
 
 namespace krot {
 
@@ -25,9 +26,10 @@ struct Removal {
 // Few observations to remove, by the excess programme (conic/excess_program.h):
 // solved with weights that make those dear that exceed the bound by little at
 // the start, and again with those of the solution, as long as that makes them
-// fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. Points then
-// take back what they can where the frames stand. Never more than are above the
-// bound at built.start.
+// fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. It looks at
+// the observations that came near the bound so far; points then take back what
+// they can where the frames stand. Never more than are above the bound at
+// built.start.
 //
 // One bound after the other: each begins with the estimate and the weights that
 // the last one ended with.
@@ -44,20 +46,22 @@ class RemovalSearch {
   double Error(const Estimate& estimate, int64_t i) const {
     return reprojection_.Error(estimate, norm_, i);
   }
-  std::vector<int64_t> Above(const Estimate& estimate) const;
-  std::vector<double> WeightsAtStart() const;
-  void Excess(const std::vector<int64_t>& component, double smallest_mu);
-  void Offer(const Estimate& estimate, Removal* best) const;
+  std::vector<double> Errors(const Estimate& estimate) const;
+  std::vector<double> WeightsOfErrors() const;
+  void SolveProgramme(double smallest_mu);
+  void Excess(const std::vector<int64_t>& part, double smallest_mu);
+  void Offer(Removal* best) const;
   bool TakeBack(Removal* best);
 
   const BuiltProblem& built_;
   const Norm norm_;
   const Context context_;
   const Reprojection reprojection_;
-  const std::vector<std::vector<int64_t>> components_;
   double max_error_ = 0;
   KnownRotationProblem rows_;
-  Estimate estimate_;  // of the last programme
+  Estimate estimate_;           // of the last programme
+  std::vector<double> errors_;  // there
+  NearSet near_;
   std::vector<double> weights_;
   std::vector<char> is_tight_;
 };
