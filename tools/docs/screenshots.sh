@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Makes docs/images/page_*.png: the report page of the bundled sample, at a desk
 # and on a phone; its error profile; and outliers planted in it, in its photos.
+# Where build-wasm/krot.html is built, browser.png, too: that page with the sample.
 # Solves the sample with build/krot, or with the executable in KROT. Needs
 # python3, chromium and its driver, and povray for the photos, unless
 # tools/sample/render.sh has made them in PHOTOS.
@@ -30,6 +31,11 @@ python3 -B "$root/tests/page/plant.py" "$work/planted" 12
 "$krot" outlier_filter --input_path "$work/planted" \
   --output_path "$work/clean" --html_path "$work/suspects.html" \
   --image_path "$photos" --OutlierFilter.max_error 3.3 --log_level 0 >/dev/null
-PYTHONPATH=$root/tests/page python3 -B "$here/screenshots.py" \
+export PYTHONPATH=$root/tests/page
+if [[ -e $root/build-wasm/krot.html ]]; then
+  python3 -B "$here/browser_screenshot.py" "$root/build-wasm/krot.html" \
+    "$root/tools/sample/model" "$root/docs/images/browser.png"
+fi
+python3 -B "$here/screenshots.py" \
   "$work/page.html" "$work/filtered.html" "$work/suspects.html" \
   "$root/docs/images"
