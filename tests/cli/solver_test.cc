@@ -119,7 +119,8 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "sweeps", "iterations", "support", "seconds", "peak_memory_bytes",
           "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
           "linear_relative_gap", "is_given_back", "contradictions", "finish",
-          "same_image", "outliers", "rotations", "fixed"));
+          "same_image", "outliers", "rotations", "fixed", "positions",
+          "support_positions"));
   EXPECT_THAT(Keys(report["finish"]),
               ::testing::UnorderedElementsAre(
                   "finish", "loss", "termination", "cap", "lowest_cost",
