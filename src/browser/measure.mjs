@@ -1,7 +1,8 @@
 // node measure.mjs BUILD_WASM KROT MODEL...
 //
 // Solves each model by BUILD_WASM/krot.wasm and by the native KROT on one thread,
-// three times in turn, and prints the medians, wall clock with reading and writing.
+// three times in turn, and prints the medians, wall clock with reading and writing,
+// and the memory of the last.
 
 import fs from 'node:fs';
 import os from 'node:os';
@@ -15,17 +16,24 @@ const here = path.join(scratch, 'wasm');
 const native = path.join(scratch, 'native');
 
 const median = (values) => values.sort((a, b) => a - b)[1].toFixed(2);
-console.log('| model | observations | WebAssembly, s | native, one thread, s |');
-console.log('|---|---:|---:|---:|');
+const megabytes = (bytes) => (bytes / 1e6).toFixed(0);
+console.log('| model | observations | WebAssembly, s | native, one thread, s | ' +
+  'WebAssembly, MB | native, MB |');
+console.log('|---|---:|---:|---:|---:|---:|');
 for (const model of models) {
   const times = { here: [], native: [] };
+  const bytes = {};
   for (let n = 0; n < 3; ++n) {
-    times.here.push(await solveByWasm(build, model, here));
-    times.native.push(solveNatively(krot, model, native));
+    const [a, b] = [await solveByWasm(build, model, here),
+      solveNatively(krot, model, native)];
+    times.here.push(a.time);
+    times.native.push(b.time);
+    Object.assign(bytes, { here: a.bytes, native: b.bytes });
   }
   const report = JSON.parse(fs.readFileSync(path.join(here, 'report.json')));
   console.log(`| ${path.basename(model)} | ${
     report.num_observations.toLocaleString('en')} | ${
-    median(times.here)} | ${median(times.native)} |`);
+    median(times.here)} | ${median(times.native)} | ${
+    megabytes(bytes.here)} | ${megabytes(bytes.native)} |`);
 }
 fs.rmSync(scratch, { recursive: true });

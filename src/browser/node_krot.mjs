@@ -16,13 +16,13 @@ function seconds(work) {
 }
 
 // Into `folder`, which is emptied: result/, certificate.json and report.json.
-// Seconds.
+// What it took: seconds, and bytes of memory at the most.
 export async function solveByWasm(build, model, folder) {
   const createKrot =
     createRequire(import.meta.url)(path.resolve(build, 'krot.js'));
   const wasmBinary = fs.readFileSync(path.join(build, 'krot.wasm'));
-  const { FS, callMain } =
-    await createKrot({ wasmBinary, print() {}, printErr() {} });
+  const instance = await createKrot({ wasmBinary, print() {}, printErr() {} });
+  const { FS, callMain } = instance;
   FS.mkdir('model');
   for (const name of fs.readdirSync(model)) {
     const file = path.join(model, name);
@@ -38,7 +38,7 @@ export async function solveByWasm(build, model, folder) {
     ...names.map((name) => `result/${name}`)]) {
     fs.writeFileSync(path.join(folder, file), FS.readFile(file));
   }
-  return time;
+  return { time, bytes: instance.HEAPU8.length };  // it never shrinks
 }
 
 // The same by the native command on one thread.
@@ -46,8 +46,10 @@ export function solveNatively(krot, model, folder) {
   fs.rmSync(folder, { recursive: true, force: true });
   fs.mkdirSync(folder);
   const args = kSolve.map((word) => word === 'model' ? path.resolve(model) : word);
-  return seconds(() => execFileSync(path.resolve(krot), args,
+  const time = seconds(() => execFileSync(path.resolve(krot), args,
     { cwd: folder, stdio: 'ignore' }));
+  const report = JSON.parse(fs.readFileSync(path.join(folder, 'report.json')));
+  return { time, bytes: report.peak_memory_bytes };
 }
 
 // Whether the native command accepts the certificate in `folder` for the model
