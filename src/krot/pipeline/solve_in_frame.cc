@@ -55,13 +55,13 @@ void CheckOptions(const SolveModelOptions& options) {
 void CountProblem(const Model& model, const BuiltProblem& built,
                   SolveSummary* summary) {
   const KnownRotationProblem& problem = built.problem;
-  summary->num_frames = problem.num_frames;
+  summary->num_frames = static_cast<int64_t>(built.frame_of.size());
   summary->num_images = static_cast<int64_t>(built.image_of.size());
   summary->num_points = static_cast<int64_t>(built.point_of.size());
-  summary->num_observations = static_cast<int64_t>(built.pixels.size());
+  summary->num_observations = built.NumPixels();
   summary->num_positions = static_cast<int64_t>(built.positions.size());
   summary->num_components = FindComponents(problem).count;
-  for (int32_t f = 0; f < problem.num_frames; ++f) {
+  for (int32_t f = 0; f < summary->num_frames; ++f) {
     summary->num_fixed_frames += problem.IsFixedFrame(f);
   }
   for (int32_t k = 0; k < summary->num_points; ++k) {
