@@ -1,6 +1,6 @@
 """Changes the certificate checker in one place at a time; its tests must notice.
 
-Usage: mutate_checker.py BUILD [--count N] [--seed S]
+Usage: mutate_checker.py BUILD [--count N] [--skip N] [--seed S] [--jobs N]
 BUILD is a build folder with proof_test (Ninja). Each mutant is one operator,
 bound or constant of the checker's sources that becomes another; it is compiled,
 linked into proof_test and run. Prints the mutants that no test notices, with
@@ -128,6 +128,8 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
     parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--skip", type=int, default=0,
+                        help="of the first, which were tried before")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
@@ -139,7 +141,7 @@ def main():
             concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         bench = Bench(pathlib.Path(options.build).resolve(),
                       pathlib.Path(folder))
-        todo = chosen[:options.count]
+        todo = chosen[options.skip:options.skip + options.count]
         for mutant, result in zip(todo, pool.map(bench.is_noticed, todo,
                                                  range(len(todo)))):
             if result:
