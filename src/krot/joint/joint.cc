@@ -115,8 +115,8 @@ JointTermination ComponentSolve::SolvePart(const ProblemSubset& part,
     return JointTermination::kMaxIterations;
   }
   const auto replace = [&](Estimate optimum) {
-    RestoreGaugeIfHarmless(part.problem(), start, options_.norm,
-                           context_.num_threads, &optimum);
+    RestoreGaugeIfHarmless(part.problem(), start, options_.norm, context_,
+                           &optimum);
     part.Replace(optimum, candidate);
   };
   const JointTermination termination = solve.Run(

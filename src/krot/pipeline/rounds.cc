@@ -65,15 +65,20 @@ class Rounds {
 
  private:
   double TrueCost(const Estimate& estimate) const {
-    return reprojection_.TrueCost(estimate, options_.norm,
-                                  context_.num_threads);
+    return context_.Max(
+        reprojection_.TrueCost(estimate, options_.norm, context_.num_threads));
   }
   double LevelledCost(const Estimate& estimate) const {
-    return reprojection_.LevelledCost(estimate, options_.norm,
-                                      context_.num_threads);
+    return context_.Max(reprojection_.LevelledCost(estimate, options_.norm,
+                                                   context_.num_threads));
   }
   double PixelCost() const {
     return positions_.Any() ? TrueCost(estimate_) : cost_;
+  }
+  double RowsCost(const KnownRotationProblem& rows,
+                  const Estimate& estimate) const {
+    return context_.Max(
+        Cost(rows, estimate, options_.norm, context_.num_threads));
   }
   // Of what would be the result.
   double ReachedCost() const {
@@ -192,8 +197,7 @@ bool Rounds::RunOne() {
     bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of_);
   }
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
-  if (!std::isfinite(
-          Cost(problem, estimate_, options_.norm, context_.num_threads))) {
+  if (!std::isfinite(RowsCost(problem, estimate_))) {
     return false;  // a depth is rounding alone
   }
   Estimate solved = estimate_;
@@ -204,12 +208,11 @@ bool Rounds::RunOne() {
       },
       context_, timer_, &solved, &summary_);
   if (options_.res_int.update_frames) {
-    RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_.num_threads,
-                           &solved);
+    RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_, &solved);
   }
 
   Round round;
-  round.linear_cost = Cost(rows, solved, options_.norm, context_.num_threads);
+  round.linear_cost = RowsCost(rows, solved);
   if (rows_certificate_ && !bounded) {
     round.linear_lower_bound = rows_certificate_->lower_bound;
   }
@@ -217,7 +220,7 @@ bool Rounds::RunOne() {
   Estimate from = std::exchange(estimate_, Estimate());
   if (options_.res_int.update_frames) {
     estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
-                              context_.num_threads, &round.step);
+                              context_, &round.step);
   } else {
     estimate_ = BestPointsOnSegments(reprojection_, rows, from, solved,
                                      options_.norm, context_.num_threads);
@@ -226,9 +229,9 @@ bool Rounds::RunOne() {
   cost_ = LevelledCost(estimate_);
   int64_t num_bounded = 0;
   if (round.step < 1) {
-    num_bounded =
+    num_bounded = context_.Sum(
         trust_.Shrink(reprojection_, rows, from, solved, options_.norm,
-                      (1 + kKeptPromise) * round.linear_cost);
+                      (1 + kKeptPromise) * round.linear_cost));
   } else {
     trust_.Clear();
   }
