@@ -1,10 +1,13 @@
 #include "tools/krot_mpi/shared_model.h"
 
+#include <algorithm>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/model_digest.h"
+#include "krot/model/image_geometry.h"
 
 namespace krot {
 namespace {
@@ -13,6 +16,12 @@ namespace {
 struct SolvedPoint {
   Eigen::Vector3d xyz;
   double error;
+};
+
+struct Named {
+  Point3DId point3D_id;
+  ImageId image_id;
+  uint32_t point2D_idx;
 };
 
 }  // namespace
@@ -24,8 +33,36 @@ Model SharedModel::Take(const Model& whole) {
   return std::move(share.model);
 }
 
+void SharedModel::NameInWhole(const Model& share, SolveSummary* summary) const {
+  std::vector<Named> support;
+  for (const SupportObservation& o : summary->support) {
+    support.push_back({o.point3D_id, o.image_id, o.point2D_idx});
+  }
+  if (summary->certificate) {
+    for (const auto& o : summary->certificate->observations) {
+      support.push_back({o.point3D_id, o.image_id, o.point2D_idx});
+    }
+  }
+  ranks_.Broadcast(&support);
+  std::unordered_set<Point3DId> ids;
+  for (const Point3D& point : share.points3D) ids.insert(point.id);
+  const auto images = ImageIndices(share);
+  std::vector<uint32_t> names(support.size(), 0);  // where others name them
+  for (size_t n = 0; n < support.size(); ++n) {
+    if (ids.count(support[n].point3D_id) == 0) continue;
+    names[n] =
+        point2D_of_[images.at(support[n].image_id)][support[n].point2D_idx];
+  }
+  ranks_.Reduce([](uint32_t a, uint32_t b) { return std::max(a, b); }, &names);
+  auto name = names.begin();
+  for (SupportObservation& o : summary->support) o.point2D_idx = *name++;
+  if (!summary->certificate) return;
+  for (auto& o : summary->certificate->observations) o.point2D_idx = *name++;
+}
+
 bool SharedModel::Join(Model* model, Model* solved,
                        SolveSummary* summary) const {
+  NameInWhole(*model, summary);
   std::vector<SolvedPoint> points;
   for (const Point3D& point : solved->points3D) {
     points.push_back({point.xyz, point.error});

@@ -24,6 +24,7 @@ class SharedModel {
   bool Join(Model* model, Model* solved, SolveSummary* summary) const;
 
  private:
+  // 2D points of the support, which are named as in the shares.
   void NameInWhole(const Model& share, SolveSummary* summary) const;
 
   const ModelPaths& paths_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -68,9 +69,12 @@ class Ranks {
   }
   template <typename T>
   void Broadcast(T* value, int from = 0) {
-    std::vector<T> values = {*value};
-    Broadcast(&values, from);
-    *value = values[0];
+    struct Boxed {  // vectors of bool are no plain values
+      T value;
+    };
+    std::vector<Boxed> boxed = {{*value}};
+    Broadcast(&boxed, from);
+    *value = boxed[0].value;
   }
 
   // combine(combine(a, b), c) of the ranks' values, one by one; all have as
@@ -85,6 +89,12 @@ class Ranks {
         (*values)[n] = combine((*values)[n], all[r][n]);
       }
     }
+  }
+
+  // What the ranks before this one have, together.
+  int64_t SumBefore(int64_t own) {
+    const std::vector<int64_t> all = Gather(std::vector<int64_t>{own});
+    return std::accumulate(all.begin(), all.begin() + rank(), int64_t{0});
   }
 
   // Hands `value` on from rank to rank, each of which changes it in turn: a

@@ -140,21 +140,14 @@ void Rounds::Prove() {
   if (!rows_certificate_) return;
   const Certificate certificate =
       *std::exchange(rows_certificate_, std::nullopt);
-  std::optional<PixelCertificate> proof;
-  if (reprojection_.IsLinear()) {
-    proof = MakePixelCertificate(
-        model_, built_, options_.norm, certificate,
-        BearingsOfPoints(model_, built_, estimate_, certificate), context_);
-  } else {
-    const std::vector<int64_t> support =
-        SupportOf(certificate, observation_of_);
-    const double sufficient =
-        (1 - kProofShare * options_.joint.relative_gap) * cost_;
-    proof = positions_.Any()
-                ? positions_.Prove(estimate_, support, sufficient)
-                : ProveInPixels(model_, built_, estimate_, options_.norm,
-                                support, sufficient, context_);
-  }
+  const double sufficient =
+      (1 - kProofShare * options_.joint.relative_gap) * cost_;
+  std::optional<PixelCertificate> proof =
+      positions_.Any()
+          ? positions_.Prove(estimate_, SupportOf(certificate, observation_of_),
+                             sufficient)
+          : ProveRows(model_, built_, estimate_, options_.norm, certificate,
+                      observation_of_, sufficient, context_);
   if (proof &&
       (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
     certificate_ = std::move(proof);
@@ -193,7 +186,8 @@ bool Rounds::RunOne() {
   const KnownRotationProblem& rows = built_.problem;
   std::optional<KnownRotationProblem> bounded;
   observation_of_.clear();
-  if (!trust_.IsEmpty()) {
+  const bool is_bounded = context_.Any(!trust_.IsEmpty());
+  if (is_bounded) {
     bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of_);
   }
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
@@ -213,7 +207,7 @@ bool Rounds::RunOne() {
 
   Round round;
   round.linear_cost = RowsCost(rows, solved);
-  if (rows_certificate_ && !bounded) {
+  if (rows_certificate_ && !is_bounded) {
     round.linear_lower_bound = rows_certificate_->lower_bound;
   }
   const double before = cost_;

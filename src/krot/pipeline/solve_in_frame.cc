@@ -8,9 +8,9 @@
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/carry_left_out.h"
-#include "krot/bridge/pixel_certificate.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/pipeline/certify.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
 #include "krot/pipeline/run_finish.h"
@@ -89,46 +89,6 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->largest_bytes = memory.at_most;
 }
 
-// Checks the certificate once more, apart from the solver that made it, and
-// says what it proves about the estimate.
-void Certify(const Model& model, const Start& start, const Estimate& estimate,
-             const SolveModelOptions& options, const Context& context,
-             const std::optional<PixelCertificate>& certificate,
-             SolveSummary* summary) {
-  if (!certificate) return;
-  const Timer timer;
-  const PixelCertificateCheck check = CheckPixelCertificate(
-      model, start.built, options.norm, *certificate, context);
-  if (check.is_accepted) {
-    summary->is_certified = true;
-    summary->lower_bound = check.lower_bound;
-    summary->support = ListSupport(model, start.built, estimate, options.norm,
-                                   certificate->rows);
-    summary->support_positions =
-        ListSupportPositions(model, start.built, estimate, *certificate);
-    if (options.describe_certificate) {
-      summary->certificate =
-          DescribeCertificate(model, start.built, options.norm, *certificate);
-    }
-  }
-  summary->seconds_certify = timer.Seconds();
-}
-
-// That no estimate is below a start's bound, in true pixels.
-void CertifyInfeasible(const Model& model, const Start& start,
-                       const SolveModelOptions& options, const Context& context,
-                       const std::optional<Certificate>& certificate,
-                       SolveSummary* summary) {
-  if (!certificate) return;
-  Certificate levelled = *certificate;
-  LevelPositions(start.built, &levelled);
-  Certify(model, start, start.built.start, options, context,
-          MakePixelCertificate(model, start.built, options.norm, levelled,
-                               BearingsOfPixels(model, start.built, levelled),
-                               context),
-          summary);
-}
-
 // With the final cost. What is claimed is what the numbers say, whatever the
 // solver thought.
 void MeasureGap(double wanted_gap, SolveSummary* summary) {
@@ -187,7 +147,7 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   const bool was_asked =
       options.init == SolveInit::kFeasible || !start->built.positions.empty();
   if (found.termination == SolveTermination::kInterrupted || was_asked) {
-    CertifyInfeasible(model, *start, options, context, found.certificate,
+    CertifyInfeasible(model, start->built, options, context, found.certificate,
                       summary);
     return false;
   }
@@ -256,7 +216,8 @@ SolveModelResult SolveInFrame(const Model& model,
       SolveInRounds(model, options, summary.method, context, solve_timer,
                     &start.built, &estimate, &summary);
   if (summary.termination == SolveTermination::kInfeasible) {
-    Certify(model, start, estimate, options, context, certificate, &summary);
+    Certify(model, start.built, estimate, options, context, certificate,
+            &summary);
     summary.seconds_solve = solve_timer.Seconds();
     result.model = model;
     return result;
@@ -302,7 +263,8 @@ SolveModelResult SolveInFrame(const Model& model,
   summary.pixel_error_after = Summarize(errors_px);
   summary.seconds_solve = solve_timer.Seconds();
 
-  Certify(model, start, estimate, options, context, certificate, &summary);
+  Certify(model, start.built, estimate, options, context, certificate,
+          &summary);
   MeasureGap(options.joint.relative_gap, &summary);
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
     summary.polish = PolishModel(options.polish, options.finish.loss,

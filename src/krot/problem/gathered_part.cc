@@ -4,24 +4,15 @@
 
 namespace krot {
 
-int64_t FirstInWhole(const KnownRotationProblem& problem, Ranks* ranks) {
-  const std::vector<int64_t> counts = ranks->Gather(std::vector<int64_t>{
-      static_cast<int64_t>(problem.observations.size())});
-  int64_t first = 0;
-  for (int r = 0; r < ranks->rank(); ++r) first += counts[r];
-  return first;
-}
-
 GatheredPart::GatheredPart(const KnownRotationProblem& problem,
                            std::vector<int32_t> points, Ranks* ranks)
     : ranks_(*ranks), points_(std::move(points)) {
-  const int64_t first_in_whole = FirstInWhole(problem, ranks);
-  num_points_ = ranks->Gather(
-      std::vector<int64_t>{static_cast<int64_t>(points_.size())});
-  int32_t first_point = 0;
-  for (int r = 0; r < ranks->rank(); ++r) {
-    first_point += static_cast<int32_t>(num_points_[r]);
-  }
+  const int64_t first_in_whole =
+      ranks->SumBefore(static_cast<int64_t>(problem.observations.size()));
+  num_points_ =
+      ranks->Gather(std::vector<int64_t>{static_cast<int64_t>(points_.size())});
+  const auto first_point = static_cast<int32_t>(
+      ranks->SumBefore(static_cast<int64_t>(points_.size())));
   std::vector<Observation> observations;
   std::vector<int64_t> in_whole;
   for (size_t n = 0; n < points_.size(); ++n) {

@@ -32,14 +32,10 @@ class GatheredPart {
 
  private:
   Ranks& ranks_;
-  std::vector<int32_t> points_;        // here
-  std::vector<int64_t> num_points_;    // per rank
+  std::vector<int32_t> points_;      // here
+  std::vector<int64_t> num_points_;  // per rank
   KnownRotationProblem problem_;
   std::vector<int64_t> in_whole_;
 };
-
-// How many observations the ranks before this one have: its own first one's
-// number in the whole.
-int64_t FirstInWhole(const KnownRotationProblem& problem, Ranks* ranks);
 
 }  // namespace krot
