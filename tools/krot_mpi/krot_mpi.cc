@@ -5,6 +5,7 @@
 #include <functional>
 #include <iostream>
 #include <new>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
 #include "krot/options/solver_options.h"
+#include "krot/report/text_table.h"
 #include "krot/version.h"
 #include "tools/krot/command_error.h"
 #include "tools/krot/solve_command.h"
@@ -30,7 +32,16 @@ constexpr char kUsage[] =
     "  krot_mpi solver -h\n"
     "  krot_mpi --version\n";
 
-int RunSharedSolver(const std::vector<std::string>& arguments, Ranks* ranks) {
+// What all ranks have sent to others.
+std::string TrafficWords(MpiRanks* ranks) {
+  const std::vector<int64_t> sent =
+      ranks->Gather(std::vector<int64_t>{ranks->bytes_sent()});
+  return "the ranks sent each other " +
+         FormatBytes(std::accumulate(sent.begin(), sent.end(), int64_t{0}));
+}
+
+int RunSharedSolver(const std::vector<std::string>& arguments,
+                    MpiRanks* ranks) {
   SolveCommand command;
   command.name = "solver";
   OptionParser parser("solver",
@@ -58,12 +69,14 @@ int RunSharedSolver(const std::vector<std::string>& arguments, Ranks* ranks) {
   SharedModel shared(command.paths, ranks);
   command.take_share = [&](const Model& whole) { return shared.Take(whole); };
   command.join = [&](Model* model, Model* solved, SolveSummary* summary) {
+    const std::string words = TrafficWords(ranks);
+    LogLine(command.common.log, 2, words);
     return shared.Join(model, solved, summary);
   };
   return RunSolveCommand(command);
 }
 
-int Run(const std::vector<std::string>& arguments, Ranks* ranks) {
+int Run(const std::vector<std::string>& arguments, MpiRanks* ranks) {
   if (!arguments.empty() && arguments.front() == "solver") {
     return RunSharedSolver({arguments.begin() + 1, arguments.end()}, ranks);
   }

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "krot/geometry/rigid_transform.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/frame_geometry.h"
 
 namespace krot {
 namespace {
@@ -20,61 +20,6 @@ constexpr double kHarmless = 1e-9;
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-// Centres closer than this, relative to the size of their coordinates and of
-// the component, coincide: rounding is a thousand times smaller.
-constexpr double kCoincident = 1e-12;
-
-// Where a frame's camera sits, once for all its views.
-struct FrameGeometry {
-  Matrix3d world_from_rig = Matrix3d::Identity();  // R_rw'
-  Vector3d centre_in_rig = Vector3d::Zero();       // -R_sr' t_sr
-  int num_views = 0;                               // that count
-  bool is_seen_through = false;                    // it has an observation
-  bool has_two_centres = false;  // its observations fix the scale
-};
-
-// The views that have observations: in this order, a frame's first one is that
-// of its first observation.
-std::vector<int32_t> SeenViews(const KnownRotationProblem& problem,
-                               const Context& context) {
-  std::vector<int32_t> seen;
-  context.InTurn(
-      [&](std::vector<int32_t>* views) {
-        std::vector<char> is_seen(problem.views.size(), 0);
-        for (const int32_t view : *views) is_seen[view] = 1;
-        for (const Observation& observation : problem.observations) {
-          if (is_seen[observation.view]) continue;
-          is_seen[observation.view] = 1;
-          views->push_back(observation.view);
-        }
-      },
-      &seen);
-  return seen;
-}
-
-std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
-                                          const Context& context) {
-  std::vector<FrameGeometry> frames(problem.num_frames);
-  for (const View& view : problem.views) ++frames[view.frame].num_views;
-
-  for (const int32_t v : SeenViews(problem, context)) {
-    const View& view = problem.views[v];
-    FrameGeometry& frame = frames[view.frame];
-    const Vector3d centre_in_rig =
-        Center({view.cam_from_rig_rotation, view.cam_from_rig_translation});
-    if (!frame.is_seen_through) {
-      frame.is_seen_through = true;
-      frame.centre_in_rig = centre_in_rig;
-      frame.world_from_rig =
-          view.cam_from_world_rotation.transpose() * view.cam_from_rig_rotation;
-    } else if ((centre_in_rig - frame.centre_in_rig).norm() >
-               kCoincident * frame.centre_in_rig.norm()) {
-      frame.has_two_centres = true;
-    }
-  }
-  return frames;
-}
 
 // C_f = R_rw' (centre_in_rig - t_f).
 Vector3d ProjectionCentre(const FrameGeometry& frame, const Vector3d& t) {
