@@ -32,10 +32,13 @@ mkdir -p "$folder/findings" "$folder/logs"
 fuzz() {
   local corpus=$folder/corpus/$1
   mkdir -p "$corpus"
-  UBSAN_OPTIONS=print_stacktrace=1 "$folder/fuzz/$1_fuzz" \
-    -max_total_time="$seconds" -timeout=30 -rss_limit_mb=2048 -max_len=20000 \
-    -print_final_stats=1 -artifact_prefix="$folder/findings/$1-" \
+  local TIMEFORMAT=%U
+  { time UBSAN_OPTIONS=print_stacktrace=1 "$folder/fuzz/$1_fuzz" \
+    -max_total_time="$seconds" -timeout=120 -report_slow_units=120 \
+    -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
+    -artifact_prefix="$folder/findings/$1-" \
     "$corpus" "$seeds/$1" >"$folder/logs/$1" 2>&1 || true
+  } 2>"$folder/logs/$1.seconds"
 }
 
 say "Fuzzing ${targets[*]}"
@@ -51,7 +54,7 @@ done
 wait
 
 found=0
-printf '| target | inputs kept | edges reached | executions | minutes | findings |\n'
+printf '| target | inputs kept | edges reached | executions | processor minutes | findings |\n'
 printf '|---|---|---|---|---|---|\n'
 for target in "${targets[@]}"; do
   log=$folder/logs/$target
@@ -60,7 +63,9 @@ for target in "${targets[@]}"; do
   executions=$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")
   findings=$(find "$folder/findings" -name "$target-*" | wc -l)
   printf "| \`%s\` | %s | %s | %s | %s | %s |\n" "$target" "$inputs" \
-    "${edges:-?}" "${executions:-?}" "$((seconds / 60))" "$findings"
+    "${edges:-?}" "${executions:-?}" \
+    "$(awk '{ printf "%.0f", $1 / 60 }' "$folder/logs/$target.seconds")" \
+    "$findings"
   found=$((found + findings))
 done
 ((found == 0)) || die "$found findings in $folder/findings"

@@ -22,6 +22,7 @@ list_skipped() {
 install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
   coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
   chromium:chromium chromedriver:chromium-driver povray:povray jq:jq \
+  CartConvert:geographiclib-tools \
   pkg-config:pkgconf shellcheck:shellcheck pybind11-dev python3-dev python3-numpy python3-pytest
 browser_page=
 if command -v emcc >/dev/null && command -v esbuild >/dev/null; then

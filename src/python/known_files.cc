@@ -26,6 +26,7 @@ void KnownFiles::AddFixedTo(OptionTable* table) {
 
 void KnownFiles::AddPositionsTo(OptionTable* table) {
   AddFile("positions_path", &positions_path_, table);
+  AddFile("point_positions_path", &point_positions_path_, table);
 }
 
 std::shared_ptr<const Model> KnownFiles::WithRotations(
@@ -48,8 +49,16 @@ FixedParts KnownFiles::Fixed(const Model& model) const {
 }
 
 std::vector<KnownPosition> KnownFiles::Positions(const Model& model) const {
-  if (positions_path_.empty()) return {};
-  return ReadPositions(ReadFileBytes(positions_path_), model);
+  std::vector<KnownPosition> positions;
+  if (!positions_path_.empty()) {
+    positions = ReadPositions(ReadFileBytes(positions_path_), model);
+  }
+  if (!point_positions_path_.empty()) {
+    const std::vector<KnownPosition> of_points =
+        ReadPointPositions(ReadFileBytes(point_positions_path_), model);
+    positions.insert(positions.end(), of_points.begin(), of_points.end());
+  }
+  return positions;
 }
 
 }  // namespace krot

@@ -30,6 +30,7 @@ class KnownFiles {
   std::string fixed_images_path_;
   std::string fixed_points_path_;
   std::string positions_path_;
+  std::string point_positions_path_;
 };
 
 }  // namespace krot

@@ -50,7 +50,7 @@ TEST_F(KnownPositions, AreKeptAndProved) {
   const KrotResult result = Solve("input", "output", Options());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("with these positions, no translations"));
-  EXPECT_THAT(result.out, HasSubstr("Known positions that hold cameras"));
+  EXPECT_THAT(result.out, HasSubstr("Known positions that hold against"));
   const Json report = Report("output");
   EXPECT_EQ(report["termination"], "gap_reached");
   EXPECT_EQ(report["positions"]["num_known"], model_.images.size());
@@ -64,7 +64,54 @@ TEST_F(KnownPositions, AreKeptAndProved) {
   }
   const KrotResult check = Check("output", "output");
   EXPECT_EQ(check.exit_code, 0) << check.err;
-  EXPECT_THAT(check.out, HasSubstr("to be within the radii below"));
+  EXPECT_THAT(check.out, HasSubstr("to be kept to the radii below"));
+}
+
+TEST_F(KnownPositions, OfPointsAndWithAxesAreKeptAndProved) {
+  WritePositions(1e-3, 0);
+  std::ofstream points(folder_ / "points.txt");
+  points.precision(17);
+  const std::vector<Point3D>& own = model_.points3D;
+  points << own[0].id << ' ' << own[0].xyz.transpose() << " .001\n"
+         << own[1].id << ' ' << own[1].xyz.transpose() << " .001 .002 .003\n"
+         << own[2].id << ' ' << own[2].xyz.transpose()
+         << " .001 .002 .003 1 0 0 .5\n";
+  points.close();
+  const KrotResult result =
+      Solve("input", "output",
+            Options({"--point_positions_path", folder_ / "points.txt"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Report("output")["positions"]["num_known"],
+            model_.images.size() + 3);
+  const Model after = Load(folder_ / "output");
+  EXPECT_LE((after.points3D[0].xyz - own[0].xyz).norm(), (1 + 1e-6) * 1e-3);
+  EXPECT_EQ(Check("output", "output").exit_code, 0);
+}
+
+TEST_F(KnownPositions, AreInflatedByTheSmallestFactorThatIsEnough) {
+  WritePositions(1e-3, 5e-3);
+  const KrotResult as_given = Solve("input", "given", Options());
+  ASSERT_EQ(as_given.exit_code, 0) << as_given.err;
+  const double bound = Report("given")["lower_bound"];
+  const KrotResult result =
+      Solve("input", "output",
+            Options({"--Problem.inflate_positions", std::to_string(0.9 * bound),
+                     "--factor_certificate_path", folder_ / "factor.json"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("All radii are multiplied by "));
+  const Json factor = Report("output")["positions"]["factor"];
+  EXPECT_GT(factor["lower_bound"], 1);
+  EXPECT_LE(factor["value"], 1.01 * factor["lower_bound"].get<double>());
+  EXPECT_LE(Report("output")["cost_final"], 0.9 * bound + 1e-6);
+  const KrotResult check =
+      RunKrot({"certificate_checker", "--input_path", folder_ / "input",
+               "--certificate_path", folder_ / "factor.json"});
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+
+  const KrotResult refused = Solve(
+      "input", "refused", Options({"--Problem.inflate_positions", "1e-3"}));
+  EXPECT_EQ(refused.exit_code, 7);
+  EXPECT_THAT(refused.err, HasSubstr("a million times as large"));
 }
 
 TEST_F(KnownPositions, ThatCannotBeKeptAreNamedAndRefuted) {
@@ -88,6 +135,9 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
            {"nobody.jpg 1 2 3 4\n", "positions.txt:1: found \"nobody.jpg\""},
            {"# a\n" + name + " 1 2 3 0\n", "positions.txt:2: found \"0\""},
            {name + " 1 2 3 -1\n", "a radius above zero"},
+           {name + " 1 2 3 1 1 0\n", "a radius above zero"},
+           {name + " 1 2 3 1 1 1e5\n", "10,000 times another"},
+           {name + " 1 2 3 1 2 3 0 0 0 0\n", "a quaternion that is not zero"},
            {name + " 1 2 x 1\n", "found \"x\""},
            {name + " 1 2 inf 1\n", "found \"inf\""},
            {"1 2 3 4\n", "found no name"},
@@ -99,6 +149,24 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
   }
+  for (const auto& [text, part] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"99999 1 2 3 4\n", "the id of a 3D point of the model"},
+           {"a 1 2 3 4\n", "the id of a 3D point"},
+           {"1 1 2 3\n", "found 3 numbers behind the id"},
+           {"1 1 2 3 4\n1 1 2 3 4\n", "line 1 names it"},
+           {"", "found no position"}}) {
+    SCOPED_TRACE(text);
+    std::ofstream(folder_ / "points.txt") << text;
+    const KrotResult result = Solve(
+        "input", "output", {"--point_positions_path", folder_ / "points.txt"});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, IsOneSentence("krot solver", part));
+  }
+  const KrotResult none =
+      Solve("input", "output", {"--Problem.inflate_positions", "1"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("--Problem.inflate_positions has no effect"));
   WritePositions(1, 0);
   for (const std::vector<std::string>& options :
        std::vector<std::vector<std::string>>{{"--Solver.max_error", "3"},

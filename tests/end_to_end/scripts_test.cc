@@ -42,7 +42,8 @@ class Scripts : public ::testing::Test {
 
 TEST_F(Scripts, SayHowTheyAreUsed) {
   for (const char* name : {"mapper_then_krot.sh", "compare_linf_with_ba.sh",
-                           "strecha_to_colmap.sh", "bal_to_colmap.sh"}) {
+                           "strecha_to_colmap.sh", "bal_to_colmap.sh",
+                           "geodetic_to_positions.sh"}) {
     const ScriptResult result = RunScript(name, {"-h"});
     EXPECT_EQ(result.exit_code, 0);
     EXPECT_THAT(result.out,
@@ -53,7 +54,8 @@ TEST_F(Scripts, SayHowTheyAreUsed) {
 
 TEST_F(Scripts, RefuseWhatTheyDoNotUnderstand) {
   for (const char* name : {"mapper_then_krot.sh", "compare_linf_with_ba.sh",
-                           "strecha_to_colmap.sh", "bal_to_colmap.sh"}) {
+                           "strecha_to_colmap.sh", "bal_to_colmap.sh",
+                           "geodetic_to_positions.sh"}) {
     ExpectRefused(name, {}, "is required");
     ExpectRefused(name, {"sparse"}, "'sparse' is not an option");
     ExpectRefused(name, {"--output_path"}, "--output_path needs a value");
@@ -313,6 +315,67 @@ TEST_F(Scripts, RefuseWhatIsNoProblemOfBundleAdjustmentInTheLarge) {
     EXPECT_NE(result.exit_code, 0);
     EXPECT_THAT(result.err, ::testing::HasSubstr(part));
     EXPECT_FALSE(fs::exists(output));
+  }
+}
+
+// From the centre of the earth, WGS84.
+Eigen::Vector3d Geocentric(double latitude, double longitude, double height) {
+  const double radians = std::acos(-1) / 180;
+  const double f = 1 / 298.257223563;
+  const double e2 = f * (2 - f);
+  const double sine = std::sin(latitude * radians);
+  const double cosine = std::cos(latitude * radians);
+  const double n = 6378137 / std::sqrt(1 - e2 * sine * sine);
+  return {(n + height) * cosine * std::cos(longitude * radians),
+          (n + height) * cosine * std::sin(longitude * radians),
+          (n * (1 - e2) + height) * sine};
+}
+
+TEST_F(Scripts, TakeGeodeticCoordinatesToALocalFrame) {
+  if (std::system("command -v CartConvert >/dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "CartConvert is not installed";
+  }
+  WriteBytes(folder_ / "gps.txt",
+             "# name, place, radius\na.jpg 48.1 16.2 200 5\n"
+             "b.jpg 48.102 16.197 231.5 1 1 3\n");
+  const std::vector<std::string> arguments = {
+      "--origin",          "48.1 16.2 200", "--input_path",
+      folder_ / "gps.txt", "--output_path", folder_ / "positions.txt"};
+  const ScriptResult result = RunScript("geodetic_to_positions.sh", arguments);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::istringstream text(ReadBytes(folder_ / "positions.txt"));
+  std::string line, name;
+  Eigen::Vector3d enu, axes;
+  std::getline(text, line);
+  EXPECT_EQ(line, "a.jpg 0.000000 0.000000 0.000000 5");
+  text >> name >> enu[0] >> enu[1] >> enu[2] >> axes[0] >> axes[1] >> axes[2];
+  EXPECT_EQ(name, "b.jpg");
+  EXPECT_EQ(axes, Eigen::Vector3d(1, 1, 3));
+  const Eigen::Vector3d way =
+      Geocentric(48.102, 16.197, 231.5) - Geocentric(48.1, 16.2, 200);
+  EXPECT_NEAR(enu.norm(), way.norm(), 1e-5);
+  const Eigen::Vector3d up =
+      (Geocentric(48.1, 16.2, 1200) - Geocentric(48.1, 16.2, 200)) / 1000;
+  EXPECT_NEAR(enu.z(), way.dot(up), 1e-5);
+  EXPECT_NEAR(enu.x(), way.dot(Eigen::Vector3d::UnitZ().cross(up).normalized()),
+              1e-5);
+
+  ExpectRefused("geodetic_to_positions.sh", arguments, "exists");
+  int i = 0;
+  for (const auto& [file, part] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"a.jpg 98.1 16.2 200 5\n", "not in [-90d, 90d]"},
+           {"a.jpg 48.1 16.2 200\n", "expected NAME LATITUDE"},
+           {"# nothing\n", "found no position"}}) {
+    const fs::path path = folder_ / ("gps" + std::to_string(++i) + ".txt");
+    WriteBytes(path, file);
+    const ScriptResult refused =
+        RunScript("geodetic_to_positions.sh",
+                  {"--origin", "48.1 16.2 200", "--input_path", path,
+                   "--output_path", folder_ / "none.txt"});
+    EXPECT_NE(refused.exit_code, 0);
+    EXPECT_THAT(refused.err, ::testing::HasSubstr(part));
+    EXPECT_FALSE(fs::exists(folder_ / "none.txt"));
   }
 }
 

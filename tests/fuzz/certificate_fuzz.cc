@@ -27,7 +27,7 @@ struct Truth {
   CertificateFile certificate;
 };
 
-void Check(const std::string& json) {
+void JudgeText(const std::string& json) {
   static const Truth truth;
   try {
     if (HoldsConflicts(json)) {
@@ -85,7 +85,7 @@ void Tamper(ByteSource source) {
         break;
     }
   }
-  Check(CertificateJson(file));
+  JudgeText(CertificateJson(file));
 }
 
 }  // namespace
@@ -96,7 +96,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (source.Byte() == 'T') {
     krot::Tamper(source);
   } else {
-    krot::Check({reinterpret_cast<const char*>(data), size});
+    krot::JudgeText(std::string(reinterpret_cast<const char*>(data), size));
   }
   return 0;
 }

@@ -15,7 +15,7 @@ void Read(ByteSource source) {
   const uint8_t kind = source.Byte();
   const FileBytes file = source.Rest("file");
   try {
-    switch (kind % 4) {
+    switch (kind % 5) {
       case 0: {
         Model turned = model;
         ReplaceRotations(file, &turned);
@@ -24,8 +24,12 @@ void Read(ByteSource source) {
       }
       case 3:
         for (const KnownPosition& position : ReadPositions(file, model)) {
-          Require(position.radius > 0 && position.xyz.allFinite(),
-                  "a ball of a radius above zero");
+          Require(IsFit(position.region), "a region with an inside");
+        }
+        break;
+      case 4:
+        for (const KnownPosition& position : ReadPointPositions(file, model)) {
+          Require(IsFit(position.region), "a region with an inside");
         }
         break;
       case 1:

@@ -94,6 +94,8 @@ class Seeds:
             f"{' '.join(words[9:])} {' '.join(words[5:8])} 1e-2\n"
             for words in lines)
         self.add("lists", b"\3" + positions.encode())
+        self.add("lists", b"\4# points\n1 0 0 0 1\n2 0 0 0 1 2 3\n"
+                 b"16 0 0 0 1 2 3 1 0 0 .5\n")
 
     def options(self):
         table = re.findall(r"^  --(\S+)$.*?Default: (\S*?)\.?$",

@@ -1,5 +1,7 @@
 #include "krot/outliers/outlier_filter.h"
 
+#include <cmath>
+#include <random>
 #include <set>
 #include <utility>
 
@@ -67,6 +69,27 @@ TEST(FilterOutliers, WritesAValidModelWithinTheBoundAndConflictsThatHold) {
       VerifyConflictFile(scene.model, *summary.conflicts);
   EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
   EXPECT_EQ(verdict.num_conflicts, summary.num_proved);
+}
+
+// An image has too few other observations for a conflict in two views of each.
+TEST(FilterOutliers, ProvesMostOutliersThatCrowdAnImage) {
+  SyntheticScene scene = MakeOutlierScene(5, 0, 300);
+  std::mt19937 generator(5);
+  std::uniform_real_distribution<double> angle(0, 2 * std::acos(-1));
+  int num_planted = 0;
+  for (Point2D& point2D : scene.model.images[2].points2D) {
+    if (point2D.point3D_id == kInvalidPoint3DId || generator() % 2 == 0) {
+      continue;
+    }
+    const double way = angle(generator);
+    point2D.x += 60 * std::cos(way);
+    point2D.y += 60 * std::sin(way);
+    ++num_planted;
+  }
+  const OutlierFilterSummary summary =
+      FilterOutliers(scene.model, Within(3), {}).summary;
+  EXPECT_LE(summary.num_proved, num_planted);
+  EXPECT_GE(summary.num_proved, 0.75 * num_planted);
 }
 
 TEST(FilterOutliers, RemovesNoMoreThanTheThresholdDoes) {

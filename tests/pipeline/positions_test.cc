@@ -1,5 +1,6 @@
-// Cameras within a radius of where they are known to be. The oracle of a bound
-// is the dual of the balls themselves, which knows no cones, levels and rounds.
+// Cameras and points within a radius of where they are known to be. The oracle
+// of a bound is the dual of the balls and ellipsoids themselves, which knows no
+// cones, levels and rounds.
 
 #include <algorithm>
 #include <cmath>
@@ -23,6 +24,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+using Of = KnownPosition::Of;
+
 constexpr double kKept = 1e-6;  // of a radius
 
 SceneOptions Options() {
@@ -40,22 +43,55 @@ Vector3d CentreOf(const Model& model, int32_t image) {
   return Center(ImageGeometries(model)[image].cam_from_world);
 }
 
-// Half of the images, `radius` around points that are `off` radii from where
-// the model has them.
+Vector3d PlaceOf(const Model& model, const KnownPosition& position) {
+  return position.of == Of::kImage ? CentreOf(model, position.index)
+                                   : model.points3D[position.index].xyz;
+}
+
+// Every `step`-th image or point, `radius` around what is `off` radii from
+// where the model has it.
 std::vector<KnownPosition> Positions(const Model& model, double radius,
-                                     double off, int step) {
+                                     double off, int step, Of of = Of::kImage) {
   std::mt19937 generator(7);
   std::normal_distribution<double> normal;
   std::vector<KnownPosition> positions;
-  for (size_t n = 0; n < model.images.size(); n += step) {
+  const size_t count =
+      of == Of::kImage ? model.images.size() : model.points3D.size();
+  for (size_t n = 0; n < count; n += step) {
     const Vector3d direction =
         Vector3d(normal(generator), normal(generator), normal(generator))
             .normalized();
-    const auto image = static_cast<int32_t>(n);
-    positions.push_back(
-        {image, CentreOf(model, image) + off * radius * direction, radius});
+    KnownPosition position{of, static_cast<int32_t>(n), {}};
+    position.region =
+        Ball(PlaceOf(model, position) + off * radius * direction, radius);
+    positions.push_back(position);
   }
   return positions;
+}
+
+// Flat and turned, as of a receiver that knows little of one direction.
+std::vector<KnownPosition> Flattened(std::vector<KnownPosition> positions) {
+  for (KnownPosition& position : positions) {
+    position.region.semi_axes.x() *= 0.8;
+    position.region.semi_axes.z() *= 2;
+    position.region.world_from_axes = {0.8, 0.3, -0.5, 0.1};
+  }
+  return positions;
+}
+
+std::vector<KnownPosition> Scaled(std::vector<KnownPosition> positions,
+                                  double factor) {
+  for (KnownPosition& position : positions) {
+    position.region.semi_axes *= factor;
+  }
+  return positions;
+}
+
+Model Wiped(Model model) {
+  for (Frame& frame : model.frames) frame.rig_from_world.translation.setZero();
+  for (Image& image : model.images) image.cam_from_world.translation.setZero();
+  for (Point3D& point : model.points3D) point.xyz.setZero();
+  return model;
 }
 
 SolveModelResult Solve(const Model& model,
@@ -70,16 +106,25 @@ double LargestRatio(const Model& model,
                     const std::vector<KnownPosition>& positions) {
   double largest = 0;
   for (const KnownPosition& p : positions) {
+    const Vector3d in_axes = p.region.world_from_axes.normalized().inverse() *
+                             (PlaceOf(model, p) - p.region.centre);
     largest =
-        std::max(largest, (CentreOf(model, p.image) - p.xyz).norm() / p.radius);
+        std::max(largest, in_axes.cwiseQuotient(p.region.semi_axes).norm());
   }
   return largest;
 }
 
-// The largest value of sum_i (delta lambda_i w_i + y_i'v_i), over all points
-// and all cameras in their balls, in units of sum_i delta lambda_i r; of a
-// pinhole without rigs. Not above zero, it proves delta. Every camera of the
-// support must have a position.
+// The largest value of F'x over a region.
+double Largest(const Ellipsoid& region, const Vector3d& force) {
+  const Vector3d in_axes =
+      region.world_from_axes.normalized().inverse() * force;
+  return force.dot(region.centre) +
+         in_axes.cwiseProduct(region.semi_axes).norm();
+}
+
+// The largest value of sum_i (delta lambda_i w_i + y_i'v_i), over all cameras
+// and points in their regions and all others anywhere, in units of sum_i delta
+// lambda_i r; of a pinhole without rigs. Not above zero, it proves delta.
 double DualValue(const Model& model, const CertificateFile& file) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const IdIndex<ImageId> images(model.images);
@@ -101,15 +146,17 @@ double DualValue(const Model& model, const CertificateFile& file) {
     on_camera[n] -= force;
     scale += file.rows_bound * o.lambda;
   }
-  for (const Vector3d& sum : on_point) EXPECT_LT(sum.norm(), 1e-9 * scale);
   double value = 0;
   double radius = 0;
   for (const CertificateFile::Position& p : file.positions) {
-    Vector3d& pull = on_camera[*images.Find(p.image_id)];
-    value += pull.dot(p.xyz) + p.radius * pull.norm();
+    Vector3d& pull = p.of == Of::kImage
+                         ? on_camera[*images.Find(static_cast<ImageId>(p.id))]
+                         : on_point[*points.Find(p.id)];
+    value += Largest(p.region, pull);
     pull.setZero();
-    radius = std::max(radius, p.radius);
+    radius = std::max(radius, p.region.semi_axes.maxCoeff());
   }
+  for (const Vector3d& sum : on_point) EXPECT_LT(sum.norm(), 1e-9 * scale);
   for (const Vector3d& sum : on_camera) EXPECT_LT(sum.norm(), 1e-9 * scale);
   return value / (scale * radius);
 }
@@ -132,16 +179,75 @@ TEST(Positions, ThatHoldCamerasBackHaveTheOptimumThatTheirDualProves) {
   SceneOptions options = Options();
   options.camera_model_id = 0;
   const Model model = SynthesizeScene(options).model;
-  for (const double radius : {0.003, 0.03, 0.3}) {
-    SCOPED_TRACE(radius);
-    const std::vector<KnownPosition> positions =
-        Positions(model, radius, 1.3, 1);
+  const auto expect_proved = [&](const std::vector<KnownPosition>& positions) {
     const SolveModelResult result = Solve(model, positions);
     ExpectProved(model, result, positions);
     EXPECT_FALSE(result.summary.support_positions.empty());
     ASSERT_TRUE(result.summary.certificate);
     EXPECT_LE(DualValue(model, *result.summary.certificate), 1e-6);
+  };
+  for (const double radius : {0.003, 0.03, 0.3}) {
+    SCOPED_TRACE(radius);
+    expect_proved(Positions(model, radius, 1.3, 1));
+    expect_proved(Flattened(Positions(model, radius, 1.3, 1)));
+    const std::vector<KnownPosition> of_points =
+        Positions(model, radius, 1.3, 7, Of::kPoint3D);
+    expect_proved(of_points);
+    expect_proved(Flattened(of_points));
+    std::vector<KnownPosition> of_both = Positions(model, radius, 1.1, 2);
+    of_both.insert(of_both.end(), of_points.begin(), of_points.end());
+    expect_proved(of_both);
   }
+}
+
+TEST(Positions, AreGivenTheSmallestFactorThatABoundNeeds) {
+  const Model model = SynthesizeScene(Options()).model;
+  std::vector<KnownPosition> positions = Positions(model, 0.01, 1.5, 2);
+  const std::vector<KnownPosition> of_points =
+      Positions(model, 0.01, 1.5, 9, Of::kPoint3D);
+  positions.insert(positions.end(), of_points.begin(), of_points.end());
+  const double as_given = *Solve(model, positions).summary.lower_bound;
+  const double without = Solve(model, {}).summary.LowestCost();
+  SolveModelOptions options;
+  options.problem.positions = positions;
+  options.inflate_positions_to = (as_given + without) / 2;
+  const SolveModelResult result = SolveModel(model, options, {1});
+  ASSERT_TRUE(result.summary.position_factor);
+  const PositionFactor& factor = *result.summary.position_factor;
+  EXPECT_GT(factor.lower_bound, 1);
+  EXPECT_LE(factor.factor, 1.003 * factor.lower_bound);
+  EXPECT_LE(result.summary.cost_final, *options.inflate_positions_to);
+  EXPECT_LE(LargestRatio(result.model, Scaled(positions, factor.factor)),
+            1 + kKept);
+  const SolveSummary below =
+      Solve(model, Scaled(positions, factor.lower_bound)).summary;
+  EXPECT_GT(below.LowestCost(), *options.inflate_positions_to);
+  ASSERT_TRUE(factor.certificate);
+  const CertificateVerdict verdict =
+      VerifyCertificateFile(model, *factor.certificate);
+  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+  EXPECT_GT(verdict.lower_bound, *options.inflate_positions_to);
+
+  options.inflate_positions_to = 2 * as_given;
+  EXPECT_EQ(SolveModel(model, options, {1}).summary.position_factor->factor, 1);
+  options.inflate_positions_to = 0.5 * without;
+  const SolveSummary refuted = SolveModel(model, options, {1}).summary;
+  EXPECT_EQ(refuted.termination, SolveTermination::kInfeasible);
+  EXPECT_GT(*refuted.lower_bound, *options.inflate_positions_to);
+}
+
+TEST(Positions, ThatHardlyHoldAnythingBackTakeFewRounds) {
+  const Model model = SynthesizeScene(Options()).model;
+  const std::vector<KnownPosition> positions = Positions(model, 0.05, 1, 1);
+  SolveModelOptions options;
+  options.problem.positions = positions;
+  options.inflate_positions_to = 1.01 * Solve(model, {}).summary.LowestCost();
+  const SolveSummary inflated = SolveModel(model, options, {1}).summary;
+  ASSERT_TRUE(inflated.position_factor);
+  const SolveSummary summary =
+      Solve(model, Scaled(positions, inflated.position_factor->factor)).summary;
+  EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
+  EXPECT_LE(summary.rounds.size(), 15);
 }
 
 TEST(Positions, ThatHoldNothingBackLeaveTheOptimum) {
@@ -157,16 +263,16 @@ TEST(Positions, ThatHoldNothingBackLeaveTheOptimum) {
 
 TEST(Positions, BringAModelWithoutTranslationsToTheSameOptimum) {
   const Model model = SynthesizeScene(Options()).model;
-  const std::vector<KnownPosition> positions = Positions(model, 0.02, 1.2, 1);
-  const SolveModelResult result = Solve(model, positions);
-  Model wiped = model;
-  for (Frame& frame : wiped.frames) frame.rig_from_world.translation.setZero();
-  for (Image& image : wiped.images) image.cam_from_world.translation.setZero();
-  for (Point3D& point : wiped.points3D) point.xyz.setZero();
-  const SolveModelResult from_nothing = Solve(wiped, positions);
-  ExpectProved(wiped, from_nothing, positions);
-  EXPECT_LE(*result.summary.lower_bound, from_nothing.summary.LowestCost());
-  EXPECT_LE(*from_nothing.summary.lower_bound, result.summary.LowestCost());
+  const Model wiped = Wiped(model);
+  for (const std::vector<KnownPosition>& positions :
+       {Positions(model, 0.02, 1.2, 1),
+        Flattened(Positions(model, 0.02, 1.2, 10, Of::kPoint3D))}) {
+    const SolveModelResult result = Solve(model, positions);
+    const SolveModelResult from_nothing = Solve(wiped, positions);
+    ExpectProved(wiped, from_nothing, positions);
+    EXPECT_LE(*result.summary.lower_bound, from_nothing.summary.LowestCost());
+    EXPECT_LE(*from_nothing.summary.lower_bound, result.summary.LowestCost());
+  }
 }
 
 TEST(Positions, OfRigsAndFarAwayAreKept) {
@@ -188,7 +294,7 @@ TEST(Positions, OfRigsAndFarAwayAreKept) {
     image.cam_from_world.translation -= image.cam_from_world.Rotation() * shift;
   }
   for (Point3D& point : far.points3D) point.xyz += shift;
-  for (KnownPosition& position : shifted) position.xyz += shift;
+  for (KnownPosition& position : shifted) position.region.centre += shift;
   const SolveModelResult of_far = Solve(far, shifted);
   EXPECT_EQ(of_far.summary.termination, SolveTermination::kGapReached);
   EXPECT_LE(LargestRatio(of_far.model, shifted), 1 + 2 * kKept);
@@ -202,7 +308,7 @@ TEST(Positions, OfRigsAndFarAwayAreKept) {
 TEST(Positions, ThatContradictTheObservationsAreNamed) {
   const Model model = SynthesizeScene(Options()).model;
   std::vector<KnownPosition> positions = Positions(model, 0.02, 0, 1);
-  positions[3].xyz += Vector3d(0.05, 0.03, 0.02);
+  positions[3].region.centre += Vector3d(0.05, 0.03, 0.02);
   const SolveModelResult result = Solve(model, positions);
   ExpectProved(model, result, positions);
   const auto names_it = [&](const SolveSummary& summary) {
@@ -229,9 +335,10 @@ TEST(Positions, ThatNoRigCanHaveAreInConflictWithEachOther) {
   const Model model = SynthesizeScene(options).model;
   std::vector<KnownPosition> positions = Positions(model, 0.005, 0, 1);
   // The two cameras of the first rig, twice as far from each other.
-  const Vector3d apart = positions[1].xyz - positions[0].xyz;
-  positions[0].xyz -= apart / 2;
-  positions[1].xyz += apart / 2;
+  const Vector3d apart =
+      positions[1].region.centre - positions[0].region.centre;
+  positions[0].region.centre -= apart / 2;
+  positions[1].region.centre += apart / 2;
   const SolveSummary summary = Solve(model, positions).summary;
   EXPECT_EQ(summary.termination, SolveTermination::kInfeasible);
   EXPECT_TRUE(summary.is_certified);
@@ -255,8 +362,8 @@ TEST(Positions, OfATamperedCertificateAreRefused) {
     f->lower_bound *= 1.001;
     f->rows_bound *= 1.001;
   }));
-  EXPECT_FALSE(
-      is_accepted([](CertificateFile* f) { f->positions[0].radius *= 1.1; }));
+  EXPECT_FALSE(is_accepted(
+      [](CertificateFile* f) { f->positions[0].region.semi_axes *= 1.1; }));
   EXPECT_FALSE(is_accepted([](CertificateFile* f) { f->positions.clear(); }));
   EXPECT_FALSE(is_accepted(
       [](CertificateFile* f) { f->positions.push_back(f->positions[0]); }));
@@ -267,8 +374,9 @@ TEST(Positions, OfATamperedCertificateAreRefused) {
       for (CertificateFile::Position::Row& row : p.rows) row.y *= 1.01;
     }
   }));
-  EXPECT_FALSE(is_accepted(
-      [](CertificateFile* f) { f->positions[0].radius = std::nan(""); }));
+  EXPECT_FALSE(is_accepted([](CertificateFile* f) {
+    f->positions[0].region.semi_axes.y() = std::nan("");
+  }));
 }
 
 }  // namespace

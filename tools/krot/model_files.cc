@@ -94,6 +94,10 @@ void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
   parser->AddPath("positions_path", &paths->positions_path, false, "a file",
                   "Where cameras are known to be: per line an image's name and "
                   "X Y Z RADIUS, in the model's frame and unit");
+  parser->AddPath("point_positions_path", &paths->point_positions_path, false,
+                  "a file",
+                  "Where 3D points are known to be: per line an id and X Y Z "
+                  "RADIUS");
 }
 
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
@@ -205,9 +209,18 @@ FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model) {
 
 std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
                                               const Model& model) {
-  if (paths.positions_path.empty()) return {};
-  LogInput(paths.positions_path);
-  return ReadPositions(ReadFileBytes(paths.positions_path), model);
+  std::vector<KnownPosition> positions;
+  if (!paths.positions_path.empty()) {
+    LogInput(paths.positions_path);
+    positions = ReadPositions(ReadFileBytes(paths.positions_path), model);
+  }
+  if (!paths.point_positions_path.empty()) {
+    LogInput(paths.point_positions_path);
+    const std::vector<KnownPosition> of_points =
+        ReadPointPositions(ReadFileBytes(paths.point_positions_path), model);
+    positions.insert(positions.end(), of_points.begin(), of_points.end());
+  }
+  return positions;
 }
 
 }  // namespace krot

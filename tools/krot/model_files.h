@@ -25,6 +25,7 @@ struct ModelPaths {
   std::string fixed_images_path;  // "": all move
   std::string fixed_points_path;  // "": all move
   std::string positions_path;     // "": none is known
+  std::string point_positions_path;
   std::string report_path;
   std::string html_path;
   bool write_on_interrupt = false;

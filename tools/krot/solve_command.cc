@@ -105,12 +105,19 @@ void WriteConflicts(const SolveCommand& command, const SolveReport& report) {
                       ConflictJson(*report.outliers->conflicts));
 }
 
-void WriteCertificate(const SolveCommand& command,
-                      const SolveSummary& summary) {
-  if (!summary.certificate) return;
-  LogLine(command.common.log, 2, "writing " + command.certificate_path);
-  WriteFileAtomically(command.certificate_path,
-                      CertificateJson(*summary.certificate));
+void WriteCertificate(const SolveCommand& command, const std::string& path,
+                      const std::optional<CertificateFile>& certificate) {
+  if (!certificate || path.empty()) return;
+  LogLine(command.common.log, 2, "writing " + path);
+  WriteFileAtomically(path, CertificateJson(*certificate));
+}
+
+void WriteCertificates(const SolveCommand& command,
+                       const SolveSummary& summary) {
+  WriteCertificate(command, command.certificate_path, summary.certificate);
+  if (!summary.position_factor) return;
+  WriteCertificate(command, command.factor_certificate_path,
+                   summary.position_factor->certificate);
 }
 
 // "; in conflict are the positions of a.jpg, b.jpg and 12 observations".
@@ -119,7 +126,7 @@ std::string PositionsConflictWords(const SolveSummary& summary) {
   const std::vector<SupportPosition>& positions = summary.support_positions;
   std::string names;
   for (size_t n = 0; n < std::min(kMost, positions.size()); ++n) {
-    names += (n == 0 ? "" : ", ") + positions[n].image_name;
+    names += (n == 0 ? "" : ", ") + positions[n].Name();
   }
   if (positions.size() > kMost) {
     names += " and " + std::to_string(positions.size() - kMost) + " others";
@@ -142,10 +149,16 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
   if (summary.termination == SolveTermination::kNothingToSolve) {
     throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
   }
+  const SolveModelOptions& options = command.options.solve;
   const std::string bound =
-      FormatNumber(command.options.solve.init_max_error, 6) + " px";
+      (options.inflate_positions_to
+           ? "Problem.inflate_positions = " +
+                 FormatNumber(*options.inflate_positions_to, 6)
+           : "Problem.init_max_error = " +
+                 FormatNumber(options.init_max_error, 6)) +
+      " px";
   if (summary.termination == SolveTermination::kInfeasible) {
-    WriteCertificate(command, summary);
+    WriteCertificates(command, summary);
     throw CommandError(
         kExitNoStart,
         "infeasible: " +
@@ -154,16 +167,17 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
                    "least " +
                        FormatNumber(*summary.lower_bound, 6) + " px, above "
                  : std::string("no estimate is below ")) +
-            "Problem.init_max_error = " + bound +
-            (summary.num_positions > 0
+            bound +
+            (options.inflate_positions_to
+                 ? std::string(", with radii a million times as large")
+             : summary.num_positions > 0
                  ? PositionsConflictWords(summary)
                  : std::string(
                        "; --Solver.max_error leaves out what does not fit")));
   }
   if (summary.termination == SolveTermination::kNoStart) {
-    throw CommandError(kExitNoStart,
-                       "no start was found below Problem.init_max_error = " +
-                           bound + ", and no proof that there is none");
+    throw CommandError(kExitNoStart, "no start was found below " + bound +
+                                         ", and no proof that there is none");
   }
 }
 
@@ -211,6 +225,8 @@ int RunSolveCommand(const SolveCommand& command) {
   const WriteModelOptions write_options = CheckModelPaths(paths, log);
   CheckSidePath("certificate_path", command.certificate_path,
                 paths.output_path);
+  CheckSidePath("factor_certificate_path", command.factor_certificate_path,
+                paths.output_path);
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
@@ -238,7 +254,7 @@ int RunSolveCommand(const SolveCommand& command) {
   WriteModel(solved, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
   RecordEnd(total_timer, command.context.num_threads, &report.run);
-  WriteCertificate(command, report.summary);
+  WriteCertificates(command, report.summary);
   WriteConflicts(command, report);
   WriteReports(paths.report_path, paths.html_path, SolveJson(report), model,
                solved, command.context.num_threads, log);

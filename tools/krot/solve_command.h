@@ -15,8 +15,9 @@ struct SolveCommand {
   std::string name;
   std::string method_name;  // for the report; "": that of the solve
   ModelPaths paths;
-  std::string certificate_path;  // "": not wanted
-  std::string conflicts_path;    // "": not wanted
+  std::string certificate_path;         // "": not wanted
+  std::string conflicts_path;           // "": not wanted
+  std::string factor_certificate_path;  // "": not wanted
   CommonOptions common;
   TolerantSolveOptions options;  // its callbacks are set by the run
   Context context;               // likewise, and the flag

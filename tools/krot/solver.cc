@@ -38,6 +38,10 @@ int RunSolver(const std::vector<std::string>& arguments) {
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
+  parser.AddOutputFile("factor_certificate_path",
+                       &command.factor_certificate_path,
+                       "With Problem.inflate_positions: where the proof goes "
+                       "that no smaller factor is enough, as JSON");
   parser.AddOutputFile("conflicts_path", &command.conflicts_path,
                        "With Solver.max_error: where the proof goes of how "
                        "many observations must be left out, as JSON; it takes "

@@ -76,23 +76,27 @@ bool SharedModel::Join(Model* model, Model* solved,
   quiet.level = 0;
   RunRecord again;
   *model = ReadInput(paths_, quiet, &again);
-  *solved = *model;
+  summary->pixel_error_before = Summarize(PixelErrors(*model));
+  if (summary->certificate) {
+    summary->certificate->model_sha256 = ModelSha256(*model);
+  }
+  if (paths_.html_path.empty()) {  // nothing else asks for the input
+    *solved = std::move(*model);
+  } else {
+    *solved = *model;
+  }
   solved->frames = share.frames;
   for (size_t n = 0; n < share.images.size(); ++n) {
     solved->images[n].cam_from_world = share.images[n].cam_from_world;
   }
   size_t next = 0;
-  for (const std::vector<int32_t>& cut : CutPoints(*model, ranks_.count())) {
+  for (const std::vector<int32_t>& cut : CutPoints(*solved, ranks_.count())) {
     for (const int32_t k : cut) {
       solved->points3D[k].xyz = points[next].xyz;
       solved->points3D[k].error = points[next++].error;
     }
   }
-  summary->pixel_error_before = Summarize(PixelErrors(*model));
   summary->pixel_error_after = Summarize(PixelErrors(*solved));
-  if (summary->certificate) {
-    summary->certificate->model_sha256 = ModelSha256(*model);
-  }
   return true;
 }
 

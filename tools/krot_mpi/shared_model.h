@@ -18,9 +18,9 @@ class SharedModel {
 
   Model Take(const Model& whole);
 
-  // On the first rank: `*model` becomes the whole as it was read, `*solved` as
-  // it is solved, and the summary speaks of it. Whether this is the first.
-  // Every rank must call it.
+  // On the first rank: `*solved` becomes the whole as it is solved, `*model` as
+  // it was read if a page is to show it, and the summary speaks of it. Whether
+  // this is the first. Every rank must call it.
   bool Join(Model* model, Model* solved, SolveSummary* summary) const;
 
  private:

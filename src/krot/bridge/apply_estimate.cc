@@ -47,20 +47,28 @@ Estimate OwnEstimate(const Model& model, const BuiltProblem& built) {
   for (const int32_t point : built.point_of) {
     estimate.points.push_back(model.points3D[point].xyz);
   }
-  for (const BuiltPosition& position : built.positions) {
-    estimate.points.push_back(position.xyz);
-  }
+  // What stands behind the model's does not move.
+  const Estimate& start = built.start;
+  estimate.translations.insert(
+      estimate.translations.end(),
+      start.translations.begin() +
+          static_cast<std::ptrdiff_t>(built.frame_of.size()),
+      start.translations.end());
+  estimate.points.insert(
+      estimate.points.end(),
+      start.points.begin() + static_cast<std::ptrdiff_t>(built.point_of.size()),
+      start.points.end());
   return estimate;
 }
 
 Model ApplyEstimate(const Model& model, const BuiltProblem& built,
                     const Estimate& estimate) {
-  CheckArgument(estimate.translations.size() == built.frame_of.size(),
+  CheckArgument(estimate.translations.size() == built.start.translations.size(),
                 "estimate.translations.size()", estimate.translations.size(),
                 "the number of frames");
-  CheckArgument(
-      estimate.points.size() == built.point_of.size() + built.positions.size(),
-      "estimate.points.size()", estimate.points.size(), "the number of points");
+  CheckArgument(estimate.points.size() == built.start.points.size(),
+                "estimate.points.size()", estimate.points.size(),
+                "the number of points");
 
   Model result = model;
   for (size_t k = 0; k < built.point_of.size(); ++k) {

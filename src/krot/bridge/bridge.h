@@ -47,19 +47,20 @@ struct BuildProblemOptions {
   bool ignore_translations = false;
   SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
   FixedParts fixed = {};                    // what must not move, of that model
-  // Of that model's images; what is fixed, or has no observation, needs none.
+  // Of that model; what is fixed, or has no observation, needs none.
   std::vector<KnownPosition> positions = {};
   // The model is one rank's share of the points, with all of the rest: frames
   // and views are those of the whole. Null: it is the whole.
   Ranks* ranks = nullptr;
 };
 
-// Where a view's camera is known to be, as rows of the problem
+// Where a view's camera or a point is known to be, as rows of the problem
 // (position_rows.h).
 struct BuiltPosition {
-  int32_t view = 0;
-  Eigen::Vector3d xyz;
-  double radius = 0;  // scene units
+  KnownPosition::Of of = KnownPosition::Of::kImage;
+  int32_t index = 0;  // of the view or the point in the problem
+  Ellipsoid region;
+  Eigen::Matrix3d unit_from_world;  // region.UnitFromWorld()
 };
 
 // The problem, its start, and where each unknown lives in the model. All stand
@@ -76,10 +77,11 @@ struct BuiltProblem {
   std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
   std::vector<Eigen::Vector2d> pixels;  // of the observations
-  // Behind what the model has, the problem holds a point for each of these, and
-  // kRowsPerPosition views and observations, which have no place in the arrays
-  // above. At the radius the residual of their rows is `position_level`,
-  // pixels.
+  // Behind what the model has, the problem holds kRowsPerPosition views for
+  // each of these, each with an observation that has no pixel: of a fixed point
+  // behind the model's, one for each camera, or from a fixed frame behind the
+  // model's, of a point. Where a region ends the residual of its rows is
+  // `position_level`, pixels.
   std::vector<BuiltPosition> positions;
   double position_level = 1;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
@@ -90,7 +92,12 @@ struct BuiltProblem {
 
   // Whether an observation is one of the model, and not a position's row.
   bool HasPixel(int64_t observation) const {
-    return observation < static_cast<int64_t>(pixels.size());
+    return problem.observations[observation].view <
+           static_cast<int32_t>(image_of.size());
+  }
+  int64_t NumPixels() const {
+    return static_cast<int64_t>(problem.observations.size()) -
+           static_cast<int64_t>(problem.views.size() - image_of.size());
   }
 };
 

@@ -105,10 +105,8 @@ void DescribePositions(const Model& model, const BuiltProblem& built,
     const int64_t index = PositionOf(built, certified.observation);
     if (index != std::exchange(last, index)) {
       const BuiltPosition& position = built.positions[index];
-      file->positions.push_back({model.images[built.image_of[position.view]].id,
-                                 position.xyz,
-                                 position.radius,
-                                 {}});
+      file->positions.push_back(
+          {position.of, IdOf(model, built, position), position.region, {}});
     }
     file->positions.back().rows.push_back(
         {certificate.bearings[n], certified.lambda, certified.y});

@@ -45,16 +45,17 @@ struct CertificateFile {
     Eigen::Vector3d xyz;
   };
 
-  // Where a camera is known to be, and the rows of that in the support.
+  // Where a camera or a point is known to be, and the rows of that in the
+  // support.
   struct Position {
     struct Row {
       Eigen::Vector3d apex;  // p of position_rows.h
       double lambda = 0;
       Eigen::Vector2d y = Eigen::Vector2d::Zero();
     };
-    ImageId image_id = 0;
-    Eigen::Vector3d xyz;
-    double radius = 0;
+    KnownPosition::Of of = KnownPosition::Of::kImage;
+    uint64_t id = 0;  // the image's or the point's
+    Ellipsoid region;
     std::vector<Row> rows;
   };
 

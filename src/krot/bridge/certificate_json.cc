@@ -106,6 +106,15 @@ Eigen::Vector3d JsonReader::Triple(const Json& value,
           Number(value[2], place)};
 }
 
+Eigen::Quaterniond JsonReader::Quaternion(const Json& value,
+                                          const std::string& place) const {
+  if (!value.is_array() || value.size() != 4) {
+    Fail(place, value, "an array of four numbers");
+  }
+  return {Number(value[0], place), Number(value[1], place),
+          Number(value[2], place), Number(value[3], place)};
+}
+
 Eigen::Vector2d JsonReader::Pair(const Json& value,
                                  const std::string& place) const {
   if (!value.is_array() || value.size() != 2) {
@@ -164,11 +173,24 @@ void JsonReader::ReadPositions(const Json& positions,
       return Member(positions[n], place, key);
     };
     CertificateFile::Position position;
-    position.image_id =
-        static_cast<ImageId>(Id(member("image_id"), place + ".image_id",
-                                std::numeric_limits<uint32_t>::max()));
-    position.xyz = Triple(member("xyz"), place + ".xyz");
-    position.radius = Number(member("radius"), place + ".radius");
+    if (positions[n].contains("point3D_id")) {
+      position.of = KnownPosition::Of::kPoint3D;
+      position.id = Id(member("point3D_id"), place + ".point3D_id",
+                       std::numeric_limits<Point3DId>::max());
+    } else {
+      position.id = Id(member("image_id"), place + ".image_id",
+                       std::numeric_limits<ImageId>::max());
+    }
+    position.region.centre = Triple(member("xyz"), place + ".xyz");
+    if (positions[n].contains("semi_axes")) {
+      position.region.semi_axes =
+          Triple(member("semi_axes"), place + ".semi_axes");
+      position.region.world_from_axes =
+          Quaternion(member("axes_qvec"), place + ".axes_qvec");
+    } else {
+      position.region.semi_axes.setConstant(
+          Number(member("radius"), place + ".radius"));
+    }
     const Json& rows = Array(member("rows"), place + ".rows");
     for (size_t k = 0; k < rows.size(); ++k) {
       const std::string row = place + ".rows[" + std::to_string(k) + "]";
@@ -190,10 +212,19 @@ CertificateFileJson PositionsJson(const CertificateFile& file) {
                       {"lambda", row.lambda},
                       {"y", {row.y[0], row.y[1]}}});
     }
-    positions.push_back({{"image_id", position.image_id},
-                         {"xyz", TripleJson(position.xyz)},
-                         {"radius", position.radius},
-                         {"rows", rows}});
+    const Ellipsoid& region = position.region;
+    const bool is_images = position.of == KnownPosition::Of::kImage;
+    Json json = {{is_images ? "image_id" : "point3D_id", position.id},
+                 {"xyz", TripleJson(region.centre)}};
+    if (region.IsBall()) {
+      json["radius"] = region.semi_axes[0];
+    } else {
+      const Eigen::Quaterniond& q = region.world_from_axes;
+      json["semi_axes"] = TripleJson(region.semi_axes);
+      json["axes_qvec"] = {q.w(), q.x(), q.y(), q.z()};
+    }
+    json["rows"] = rows;
+    positions.push_back(std::move(json));
   }
   return positions;
 }

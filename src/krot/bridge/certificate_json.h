@@ -33,6 +33,9 @@ class JsonReader {
   std::string String(const Json& value, const std::string& place) const;
   const Json& Array(const Json& value, const std::string& place) const;
   Eigen::Vector3d Triple(const Json& value, const std::string& place) const;
+  // QW QX QY QZ.
+  Eigen::Quaterniond Quaternion(const Json& value,
+                                const std::string& place) const;
   Eigen::Vector2d Pair(const Json& value, const std::string& place) const;
   Norm ReadNorm(const Json& value) const;
   // The support of a certificate of a version.
@@ -40,7 +43,7 @@ class JsonReader {
       const Json& observations, int version, const std::string& place) const;
   // Fills in what does not move.
   void ReadFixed(const Json& fixed, CertificateFile* file) const;
-  // Fills in where cameras are known to be.
+  // Fills in where cameras and points are known to be.
   void ReadPositions(const Json& positions, CertificateFile* file) const;
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <utility>
 
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/same_image.h"
@@ -15,6 +16,26 @@ bool HasImageTwice(const KnownRotationProblem& problem, int32_t point) {
   return HasImageTwice(
       &problem.observations[begin],
       static_cast<int>(problem.point_begin[point + 1] - begin));
+}
+
+// All but its share.
+SupportPosition Describe(const Model& model, const BuiltProblem& built,
+                         const Estimate& estimate,
+                         const BuiltPosition& position) {
+  SupportPosition described;
+  if (position.of == KnownPosition::Of::kImage) {
+    const Image& image = model.images[built.image_of[position.index]];
+    described.image_id = image.id;
+    described.image_name = image.name;
+  } else {
+    described.point3D_id = model.points3D[built.point_of[position.index]].id;
+  }
+  const Eigen::Vector3d offset = OffsetOf(built, estimate, position);
+  const double ratio = (position.unit_from_world * offset).norm();
+  described.distance = offset.norm();
+  described.radius = ratio > 0 ? described.distance / ratio
+                               : position.region.semi_axes.minCoeff();
+  return described;
 }
 
 }  // namespace
@@ -43,11 +64,10 @@ std::vector<SupportPosition> ListSupportPositions(
   for (const auto& [position, pull] : pulls) sum += pull.norm();
   std::vector<SupportPosition> support;
   for (const auto& [n, pull] : pulls) {
-    const BuiltPosition& position = built.positions[n];
-    const Image& image = model.images[built.image_of[position.view]];
-    support.push_back({image.id, image.name, pull.norm() / sum,
-                       OffsetOf(built, estimate, position).norm(),
-                       position.radius});
+    SupportPosition position =
+        Describe(model, built, estimate, built.positions[n]);
+    position.share = pull.norm() / sum;
+    support.push_back(std::move(position));
   }
   std::stable_sort(
       support.begin(), support.end(),

@@ -28,11 +28,19 @@ struct SupportObservation {
 // A known position in the support: with all others and the observations it sets
 // the maximum.
 struct SupportPosition {
+  // Whose it is: an image's or, without a name, a point's.
   ImageId image_id = 0;
   std::string image_name;
+  Point3DId point3D_id = 0;
   double share = 0;     // of what the positions' rows pull in all
-  double distance = 0;  // of the camera from it, scene units
-  double radius = 0;
+  double distance = 0;  // of the camera or point from it, scene units
+  double radius = 0;    // in that direction
+
+  // "a.jpg" or "3D point 12".
+  std::string Name() const {
+    return image_name.empty() ? "3D point " + std::to_string(point3D_id)
+                              : image_name;
+  }
 };
 
 // Those of a certificate, whose rows those of built.problem are, with the

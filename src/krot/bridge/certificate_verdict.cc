@@ -3,13 +3,12 @@
 #include <cmath>
 #include <map>
 #include <optional>
-#include <set>
 #include <tuple>
 #include <utility>
 
+#include "krot/bridge/certificate_positions.h"
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/pixel_certificate.h"
-#include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/id_index.h"
@@ -47,7 +46,8 @@ std::string RefusalOfUnused(const CertificateFile::SupportObservation& o,
   bool is_of_another_point = false;
   for (size_t i = 0; i < built.pixels.size(); ++i) {
     const Observation& own = built.problem.observations[i];
-    if (static_cast<uint32_t>(built.point2D_of[i]) != o.point2D_idx ||
+    if (!built.HasPixel(static_cast<int64_t>(i)) ||
+        static_cast<uint32_t>(built.point2D_of[i]) != o.point2D_idx ||
         model.images[built.image_of[own.view]].id != o.image_id) {
       continue;
     }
@@ -111,62 +111,6 @@ struct Translation {
   PixelCertificate certificate;
 };
 
-// The rows of positions, which the problem has in the order of its views. A
-// position that it does not have, of an image without observations in the
-// problem, is missed by the proof's balance.
-void TranslatePositions(const Model& model, const CertificateFile& file,
-                        const BuiltProblem& built, Translation* translation) {
-  auto next = static_cast<int64_t>(built.pixels.size());
-  for (const BuiltPosition& built_position : built.positions) {
-    const ImageId id = model.images[built.image_of[built_position.view]].id;
-    for (const CertificateFile::Position& position : file.positions) {
-      if (position.image_id != id) continue;
-      for (size_t n = 0; n < position.rows.size(); ++n) {
-        const CertificateFile::Position::Row& row = position.rows[n];
-        translation->certificate.bearings.push_back(row.apex);
-        translation->certificate.rows.observations.push_back(
-            {next + static_cast<int64_t>(n), row.lambda, row.y});
-      }
-    }
-    next += kRowsPerPosition;
-  }
-}
-
-// Why the positions of a file are none.
-std::string RefusalOfPositions(const Model& model,
-                               const CertificateFile& file) {
-  const IdIndex<ImageId> image_index(model.images);
-  std::set<ImageId> seen;
-  for (const CertificateFile::Position& position : file.positions) {
-    const std::string name =
-        "the position of image " + std::to_string(position.image_id);
-    if (!image_index.Find(position.image_id)) {
-      return name + " is of no image of the model";
-    }
-    if (!seen.insert(position.image_id).second) return name + " stands twice";
-    if (!(position.radius > 0) || !std::isfinite(position.radius) ||
-        !position.xyz.allFinite()) {
-      return name + " has no radius above zero, or is not finite";
-    }
-    if (position.rows.size() > kRowsPerPosition) {
-      return name + " has more than " + std::to_string(kRowsPerPosition) +
-             " rows";
-    }
-  }
-  return "";
-}
-
-std::vector<KnownPosition> PositionsOf(const Model& model,
-                                       const CertificateFile& file) {
-  const IdIndex<ImageId> image_index(model.images);
-  std::vector<KnownPosition> positions;
-  for (const CertificateFile::Position& position : file.positions) {
-    positions.push_back(
-        {*image_index.Find(position.image_id), position.xyz, position.radius});
-  }
-  return positions;
-}
-
 Translation Translate(const Model& model, const CertificateFile& file,
                       BuiltProblem* built) {
   using Key = std::tuple<ImageId, uint32_t, Point3DId>;
@@ -180,9 +124,18 @@ Translation Translate(const Model& model, const CertificateFile& file,
   rows.lower_bound = file.rows_bound;
   rows.defect = file.defect;
   const Reprojection reprojection(model, *built);
+  const CertificatePositions positions(model, file, *built);
   KnownRotationProblem& problem = built->problem;
-  for (size_t i = 0; i < built->pixels.size(); ++i) {
+  for (size_t i = 0; i < problem.observations.size(); ++i) {
     Observation& own = problem.observations[i];
+    if (!built->HasPixel(static_cast<int64_t>(i))) {
+      const auto* row = positions.RowOf(static_cast<int64_t>(i));
+      if (row == nullptr) continue;
+      translation.certificate.bearings.push_back(row->apex);
+      rows.observations.push_back(
+          {static_cast<int64_t>(i), row->lambda, row->y});
+      continue;
+    }
     const auto found =
         by_key.find({model.images[built->image_of[own.view]].id,
                      static_cast<uint32_t>(built->point2D_of[i]),
@@ -200,7 +153,6 @@ Translation Translate(const Model& model, const CertificateFile& file,
     translation.certificate.bearings.push_back(o.bearing);
     rows.observations.push_back({static_cast<int64_t>(i), o.lambda, o.y});
   }
-  TranslatePositions(model, file, *built, &translation);
   if (!by_key.empty()) {
     translation.is_unseen = true;
     translation.refusal =
@@ -226,7 +178,7 @@ CertificateVerdict VerifyCertificateFile(const Model& original,
     verdict.refusal = RefusalOfPositions(original, file);
   }
   if (!verdict.refusal.empty()) return verdict;
-  const std::vector<KnownPosition> positions = PositionsOf(original, file);
+  const std::vector<KnownPosition> positions = KnownPositionsOf(original, file);
   const LocalFrame frame(original, fixed.parts, positions);
   std::optional<Model> local;
   if (!frame.IsModels()) local = frame.ToLocal(original);

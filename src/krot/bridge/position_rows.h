@@ -13,52 +13,62 @@
 
 namespace krot {
 
-// That a camera's centre C is within r of a position g, as observations of the
-// known rotation problem: a fixed point at g, seen by views of C's frame that
-// are shifted by p, |p| > r. With a = p / |p| and a, m, n orthonormal,
+// That a camera's centre C is in an ellipsoid |U (C - g)| <= 1, as observations
+// of the known rotation problem: a fixed point at g, seen by views of C's frame
+// that are shifted by p, |U p| > 1. With a = U p / |U p| and a, m, n
+// orthonormal,
 //
-//   w = a'(g + p - C),  v = (level / tan) (m n)'(g + p - C),  sin = r / |p|,
+//   w = a'U (g + p - C),  v = (level / tan) (m n)'U (g + p - C),
+//   sin = 1 / |U p|,
 //
 // has ||v|| / w <= level in the cone with its apex at g + p that touches the
-// ball, so everywhere in the ball. Where the cones of several p touch it at C
-// they are the ball to first order there, as the rows of observations are their
-// lenses (docs/method.md, "Positions within a radius").
+// ellipsoid, so everywhere in it. Where the cones of several p touch it at C
+// they are the ellipsoid to first order there, as the rows of observations are
+// their lenses (docs/method.md, "Positions within a radius").
+//
+// That a point X is in one is seen from a fixed frame, by views that are
+// shifted likewise: X + p - g takes the place of g + p - C.
 
 inline constexpr int kRowsPerPosition = 3;
 
-// A row's cone is wider than the ball by this, relative: what rounding needs,
+// A row's cone is wider than the region by this, relative: what rounding needs,
 // and what the multipliers of a proof may be off.
 inline constexpr double kPositionSlack = 1e-7;
-// Inside of all cones is inside of the ball but for this, relative.
+// Inside of all cones is inside of the region but for this, relative.
 inline constexpr double kKeptPosition = 1e-6;
 
-struct PositionRow {
-  Eigen::Matrix3d E;
-  Eigen::Vector3d shift;  // R_cw p, to be added to t_sr
-};
+// E of such a row, whose camera has axes of that rotation. None for a p that is
+// not fit: not finite, or |U p| out of range.
+std::optional<Eigen::Matrix3d> MakePositionRow(
+    const Eigen::Matrix3d& cam_from_world,
+    const Eigen::Matrix3d& unit_from_world, const Eigen::Vector3d& apex,
+    double level);
 
-// None for a p that is not fit: not finite, or |p| beside r out of range.
-std::optional<PositionRow> MakePositionRow(
-    const Eigen::Matrix3d& cam_from_world, double radius,
-    const Eigen::Vector3d& apex, double level);
-
-// Adds the positions of images that a problem has, but for those of fixed
-// frames; their rows are taken as if every camera stood at its position.
+// Adds the positions of images and points that a problem has, but for those
+// that are fixed; their rows are taken as if everything were at its position.
 void AddPositions(const std::vector<KnownPosition>& positions,
                   BuiltProblem* built);
 
-// Which of built.positions a row belongs to.
+// Which of all positions' rows a row is.
+inline int64_t RowIndex(const BuiltProblem& built, int64_t observation) {
+  return built.problem.observations[observation].view -
+         static_cast<int64_t>(built.image_of.size());
+}
+// Which of built.positions it belongs to.
 inline int64_t PositionOf(const BuiltProblem& built, int64_t observation) {
-  return (observation - static_cast<int64_t>(built.pixels.size())) /
-         kRowsPerPosition;
+  return RowIndex(built, observation) / kRowsPerPosition;
 }
 
-// C - g.
+// Of the image or 3D point whose position it is.
+uint64_t IdOf(const Model& model, const BuiltProblem& built,
+              const BuiltPosition& position);
+
+// C - g, or g - X: what rows see of it is p less that.
 Eigen::Vector3d OffsetOf(const BuiltProblem& built, const Estimate& estimate,
                          const BuiltPosition& position);
 
-// p of the row, taken at an estimate: two of a position's cones touch its ball
-// where that has the camera.
+// p of the row, taken at an estimate: two of a position's cones touch its
+// region where that has the camera or point.
 Eigen::Vector3d ApexAt(const BuiltProblem& built, const Estimate& estimate,
                        int64_t observation);
 
@@ -78,7 +88,7 @@ void TakePositionRowsOfStart(double level, BuiltProblem* built);
 void TakePositionRows(const BuiltProblem& built, const Estimate& estimate,
                       KnownRotationProblem* problem);
 
-// The largest |C - g| / r; 0 without positions.
+// The largest |U (C - g)|; 0 without positions.
 double LargestPositionRatio(const BuiltProblem& built,
                             const Estimate& estimate);
 

@@ -68,12 +68,13 @@ double Reprojection::Resolution(const Estimate& estimate, int64_t i,
 
 double Reprojection::TrueCost(const Estimate& estimate, Norm norm,
                               int num_threads) const {
-  const int64_t count = static_cast<int64_t>(built_.pixels.size());
+  const auto count = static_cast<int64_t>(built_.problem.observations.size());
   std::vector<double> largest(NumChunks(count, kObservationsPerChunk), 0);
   ParallelFor(count, kObservationsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {
                 double& cost = largest[begin / kObservationsPerChunk];
                 for (int64_t i = begin; i < end; ++i) {
+                  if (!built_.HasPixel(i)) continue;
                   cost = std::max(cost, Error(estimate, norm, i));
                 }
               });
@@ -93,11 +94,12 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                             KnownRotationProblem* problem) const {
   if (is_linear_) return true;
   TakePositionRows(built_, estimate, problem);
-  const int64_t count = static_cast<int64_t>(built_.pixels.size());
+  const auto count = static_cast<int64_t>(problem->observations.size());
   std::vector<char> do_project(NumChunks(count, kObservationsPerChunk), 1);
   ParallelFor(count, kObservationsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {
                 for (int64_t i = begin; i < end; ++i) {
+                  if (!built_.HasPixel(i)) continue;
                   Observation& observation = problem->observations[i];
                   const Source& source = sources_[observation.view];
                   const auto row =

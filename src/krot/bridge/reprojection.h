@@ -24,9 +24,8 @@ class Reprojection {
   // TrueCost differ by rounding alone.
   bool IsLinear() const { return is_linear_; }
 
-  int64_t num_observations() const {  // of the model
-    return static_cast<int64_t>(built_.pixels.size());
-  }
+  // Whether observation i is one of the model: what Error and SourceOf are of.
+  bool IsOfModel(int64_t i) const { return built_.HasPixel(i); }
 
   // ||pi(x_cam) - pixel||_p of observation i, which is one of the model, and
   // what the last digits of the coordinates may add to it: an estimate whose
@@ -39,9 +38,8 @@ class Reprojection {
   // same bits at any number of threads.
   double TrueCost(const Estimate& estimate, Norm norm, int num_threads) const;
 
-  // The same or, if that is more, the level of the positions times the largest
-  // ratio of a camera's distance from its position to the radius: what the rows
-  // are of, all of them.
+  // The same or, if that is more, the level of the positions times
+  // LargestPositionRatio: what the rows are of, all of them.
   double LevelledCost(const Estimate& estimate, Norm norm,
                       int num_threads) const;
 

@@ -30,9 +30,9 @@ struct BoundedIterate {
 struct BoundedOptions {
   Norm norm;       // of the cap: p = 1, 2 or infinity
   double cap = 0;  // pixels; > 0
-  // The observations behind so many first ones have no error to be squared, but
-  // bounds alone; none: all have.
-  std::optional<int64_t> num_errors;
+  // The observations of views behind so many first ones have no error to be
+  // squared, but bounds alone; none: all have.
+  std::optional<int32_t> num_views;
   ErrorLoss loss;
   double gap_tolerance = 1e-3;           // > 0, relative to the cost
   double stationarity_tolerance = 1e-6;  // > 0

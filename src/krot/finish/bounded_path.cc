@@ -64,8 +64,8 @@ BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
     : problem_(problem),
       options_(options),
       context_(context),
-      system_(problem, Cap(options.norm, options.cap), options.loss,
-              NumErrors(), context),
+      system_(problem, Cap(options.norm, options.cap), options.loss, NumViews(),
+              context),
       multipliers_(problem.observations.size()) {
   now_.x = start;
   now_.viewed.resize(problem.observations.size());
@@ -91,8 +91,9 @@ bool BoundedPath<Cap>::View(State* state) {
         state->viewed[i] = {e, viewed.depth};
         const Vector h = system_.cap().Slacks(e);
         if (!(h.minCoeff() > 0)) return {-1, 0, {}};
-        const double loss =
-            i < NumErrors() ? options_.loss.Value(e.squaredNorm()) : 0;
+        const double loss = observations()[i].view < NumViews()
+                                ? options_.loss.Value(e.squaredNorm())
+                                : 0;
         return {h.minCoeff(), loss / 2,
                 LogProduct(system_.cap().RelativeSlack(h))};
       },

@@ -56,9 +56,9 @@ class BoundedPath {
   const std::vector<Observation>& observations() const {
     return rows().observations;
   }
-  int64_t NumErrors() const {
-    return options_.num_errors.value_or(
-        static_cast<int64_t>(problem_.observations.size()));
+  int32_t NumViews() const {
+    return options_.num_views.value_or(
+        static_cast<int32_t>(problem_.views.size()));
   }
   bool TakeRows(const Estimate& x) {
     return !options_.take_rows || context_.All(options_.take_rows(x, &rows_));

@@ -28,11 +28,11 @@ std::vector<Matrix3d> FrameRotations(const KnownRotationProblem& problem) {
 template <typename Cap>
 BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
                                   const Cap& cap, const ErrorLoss& loss,
-                                  int64_t num_errors, const Context& context)
+                                  int32_t num_views, const Context& context)
     : problem_(problem),
       cap_(cap),
       loss_(loss),
-      num_errors_(num_errors),
+      num_views_(num_views),
       loop_(static_cast<int64_t>(problem.observations.size()), context),
       structure_(AnchoredStructure(problem, context)),
       frame_rotations_(FrameRotations(problem)),

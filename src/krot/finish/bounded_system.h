@@ -40,10 +40,10 @@ class BoundedSystem {
  public:
   using Vector = typename Cap::Vector;
 
-  // Keeps a reference to `problem`, but for its observations' rows. Those
-  // behind the first `num_errors` are bounds alone.
+  // Keeps a reference to `problem`, but for its observations' rows. Those of
+  // views behind the first `num_views` are bounds alone.
   BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
-                const ErrorLoss& loss, int64_t num_errors,
+                const ErrorLoss& loss, int32_t num_views,
                 const Context& context);
 
   // The system at an iterate, whose rows are those of `observations`; errors
@@ -98,7 +98,9 @@ class BoundedSystem {
 
   // rho' of an observation's error.
   double WeightOf(int64_t i) const {
-    return i < num_errors_ ? loss_.Weight((*viewed_)[i].e.squaredNorm()) : 0;
+    return problem_.observations[i].view < num_views_
+               ? loss_.Weight((*viewed_)[i].e.squaredNorm())
+               : 0;
   }
   Root RootOf(int64_t i) const;
   Correction CorrectionOf(int64_t i) const {
@@ -112,7 +114,7 @@ class BoundedSystem {
   const KnownRotationProblem& problem_;
   const Cap cap_;
   const ErrorLoss loss_;
-  const int64_t num_errors_;
+  const int32_t num_views_;
   const ObservationLoop loop_;
   const BlockStructure structure_;
   // R_rw of the frames that an observation has.

@@ -75,7 +75,9 @@ std::vector<Vector3d> Positions(const Model& model, const FixedParts& fixed,
     const std::vector<Vector3d> points = Points(model, fixed.points3D);
     positions.insert(positions.end(), points.begin(), points.end());
   }
-  for (const KnownPosition& position : known) positions.push_back(position.xyz);
+  for (const KnownPosition& position : known) {
+    positions.push_back(position.region.centre);
+  }
   if (positions.empty()) positions = Centres(model, {});
   if (positions.empty()) positions = Points(model, {});
   return positions;
@@ -130,7 +132,7 @@ Model LocalFrame::ToLocal(const Model& model) const {
 
 std::vector<KnownPosition> LocalFrame::ToLocal(
     std::vector<KnownPosition> known) const {
-  for (KnownPosition& position : known) position.xyz -= origin_;
+  for (KnownPosition& position : known) position.region.centre -= origin_;
   return known;
 }
 

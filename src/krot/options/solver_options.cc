@@ -13,6 +13,18 @@ namespace {
 // The paper's own rule, where its settings are asked for [Zhang18, Sec. 5].
 constexpr double kPaperSweepTolerance = 1e-3;
 
+void AddPixels(const std::string& name, const std::string& help,
+               const std::string& default_text, std::optional<double>* pixels,
+               OptionTable* table) {
+  table->Add({name, help, "a number > 0, pixels", default_text, false,
+              [pixels](const std::string& text) {
+                double value = 0;
+                if (!ParseReal(text, &value) || !(value > 0)) return false;
+                *pixels = value;
+                return true;
+              }});
+}
+
 void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
   table->AddNamed<SolveMethod>(
       "Solver.method", &options->method,
@@ -34,23 +46,15 @@ void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
   table->AddReal("Problem.init_max_error", &options->init_max_error,
                  Above(0.0, "pixels"),
                  "With a feasible start: the largest error that it may have");
+  AddPixels("Problem.inflate_positions",
+            "Multiply all radii of known positions by the smallest factor, at "
+            "least 1, at which the largest error can be at most this",
+            "radii are as the files have them", &options->inflate_positions_to,
+            table);
   table->AddInteger(
       "Joint.max_iterations", &options->joint.max_iterations, AtLeast(1),
       "Iterations per connected component and round after which to "
       "stop in any case");
-}
-
-void AddMaxError(std::optional<double>* max_error, OptionTable* table) {
-  table->Add({"Solver.max_error",
-              "The error that no observation may have: few are removed, as by "
-              "outlier_filter, so that all others are within it",
-              "a number > 0, pixels", "none is removed", false,
-              [max_error](const std::string& text) {
-                double value = 0;
-                if (!ParseReal(text, &value) || !(value > 0)) return false;
-                *max_error = value;
-                return true;
-              }});
 }
 
 void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
@@ -89,12 +93,21 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     table.Refuse("Solver.finish_slack", why);
     table.Refuse("Problem.init_max_error",
                  "with --Solver.max_error, which needs no such start");
-    for (const char* name :
-         {"fixed_images_path", "fixed_points_path", "positions_path"}) {
+    for (const char* name : {"fixed_images_path", "fixed_points_path",
+                             "positions_path", "point_positions_path"}) {
       table.Refuse(name, "with --Solver.max_error, which moves everything");
     }
   } else {
     table.Refuse("conflicts_path", "without --Solver.max_error");
+  }
+  if (!table.IsGiven("positions_path") &&
+      !table.IsGiven("point_positions_path")) {
+    table.Refuse("Problem.inflate_positions",
+                 "without --positions_path or --point_positions_path");
+  }
+  if (!options.inflate_positions_to) {
+    table.Refuse("factor_certificate_path",
+                 "without --Problem.inflate_positions");
   }
   const bool has_joint_norm =
       options.norm.p == 2 || options.norm.IsPolyhedral();
@@ -109,9 +122,12 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   if (options.norm.p != 2 || method == SolveMethod::kResInt ||
       options.polish != Polish::kNone ||
       options.finish.finish == Finish::kSweeps) {
-    table.Refuse("positions_path",
-                 "but with --Solver.norm 2, the joint solver, and neither a "
-                 "polish nor a finish of sweeps");
+    for (const char* name : {"positions_path", "point_positions_path",
+                             "Problem.inflate_positions"}) {
+      table.Refuse(name,
+                   "but with --Solver.norm 2, the joint solver, and neither a "
+                   "polish nor a finish of sweeps");
+    }
   }
   if (method == SolveMethod::kResInt) {
     const char* why =
@@ -151,7 +167,10 @@ void AddSolverOptions(TolerantSolveOptions* options, Context* context,
                       OptionTable* table) {
   SolveModelOptions* solve = &options->solve;
   AddScheduleOptions(solve, table);
-  AddMaxError(&options->max_error, table);
+  AddPixels("Solver.max_error",
+            "The error that no observation may have: few are removed, as by "
+            "outlier_filter, so that all others are within it",
+            "none is removed", &options->max_error, table);
   AddFinishOptions(solve, table);
   AddSolveOptions(solve, context, table);
   AddResIntOptions(SolveModelOptions(), &solve->res_int, table);

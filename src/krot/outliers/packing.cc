@@ -9,6 +9,7 @@
 #include "krot/bridge/built_part.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/outliers/neighbourhood.h"
+#include "krot/outliers/scarce.h"
 #include "krot/outliers/two_view_conflicts.h"
 #include "krot/problem/components.h"
 #include "krot/problem/subset.h"
@@ -24,8 +25,6 @@ constexpr size_t kMaxForMoreFrames = 400;
 constexpr size_t kMaxTight = 250;
 // Open observations that look for a conflict at the same time.
 constexpr size_t kBatch = 16;
-// What an observation is worth that others of its track need.
-constexpr float kWorthToItsTrack = 0.3F;
 
 class Packing {
  public:
@@ -63,11 +62,11 @@ class Packing {
     return ProveConflict(model_, built_, bound_, small_context_, conflict);
   }
   bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
-  std::vector<float> Worths(const std::vector<int64_t>& open) const;
   std::optional<Conflict> InTwoViews(int64_t i,
                                      const std::vector<float>& worth) const;
   void ChargeInTwoViews(std::vector<int64_t>* open);
   bool Charge(int64_t i, int num_others);
+  void ChargeInFrames(std::vector<int64_t>* open);
   void Charge(std::vector<int64_t>* open);
   void ChargeTight();
   void Take(Conflict conflict);
@@ -132,22 +131,6 @@ void Packing::Take(Conflict conflict) {
   conflicts_.push_back(std::move(conflict));
 }
 
-// How dispensable observations are; those of a track that an open one has
-// little else of are less so.
-std::vector<float> Packing::Worths(const std::vector<int64_t>& open) const {
-  std::vector<float> worth(is_free_.begin(), is_free_.end());
-  for (const int64_t i : open) {
-    const int32_t k = problem_.observations[i].point;
-    const int64_t begin = problem_.point_begin[k];
-    const int64_t end = problem_.point_begin[k + 1];
-    if (std::count(&is_free_[0] + begin, &is_free_[0] + end, 1) > 2) continue;
-    for (int64_t j = begin; j < end; ++j) {
-      if (is_free_[j]) worth[j] = kWorthToItsTrack;
-    }
-  }
-  return worth;
-}
-
 std::optional<Conflict> Packing::InTwoViews(
     int64_t i, const std::vector<float>& worth) const {
   std::vector<std::vector<int64_t>> sets;
@@ -182,7 +165,7 @@ void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
     }
     std::vector<int64_t> all = queue;
     all.insert(all.end(), batch.begin(), batch.end());
-    const std::vector<float> worth = Worths(all);
+    const std::vector<float> worth = Worths(problem_, is_free_, all);
     std::vector<std::optional<Conflict>> found(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), 1, context_.num_threads,
                 [&](int64_t n, int64_t, int) {
@@ -227,8 +210,7 @@ bool Packing::Charge(int64_t i, int num_others) {
 
 // Those that are left open found no conflict of their own. Those that barely
 // miss the bound hardly ever find one in more frames.
-void Packing::Charge(std::vector<int64_t>* open) {
-  ChargeInTwoViews(open);
+void Packing::ChargeInFrames(std::vector<int64_t>* open) {
   for (const int num_others : {2, 3}) {
     std::vector<int64_t> left;
     for (size_t n = 0; n < open->size() && !context_.IsCancelled(); ++n) {
@@ -239,6 +221,17 @@ void Packing::Charge(std::vector<int64_t>* open) {
     }
     *open = std::move(left);
   }
+}
+
+// Conflicts of two views are the smallest, but have three observations in the
+// open one's view; others may have two.
+void Packing::Charge(std::vector<int64_t>* open) {
+  std::vector<int64_t> crowded = TakeCrowded(problem_, is_free_, open);
+  ChargeInFrames(&crowded);
+  ChargeInTwoViews(open);
+  ChargeInTwoViews(&crowded);
+  ChargeInFrames(open);
+  open->insert(open->begin(), crowded.begin(), crowded.end());
 }
 
 std::vector<Conflict> Packing::Run() {

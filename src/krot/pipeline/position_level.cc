@@ -10,6 +10,9 @@ namespace {
 constexpr double kSteepest = 0.98;
 // What it counts as at least where the level's excess is chosen.
 constexpr double kLeastSlope = 0.5;
+// Of the tolerance, whatever the slope seems to be: what is chosen below, and
+// some.
+constexpr double kMostExcess = 1.25 / kLeastSlope;
 // Levels that are nearer to each other, relative, show no slope.
 constexpr double kNear = 1e-5;
 
@@ -31,7 +34,7 @@ std::optional<double> PositionLevel::Next(double level, double optimum,
   // A level e above the fixed point costs slope e, and leaves (1 - slope) e.
   const double excess = x - std::log(cost);
   if (is_kept && slope_ * excess <= 2 * (1 - slope_) * tolerance_ &&
-      excess <= tolerance_) {
+      excess <= kMostExcess * tolerance_) {
     return std::nullopt;
   }
   // As G rises slower than L, the fixed point is beyond y as seen from x.

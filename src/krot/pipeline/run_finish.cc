@@ -53,7 +53,7 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   bounded.cap = (1 - kRounding) * finish.cap;
   bounded.loss = options.finish.loss;
   bounded.callback = options.finish.callback;
-  bounded.num_errors = static_cast<int64_t>(built->pixels.size());
+  bounded.num_views = static_cast<int32_t>(built->image_of.size());
   built->position_level = bounded.cap / (1 + kShareOfKept * kKeptPosition);
   TakePositionRows(*built, *estimate, &built->problem);
   if (!reprojection.IsLinear()) {

@@ -62,16 +62,14 @@ void CheckOptions(const SolveModelOptions& options, const Context& context) {
 void CountProblem(const Model& model, const BuiltProblem& built,
                   const Context& context, SolveSummary* summary) {
   const KnownRotationProblem& problem = built.problem;
-  const auto whole = [&](size_t own) {
-    return context.Sum(static_cast<int64_t>(own));
-  };
-  summary->num_frames = problem.num_frames;
+  summary->num_frames = static_cast<int64_t>(built.frame_of.size());
   summary->num_images = static_cast<int64_t>(built.image_of.size());
-  summary->num_points = whole(built.point_of.size());
-  summary->num_observations = whole(built.pixels.size());
+  summary->num_points =
+      context.Sum(static_cast<int64_t>(built.point_of.size()));
+  summary->num_observations = context.Sum(built.NumPixels());
   summary->num_positions = static_cast<int64_t>(built.positions.size());
   summary->num_components = FindComponents(problem, context).count;
-  for (int32_t f = 0; f < problem.num_frames; ++f) {
+  for (int32_t f = 0; f < summary->num_frames; ++f) {
     summary->num_fixed_frames += problem.IsFixedFrame(f);
   }
   for (size_t k = 0; k < built.point_of.size(); ++k) {

@@ -5,6 +5,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/local_frame.h"
+#include "krot/pipeline/inflate_positions.h"
 #include "krot/pipeline/solve_in_frame.h"
 
 namespace krot {
@@ -31,7 +32,10 @@ void PlaceKnown(const Model& model, const std::vector<KnownPosition>& known,
                 CertificateFile* certificate) {
   for (CertificateFile::Position& position : certificate->positions) {
     for (const KnownPosition& k : known) {
-      if (model.images[k.image].id == position.image_id) position.xyz = k.xyz;
+      const bool is_images = k.of == KnownPosition::Of::kImage;
+      const uint64_t id =
+          is_images ? model.images[k.index].id : model.points3D[k.index].id;
+      if (k.of == position.of && id == position.id) position.region = k.region;
     }
   }
 }
@@ -49,6 +53,9 @@ SolveMethod EffectiveMethod(const SolveModelOptions& options) {
 SolveModelResult SolveModel(const Model& model,
                             const SolveModelOptions& options,
                             const Context& context) {
+  if (options.inflate_positions_to) {
+    return SolveWithInflatedPositions(model, options, context);
+  }
   const BuildProblemOptions& known = options.problem;
   const LocalFrame frame(model, known.fixed, known.positions);
   SolveModelOptions local_options = options;

@@ -62,6 +62,17 @@ struct Round {
   double seconds = 0;                        // since the solve's start
 };
 
+// By what all radii of positions were multiplied so that the largest error can
+// be at most `max_error`.
+struct PositionFactor {
+  double factor = 1;
+  // None below is enough: `certificate` proves an error above max_error for
+  // radii times this; 1 without one.
+  double lower_bound = 1;
+  double max_error = 0;  // pixels
+  std::optional<CertificateFile> certificate;
+};
+
 struct SolveSummary {
   SolveTermination termination = SolveTermination::kNotRun;
   SolveMethod method = SolveMethod::kAuto;  // that was used, not asked for
@@ -80,6 +91,7 @@ struct SolveSummary {
   // Of a camera's distance from its position to the radius, of the model
   // written.
   double largest_position_ratio = 0;
+  std::optional<PositionFactor> position_factor;  // if asked for
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
   int64_t num_same_image_tracks = 0;  // that hold an image more than once
@@ -145,6 +157,10 @@ struct SolveModelOptions {
   double init_max_error = 100;        // pixels; > 0; the start's, if kFeasible
   bool describe_certificate = false;  // fill SolveSummary::certificate
   BuildProblemOptions problem;
+  // Pixels; if given, the radii of problem.positions are multiplied by the
+  // smallest factor, at least 1, at which the largest error can be at most
+  // this. That takes some ten solves.
+  std::optional<double> inflate_positions_to;
   Polish polish = Polish::kNone;  // of SolveModel
 
   // Takes the place of that in the stages' own options.

@@ -27,7 +27,7 @@ bool CentresCoincide(const BuiltProblem& built) {
     return Center({view.cam_from_world_rotation,
                    cam_from_rig * built.start.translations[view.frame]});
   };
-  if (built.problem.num_frames < 2) return false;
+  if (built.frame_of.size() < 2) return false;
   const Eigen::Vector3d first = centre(built.problem.views.front());
   for (size_t v = 0; v < built.image_of.size(); ++v) {
     if (centre(built.problem.views[v]) != first) return false;

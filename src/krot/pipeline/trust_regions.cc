@@ -38,8 +38,12 @@ int64_t TrustRegions::Shrink(const Reprojection& reprojection,
                              const Estimate& from, const Estimate& to,
                              Norm norm, double level) {
   int64_t count = 0;
-  for (int64_t i = 0; i < reprojection.num_observations(); ++i) {
-    if (!(reprojection.Error(to, norm, i) > level)) continue;
+  const auto num_observations =
+      static_cast<int64_t>(problem.observations.size());
+  for (int64_t i = 0; i < num_observations; ++i) {
+    if (!reprojection.IsOfModel(i) ||
+        !(reprojection.Error(to, norm, i) > level))
+      continue;
     const Observation& observation = problem.observations[i];
     const Basis basis = BasisAcross(InCamera(problem, from, observation));
     const Vector3d x_cam = InCamera(problem, to, observation);

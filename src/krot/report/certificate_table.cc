@@ -25,8 +25,9 @@ std::string FixedSentence(const CertificateVerdict& verdict) {
 std::string PositionsSentence(const CertificateVerdict& verdict) {
   if (verdict.positions.empty()) return "";
   return "It takes " +
-         Counted(static_cast<int64_t>(verdict.positions.size()), "camera") +
-         " to be within the radii below of the positions in its file.\n";
+         Counted(static_cast<int64_t>(verdict.positions.size()),
+                 "known position") +
+         " of its file to be kept to the radii below.\n";
 }
 
 }  // namespace
@@ -37,13 +38,13 @@ std::string PositionsTable(const std::vector<SupportPosition>& positions,
   const size_t count =
       std::min(positions.size(), static_cast<size_t>(max_positions));
   TextTable table;
-  table.AddRow({"image", "share", "distance", "radius"});
+  table.AddRow({"position of", "share", "distance", "radius"});
   for (size_t n = 0; n < count; ++n) {
     const SupportPosition& p = positions[n];
-    table.AddRow({p.image_name, FormatNumber(p.share, 4),
+    table.AddRow({p.Name(), FormatNumber(p.share, 4),
                   FormatNumber(p.distance, 6), FormatNumber(p.radius, 6)});
   }
-  return "\nKnown positions that hold cameras against the support: " +
+  return "\nKnown positions that hold against the support: " +
          std::to_string(positions.size()) +
          (count < positions.size() ? "; the first " + std::to_string(count)
                                    : std::string()) +

@@ -75,14 +75,24 @@ Json SupportJson(const std::vector<SupportObservation>& support) {
   return json;
 }
 
+Json FactorJson(const std::optional<PositionFactor>& factor) {
+  if (!factor) return nullptr;
+  return {{"value", factor->factor},
+          {"lower_bound", factor->lower_bound},
+          {"max_error", factor->max_error}};
+}
+
 Json PositionsJson(const std::vector<SupportPosition>& positions) {
   Json json = Json::array();
   for (const SupportPosition& position : positions) {
-    json.push_back({{"image_id", position.image_id},
-                    {"image_name", position.image_name},
-                    {"share", position.share},
-                    {"distance", position.distance},
-                    {"radius", position.radius}});
+    Json entry = position.image_name.empty()
+                     ? Json({{"point3D_id", position.point3D_id}})
+                     : Json({{"image_id", position.image_id},
+                             {"image_name", position.image_name}});
+    entry.update({{"share", position.share},
+                  {"distance", position.distance},
+                  {"radius", position.radius}});
+    json.push_back(std::move(entry));
   }
   return json;
 }
@@ -191,7 +201,8 @@ std::string SolveJson(const SolveReport& report) {
         {"num_points", summary.num_fixed_points}}},
       {"positions",
        {{"num_known", summary.num_positions},
-        {"largest_ratio", summary.largest_position_ratio}}},
+        {"largest_ratio", summary.largest_position_ratio},
+        {"factor", FactorJson(summary.position_factor)}}},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},

@@ -196,18 +196,36 @@ std::string SameImageSentence(const SolveSummary& summary) {
   return sentence + ".\n";
 }
 
-// How cameras stand to where they are known to be.
+// How cameras and points stand to where they are known to be.
 std::string PositionsKeptSentence(const SolveSummary& summary) {
   if (summary.num_positions == 0) return "";
   const std::string ratio =
       FormatNumber(100 * summary.largest_position_ratio, 2) +
       " % of its radius.\n";
   return summary.largest_position_ratio > 1 + 1e-6
-             ? "Not all cameras came to be where they are known to be: one is "
-               "off by " +
+             ? "Not everything came to be where it is known to be: the "
+               "farthest "
+               "is off by " +
                    ratio
              : Counted(summary.num_positions, "known position") +
-                   " kept; the farthest camera is off by " + ratio;
+                   " kept; the farthest is off by " + ratio;
+}
+
+// By what their radii were multiplied.
+std::string PositionFactorSentence(const SolveSummary& summary) {
+  if (!summary.position_factor) return "";
+  const PositionFactor& factor = *summary.position_factor;
+  const std::string pixels = FormatNumber(factor.max_error, 4) + " px";
+  if (factor.factor == 1) {
+    return "The largest error can be at most " + pixels +
+           " with the radii as they are.\n";
+  }
+  return "All radii are multiplied by " + FormatNumber(factor.factor, 4) +
+         ", so that the largest error can be at most " + pixels +
+         (factor.certificate ? "; with " + FormatNumber(factor.lower_bound, 4) +
+                                   " it is proved to be above"
+                             : std::string()) +
+         ".\n";
 }
 
 // What was left out so that all else is within a bound.
@@ -238,7 +256,8 @@ std::string SolveTable(const SolveReport& report) {
          << Counted(summary.num_components, "component")
          << " without observations in common; each is solved.\n";
   }
-  text << PositionsKeptSentence(summary) << SolveEndSentence(summary) << '\n'
+  text << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
+       << SolveEndSentence(summary) << '\n'
        << Verdict(summary) << '\n';
   if (summary.is_certified) {
     text << SupportTable(summary.support, kListedSupport)
