@@ -47,7 +47,7 @@ TEST_F(BestOnSegment_, StopsWhereTheTrueErrorIsLowAndNotAtItsEnd) {
   ASSERT_GT(CostOf(to_), CostOf(from_));
   double step = -1;
   const Estimate best =
-      BestOnSegment(reprojection_, from_, to_, Norm::L2(), 1, &step);
+      BestOnSegment(reprojection_, from_, to_, Norm::L2(), Context{1}, &step);
   EXPECT_GT(step, 0);
   EXPECT_LT(step, 0.5);
   EXPECT_LT(CostOf(best), 0.5 * CostOf(from_));
@@ -57,11 +57,11 @@ TEST_F(BestOnSegment_, StopsWhereTheTrueErrorIsLowAndNotAtItsEnd) {
 
 TEST_F(BestOnSegment_, StaysWhereEveryStepIsUphill) {
   double step = -1;
-  const Estimate best =
-      BestOnSegment(reprojection_, built_.start, to_, Norm::L2(), 1, &step);
+  const Estimate best = BestOnSegment(reprojection_, built_.start, to_,
+                                      Norm::L2(), Context{1}, &step);
   EXPECT_LE(CostOf(best), CostOf(built_.start));
   const Estimate up =
-      BestOnSegment(reprojection_, from_, from_, Norm::L2(), 1, &step);
+      BestOnSegment(reprojection_, from_, from_, Norm::L2(), Context{1}, &step);
   EXPECT_EQ(step, 0);
   EXPECT_EQ(up.points, from_.points);
 }

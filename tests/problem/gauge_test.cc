@@ -269,7 +269,7 @@ TEST(RestoreGaugeIfHarmless, DoesTheSameWhereNothingIsLost) {
   Estimate restored = moved;
   RestoreGauge(scene.problem, scene.estimate, &restored);
   Estimate estimate = moved;
-  RestoreGaugeIfHarmless(scene.problem, scene.estimate, Norm::L2(), 1,
+  RestoreGaugeIfHarmless(scene.problem, scene.estimate, Norm::L2(), Context{1},
                          &estimate);
   EXPECT_NE(estimate.points, moved.points);
   EXPECT_EQ(estimate.points, restored.points);
@@ -286,7 +286,7 @@ TEST(RestoreGaugeIfHarmless, StaysWhereCoordinatesWouldLoseTheirDigits) {
   RestoreGauge(scene.problem, far, &restored);
   ASSERT_GT(Cost(scene.problem, restored, Norm::L2(), 1), (1 + 1e-8) * cost);
   Estimate estimate = scene.estimate;
-  RestoreGaugeIfHarmless(scene.problem, far, Norm::L2(), 1, &estimate);
+  RestoreGaugeIfHarmless(scene.problem, far, Norm::L2(), Context{1}, &estimate);
   EXPECT_EQ(estimate.points, scene.estimate.points);
   EXPECT_EQ(estimate.translations, scene.estimate.translations);
 }

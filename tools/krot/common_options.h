@@ -15,6 +15,8 @@ struct CommonOptions {
   std::string project_path;
 };
 
+void AddLogLevel(LogOptions* log, OptionParser* parser);
+void AddProjectPath(std::string* project_path, OptionParser* parser);
 void AddCommonOptions(const std::string& seed_description,
                       CommonOptions* options, OptionParser* parser);
 

@@ -84,6 +84,10 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
     if (summary.num_observations == 0) {
       throw CommandError(kExitNothingToSolve, NothingToSolveSentence(summary));
     }
+    if (command.take_share) {
+      LogLine(log, 1, ProblemWords(summary));
+      return;
+    }
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
     CheckMemory(summary);
   };
@@ -226,17 +230,21 @@ int RunSolveCommand(const SolveCommand& command) {
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
-  const Model model = ReadInput(paths, log, &report.run);
+  Model model = ReadInput(paths, log, &report.run);
+  if (command.take_share) model = command.take_share(model);
 
   Context context = command.context;
   if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
-  const Model solved = Solve(command, model, context, &report);
+  Model solved = Solve(command, model, context, &report);
   DeferInterrupts();
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);
   }
   ThrowIfNoStart(command, report);
   ThrowIfNothingSoFar(report);
+  if (command.join && !command.join(&model, &solved, &report.summary)) {
+    return kExitDone;
+  }
 
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, solved);

@@ -21,6 +21,12 @@ struct SolveCommand {
   CommonOptions common;
   TolerantSolveOptions options;  // its callbacks are set by the run
   Context context;               // likewise, and the flag
+
+  // Where several processes solve the model together (tools/krot_mpi): what
+  // this one takes of it; and, of the one that writes, the whole as it was read
+  // and as it is solved. Empty: this one has it all.
+  std::function<Model(const Model& whole)> take_share;
+  std::function<bool(Model* model, Model* solved, SolveSummary* summary)> join;
 };
 
 // Returns an exit code or throws. Nothing is written before the solve is done:

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "krot/base/progress.h"
+#include "krot/base/ranks.h"
 
 namespace krot {
 
@@ -16,10 +20,53 @@ struct Context {
   const CancelFlag* cancel = nullptr;  // may be null
   // Takes a sentence on what was chosen, and why; may be empty.
   std::function<void(const std::string&)> on_note = {};
+  // The processes that share the points; null: this one has them all.
+  Ranks* ranks = nullptr;
 
   bool IsCancelled() const { return krot::IsCancelled(cancel); }
   void Note(const std::string& sentence) const {
     if (on_note) on_note(sentence);
+  }
+
+  // The same for work on this process's own share.
+  Context Alone() const {
+    Context alone = *this;
+    alone.ranks = nullptr;
+    return alone;
+  }
+
+  // Of the whole, from what it is of this process's share.
+  double Max(double own) const {
+    return Reduced(own, [](double a, double b) { return std::max(a, b); });
+  }
+  int64_t Sum(int64_t own) const {
+    return Reduced(own, [](int64_t a, int64_t b) { return a + b; });
+  }
+  bool All(bool own) const { return Sum(own ? 0 : 1) == 0; }
+  bool Any(bool own) const { return Sum(own ? 1 : 0) > 0; }
+  template <typename T, typename Combine>
+  void Reduce(const Combine& combine, std::vector<T>* values) const {
+    if (ranks != nullptr) ranks->Reduce(combine, values);
+  }
+  // What `change` makes of the value in the order of the points of the whole.
+  template <typename T, typename Change>
+  void InTurn(const Change& change, std::vector<T>* value) const {
+    if (ranks == nullptr) return change(value);
+    ranks->InTurn(change, value);
+  }
+  // Throws RanksError where several processes share the points.
+  void RequireAlone(const std::string& what) const {
+    if (ranks == nullptr) return;
+    throw RanksError(what + " is for one process: use krot solver");
+  }
+
+ private:
+  template <typename T, typename Combine>
+  T Reduced(T own, const Combine& combine) const {
+    if (ranks == nullptr) return own;
+    std::vector<T> value = {own};
+    ranks->Reduce(combine, &value);
+    return value[0];
   }
 };
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "krot/base/ranks.h"
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 #include "krot/model/positions_file.h"
@@ -48,6 +49,9 @@ struct BuildProblemOptions {
   FixedParts fixed = {};                    // what must not move, of that model
   // Of that model; what is fixed, or has no observation, needs none.
   std::vector<KnownPosition> positions = {};
+  // The model is one rank's share of the points, with all of the rest: frames
+  // and views are those of the whole. Null: it is the whole.
+  Ranks* ranks = nullptr;
 };
 
 // Where a view's camera or a point is known to be, as rows of the problem

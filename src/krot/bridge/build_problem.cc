@@ -283,7 +283,7 @@ BuiltProblem BuildProblem(const Model& model,
   if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;
   Compact(ProcessPoints(sources, options, &built), &built);
-  AddFramesAndViews(model, sources.geometries, &built);
+  AddFramesAndViews(model, sources.geometries, options.ranks, &built);
   FixPositions(options.fixed, &built);
   AddPositions(options.positions, &built);
   IndexObservations(&built.problem);

@@ -1,5 +1,6 @@
 #include "krot/bridge/frames_and_views.h"
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -9,11 +10,15 @@ namespace krot {
 
 void AddFramesAndViews(const Model& model,
                        const std::vector<ImageGeometry>& geometries,
-                       BuiltProblem* built) {
+                       Ranks* ranks, BuiltProblem* built) {
   KnownRotationProblem& problem = built->problem;
   std::vector<int32_t> frame_index(model.frames.size(), -1);
   for (const Observation& observation : problem.observations) {
     frame_index[geometries[observation.view].frame] = 0;
+  }
+  if (ranks != nullptr) {
+    ranks->Reduce([](int32_t a, int32_t b) { return std::max(a, b); },
+                  &frame_index);
   }
   for (const int32_t f : OrderOfIds(model.frames)) {
     if (frame_index[f] < 0) continue;

@@ -13,7 +13,7 @@ namespace krot {
 // from now on.
 void AddFramesAndViews(const Model& model,
                        const std::vector<ImageGeometry>& geometries,
-                       BuiltProblem* built);
+                       Ranks* ranks, BuiltProblem* built);
 
 // Fixes what is marked of the model where the problem starts.
 void FixPositions(const FixedParts& fixed, BuiltProblem* built);

@@ -1,22 +1,26 @@
 #include "krot/conic/block_structure.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "krot/problem/components.h"
 
 namespace krot {
 
-BlockStructure AnchoredStructure(const KnownRotationProblem& problem) {
+BlockStructure AnchoredStructure(const KnownRotationProblem& problem,
+                                 const Context& context) {
   BlockStructure structure;
   structure.point_begin = problem.point_begin;
   structure.frame_of.reserve(problem.observations.size());
   for (const Observation& observation : problem.observations) {
     structure.frame_of.push_back(problem.views[observation.view].frame);
   }
-  const auto count = [&](int32_t f) {
-    return problem.frame_begin[f + 1] - problem.frame_begin[f];
-  };
-  const Components components = FindComponents(problem);
+  std::vector<int64_t> count;
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    count.push_back(problem.frame_begin[f + 1] - problem.frame_begin[f]);
+  }
+  context.Reduce(std::plus<int64_t>(), &count);
+  const Components components = FindComponents(problem, context);
   std::vector<char> is_held(components.count, 0);
   if (!problem.fixed_points.empty()) {
     structure.point_is_fixed.assign(problem.num_points, 0);
@@ -36,7 +40,7 @@ BlockStructure AnchoredStructure(const KnownRotationProblem& problem) {
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     if (components.of_frame[f] < 0 || is_held[components.of_frame[f]]) continue;
     int32_t& best = anchor[components.of_frame[f]];
-    if (best < 0 || count(f) > count(best)) best = f;
+    if (best < 0 || count[f] > count[best]) best = f;
   }
   for (const int32_t f : anchor) {
     if (f >= 0) structure.frame_is_fixed[f] = 1;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -31,8 +32,10 @@ struct BlockStructure {
 
 // That of a problem: what it fixes is, and for the translation's gauge, of each
 // connected component in which it fixes nothing, the frame with the most
-// observations. So is a frame without any.
-BlockStructure AnchoredStructure(const KnownRotationProblem& problem);
+// observations. So is a frame without any. Where ranks share the points, these
+// are those of the whole.
+BlockStructure AnchoredStructure(const KnownRotationProblem& problem,
+                                 const Context& context = {});
 
 // Per point, the places of its observations among them, in the order of their
 // frames.

@@ -23,15 +23,38 @@ constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;
 
+void SortAndUnite(std::vector<int32_t>* list) {
+  std::sort(list->begin(), list->end());
+  list->erase(std::unique(list->begin(), list->end()), list->end());
+}
+
 // Of a column, what stands in blocks of the lower triangle: nothing else is
 // written.
-auto LowerBlocks(int64_t column, Eigen::MatrixXd* matrix) {
+template <typename Matrix>
+auto LowerBlocks(int64_t column, Matrix* matrix) {
   return matrix->col(column).tail(matrix->rows() - column / 3 * 3);
+}
+
+// The rows of blocks that the points of any rank have, per column.
+void Unite(Ranks* ranks, std::vector<std::vector<int32_t>>* rows) {
+  std::vector<int32_t> blocks;  // column and row in turn
+  for (size_t column = 0; column < rows->size(); ++column) {
+    for (const int32_t row : (*rows)[column]) {
+      blocks.push_back(static_cast<int32_t>(column));
+      blocks.push_back(row);
+    }
+    (*rows)[column].clear();
+  }
+  blocks = ranks->Gather(blocks);
+  for (size_t n = 0; n < blocks.size(); n += 2) {
+    (*rows)[blocks[n]].push_back(blocks[n + 1]);
+  }
+  for (std::vector<int32_t>& list : *rows) SortAndUnite(&list);
 }
 
 }  // namespace
 
-FrameSystem::FrameSystem(const BlockStructure& structure)
+FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
     : column_of_frame_(structure.num_frames(), -1) {
   int64_t num_free = 0;
   for (int64_t f = 0; f < structure.num_frames(); ++f) {
@@ -41,7 +64,7 @@ FrameSystem::FrameSystem(const BlockStructure& structure)
   num_columns_ = 3 * num_free;
   num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
   if (num_free > kAlwaysDenseFrames) {
-    FindPattern(structure);
+    FindPattern(structure, ranks);
     const double share = static_cast<double>(block_row_.size()) /
                          (0.5 * static_cast<double>(num_free * num_free));
     is_dense_ = num_free <= kMaxDenseFrames && share > kSparseShare;
@@ -53,7 +76,7 @@ FrameSystem::FrameSystem(const BlockStructure& structure)
   }
 }
 
-void FrameSystem::FindPattern(const BlockStructure& structure) {
+void FrameSystem::FindPattern(const BlockStructure& structure, Ranks* ranks) {
   std::vector<std::vector<int32_t>> rows(num_columns_ / 3);
   for (int64_t k = 0; k < structure.num_points(); ++k) {
     for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
@@ -68,12 +91,10 @@ void FrameSystem::FindPattern(const BlockStructure& structure) {
     }
     // Keep the lists short while they grow.
     if (k % 4096 == 4095 || k + 1 == structure.num_points()) {
-      for (std::vector<int32_t>& list : rows) {
-        std::sort(list.begin(), list.end());
-        list.erase(std::unique(list.begin(), list.end()), list.end());
-      }
+      for (std::vector<int32_t>& list : rows) SortAndUnite(&list);
     }
   }
+  if (ranks != nullptr) Unite(ranks, &rows);
   block_begin_.assign(1, 0);
   for (size_t column = 0; column < rows.size(); ++column) {
     // Every diagonal block exists, observed or not.
@@ -100,12 +121,41 @@ FrameSystem::Block FrameSystem::BlockOf(int part, int32_t a, int32_t b) {
 }
 
 void FrameSystem::SetZero() {
-  for (Eigen::MatrixXd& part : dense_) {
-    part.resize(num_columns_, num_columns_);
-    for (int64_t c = 0; c < num_columns_; ++c) LowerBlocks(c, &part).setZero();
+  for (int part = 0; part < num_parts_; ++part) SetZero(part);
+}
+
+void FrameSystem::SetZero(int part) {
+  if (!is_dense_) {
+    values_[part].assign(9 * block_row_.size(), 0.0);
+    return;
   }
-  for (std::vector<double>& part : values_) {
-    part.assign(9 * block_row_.size(), 0.0);
+  dense_[part].resize(num_columns_, num_columns_);
+  for (int64_t c = 0; c < num_columns_; ++c) {
+    LowerBlocks(c, &dense_[part]).setZero();
+  }
+}
+
+std::vector<double> FrameSystem::Part(int part) const {
+  if (!is_dense_) return values_[part];
+  std::vector<double> numbers;
+  for (int64_t c = 0; c < num_columns_; ++c) {
+    const auto column = LowerBlocks(c, &dense_[part]);
+    numbers.insert(numbers.end(), column.data(), column.data() + column.size());
+  }
+  return numbers;
+}
+
+void FrameSystem::SetPart(int part, const std::vector<double>& numbers) {
+  if (!is_dense_) {
+    values_[part] = numbers;
+    return;
+  }
+  dense_[part].resize(num_columns_, num_columns_);
+  const double* next = numbers.data();
+  for (int64_t c = 0; c < num_columns_; ++c) {
+    auto column = LowerBlocks(c, &dense_[part]);
+    std::copy_n(next, column.size(), column.data());
+    next += column.size();
   }
 }
 

@@ -7,6 +7,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
+#include "krot/base/ranks.h"
 #include "krot/conic/block_structure.h"
 #include "krot/conic/dense_cholesky.h"
 
@@ -23,7 +24,8 @@ namespace krot {
 // threads than parts, four or, for many frames, two, do not make it faster.
 class FrameSystem {
  public:
-  explicit FrameSystem(const BlockStructure& structure);
+  // Where ranks share the points they make one each, of their shares.
+  explicit FrameSystem(const BlockStructure& structure, Ranks* ranks = nullptr);
 
   bool is_dense() const { return is_dense_; }
   int num_parts() const { return num_parts_; }
@@ -32,6 +34,10 @@ class FrameSystem {
   int32_t column(int32_t frame) const { return column_of_frame_[frame]; }
 
   void SetZero();
+  void SetZero(int part);
+  // A part of the sum as numbers, and back.
+  std::vector<double> Part(int part) const;
+  void SetPart(int part, const std::vector<double>& numbers);
   // Adds a 3x3 block (column-major) at frames a, b with column(a) >=
   // column(b) >= 0. Different parts may be filled at the same time.
   void AddBlock(int part, int32_t a, int32_t b, const double block[9]);
@@ -58,7 +64,7 @@ class FrameSystem {
     int64_t stride;
   };
 
-  void FindPattern(const BlockStructure& structure);
+  void FindPattern(const BlockStructure& structure, Ranks* ranks);
   Block BlockOf(int part, int32_t a, int32_t b);
 
   bool is_dense_ = true;

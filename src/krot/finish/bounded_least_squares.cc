@@ -34,7 +34,7 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
   CheckArgument(options.max_iterations >= 1, "max_iterations",
                 options.max_iterations, ">= 1");
   const double cost =
-      Cost(problem, *estimate, options.norm, context.num_threads);
+      context.Max(Cost(problem, *estimate, options.norm, context.num_threads));
   CheckArgument(cost < options.cap, "cost of the start", cost, "below the cap");
   return options.norm.p == 2
              ? Run<DiscCap>(problem, options, context, estimate)

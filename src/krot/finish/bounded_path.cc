@@ -65,7 +65,7 @@ BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
       options_(options),
       context_(context),
       system_(problem, Cap(options.norm, options.cap), options.loss, NumViews(),
-              context.num_threads),
+              context),
       multipliers_(problem.observations.size()) {
   now_.x = start;
   now_.viewed.resize(problem.observations.size());

@@ -61,7 +61,7 @@ class BoundedPath {
         static_cast<int32_t>(problem_.views.size()));
   }
   bool TakeRows(const Estimate& x) {
-    return !options_.take_rows || options_.take_rows(x, &rows_);
+    return !options_.take_rows || context_.All(options_.take_rows(x, &rows_));
   }
   // Whether every error is below the cap.
   bool View(State* state);
@@ -69,7 +69,7 @@ class BoundedPath {
     return state.cost + mu * state.barrier;
   }
   double Count() const {  // of pairs
-    return static_cast<double>(system_.loop().count() * Cap::kNum);
+    return static_cast<double>(system_.loop().whole_count() * Cap::kNum);
   }
   double MuOf(double relative_gap) const {
     return relative_gap * now_.cost / Count();

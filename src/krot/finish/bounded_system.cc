@@ -28,15 +28,15 @@ std::vector<Matrix3d> FrameRotations(const KnownRotationProblem& problem) {
 template <typename Cap>
 BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
                                   const Cap& cap, const ErrorLoss& loss,
-                                  int32_t num_views, int num_threads)
+                                  int32_t num_views, const Context& context)
     : problem_(problem),
       cap_(cap),
       loss_(loss),
       num_views_(num_views),
-      loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
-      structure_(AnchoredStructure(problem)),
+      loop_(static_cast<int64_t>(problem.observations.size()), context),
+      structure_(AnchoredStructure(problem, context)),
       frame_rotations_(FrameRotations(problem)),
-      elimination_(structure_, num_threads),
+      elimination_(structure_, context),
       root_(problem.observations.size()),
       correction_(problem.observations.size()),
       d_(problem.observations.size()) {}

@@ -43,7 +43,8 @@ class BoundedSystem {
   // Keeps a reference to `problem`, but for its observations' rows. Those of
   // views behind the first `num_views` are bounds alone.
   BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
-                const ErrorLoss& loss, int32_t num_views, int num_threads);
+                const ErrorLoss& loss, int32_t num_views,
+                const Context& context);
 
   // The system at an iterate, whose rows are those of `observations`; errors
   // and multipliers must outlive the calls below. False if there is no factor.

@@ -41,12 +41,14 @@ struct CentreElimination::Sightings {
 };
 
 CentreElimination::CentreElimination(const BlockStructure& structure,
-                                     int num_threads)
+                                     const Context& context)
     : structure_(structure),
-      num_threads_(
-          structure.num_observations() < kFewObservations ? 1 : num_threads),
-      frame_system_(structure),
-      parts_(structure.point_begin, frame_system_.num_parts()),
+      num_threads_(structure.num_observations() < kFewObservations
+                       ? 1
+                       : context.num_threads),
+      ranks_(context.ranks),
+      frame_system_(structure, ranks_),
+      parts_(structure.point_begin, frame_system_.num_parts(), ranks_),
       fine_parts_(structure.point_begin, kFineParts),
       rows_(structure.num_observations() * 9),
       Q_(rows_.size()),
@@ -129,10 +131,29 @@ void CentreElimination::AddHighLeverage(int part, const Sightings& s) {
 }
 
 bool CentreElimination::Factorize() {
+  const auto add = [&](int64_t k, int part) { AddPointToFrameSystem(k, part); };
+  if (ranks_ != nullptr) return FactorizeOnFirst(add);
   frame_system_.SetZero();
-  parts_.ForEach(num_threads_,
-                 [&](int64_t k, int part) { AddPointToFrameSystem(k, part); });
+  parts_.ForEach(num_threads_, add);
   return frame_system_.Factorize(num_threads_);
+}
+
+// The system is the first rank's.
+template <typename Add>
+bool CentreElimination::FactorizeOnFirst(const Add& add) {
+  for (int part = 0; part < frame_system_.num_parts(); ++part) {
+    if (ranks_->IsFirst() || parts_.HasPoints(part)) {
+      frame_system_.SetZero(part);
+    }
+  }
+  parts_.SumOverRanks(
+      num_threads_, add, [&](int part) { return frame_system_.Part(part); },
+      [&](int part, const std::vector<double>& numbers) {
+        frame_system_.SetPart(part, numbers);
+      });
+  bool has_factor = !ranks_->IsFirst() || frame_system_.Factorize(num_threads_);
+  ranks_->Broadcast(&has_factor);
+  return has_factor;
 }
 
 // top = Q'r; the frames' right-hand side loses B'(r - Q top).
@@ -173,17 +194,39 @@ void CentreElimination::BackSubstitute(int64_t k, double* r,
   }
 }
 
+VectorXd CentreElimination::SolveFrames(const VectorXd& rhs) const {
+  if (ranks_ == nullptr) return frame_system_.Solve(rhs);
+  std::vector<double> solution(rhs.size());
+  if (ranks_->IsFirst()) {
+    VectorXd::Map(solution.data(), rhs.size()) = frame_system_.Solve(rhs);
+  }
+  ranks_->Broadcast(&solution);
+  return VectorXd::Map(solution.data(), rhs.size());
+}
+
 void CentreElimination::Solve(double* r, BlockVector* x) const {
   const int num_parts = frame_system_.num_parts();
   std::vector<VectorXd> rhs(num_parts,
                             VectorXd::Zero(frame_system_.num_columns()));
   x->points.resize(structure_.num_points());
   x->frames.assign(structure_.num_frames(), Vector3d::Zero());
-  parts_.ForEach(num_threads_, [&](int64_t k, int part) {
+  const auto reduce = [&](int64_t k, int part) {
     ReducePoint(k, r, &x->points[k], &rhs[part]);
-  });
+  };
+  if (ranks_ == nullptr) {
+    parts_.ForEach(num_threads_, reduce);
+  } else {
+    parts_.SumOverRanks(
+        num_threads_, reduce,
+        [&](int part) {
+          return std::vector<double>(rhs[part].begin(), rhs[part].end());
+        },
+        [&](int part, const std::vector<double>& numbers) {
+          rhs[part] = VectorXd::Map(numbers.data(), rhs[part].size());
+        });
+  }
   for (int part = 1; part < num_parts; ++part) rhs[0] += rhs[part];
-  const VectorXd c = frame_system_.Solve(rhs[0]);
+  const VectorXd c = SolveFrames(rhs[0]);
   for (int64_t f = 0; f < structure_.num_frames(); ++f) {
     const int32_t column = frame_system_.column(static_cast<int32_t>(f));
     if (column >= 0) x->frames[f] = c.segment<3>(column);

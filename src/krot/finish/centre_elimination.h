@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/context.h"
 #include "krot/conic/block_structure.h"
 #include "krot/conic/frame_system.h"
 #include "krot/conic/point_parts.h"
@@ -31,7 +32,8 @@ class CentreElimination {
  public:
   // Keeps a reference to `structure`, of which what is fixed has c_f = 0, s =
   // 0.
-  CentreElimination(const BlockStructure& structure, int num_threads);
+  // Where ranks share the points they make one each, of their shares.
+  CentreElimination(const BlockStructure& structure, const Context& context);
 
   // B_i, row-major.
   double* rows(int64_t i) { return &rows_[i * 9]; }
@@ -51,6 +53,9 @@ class CentreElimination {
 
   void FindSightings(int64_t k, Sightings* sightings);
   void AddPointToFrameSystem(int64_t k, int part);
+  template <typename Add>
+  bool FactorizeOnFirst(const Add& add);
+  Eigen::VectorXd SolveFrames(const Eigen::VectorXd& rhs) const;
   void AddHighLeverage(int part, const Sightings& sightings);
   void ReducePoint(int64_t k, const double* r, Eigen::Vector3d* top,
                    Eigen::VectorXd* rhs) const;
@@ -58,6 +63,7 @@ class CentreElimination {
 
   const BlockStructure& structure_;
   const int num_threads_;
+  Ranks* const ranks_;
   FrameSystem frame_system_;
   const PointParts parts_;  // of the frame system's sum
   const PointParts fine_parts_;

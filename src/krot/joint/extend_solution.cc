@@ -36,13 +36,14 @@ bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
       observations.push_back(i);
     }
   }
-  if (observations.empty()) return !is_behind;
-  const ProblemSubset part(problem, std::move(observations));
-  Estimate placed = part.Restrict(*estimate);
-  BlockSweep(part.problem(), FastDescentOptions(), norm, context)
-      .IntersectPoints(&placed);
-  part.Replace(placed, estimate);
-  return !is_behind;
+  if (!observations.empty()) {
+    const ProblemSubset part(problem, std::move(observations));
+    Estimate placed = part.Restrict(*estimate);
+    BlockSweep(part.problem(), FastDescentOptions(), norm, context.Alone())
+        .IntersectPoints(&placed);
+    part.Replace(placed, estimate);
+  }
+  return !context.Any(is_behind);
 }
 
 bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
@@ -50,7 +51,8 @@ bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
                     double highest, Estimate* estimate) {
   if (!PlaceOthers(problem, set, norm, context, level, estimate)) return false;
   const auto excess = [&] {
-    return Cost(problem, *estimate, norm, context.num_threads) - highest;
+    return context.Max(Cost(problem, *estimate, norm, context.num_threads)) -
+           highest;
   };
   double left = excess();
   if (left <= 0) return true;

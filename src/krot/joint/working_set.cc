@@ -1,8 +1,11 @@
 #include "krot/joint/working_set.h"
 
 #include <algorithm>
+#include <functional>
+#include <limits>
 #include <utility>
 
+#include "krot/joint/frame_ties.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
@@ -11,69 +14,86 @@ namespace {
 constexpr double kShareOfCost = 0.8;
 constexpr int kTiesPerFrame = 20;
 
+using Candidate = std::pair<double, int64_t>;  // -cost, point
+
+void KeepWorst(int64_t count, std::vector<Candidate>* candidates) {
+  if (static_cast<int64_t>(candidates->size()) <= count) return;
+  std::nth_element(candidates->begin(), candidates->begin() + count,
+                   candidates->end());
+  candidates->resize(count);
+}
+
 }  // namespace
 
-WorkingSet::WorkingSet(const KnownRotationProblem& problem)
-    : problem_(problem), contains_(problem.num_points, 0) {}
-
-void WorkingSet::Add(int32_t point) {
-  contains_[point] = 1;
-  ++num_points_;
+WorkingSet::WorkingSet(const KnownRotationProblem& problem,
+                       const Context& context)
+    : problem_(problem),
+      context_(context),
+      contains_(problem.num_points, 0),
+      num_points_of_whole_(context.Sum(problem.num_points)) {
+  if (context.ranks != nullptr) {
+    first_point_ = context.ranks->SumBefore(problem.num_points);
+  }
 }
 
 int64_t WorkingSet::AddAbove(const Estimate& estimate, Norm norm, double level,
                              int64_t max_points) {
-  std::vector<std::pair<double, int32_t>> above;  // -cost, point
+  std::vector<Candidate> above;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
     if (Contains(k)) continue;
     const double cost = PointCost(problem_, estimate, norm, k);
-    if (cost > level) above.emplace_back(-cost, k);
+    if (cost > level) above.emplace_back(-cost, first_point_ + k);
   }
-  if (static_cast<int64_t>(above.size()) > max_points) {
-    std::nth_element(above.begin(), above.begin() + max_points, above.end());
-    above.resize(max_points);
+  KeepWorst(max_points, &above);
+  if (context_.ranks != nullptr) {
+    above = context_.ranks->Gather(above);
+    KeepWorst(max_points, &above);
   }
-  for (const auto& worst : above) Add(worst.second);
+  for (const Candidate& worst : above) {
+    const int64_t k = worst.second - first_point_;
+    if (k >= 0 && k < problem_.num_points) contains_[k] = 1;
+  }
+  num_points_ += static_cast<int64_t>(above.size());
   return static_cast<int64_t>(above.size());
 }
 
 void WorkingSet::AddTies(int count) {
-  std::vector<int64_t> missing(problem_.num_frames, count);  // per frame
-  const auto for_frames = [&](int32_t point, const auto& visit) {
-    for (int64_t i = problem_.point_begin[point];
-         i < problem_.point_begin[point + 1]; ++i) {
-      visit(missing[problem_.views[problem_.observations[i].view].frame]);
+  std::vector<int64_t> tied(problem_.num_frames, 0);
+  for (int32_t k = 0; k < problem_.num_points; ++k) {
+    if (!Contains(k)) continue;
+    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+         ++i) {
+      ++tied[problem_.views[problem_.observations[i].view].frame];
     }
-  };
+  }
+  context_.Reduce(std::plus<int64_t>(), &tied);
   std::vector<int32_t> others;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (Contains(k)) {
-      for_frames(k, [](int64_t& left) { --left; });
-    } else {
-      others.push_back(k);
-    }
+    if (!Contains(k)) others.push_back(k);
   }
-  const auto length = [&](int32_t k) {
-    return problem_.point_begin[k + 1] - problem_.point_begin[k];
-  };
-  std::stable_sort(others.begin(), others.end(),
-                   [&](int32_t a, int32_t b) { return length(a) > length(b); });
-  for (const int32_t k : others) {
-    bool is_missed = false;
-    for_frames(k, [&](int64_t& left) { is_missed |= left > 0; });
-    if (!is_missed) continue;
-    for_frames(k, [](int64_t& left) { --left; });
-    Add(k);
-  }
+  const std::vector<int32_t> ties =
+      FindTies(problem_, std::move(others), count, std::move(tied), context_);
+  for (const int32_t k : ties) contains_[k] = 1;
+  num_points_ += context_.Sum(static_cast<int64_t>(ties.size()));
 }
 
 void WorkingSet::AddPoint(int32_t point) {
-  if (!Contains(point)) Add(point);
+  if (Contains(point)) return;
+  contains_[point] = 1;
+  ++num_points_;
 }
 
 void WorkingSet::AddAll() {
   std::fill(contains_.begin(), contains_.end(), 1);
-  num_points_ = problem_.num_points;
+  num_points_ = num_points_of_whole_;
+}
+
+std::vector<int32_t> WorkingSet::Points() const {
+  std::vector<int32_t> points;
+  for (int32_t k = 0; k < problem_.num_points; ++k) {
+    if (Contains(k)) points.push_back(k);
+  }
+  return points;
 }
 
 std::vector<int64_t> WorkingSet::Observations() const {
@@ -94,13 +114,15 @@ double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {
     if (!Contains(k)) continue;
     cost = std::max(cost, PointCost(problem_, estimate, norm, k));
   }
-  return cost;
+  return context_.Max(cost);
 }
 
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
-                           const Estimate& estimate, Norm norm, double cost) {
-  WorkingSet set(problem);
-  set.AddAbove(estimate, norm, kShareOfCost * cost, problem.num_points);
+                           const Estimate& estimate, Norm norm, double cost,
+                           const Context& context) {
+  WorkingSet set(problem, context);
+  set.AddAbove(estimate, norm, kShareOfCost * cost,
+               std::numeric_limits<int64_t>::max());
   set.AddTies(kTiesPerFrame);
   return set;
 }

@@ -92,7 +92,7 @@ void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
   const ProblemSubset part(built.problem, kept);
   Estimate own = part.Restrict(placed);
   RestoreGaugeIfHarmless(part.problem(), part.Restrict(built.start),
-                         options_.solve.norm, context_.num_threads, &own);
+                         options_.solve.norm, context_, &own);
   part.Replace(own, &placed);
   *moved = ApplyEstimate(model_, built, placed);
 }

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "krot/bridge/gathered_support.h"
 #include "krot/bridge/position_rows.h"
+#include "krot/bridge/reprojection.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/subset.h"
 
@@ -75,6 +78,74 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     }
   }
   return best;
+}
+
+namespace {
+
+std::optional<PixelCertificate> ProveLinear(const Model& model,
+                                            const BuiltProblem& built,
+                                            const Estimate& x_hat, Norm norm,
+                                            const Certificate& certificate,
+                                            const Context& context) {
+  return MakePixelCertificate(
+      model, built, norm, certificate,
+      BearingsOfPoints(model, built, x_hat, certificate), context);
+}
+
+std::optional<PixelCertificate> ProveSharedRows(
+    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
+    Norm norm, const Certificate& certificate,
+    const std::vector<int64_t>& observation_of, double sufficient,
+    const Context& context) {
+  Ranks& ranks = *context.ranks;
+  const Context here = context.Alone();
+  const size_t num_rows = built.problem.observations.size();
+  std::vector<int64_t> own;
+  for (const int64_t i : OwnSupport(
+           certificate,
+           static_cast<int64_t>(observation_of.empty() ? num_rows
+                                                       : observation_of.size()),
+           &ranks)) {
+    const int64_t row = observation_of.empty() ? i : observation_of[i];
+    if (row >= 0) own.push_back(row);
+  }
+  const GatheredSupport gathered =
+      GatherSupport(model, built, x_hat, own, &ranks);
+  std::optional<PixelCertificate> proof;
+  if (ranks.IsFirst()) {
+    proof =
+        Reprojection(gathered.model, gathered.built).IsLinear()
+            ? ProveLinear(gathered.model, gathered.built, gathered.estimate,
+                          norm, gathered.FromWhole(certificate), here)
+            : ProveInPixels(gathered.model, gathered.built, gathered.estimate,
+                            norm, gathered.observations, sufficient, here);
+    if (proof) proof->rows = gathered.ToWhole(std::move(proof->rows));
+  }
+  bool is_proved = proof.has_value();
+  ranks.Broadcast(&is_proved);
+  if (!is_proved) return std::nullopt;
+  if (!proof) proof.emplace();
+  ranks.Broadcast(&proof->lower_bound);
+  return proof;
+}
+
+}  // namespace
+
+std::optional<PixelCertificate> ProveRows(
+    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
+    Norm norm, const Certificate& certificate,
+    const std::vector<int64_t>& observation_of, double sufficient,
+    const Context& context) {
+  if (context.ranks != nullptr) {
+    return ProveSharedRows(model, built, x_hat, norm, certificate,
+                           observation_of, sufficient, context);
+  }
+  if (Reprojection(model, built).IsLinear()) {
+    return ProveLinear(model, built, x_hat, norm, certificate, context);
+  }
+  return ProveInPixels(model, built, x_hat, norm,
+                       SupportOf(certificate, observation_of), sufficient,
+                       context);
 }
 
 std::vector<int64_t> SupportOf(const Certificate& certificate,

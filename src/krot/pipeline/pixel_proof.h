@@ -28,6 +28,17 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               double sufficient,
                                               const Context& context);
 
+// The same from a certificate of the problem that was solved, whose observation
+// i is `observation_of[i]` of built.problem, -1: none; empty: i. Where rows do
+// not depend on where they are taken it is that certificate's own. Where ranks
+// share the points the first one has the result, in the numbers of the whole
+// (gathered_support.h), the others its lower bound.
+std::optional<PixelCertificate> ProveRows(
+    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
+    Norm norm, const Certificate& certificate,
+    const std::vector<int64_t>& observation_of, double sufficient,
+    const Context& context);
+
 // The observations of a certificate, by what they are called: `observation_of`,
 // or as they are if that is empty. Those that are -1 there are left out.
 std::vector<int64_t> SupportOf(const Certificate& certificate,

@@ -65,15 +65,20 @@ class Rounds {
 
  private:
   double TrueCost(const Estimate& estimate) const {
-    return reprojection_.TrueCost(estimate, options_.norm,
-                                  context_.num_threads);
+    return context_.Max(
+        reprojection_.TrueCost(estimate, options_.norm, context_.num_threads));
   }
   double LevelledCost(const Estimate& estimate) const {
-    return reprojection_.LevelledCost(estimate, options_.norm,
-                                      context_.num_threads);
+    return context_.Max(reprojection_.LevelledCost(estimate, options_.norm,
+                                                   context_.num_threads));
   }
   double PixelCost() const {
     return positions_.Any() ? TrueCost(estimate_) : cost_;
+  }
+  double RowsCost(const KnownRotationProblem& rows,
+                  const Estimate& estimate) const {
+    return context_.Max(
+        Cost(rows, estimate, options_.norm, context_.num_threads));
   }
   // Of what would be the result.
   double ReachedCost() const {
@@ -135,21 +140,14 @@ void Rounds::Prove() {
   if (!rows_certificate_) return;
   const Certificate certificate =
       *std::exchange(rows_certificate_, std::nullopt);
-  std::optional<PixelCertificate> proof;
-  if (reprojection_.IsLinear()) {
-    proof = MakePixelCertificate(
-        model_, built_, options_.norm, certificate,
-        BearingsOfPoints(model_, built_, estimate_, certificate), context_);
-  } else {
-    const std::vector<int64_t> support =
-        SupportOf(certificate, observation_of_);
-    const double sufficient =
-        (1 - kProofShare * options_.joint.relative_gap) * cost_;
-    proof = positions_.Any()
-                ? positions_.Prove(estimate_, support, sufficient)
-                : ProveInPixels(model_, built_, estimate_, options_.norm,
-                                support, sufficient, context_);
-  }
+  const double sufficient =
+      (1 - kProofShare * options_.joint.relative_gap) * cost_;
+  std::optional<PixelCertificate> proof =
+      positions_.Any()
+          ? positions_.Prove(estimate_, SupportOf(certificate, observation_of_),
+                             sufficient)
+          : ProveRows(model_, built_, estimate_, options_.norm, certificate,
+                      observation_of_, sufficient, context_);
   if (proof &&
       (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
     certificate_ = std::move(proof);
@@ -188,12 +186,12 @@ bool Rounds::RunOne() {
   const KnownRotationProblem& rows = built_.problem;
   std::optional<KnownRotationProblem> bounded;
   observation_of_.clear();
-  if (!trust_.IsEmpty()) {
+  const bool is_bounded = context_.Any(!trust_.IsEmpty());
+  if (is_bounded) {
     bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of_);
   }
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
-  if (!std::isfinite(
-          Cost(problem, estimate_, options_.norm, context_.num_threads))) {
+  if (!std::isfinite(RowsCost(problem, estimate_))) {
     return false;  // a depth is rounding alone
   }
   Estimate solved = estimate_;
@@ -204,20 +202,19 @@ bool Rounds::RunOne() {
       },
       context_, timer_, &solved, &summary_);
   if (options_.res_int.update_frames) {
-    RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_.num_threads,
-                           &solved);
+    RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_, &solved);
   }
 
   Round round;
-  round.linear_cost = Cost(rows, solved, options_.norm, context_.num_threads);
-  if (rows_certificate_ && !bounded) {
+  round.linear_cost = RowsCost(rows, solved);
+  if (rows_certificate_ && !is_bounded) {
     round.linear_lower_bound = rows_certificate_->lower_bound;
   }
   const double before = cost_;
   Estimate from = std::exchange(estimate_, Estimate());
   if (options_.res_int.update_frames) {
     estimate_ = BestOnSegment(reprojection_, from, solved, options_.norm,
-                              context_.num_threads, &round.step);
+                              context_, &round.step);
   } else {
     estimate_ = BestPointsOnSegments(reprojection_, rows, from, solved,
                                      options_.norm, context_.num_threads);
@@ -226,9 +223,9 @@ bool Rounds::RunOne() {
   cost_ = LevelledCost(estimate_);
   int64_t num_bounded = 0;
   if (round.step < 1) {
-    num_bounded =
+    num_bounded = context_.Sum(
         trust_.Shrink(reprojection_, rows, from, solved, options_.norm,
-                      (1 + kKeptPromise) * round.linear_cost);
+                      (1 + kKeptPromise) * round.linear_cost));
   } else {
     trust_.Clear();
   }

@@ -63,8 +63,8 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   }
   Estimate finished = *estimate;
   finish.solve = MinimizeBounded(built->problem, bounded, context, &finished);
-  const double cost =
-      reprojection.TrueCost(finished, options.norm, context.num_threads);
+  const double cost = context.Max(
+      reprojection.TrueCost(finished, options.norm, context.num_threads));
   if (!(cost <= finish.cap) ||
       LargestPositionRatio(*built, finished) > 1 + kKeptPosition) {
     return;
@@ -87,12 +87,11 @@ void FinishBySweeps(const Reprojection& reprojection,
                       options.norm, context);
     blocks.IntersectPoints(&swept);
     blocks.ResectFrames(&swept);
-    if (context.IsCancelled() || !(Cost(built->problem, swept, options.norm,
-                                        context.num_threads) <= highest)) {
-      return;
-    }
-    const double cost =
-        reprojection.TrueCost(swept, options.norm, context.num_threads);
+    const double rows_cost = context.Max(
+        Cost(built->problem, swept, options.norm, context.num_threads));
+    if (context.IsCancelled() || !(rows_cost <= highest)) return;
+    const double cost = context.Max(
+        reprojection.TrueCost(swept, options.norm, context.num_threads));
     if (!(cost <= highest)) return;
     *estimate = std::move(swept);
     reprojection.TakeRows(*estimate, context.num_threads, &built->problem);

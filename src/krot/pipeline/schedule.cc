@@ -54,7 +54,8 @@ class Schedule {
         timer_(timer),
         estimate_(*estimate),
         summary_(*summary),
-        cost_(Cost(problem, *estimate, options.norm, context.num_threads)) {}
+        cost_(context.Max(
+            Cost(problem, *estimate, options.norm, context.num_threads))) {}
 
   void Sweeps(ResIntOptions res_int);
   void LeadingSweeps();

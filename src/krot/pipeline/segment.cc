@@ -29,14 +29,18 @@ Estimate Between(const Estimate& from, const Estimate& to, double step) {
 }  // namespace
 
 Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
-                       const Estimate& to, Norm norm, int num_threads,
+                       const Estimate& to, Norm norm, const Context& context,
                        double* step) {
+  const auto cost_of = [&](const Estimate& estimate) {
+    return context.Max(
+        reprojection.LevelledCost(estimate, norm, context.num_threads));
+  };
   Estimate best = from;
-  double best_cost = reprojection.LevelledCost(from, norm, num_threads);
+  double best_cost = cost_of(from);
   *step = 0;
   for (double trial = 1; trial >= kShortestStep; trial *= kShorter) {
     Estimate candidate = trial == 1 ? to : Between(from, to, trial);
-    const double cost = reprojection.LevelledCost(candidate, norm, num_threads);
+    const double cost = cost_of(candidate);
     if (cost < best_cost) {
       best = std::move(candidate);
       best_cost = cost;

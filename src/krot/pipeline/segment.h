@@ -1,5 +1,6 @@
 #pragma once
 
+#include "krot/base/context.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
@@ -14,7 +15,7 @@ namespace krot {
 // The best estimate found, `from` if none is below it; `*step` in [0, 1].
 // O(observations) per trial.
 Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
-                       const Estimate& to, Norm norm, int num_threads,
+                       const Estimate& to, Norm norm, const Context& context,
                        double* step);
 
 // The same for every point on its own, where both have the same frames.

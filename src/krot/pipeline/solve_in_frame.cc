@@ -8,9 +8,9 @@
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/carry_left_out.h"
-#include "krot/bridge/pixel_certificate.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/pipeline/certify.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
 #include "krot/pipeline/run_finish.h"
@@ -31,7 +31,12 @@ constexpr double kErrorRounding = 1e-9;
 // Of the bound of a start, the level at which it keeps positions.
 constexpr double kShareOfStart = 0.99;
 
-void CheckOptions(const SolveModelOptions& options) {
+void CheckOptions(const SolveModelOptions& options, const Context& context) {
+  if (options.problem.fixed.Any()) context.RequireAlone("what must not move");
+  if (!options.problem.positions.empty()) {
+    context.RequireAlone("what keeps positions");
+  }
+  if (options.polish != Polish::kNone) context.RequireAlone("a polish");
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
   CheckArgument(options.init_max_error > 0, "init_max_error",
                 options.init_max_error, "> 0");
@@ -52,67 +57,34 @@ void CheckOptions(const SolveModelOptions& options) {
                 "another with problem.positions");
 }
 
+// The counts are those of the whole; memory is that of one process, and not
+// announced to several.
 void CountProblem(const Model& model, const BuiltProblem& built,
-                  SolveSummary* summary) {
+                  const Context& context, SolveSummary* summary) {
   const KnownRotationProblem& problem = built.problem;
   summary->num_frames = static_cast<int64_t>(built.frame_of.size());
   summary->num_images = static_cast<int64_t>(built.image_of.size());
-  summary->num_points = static_cast<int64_t>(built.point_of.size());
-  summary->num_observations = built.NumPixels();
+  summary->num_points =
+      context.Sum(static_cast<int64_t>(built.point_of.size()));
+  summary->num_observations = context.Sum(built.NumPixels());
   summary->num_positions = static_cast<int64_t>(built.positions.size());
-  summary->num_components = FindComponents(problem).count;
+  summary->num_components = FindComponents(problem, context).count;
   for (int32_t f = 0; f < summary->num_frames; ++f) {
     summary->num_fixed_frames += problem.IsFixedFrame(f);
   }
-  for (int32_t k = 0; k < summary->num_points; ++k) {
-    summary->num_fixed_points += problem.IsFixedPoint(k);
+  for (size_t k = 0; k < built.point_of.size(); ++k) {
+    summary->num_fixed_points += problem.IsFixedPoint(static_cast<int32_t>(k));
   }
-  summary->left_out = built.left_out;
-  summary->num_retriangulated_points = built.num_retriangulated_points;
-  summary->num_same_image_tracks = built.num_same_image_tracks;
+  for (size_t n = 0; n < built.left_out.size(); ++n) {
+    summary->left_out[n] = context.Sum(built.left_out[n]);
+  }
+  summary->num_retriangulated_points =
+      context.Sum(built.num_retriangulated_points);
+  summary->num_same_image_tracks = context.Sum(built.num_same_image_tracks);
+  if (context.ranks != nullptr) return;
   const SolveMemory memory = EstimateSolveMemory(model, built, *summary);
   summary->likely_bytes = memory.likely;
   summary->largest_bytes = memory.at_most;
-}
-
-// Checks the certificate once more, apart from the solver that made it, and
-// says what it proves about the estimate.
-void Certify(const Model& model, const Start& start, const Estimate& estimate,
-             const SolveModelOptions& options, const Context& context,
-             const std::optional<PixelCertificate>& certificate,
-             SolveSummary* summary) {
-  if (!certificate) return;
-  const Timer timer;
-  const PixelCertificateCheck check = CheckPixelCertificate(
-      model, start.built, options.norm, *certificate, context);
-  if (check.is_accepted) {
-    summary->is_certified = true;
-    summary->lower_bound = check.lower_bound;
-    summary->support = ListSupport(model, start.built, estimate, options.norm,
-                                   certificate->rows);
-    summary->support_positions =
-        ListSupportPositions(model, start.built, estimate, *certificate);
-    if (options.describe_certificate) {
-      summary->certificate =
-          DescribeCertificate(model, start.built, options.norm, *certificate);
-    }
-  }
-  summary->seconds_certify = timer.Seconds();
-}
-
-// That no estimate is below a start's bound, in true pixels.
-void CertifyInfeasible(const Model& model, const Start& start,
-                       const SolveModelOptions& options, const Context& context,
-                       const std::optional<Certificate>& certificate,
-                       SolveSummary* summary) {
-  if (!certificate) return;
-  Certificate levelled = *certificate;
-  LevelPositions(start.built, &levelled);
-  Certify(model, start, start.built.start, options, context,
-          MakePixelCertificate(model, start.built, options.norm, levelled,
-                               BearingsOfPixels(model, start.built, levelled),
-                               context),
-          summary);
 }
 
 // With the final cost. What is claimed is what the numbers say, whatever the
@@ -173,14 +145,14 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   const bool was_asked =
       options.init == SolveInit::kFeasible || !start->built.positions.empty();
   if (found.termination == SolveTermination::kInterrupted || was_asked) {
-    CertifyInfeasible(model, *start, options, context, found.certificate,
+    CertifyInfeasible(model, start->built, options, context, found.certificate,
                       summary);
     return false;
   }
   context.Note("there is none; going on without those observations");
   *start = OwnStart(model, options, context);
   summary->init = start->init;
-  CountProblem(model, start->built, summary);
+  CountProblem(model, start->built, context, summary);
   *estimate = start->built.start;
   summary->termination = SolveTermination::kNothingToSolve;
   return !start->built.problem.observations.empty();
@@ -189,19 +161,19 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
 // Whether an error that was finite is now above the largest that was, and above
 // what may be; all in the norm of the solve.
 bool IsWorse(const std::vector<double>& errors_before_px,
-             const std::vector<double>& errors_after_px, double allowed_px) {
+             const std::vector<double>& errors_after_px, double allowed_px,
+             const Context& context) {
   double largest = allowed_px;
   for (const double error : errors_before_px) {
     if (std::isfinite(error)) largest = std::max(largest, error);
   }
-  largest *= 1 + kErrorRounding;
+  largest = context.Max(largest) * (1 + kErrorRounding);
+  bool is_worse = false;
   for (size_t i = 0; i < errors_before_px.size(); ++i) {
-    if (std::isfinite(errors_before_px[i]) &&
-        !(errors_after_px[i] <= largest)) {
-      return true;
-    }
+    is_worse |=
+        std::isfinite(errors_before_px[i]) && !(errors_after_px[i] <= largest);
   }
-  return false;
+  return context.Any(is_worse);
 }
 
 }  // namespace
@@ -209,7 +181,7 @@ bool IsWorse(const std::vector<double>& errors_before_px,
 SolveModelResult SolveInFrame(const Model& model,
                               const SolveModelOptions& options,
                               const Context& context) {
-  CheckOptions(options);
+  CheckOptions(options, context);
   SolveModelResult result;
   SolveSummary& summary = result.summary;
   summary.method = EffectiveMethod(options);
@@ -219,12 +191,12 @@ SolveModelResult SolveInFrame(const Model& model,
   const Timer build_timer;
   Start start = ChooseStart(model, options, summary.method, context);
   summary.init = start.init;
-  CountProblem(model, start.built, &summary);
+  CountProblem(model, start.built, context, &summary);
   summary.pixel_error_before = Summarize(PixelErrors(model, num_threads));
   summary.pixel_error_after = summary.pixel_error_before;
   summary.seconds_build = build_timer.Seconds();
   if (options.on_built) options.on_built(summary);
-  if (start.built.problem.observations.empty()) {
+  if (summary.num_observations + summary.num_positions == 0) {
     summary.termination = SolveTermination::kNothingToSolve;
     result.model = model;
     return result;
@@ -242,7 +214,8 @@ SolveModelResult SolveInFrame(const Model& model,
       SolveInRounds(model, options, summary.method, context, solve_timer,
                     &start.built, &estimate, &summary);
   if (summary.termination == SolveTermination::kInfeasible) {
-    Certify(model, start, estimate, options, context, certificate, &summary);
+    Certify(model, start.built, estimate, options, context, certificate,
+            &summary);
     summary.seconds_solve = solve_timer.Seconds();
     result.model = model;
     return result;
@@ -256,13 +229,16 @@ SolveModelResult SolveInFrame(const Model& model,
   }
   if (options.res_int.update_frames) {
     RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
-                           num_threads, &estimate);
+                           context, &estimate);
   }
   PutFixed(start.built.problem, &estimate);
   summary.largest_position_ratio = LargestPositionRatio(start.built, estimate);
   const Reprojection reprojection(model, start.built);
-  summary.cost_final =
-      reprojection.TrueCost(estimate, options.norm, num_threads);
+  const auto true_cost = [&] {
+    return context.Max(
+        reprojection.TrueCost(estimate, options.norm, num_threads));
+  };
+  summary.cost_final = true_cost();
   result.model = ApplyEstimate(model, start.built, estimate);
   const std::vector<double> before_px =
       PixelErrors(model, num_threads, options.norm);
@@ -272,21 +248,21 @@ SolveModelResult SolveInFrame(const Model& model,
   // count.
   if (start.built.positions.empty() &&
       IsWorse(before_px, PixelErrors(result.model, num_threads, options.norm),
-              options.finish.max_error.value_or(0))) {
+              options.finish.max_error.value_or(0), context)) {
     summary.is_given_back = true;
     summary.finish.reset();
     result.model = model;
     estimate = OwnEstimate(model, start.built);
     reprojection.TakeRows(estimate, num_threads, &start.built.problem);
-    summary.cost_final =
-        reprojection.TrueCost(estimate, options.norm, num_threads);
+    summary.cost_final = true_cost();
   }
   const std::vector<double> errors_px = PixelErrors(result.model, num_threads);
   UpdatePointErrors(errors_px, &result.model);
   summary.pixel_error_after = Summarize(errors_px);
   summary.seconds_solve = solve_timer.Seconds();
 
-  Certify(model, start, estimate, options, context, certificate, &summary);
+  Certify(model, start.built, estimate, options, context, certificate,
+          &summary);
   MeasureGap(options.joint.relative_gap, &summary);
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
     summary.polish = PolishModel(options.polish, options.finish.loss,

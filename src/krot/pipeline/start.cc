@@ -11,8 +11,10 @@
 namespace krot {
 namespace {
 
-bool IsLarger(const BuiltProblem& a, const BuiltProblem& b) {
-  return a.problem.observations.size() > b.problem.observations.size();
+constexpr char kStartFromNothing[] = "a start from nothing";
+
+int64_t NumObservations(const BuiltProblem& built, const Context& context) {
+  return context.Sum(static_cast<int64_t>(built.problem.observations.size()));
 }
 
 // Whether all frames see the points from the same place, as in a model whose
@@ -46,16 +48,12 @@ bool IsFarFromPositions(const Model& model, const BuiltProblem& own,
            options.init_max_error);
 }
 
-std::string NumberOfMissing(const BuiltProblem& all, const BuiltProblem& own) {
-  return std::to_string(all.problem.observations.size() -
-                        own.problem.observations.size());
-}
-
 BuiltProblem Build(const Model& model, const SolveModelOptions& options,
                    const Context& context, bool ignore_translations) {
   BuildProblemOptions build_options = options.problem;
   build_options.num_threads = context.num_threads;
   build_options.ignore_translations = ignore_translations;
+  build_options.ranks = context.ranks;
   return BuildProblem(model, build_options);
 }
 
@@ -74,8 +72,8 @@ Start OwnStart(const Model& model, const SolveModelOptions& options,
 Start ChooseStart(const Model& model, const SolveModelOptions& options,
                   SolveMethod method, const Context& context) {
   Start own = OwnStart(model, options, context);
-  const auto count = [&own](LeftOut reason) {
-    return own.built.left_out[static_cast<size_t>(reason)];
+  const auto count = [&](LeftOut reason) {
+    return context.Sum(own.built.left_out[static_cast<size_t>(reason)]);
   };
   const bool coincide = CentresCoincide(own.built);
   const bool asked = options.init == SolveInit::kFeasible;
@@ -85,6 +83,7 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
       count(LeftOut::kNoPose) == 0) {
     return own;
   }
+  if (asked) context.RequireAlone(kStartFromNothing);
 
   Start all{Build(model, options, context, /*ignore_translations=*/true),
             SolveInit::kFeasible};
@@ -95,19 +94,22 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
         "that is not");
     return all;
   }
-  const bool is_larger = IsLarger(all.built, own.built);
+  const int64_t num_missing =
+      NumObservations(all.built, context) - NumObservations(own.built, context);
+  const bool is_larger = num_missing > 0;
   if (!is_larger && !coincide) return own;
   if (method != SolveMethod::kAuto) {
     if (is_larger) {
       context.Note(
-          NumberOfMissing(all.built, own.built) +
+          std::to_string(num_missing) +
           " observations are left out because they have no pose or are "
           "behind their cameras; --Solver.init feasible takes them in");
     }
     return own;
   }
+  context.RequireAlone(kStartFromNothing);
   context.Note(is_larger ? "the model's translations and points leave out " +
-                               NumberOfMissing(all.built, own.built) +
+                               std::to_string(num_missing) +
                                " observations; looking for a start that has "
                                "all of them"
                          : std::string("all cameras of the model stand in one "
@@ -118,6 +120,7 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
                              const SolveModelOptions& options,
                              const Context& context, const JointCallback& log) {
+  context.RequireAlone(kStartFromNothing);
   InitializerOptions initializer;
   initializer.norm = options.norm;
   initializer.max_error = options.init_max_error;

@@ -1,5 +1,6 @@
 #include "krot/problem/components.h"
 
+#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -8,9 +9,23 @@
 namespace krot {
 namespace {
 
+// What other ranks' points connect, too.
+void UniteRanks(Ranks* ranks, std::vector<char>* is_seen,
+                DisjointSets* frames) {
+  const auto num_frames = static_cast<int64_t>(is_seen->size());
+  ranks->Reduce([](char a, char b) { return std::max(a, b); }, is_seen);
+  std::vector<int64_t> roots;
+  for (int64_t f = 0; f < num_frames; ++f) roots.push_back(frames->Find(f));
+  const std::vector<int64_t> all = ranks->Gather(roots);
+  for (size_t n = 0; n < all.size(); ++n) {
+    frames->Unite(static_cast<int64_t>(n) % num_frames, all[n]);
+  }
+}
+
 // Of the graph that these observations span.
 Components FindComponentsOf(const KnownRotationProblem& problem,
-                            const std::vector<int64_t>& observations) {
+                            const std::vector<int64_t>& observations,
+                            const Context& context) {
   const auto point_of = [&](int64_t n) {
     return problem.observations[observations[n]].point;
   };
@@ -28,6 +43,7 @@ Components FindComponentsOf(const KnownRotationProblem& problem,
       frames.Unite(frame_of(n), frame_of(n - 1));
     }
   }
+  if (context.ranks != nullptr) UniteRanks(context.ranks, &is_seen, &frames);
 
   Components components;
   components.of_frame.assign(problem.num_frames, -1);
@@ -52,8 +68,9 @@ std::vector<int64_t> All(const KnownRotationProblem& problem) {
 
 }  // namespace
 
-Components FindComponents(const KnownRotationProblem& problem) {
-  return FindComponentsOf(problem, All(problem));
+Components FindComponents(const KnownRotationProblem& problem,
+                          const Context& context) {
+  return FindComponentsOf(problem, All(problem), context);
 }
 
 std::vector<std::vector<int64_t>> SplitIntoComponents(
@@ -63,7 +80,7 @@ std::vector<std::vector<int64_t>> SplitIntoComponents(
 
 std::vector<std::vector<int64_t>> SplitIntoComponents(
     const KnownRotationProblem& problem, std::vector<int64_t> observations) {
-  const Components components = FindComponentsOf(problem, observations);
+  const Components components = FindComponentsOf(problem, observations, {});
   std::vector<std::vector<int64_t>> split(components.count);
   if (components.count == 1) {
     split[0] = std::move(observations);

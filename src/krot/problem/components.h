@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -15,9 +16,10 @@ struct Components {
   std::vector<int32_t> of_point;  // -1: the point has no observation
 };
 
-// Components are numbered by their first frame. O(observations) up to the
-// inverse Ackermann function.
-Components FindComponents(const KnownRotationProblem& problem);
+// Components are numbered by their first frame, and those of the whole where
+// ranks share the points. O(observations) up to the inverse Ackermann function.
+Components FindComponents(const KnownRotationProblem& problem,
+                          const Context& context = {});
 
 // The indices of all observations, by connected component: ascending, and
 // components in the order of their first frame.

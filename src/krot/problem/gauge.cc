@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "krot/geometry/rigid_transform.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
+#include "krot/problem/frame_geometry.h"
 
 namespace krot {
 namespace {
@@ -21,41 +21,6 @@ constexpr double kHarmless = 1e-9;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Centres closer than this, relative to the size of their coordinates and of
-// the component, coincide: rounding is a thousand times smaller.
-constexpr double kCoincident = 1e-12;
-
-// Where a frame's camera sits, once for all its views.
-struct FrameGeometry {
-  Matrix3d world_from_rig = Matrix3d::Identity();  // R_rw'
-  Vector3d centre_in_rig = Vector3d::Zero();       // -R_sr' t_sr
-  int num_views = 0;                               // that count
-  bool is_seen_through = false;                    // it has an observation
-  bool has_two_centres = false;  // its observations fix the scale
-};
-
-std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem) {
-  std::vector<FrameGeometry> frames(problem.num_frames);
-  for (const View& view : problem.views) ++frames[view.frame].num_views;
-
-  for (const Observation& observation : problem.observations) {
-    const View& view = problem.views[observation.view];
-    FrameGeometry& frame = frames[view.frame];
-    const Vector3d centre_in_rig =
-        Center({view.cam_from_rig_rotation, view.cam_from_rig_translation});
-    if (!frame.is_seen_through) {
-      frame.is_seen_through = true;
-      frame.centre_in_rig = centre_in_rig;
-      frame.world_from_rig =
-          view.cam_from_world_rotation.transpose() * view.cam_from_rig_rotation;
-    } else if ((centre_in_rig - frame.centre_in_rig).norm() >
-               kCoincident * frame.centre_in_rig.norm()) {
-      frame.has_two_centres = true;
-    }
-  }
-  return frames;
-}
-
 // C_f = R_rw' (centre_in_rig - t_f).
 Vector3d ProjectionCentre(const FrameGeometry& frame, const Vector3d& t) {
   return frame.world_from_rig * (frame.centre_in_rig - t);
@@ -65,6 +30,7 @@ Vector3d ProjectionCentre(const FrameGeometry& frame, const Vector3d& t) {
 struct Spread {
   Vector3d centroid = Vector3d::Zero();
   double rms = 0;  // distance to the centroid
+  double weight = 0;
 };
 
 // One per component; position n counts weights[n] times. The centroid is NaN
@@ -72,26 +38,31 @@ struct Spread {
 std::vector<Spread> MeasureSpreads(const std::vector<Vector3d>& positions,
                                    const std::vector<int>& weights,
                                    const std::vector<int32_t>& component_of,
-                                   int32_t num_components) {
+                                   int32_t num_components,
+                                   const Context& context) {
   std::vector<Spread> spreads(num_components);
-  std::vector<double> sum_of_weights(num_components, 0);
-  for (size_t n = 0; n < positions.size(); ++n) {
-    const int32_t component = component_of[n];
-    if (component < 0 || weights[n] == 0) continue;
-    spreads[component].centroid += weights[n] * positions[n];
-    sum_of_weights[component] += weights[n];
-  }
-  for (int32_t c = 0; c < num_components; ++c) {
-    spreads[c].centroid /= sum_of_weights[c];
-  }
-  for (size_t n = 0; n < positions.size(); ++n) {
-    const int32_t component = component_of[n];
-    if (component < 0 || weights[n] == 0) continue;
-    Spread& spread = spreads[component];
-    spread.rms += weights[n] * (positions[n] - spread.centroid).squaredNorm();
-  }
-  for (int32_t c = 0; c < num_components; ++c) {
-    spreads[c].rms = std::sqrt(spreads[c].rms / sum_of_weights[c]);
+  context.InTurn(
+      [&](std::vector<Spread>* sums) {
+        for (size_t n = 0; n < positions.size(); ++n) {
+          if (component_of[n] < 0 || weights[n] == 0) continue;
+          Spread& sum = (*sums)[component_of[n]];
+          sum.centroid += weights[n] * positions[n];
+          sum.weight += weights[n];
+        }
+      },
+      &spreads);
+  for (Spread& spread : spreads) spread.centroid /= spread.weight;
+  context.InTurn(
+      [&](std::vector<Spread>* sums) {
+        for (size_t n = 0; n < positions.size(); ++n) {
+          if (component_of[n] < 0 || weights[n] == 0) continue;
+          Spread& sum = (*sums)[component_of[n]];
+          sum.rms += weights[n] * (positions[n] - sum.centroid).squaredNorm();
+        }
+      },
+      &spreads);
+  for (Spread& spread : spreads) {
+    spread.rms = std::sqrt(spread.rms / spread.weight);
   }
   return spreads;
 }
@@ -113,7 +84,8 @@ struct Extent {
 std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
                                    const std::vector<int>& point_weights,
                                    const Components& components,
-                                   const Estimate& estimate) {
+                                   const Estimate& estimate,
+                                   const Context& context) {
   std::vector<Vector3d> centres;
   std::vector<int> num_views;
   for (size_t f = 0; f < frames.size(); ++f) {
@@ -121,21 +93,28 @@ std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
     num_views.push_back(frames[f].num_views);
   }
   const std::vector<Spread> of_centres =
-      MeasureSpreads(centres, num_views, components.of_frame, components.count);
-  const std::vector<Spread> of_points = MeasureSpreads(
-      estimate.points, point_weights, components.of_point, components.count);
+      MeasureSpreads(centres, num_views, components.of_frame, components.count,
+                     context.Alone());
+  const std::vector<Spread> of_points =
+      MeasureSpreads(estimate.points, point_weights, components.of_point,
+                     components.count, context);
 
   std::vector<Extent> extents(components.count);
   for (int32_t c = 0; c < components.count; ++c) {
     extents[c].centres = of_centres[c];
     extents[c].points = of_points[c];
   }
+  std::vector<double> nearest(components.count,
+                              std::numeric_limits<double>::infinity());
   for (size_t k = 0; k < estimate.points.size(); ++k) {
-    if (components.of_point[k] < 0 || point_weights[k] == 0) continue;
-    Extent& extent = extents[components.of_point[k]];
-    extent.nearest_point =
-        std::min(extent.nearest_point,
-                 (estimate.points[k] - extent.centres.centroid).norm());
+    const int32_t c = components.of_point[k];
+    if (c < 0 || point_weights[k] == 0) continue;
+    nearest[c] = std::min(
+        nearest[c], (estimate.points[k] - extents[c].centres.centroid).norm());
+  }
+  context.Reduce([](double a, double b) { return std::min(a, b); }, &nearest);
+  for (int32_t c = 0; c < components.count; ++c) {
+    extents[c].nearest_point = nearest[c];
   }
   return extents;
 }
@@ -211,9 +190,10 @@ Move MoveOnto(const Extent& reference, const Extent& estimate,
 }  // namespace
 
 void RestoreGauge(const KnownRotationProblem& problem,
-                  const Estimate& reference, Estimate* estimate) {
-  const Components components = FindComponents(problem);
-  std::vector<FrameGeometry> frames = DescribeFrames(problem);
+                  const Estimate& reference, Estimate* estimate,
+                  const Context& context) {
+  const Components components = FindComponents(problem, context);
+  std::vector<FrameGeometry> frames = DescribeFrames(problem, context);
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     if (!reference.translations[f].allFinite()) frames[f].num_views = 0;
   }
@@ -222,9 +202,9 @@ void RestoreGauge(const KnownRotationProblem& problem,
     point_weights.push_back(point.allFinite());
   }
   const std::vector<Extent> wanted =
-      MeasureExtents(frames, point_weights, components, reference);
+      MeasureExtents(frames, point_weights, components, reference, context);
   const std::vector<Extent> found =
-      MeasureExtents(frames, point_weights, components, *estimate);
+      MeasureExtents(frames, point_weights, components, *estimate, context);
 
   std::vector<char> scale_is_free(components.count, true);
   for (int32_t f = 0; f < problem.num_frames; ++f) {
@@ -259,12 +239,13 @@ void RestoreGauge(const KnownRotationProblem& problem,
 
 void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
                             const Estimate& reference, Norm norm,
-                            int num_threads, Estimate* estimate) {
+                            const Context& context, Estimate* estimate) {
   Estimate moved = *estimate;
-  RestoreGauge(problem, reference, &moved);
-  const double limit =
-      (1 + kHarmless) * Cost(problem, *estimate, norm, num_threads);
-  if (Cost(problem, moved, norm, num_threads) <= limit) {
+  RestoreGauge(problem, reference, &moved, context);
+  const auto cost = [&](const Estimate& x) {
+    return context.Max(Cost(problem, x, norm, context.num_threads));
+  };
+  if (cost(moved) <= (1 + kHarmless) * cost(*estimate)) {
     *estimate = std::move(moved);
   }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "krot/base/context.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
@@ -27,14 +28,15 @@ namespace krot {
 // distance to what is fixed. An estimate in the right place keeps its bits.
 // O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
-                  const Estimate& reference, Estimate* estimate);
+                  const Estimate& reference, Estimate* estimate,
+                  const Context& context = {});
 
 // The same, unless it would raise the cost of its own rows, pixels, by more
 // than rounding: what is small and near the origin loses its digits elsewhere.
 // Then the estimate stays as it is.
 void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
                             const Estimate& reference, Norm norm,
-                            int num_threads, Estimate* estimate);
+                            const Context& context, Estimate* estimate);
 
 // Scales an estimate to a median depth of one: that of a problem without
 // baselines (HasBaseline), whose scale is free. O(observations).

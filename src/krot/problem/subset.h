@@ -26,6 +26,9 @@ class ProblemSubset {
   }
   bool IsWhole() const { return copy_ == nullptr; }
 
+  // All of it.
+  explicit ProblemSubset(const KnownRotationProblem& whole) : whole_(whole) {}
+
   // What the subset's observation is called in the whole.
   int64_t InWhole(int64_t observation) const {
     return IsWhole() ? observation : observation_of_[observation];

@@ -21,6 +21,7 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
                        const FastDescentOptions& options, Norm norm,
                        const Context& context)
     : problem_(problem),
+      options_(options),
       norm_(norm),
       context_(context),
       descents_(ResolveNumThreads(context.num_threads),
@@ -30,17 +31,31 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
 
 double BlockSweep::IntersectPoints(Estimate* estimate) {
   cameras_ = CamerasFromWorld(problem_, estimate->translations);
-  return LargestOver(problem_.num_points, kPointsPerChunk,
-                     [&](int64_t k, FastDescent* descent) {
-                       return IntersectPoint(k, descent, estimate);
-                     });
+  return context_.Max(LargestOver(problem_.num_points, kPointsPerChunk,
+                                  [&](int64_t k, FastDescent* descent) {
+                                    return IntersectPoint(k, descent, estimate);
+                                  }));
 }
 
 double BlockSweep::ResectFrames(Estimate* estimate) {
+  if (context_.ranks != nullptr) return ResectShare(estimate);
   return LargestOver(problem_.num_frames, kFramesPerChunk,
                      [&](int64_t f, FastDescent* descent) {
                        return ResectFrame(f, descent, estimate);
                      });
+}
+
+double BlockSweep::ResectShare(Estimate* estimate) {
+  if (!frame_share_) {
+    frame_share_ = std::make_unique<FrameShare>(problem_, context_.ranks);
+    frame_blocks_ = std::make_unique<BlockSweep>(
+        frame_share_->problem(), options_, norm_, context_.Alone());
+  }
+  Estimate share = frame_share_->Receive(*estimate);
+  frame_blocks_->SetGoal(goal_);
+  const double cost = frame_blocks_->ResectFrames(&share);
+  frame_share_->Publish(share, estimate);
+  return context_.Max(cost);
 }
 
 // The largest of what `minimize` returns for every block.

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "krot/base/context.h"
 #include "krot/minimax/fast_descent.h"
 #include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/sweeps/frame_share.h"
 
 namespace krot {
 
@@ -14,6 +16,9 @@ namespace krot {
 // thread keeps one FastDescent, so that sweeps do not allocate once warm.
 // Once it is cancelled, the blocks that are left are skipped. What the problem
 // fixes stays.
+//
+// Where ranks share the points each takes its own, and a share of the frames
+// (frame_share.h): they call both together.
 //
 // Both return the cost that is reached, pixels, to rounding what Cost() gives:
 // infinity where a block starts at a depth that is not positive, and then the
@@ -39,9 +44,11 @@ class BlockSweep {
   double LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
                      const Function& minimize);
   double IntersectPoint(int64_t k, FastDescent* descent, Estimate* estimate);
+  double ResectShare(Estimate* estimate);
   double ResectFrame(int64_t f, FastDescent* descent, Estimate* estimate);
 
   const KnownRotationProblem& problem_;
+  const FastDescentOptions options_;
   Norm norm_;
   const Context context_;
   DescentGoal goal_;
@@ -50,6 +57,9 @@ class BlockSweep {
   // Every block's warm start.
   std::vector<ActiveResiduals> point_active_;
   std::vector<ActiveResiduals> frame_active_;
+  // Where ranks share the points, once frames have moved.
+  std::unique_ptr<FrameShare> frame_share_;
+  std::unique_ptr<BlockSweep> frame_blocks_;
 };
 
 }  // namespace krot

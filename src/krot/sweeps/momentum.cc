@@ -19,10 +19,10 @@ void Extrapolate(const std::vector<Eigen::Vector3d>& from,
 
 }  // namespace
 
-Momentum::Momentum(const KnownRotationProblem& problem, int num_threads,
+Momentum::Momentum(const KnownRotationProblem& problem, const Context& context,
                    const Estimate& start, double cost)
     : problem_(problem),
-      num_threads_(num_threads),
+      context_(context),
       best_(start),
       previous_(start),
       best_cost_(cost) {}
@@ -35,7 +35,10 @@ Estimate Momentum::NextStart() {
     Extrapolate(previous_.points, best_.points, beta, &start.points);
     Extrapolate(previous_.translations, best_.translations, beta,
                 &start.translations);
-    if (AllDepthsPositive(problem_, start, num_threads_)) return start;
+    if (context_.All(
+            AllDepthsPositive(problem_, start, context_.num_threads))) {
+      return start;
+    }
   }
   improvements_ = 0;
   return best_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -14,7 +15,7 @@ namespace krot {
 class Momentum {
  public:
   // Starts at `start`, of cost `cost`; keeps a reference to `problem`.
-  Momentum(const KnownRotationProblem& problem, int num_threads,
+  Momentum(const KnownRotationProblem& problem, const Context& context,
            const Estimate& start, double cost);
 
   // Where the next sweep starts: the best estimate, or beyond it as far as
@@ -30,7 +31,7 @@ class Momentum {
 
  private:
   const KnownRotationProblem& problem_;
-  const int num_threads_;
+  const Context context_;
   Estimate best_;
   Estimate previous_;  // the best one before it
   double best_cost_;

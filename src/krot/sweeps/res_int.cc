@@ -35,15 +35,16 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
       options.fast_descent.settings == FastDescentSettings::kPaper;
   const int patience = literal ? 1 : options.patience;
   ResIntSummary summary;
-  summary.cost_initial =
-      Cost(problem, *estimate, options.norm, context.num_threads);
+  const auto cost_of = [&](const Estimate& x) {
+    return context.Max(Cost(problem, x, options.norm, context.num_threads));
+  };
+  summary.cost_initial = cost_of(*estimate);
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
                 summary.cost_initial, "finite: all depths positive");
 
   summary.termination = ResIntTermination::kMaxSweeps;
   BlockSweep blocks(problem, options.fast_descent, options.norm, context);
-  Momentum momentum(problem, context.num_threads, *estimate,
-                    summary.cost_initial);
+  Momentum momentum(problem, context, *estimate, summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
   int idle_sweeps = 0;  // in a row
   for (int sweep = 1; sweep <= options.max_sweeps; ++sweep) {
@@ -77,8 +78,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
     }
   }
   // The costs of sweeps differ from Cost() by rounding.
-  summary.cost_final =
-      Cost(problem, momentum.best(), options.norm, context.num_threads);
+  summary.cost_final = cost_of(momentum.best());
   if (summary.cost_final <= summary.cost_initial) {
     *estimate = momentum.best();
   } else {

@@ -1,0 +1,209 @@
+#include "krot/joint/component_solve.h"
+
+#include <numeric>
+#include <utility>
+
+#include "krot/joint/extend_solution.h"
+#include "krot/problem/components.h"
+#include "krot/problem/gathered_part.h"
+#include "krot/problem/gauge.h"
+#include "krot/proof/certificate.h"
+
+namespace krot {
+namespace {
+
+// A working set takes in the points that do not fit in below this share of its
+// optimum, the worst first, and grows by this factor at most.
+constexpr double kShareOfLevel = 0.8;
+constexpr double kMaxGrowth = 3;
+// Of the gap asked for, the share that a working set's own proof may leave; the
+// rest is what other points may exceed its cost by.
+constexpr double kShareOfGapForProof = 0.5;
+// After so many rounds it takes in everything.
+constexpr int kMaxRounds = 12;
+// A component of fewer points for each frame is solved as it is: ties alone
+// take in most of it.
+constexpr int kFewPointsPerFrame = 10;
+
+// The first rank's certificate of a gathered part, on every rank.
+std::optional<Certificate> InWhole(const GatheredPart& part,
+                                   std::optional<Certificate> certificate,
+                                   Ranks* ranks) {
+  char is_there = certificate.has_value();
+  ranks->Broadcast(&is_there);
+  if (!is_there) return std::nullopt;
+  Certificate in_whole = certificate.value_or(Certificate());
+  for (CertifiedObservation& o : in_whole.observations) {
+    o.observation = part.in_whole()[o.observation];
+  }
+  ranks->Broadcast(&in_whole.lower_bound);
+  ranks->Broadcast(&in_whole.defect);
+  ranks->Broadcast(&in_whole.observations);
+  return in_whole;
+}
+
+}  // namespace
+
+ComponentSolve::ComponentSolve(const KnownRotationProblem& problem,
+                               const JointOptions& options,
+                               const Context& context, const Estimate& start)
+    : problem_(problem),
+      options_(options),
+      context_(context),
+      estimate_(start),
+      cost_(CostOf(start)),
+      set_(FirstWorkingSet(problem, start, options.norm, cost_, context)) {}
+
+// A working set whose solution leaves other points above it is not worth a
+// proof, but more points.
+JointTermination ComponentSolve::SolvePart(const Place& place,
+                                           const ProblemSubset& part,
+                                           const IterationReport& report) {
+  JointOptions options = options_;
+  if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
+  const Context here = context_.Alone();
+  const Estimate start = part.Restrict(place.best);
+  CertifiedSolve solve(part.problem(), options, here, start, lower_bound_);
+  // What is below another part's bound already is good enough.
+  if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
+  if (iterations_ >= options_.max_iterations) {
+    return JointTermination::kMaxIterations;
+  }
+  const auto replace = [&](Estimate optimum) {
+    RestoreGaugeIfHarmless(part.problem(), start, options_.norm, here,
+                           &optimum);
+    part.Replace(optimum, place.candidate);
+  };
+  const JointTermination termination = solve.Run(
+      options_.max_iterations - iterations_,
+      [&](const Estimate& estimate) {
+        replace(estimate);
+        do_others_fit_ = place.fit_others();
+        return do_others_fit_;
+      },
+      [&](const JointIteration& iteration) {
+        if (set_.IsAll()) reached_ = std::min(reached_, solve.cost());
+        report(iteration);
+      });
+  iterations_ += solve.iterations();
+  if (solve.lower_bound() > lower_bound_) {
+    lower_bound_ = solve.lower_bound();
+    certificate_ = InWhole(part, *solve.certificate());
+  }
+  if (do_others_fit_) replace(solve.estimate());
+  return termination;
+}
+
+JointTermination ComponentSolve::SolveParts(const Place& place,
+                                            std::vector<int64_t> observations,
+                                            const IterationReport& report) {
+  JointTermination worst = JointTermination::kGapReached;
+  for (std::vector<int64_t>& part :
+       SplitIntoComponents(place.problem, std::move(observations))) {
+    const JointTermination termination =
+        SolvePart(place, ProblemSubset(place.problem, std::move(part)), report);
+    if (termination == JointTermination::kGapReached) continue;
+    worst = termination;
+    if (termination != JointTermination::kStalled || !do_others_fit_) break;
+  }
+  return worst;
+}
+
+JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
+                                                 Estimate* candidate) {
+  std::vector<int64_t> observations = set_.Observations();
+  num_working_observations_ =
+      context_.Sum(static_cast<int64_t>(observations.size()));
+  do_others_fit_ = true;
+  if (context_.ranks != nullptr) return SolveGathered(report, candidate);
+  return SolveParts(
+      {problem_, estimate_, candidate, [&] { return FitOthers(candidate); }},
+      std::move(observations), report);
+}
+
+// The first rank solves the set; whenever it asks whether the others' points
+// fit in, all find out.
+JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
+                                               Estimate* candidate) {
+  Ranks& ranks = *context_.ranks;
+  const GatheredPart gathered(problem_, set_.Points(), &ranks);
+  Estimate best = gathered.Collect(estimate_);
+  Estimate moved = gathered.Collect(*candidate);
+  const auto fit_others = [&] {
+    gathered.Scatter(moved, candidate);
+    const bool do_fit = FitOthers(candidate);
+    best = gathered.Collect(estimate_);
+    moved = gathered.Collect(*candidate);
+    return do_fit;
+  };
+  const auto is_asked = [&](char is_asked_here) {
+    ranks.Broadcast(&is_asked_here);
+    return is_asked_here != 0;
+  };
+  std::optional<Certificate> earlier =
+      std::exchange(certificate_, std::nullopt);
+  JointTermination termination = JointTermination::kNotRun;
+  if (ranks.IsFirst()) {
+    std::vector<int64_t> all(gathered.in_whole().size());
+    std::iota(all.begin(), all.end(), 0);
+    const Place place = {gathered.problem(), best, &moved,
+                         [&] { return is_asked(1) && fit_others(); }};
+    termination = SolveParts(place, std::move(all), report);
+    is_asked(0);
+  } else {
+    while (is_asked(0)) fit_others();
+  }
+  gathered.Scatter(moved, candidate);
+  ranks.Broadcast(&termination);
+  ranks.Broadcast(&do_others_fit_);
+  ranks.Broadcast(&iterations_);
+  ranks.Broadcast(&lower_bound_);
+  certificate_ = InWhole(gathered, certificate_, &ranks);
+  if (!certificate_) certificate_ = std::move(earlier);
+  return termination;
+}
+
+// Whether the working set's solution extends to all points, none exceeding its
+// cost by more than the gap leaves room for.
+bool ComponentSolve::FitOthers(Estimate* candidate) {
+  level_ = set_.Cost(*candidate, options_.norm);
+  const double highest =
+      level_ / (1 - (1 - kShareOfGapForProof) * options_.relative_gap);
+  const bool do_fit = ExtendSolution(problem_, set_, options_.norm, context_,
+                                     level_, highest, candidate);
+  Keep(*candidate);
+  return do_fit;
+}
+
+void ComponentSolve::Keep(const Estimate& candidate) {
+  const double cost = CostOf(candidate);
+  if (cost > cost_) return;
+  cost_ = cost;
+  estimate_ = candidate;
+}
+
+JointTermination ComponentSolve::Run(const IterationReport& report) {
+  if (IsLowEnough()) return JointTermination::kGapReached;
+  if (context_.Sum(problem_.num_points) <
+      int64_t{kFewPointsPerFrame} * problem_.num_frames) {
+    set_.AddAll();
+  }
+  for (int round = 1;; ++round) {
+    Estimate candidate = estimate_;
+    const JointTermination termination = SolveWorkingSet(report, &candidate);
+    if (do_others_fit_) do_others_fit_ = FitOthers(&candidate);
+    if (IsGapReached()) return JointTermination::kGapReached;
+    if (set_.IsAll() || termination == JointTermination::kInterrupted ||
+        termination == JointTermination::kMaxIterations) {
+      return termination;
+    }
+    const int64_t num_added = set_.AddAbove(
+        candidate, options_.norm, kShareOfLevel * level_,
+        static_cast<int64_t>((kMaxGrowth - 1) *
+                             static_cast<double>(set_.num_points())) +
+            1);
+    if (do_others_fit_ || num_added == 0 || round == kMaxRounds) set_.AddAll();
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,232 @@
+// What ranks that share the points make of a model has the bits of what one
+// process makes of it.
+
+#include <cstring>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "krot/bridge/certificate_file.h"
+#include "krot/conic/observation_loop.h"
+#include "krot/joint/working_set.h"
+#include "krot/model/binary_io.h"
+#include "krot/model/model_share.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/problem/cost.h"
+#include "krot/synthetic/scene.h"
+#include "tests/testing/thread_ranks.h"
+
+namespace krot {
+namespace {
+
+SceneOptions Scene() {
+  SceneOptions options;
+  options.num_frames = 12;
+  options.num_points = 400;
+  options.track_length = 4;
+  options.pixel_noise = 0.5;
+  options.start_translation_noise = 0.005;
+  options.start_point_noise = 0.005;
+  return options;
+}
+
+// Puts the shares' points into their places in the whole.
+void PutPoints(const Model& whole, int rank, int count, const Model& share,
+               Model* joined) {
+  const std::vector<int32_t> points = CutPoints(whole, count)[rank];
+  for (size_t n = 0; n < points.size(); ++n) {
+    joined->points3D[points[n]].xyz = share.points3D[n].xyz;
+    joined->points3D[points[n]].error = share.points3D[n].error;
+  }
+}
+
+struct Solved {
+  Model model;
+  SolveSummary summary;  // of the first rank
+};
+
+Solved SolveByRanks(const Model& whole, const SolveModelOptions& options,
+                    int count) {
+  Solved solved;
+  std::vector<Model> shares(count);
+  ThreadRanks::Run(count, [&](Ranks* ranks) {
+    const ModelShare share =
+        TakeShare(whole, CutPoints(whole, count)[ranks->rank()]);
+    Context context{1};
+    context.ranks = ranks;
+    SolveModelResult result = SolveModel(share.model, options, context);
+    shares[ranks->rank()] = std::move(result.model);
+    if (ranks->IsFirst()) solved.summary = std::move(result.summary);
+  });
+  solved.model = whole;
+  solved.model.frames = shares[0].frames;
+  for (size_t n = 0; n < whole.images.size(); ++n) {
+    solved.model.images[n].cam_from_world = shares[0].images[n].cam_from_world;
+  }
+  for (int r = 0; r < count; ++r) {
+    PutPoints(whole, r, count, shares[r], &solved.model);
+  }
+  return solved;
+}
+
+void ExpectSameBits(const Solved& a, const SolveModelResult& b) {
+  EXPECT_EQ(FormatImagesBinary(a.model), FormatImagesBinary(b.model));
+  EXPECT_EQ(FormatFramesBinary(a.model), FormatFramesBinary(b.model));
+  EXPECT_EQ(FormatPoints3DBinary(a.model), FormatPoints3DBinary(b.model));
+  EXPECT_EQ(a.summary.termination, b.summary.termination);
+  EXPECT_EQ(a.summary.cost_final, b.summary.cost_final);
+  EXPECT_EQ(a.summary.lower_bound, b.summary.lower_bound);
+  EXPECT_EQ(a.summary.rounds.size(), b.summary.rounds.size());
+  EXPECT_EQ(a.summary.num_observations, b.summary.num_observations);
+  EXPECT_EQ(a.summary.support.size(), b.summary.support.size());
+}
+
+class SolveByRanksTest : public ::testing::TestWithParam<int> {
+ protected:
+  static void Compare(const SceneOptions& scene,
+                      const SolveModelOptions& options) {
+    const Model whole = SynthesizeScene(scene).model;
+    const SolveModelResult alone = SolveModel(whole, options, Context{1});
+    ExpectSameBits(SolveByRanks(whole, options, GetParam()), alone);
+  }
+};
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcess) { Compare(Scene(), {}); }
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWhereRowsAreTakenAnew) {
+  SceneOptions scene = Scene();
+  scene.camera_model_id = 4;  // OPENCV
+  Compare(scene, {});
+}
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWithBaselines) {
+  SceneOptions scene = Scene();
+  scene.sensors_per_rig = 2;
+  Compare(scene, {});
+}
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessBySweepsAlone) {
+  SolveModelOptions options;
+  options.method = SolveMethod::kResInt;
+  Compare(Scene(), options);
+}
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWithAFinishOfSweeps) {
+  SolveModelOptions options;
+  options.finish.finish = Finish::kSweeps;
+  Compare(Scene(), options);
+}
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessInTheLargestNorm) {
+  SolveModelOptions options;
+  options.norm = Norm::LInf();
+  Compare(Scene(), options);
+}
+
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWhereWorkingSetsGrow) {
+  SceneOptions scene = Scene();
+  scene.layout = SceneLayout::kStreet;
+  scene.num_frames = 40;
+  scene.num_points = 4000;
+  Compare(scene, {});
+}
+
+INSTANTIATE_TEST_SUITE_P(OfSoMany, SolveByRanksTest,
+                         ::testing::Values(1, 2, 3, 4, 7));
+
+TEST(SolveByRanks, RefusesWhatIsForOneProcess) {
+  const Model whole = SynthesizeScene(Scene()).model;
+  SolveModelOptions options;
+  options.init = SolveInit::kFeasible;
+  try {
+    SolveByRanks(whole, options, 2);
+    FAIL();
+  } catch (const RanksError& error) {
+    EXPECT_STREQ(error.what(),
+                 "a start from nothing is for one process: use krot solver");
+  }
+}
+
+TEST(CutPoints, GivesEveryPointToOneRankInTheOrderOfIds) {
+  const Model whole = SynthesizeScene(Scene()).model;
+  const std::vector<std::vector<int32_t>> cut = CutPoints(whole, 3);
+  std::vector<int32_t> all;
+  Point3DId last = 0;
+  for (const std::vector<int32_t>& points : cut) {
+    Point3DId largest = last;
+    int64_t num_observations = 0;
+    for (const int32_t k : points) {
+      const Point3D& point = whole.points3D[k];
+      EXPECT_TRUE(last == 0 || point.id > last);
+      largest = std::max(largest, point.id);
+      num_observations +=
+          static_cast<int64_t>(point.track_end - point.track_begin);
+      all.push_back(k);
+    }
+    last = largest;
+    EXPECT_NEAR(static_cast<double>(num_observations),
+                static_cast<double>(whole.track_elements.size()) / 3, 40);
+  }
+  EXPECT_EQ(all.size(), whole.points3D.size());
+}
+
+TEST(TakeShare, KeepsEveryObservationOfItsPoints) {
+  const Model whole = SynthesizeScene(Scene()).model;
+  const std::vector<int32_t> points = CutPoints(whole, 2)[1];
+  const ModelShare share = TakeShare(whole, points);
+  ASSERT_EQ(share.model.points3D.size(), points.size());
+  for (size_t n = 0; n < points.size(); ++n) {
+    const Point3D& own = share.model.points3D[n];
+    const Point3D& in_whole = whole.points3D[points[n]];
+    ASSERT_EQ(own.track_end - own.track_begin,
+              in_whole.track_end - in_whole.track_begin);
+    for (uint64_t e = 0; e < own.track_end - own.track_begin; ++e) {
+      const TrackElement& a = share.model.track_elements[own.track_begin + e];
+      const TrackElement& b = whole.track_elements[in_whole.track_begin + e];
+      ASSERT_EQ(a.image_id, b.image_id);
+      size_t image = 0;
+      while (whole.images[image].id != a.image_id) ++image;
+      EXPECT_EQ(share.model.images[image].points2D[a.point2D_idx].x,
+                whole.images[image].points2D[b.point2D_idx].x);
+      EXPECT_EQ(share.point2D_of[image][a.point2D_idx], b.point2D_idx);
+    }
+  }
+}
+
+TEST(ObservationLoop, SumsOverRanksAsOverAll) {
+  constexpr int64_t kCounts[] = {5000, 0, 17, 9000, 4096, 123};
+  const auto term = [](int64_t i) { return 1.0 / static_cast<double>(i + 1); };
+  int64_t total = 0;
+  for (const int64_t count : kCounts) total += count;
+  const double alone = ObservationLoop(total, 1).Sum(term);
+  ThreadRanks::Run(6, [&](Ranks* ranks) {
+    Context context{1};
+    context.ranks = ranks;
+    const int64_t first = ranks->SumBefore(kCounts[ranks->rank()]);
+    const ObservationLoop loop(kCounts[ranks->rank()], context);
+    EXPECT_EQ(loop.Sum([&](int64_t i) { return term(first + i); }), alone);
+  });
+}
+
+TEST(Ranks, GatherInTheirOrderAndHandOnInTurn) {
+  ThreadRanks::Run(4, [](Ranks* ranks) {
+    const std::vector<int> own(static_cast<size_t>(ranks->rank()),
+                               ranks->rank());
+    EXPECT_THAT(ranks->Gather(own), ::testing::ElementsAre(1, 2, 2, 3, 3, 3));
+    EXPECT_EQ(ranks->GatherOnFirst(own).size(), ranks->IsFirst() ? 6u : 0u);
+    std::vector<char> letters;
+    ranks->InTurn(
+        [&](std::vector<char>* all) {
+          all->push_back(static_cast<char>('a' + ranks->rank()));
+        },
+        &letters);
+    EXPECT_THAT(letters, ::testing::ElementsAre('a', 'b', 'c', 'd'));
+    EXPECT_EQ(ranks->SumBefore(10), 10 * ranks->rank());
+  });
+}
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "krot/base/ranks.h"
+
+namespace krot {
+
+// The processes that mpirun started. MPI is initialised as long as it lives;
+// one at a time.
+class MpiRanks : public Ranks {
+ public:
+  MpiRanks(int* argc, char*** argv);
+  ~MpiRanks() override;
+  MpiRanks(const MpiRanks&) = delete;
+  MpiRanks& operator=(const MpiRanks&) = delete;
+
+  int rank() const override { return rank_; }
+  int count() const override { return count_; }
+  std::vector<std::string> Exchange(std::vector<std::string> bytes) override;
+
+  // To other ranks, so far.
+  int64_t bytes_sent() const { return bytes_sent_; }
+
+  // Ends all ranks.
+  [[noreturn]] void Abort(int exit_code);
+
+ private:
+  int rank_ = 0;
+  int count_ = 1;
+  int64_t bytes_sent_ = 0;
+};
+
+}  // namespace krot

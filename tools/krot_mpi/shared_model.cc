@@ -1,0 +1,103 @@
+#include "tools/krot_mpi/shared_model.h"
+
+#include <algorithm>
+#include <unordered_set>
+#include <utility>
+#include <vector>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/bridge/model_digest.h"
+#include "krot/model/image_geometry.h"
+
+namespace krot {
+namespace {
+
+// What a solve changes of a point.
+struct SolvedPoint {
+  Eigen::Vector3d xyz;
+  double error;
+};
+
+struct Named {
+  Point3DId point3D_id;
+  ImageId image_id;
+  uint32_t point2D_idx;
+};
+
+}  // namespace
+
+Model SharedModel::Take(const Model& whole) {
+  ModelShare share =
+      TakeShare(whole, CutPoints(whole, ranks_.count())[ranks_.rank()]);
+  point2D_of_ = std::move(share.point2D_of);
+  return std::move(share.model);
+}
+
+void SharedModel::NameInWhole(const Model& share, SolveSummary* summary) const {
+  std::vector<Named> support;
+  for (const SupportObservation& o : summary->support) {
+    support.push_back({o.point3D_id, o.image_id, o.point2D_idx});
+  }
+  if (summary->certificate) {
+    for (const auto& o : summary->certificate->observations) {
+      support.push_back({o.point3D_id, o.image_id, o.point2D_idx});
+    }
+  }
+  ranks_.Broadcast(&support);
+  std::unordered_set<Point3DId> ids;
+  for (const Point3D& point : share.points3D) ids.insert(point.id);
+  const auto images = ImageIndices(share);
+  std::vector<uint32_t> names(support.size(), 0);  // where others name them
+  for (size_t n = 0; n < support.size(); ++n) {
+    if (ids.count(support[n].point3D_id) == 0) continue;
+    names[n] =
+        point2D_of_[images.at(support[n].image_id)][support[n].point2D_idx];
+  }
+  ranks_.Reduce([](uint32_t a, uint32_t b) { return std::max(a, b); }, &names);
+  auto name = names.begin();
+  for (SupportObservation& o : summary->support) o.point2D_idx = *name++;
+  if (!summary->certificate) return;
+  for (auto& o : summary->certificate->observations) o.point2D_idx = *name++;
+}
+
+bool SharedModel::Join(Model* model, Model* solved,
+                       SolveSummary* summary) const {
+  NameInWhole(*model, summary);
+  std::vector<SolvedPoint> points;
+  for (const Point3D& point : solved->points3D) {
+    points.push_back({point.xyz, point.error});
+  }
+  points = ranks_.GatherOnFirst(points);
+  if (!ranks_.IsFirst()) return false;
+
+  const Model share = std::exchange(*solved, Model());
+  *model = Model();
+  LogOptions quiet;
+  quiet.level = 0;
+  RunRecord again;
+  *model = ReadInput(paths_, quiet, &again);
+  summary->pixel_error_before = Summarize(PixelErrors(*model));
+  if (summary->certificate) {
+    summary->certificate->model_sha256 = ModelSha256(*model);
+  }
+  if (paths_.html_path.empty()) {  // nothing else asks for the input
+    *solved = std::move(*model);
+  } else {
+    *solved = *model;
+  }
+  solved->frames = share.frames;
+  for (size_t n = 0; n < share.images.size(); ++n) {
+    solved->images[n].cam_from_world = share.images[n].cam_from_world;
+  }
+  size_t next = 0;
+  for (const std::vector<int32_t>& cut : CutPoints(*solved, ranks_.count())) {
+    for (const int32_t k : cut) {
+      solved->points3D[k].xyz = points[next].xyz;
+      solved->points3D[k].error = points[next++].error;
+    }
+  }
+  summary->pixel_error_after = Summarize(PixelErrors(*solved));
+  return true;
+}
+
+}  // namespace krot
