@@ -100,7 +100,7 @@ TEST_F(CentreEliminationTest, SolvesTheLeastSquares) {
     structure_.point_is_fixed.assign(structure_.num_points(), 0);
     if (decades == 0) structure_.point_is_fixed[0] = 1;
     if (decades < 4) structure_.point_is_fixed[5] = 1;
-    CentreElimination elimination(structure_, 1);
+    CentreElimination elimination(structure_, {1});
     Fill(decades, &elimination);
     const LongMatrix A = DenseA(&elimination);
     const LongVector r = Eigen::Map<const Eigen::VectorXd>(
@@ -125,7 +125,7 @@ TEST_F(CentreEliminationTest, SolvesTheLeastSquares) {
 // One row of point 1 in frame 2 outweighs all others by ten orders of magnitude
 // and more; frame and point move along each other.
 TEST_F(CentreEliminationTest, KeepsWhatOneRowOutweighs) {
-  CentreElimination elimination(structure_, 1);
+  CentreElimination elimination(structure_, {1});
   Fill(0, &elimination);
   const int64_t i = structure_.point_begin[1] + 3;
   for (int c = 0; c < 3; ++c) elimination.rows(i)[c] *= 1e6;
@@ -141,7 +141,7 @@ TEST_F(CentreEliminationTest, KeepsWhatOneRowOutweighs) {
 }
 
 TEST_F(CentreEliminationTest, LeavesADirectionThatNoRowTells) {
-  CentreElimination elimination(structure_, 1);
+  CentreElimination elimination(structure_, {1});
   Fill(0, &elimination);
   for (int64_t i = structure_.point_begin[3]; i < structure_.point_begin[4];
        ++i) {
@@ -158,7 +158,7 @@ TEST_F(CentreEliminationTest, HasTheSameBitsAtAnyNumberOfThreads) {
   const BlockStructure structure = MakeStructure(9, 800);
   std::vector<double> expected;
   for (const int num_threads : {1, 2, 3}) {
-    CentreElimination elimination(structure, num_threads);
+    CentreElimination elimination(structure, {num_threads});
     std::mt19937 generator(3);
     std::normal_distribution<double> normal;
     for (int64_t n = 0; n < 9 * structure.num_observations(); ++n) {
