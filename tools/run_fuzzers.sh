@@ -34,10 +34,10 @@ fuzz() {
   mkdir -p "$corpus"
   local TIMEFORMAT=%U
   { time UBSAN_OPTIONS=print_stacktrace=1 "$folder/fuzz/$1_fuzz" \
-    -max_total_time="$seconds" -timeout=120 -report_slow_units=120 \
-    -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
-    -artifact_prefix="$folder/findings/$1-" \
-    "$corpus" "$seeds/$1" >"$folder/logs/$1" 2>&1 || true
+      -max_total_time="$seconds" -timeout=120 -report_slow_units=120 \
+      -rss_limit_mb=2048 -max_len=20000 -print_final_stats=1 \
+      -artifact_prefix="$folder/findings/$1-" \
+      "$corpus" "$seeds/$1" >"$folder/logs/$1" 2>&1 || true
   } 2>"$folder/logs/$1.seconds"
 }
 

@@ -21,13 +21,13 @@ class ProblemSubset {
   ProblemSubset(const KnownRotationProblem& whole,
                 std::vector<int64_t> observations);
 
+  // All of it.
+  explicit ProblemSubset(const KnownRotationProblem& whole) : whole_(whole) {}
+
   const KnownRotationProblem& problem() const {
     return copy_ ? *copy_ : whole_;
   }
   bool IsWhole() const { return copy_ == nullptr; }
-
-  // All of it.
-  explicit ProblemSubset(const KnownRotationProblem& whole) : whole_(whole) {}
 
   // What the subset's observation is called in the whole.
   int64_t InWhole(int64_t observation) const {

@@ -204,8 +204,7 @@ std::string PositionsKeptSentence(const SolveSummary& summary) {
       " % of its radius.\n";
   return summary.largest_position_ratio > 1 + 1e-6
              ? "Not everything came to be where it is known to be: the "
-               "farthest "
-               "is off by " +
+               "farthest is off by " +
                    ratio
              : Counted(summary.num_positions, "known position") +
                    " kept; the farthest is off by " + ratio;
