@@ -1,5 +1,9 @@
 #include "krot/conic/cones.h"
 
+#include <limits>
+#include <random>
+#include <type_traits>
+
 #include <gtest/gtest.h>
 
 #include "tests/conic/random_cones.h"
@@ -53,6 +57,31 @@ TYPED_TEST(ConeTest, DivideInvertsTheProduct) {
     // The product's condition is that of x.
     EXPECT_LT((quotient - y).norm(), 4e-15 / margin);
   }
+}
+
+template <int kDim>
+void ExpectInsideWithTheMultiplier(Norm norm, const Eigen::Vector3d& m) {
+  const auto z = FromMultiplier<kDim>(norm, m[0], m.tail<2>());
+  EXPECT_LT((ConeMap<kDim>(norm).transpose() * z - m).norm(), 4e-15);
+  using Cone = std::conditional_t<kDim == 3, SecondOrderCone, FourHalfLines>;
+  EXPECT_GE(Cone::SmallestEigenvalue(z), -4e-15);
+}
+
+TEST(FromMultiplier, IsInTheConeAndHasTheMultiplier) {
+  const double infinity = std::numeric_limits<double>::infinity();
+  std::mt19937 generator(7);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (int n = 0; n < kTrials; ++n) {
+    const Eigen::Vector2d y(uniform(generator), uniform(generator));
+    // Every other one on the cone's boundary.
+    const double more = n % 2 == 0 ? 0 : 1 + uniform(generator);
+    ExpectInsideWithTheMultiplier<3>({2}, {y.norm() + more, y[0], y[1]});
+    ExpectInsideWithTheMultiplier<4>(
+        {1}, {y.lpNorm<Eigen::Infinity>() + more, y[0], y[1]});
+    ExpectInsideWithTheMultiplier<4>({infinity},
+                                     {y.lpNorm<1>() + more, y[0], y[1]});
+  }
+  ExpectInsideWithTheMultiplier<4>({1}, {0, 0, 0});
 }
 
 TYPED_TEST(ConeTest, SmallestEigenvalueIsWhatTheIdentityMayTakeAway) {

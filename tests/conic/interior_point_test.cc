@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/minimax/residual.h"
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
@@ -101,6 +102,40 @@ TEST_P(InteriorPoint, MultipliersAreStationaryAtTheEnd) {
   }
   for (const Eigen::Vector3d& sum : of_frame) {
     EXPECT_LT(sum.norm(), 1e-6 * size);
+  }
+}
+
+// As where a working set grows: from the multipliers of the observations near
+// the maximum, all others still unknown.
+TEST_P(InteriorPoint, IsThereSoonerFromKnownMultipliers) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeScene(seed, 60);
+    const KnownRotationProblem& problem = scene.problem;
+    InteriorPointOptions options = Options(norm());
+    options.smallest_gap = 1e-5;
+    options.max_iterations = 6;
+    Estimate start = scene.estimate;
+    std::vector<Multiplier> known;
+    MinimizeJointly(problem, options, {}, &start, &known);
+    options.max_iterations = 200;
+    Estimate cold = start;
+    std::vector<Multiplier> multipliers;
+    const InteriorPointSummary from_nothing =
+        MinimizeJointly(problem, options, {}, &cold, &multipliers);
+    const double level = 0.5 * Cost(problem, start, norm(), 1);
+    for (size_t i = 0; i < known.size(); ++i) {
+      const double residual = ResidualOf(
+          ViewPoint(problem, problem.observations[i], start), norm());
+      if (residual < level) known[i] = {};
+    }
+    options.known_multipliers = &known;
+    Estimate warm = start;
+    const InteriorPointSummary from_known =
+        MinimizeJointly(problem, options, {}, &warm, &multipliers);
+    EXPECT_LT(from_known.iterations, from_nothing.iterations);
+    const double cost = Cost(problem, cold, norm(), 1);
+    EXPECT_NEAR(Cost(problem, warm, norm(), 1), cost, 1e-4 * cost);
   }
 }
 
@@ -247,6 +282,10 @@ TEST(MinimizeJointly, RefusesStartsBehindACameraAndBadOptions) {
   EXPECT_THROW(run(options), std::invalid_argument);
   options = Options(Norm::L2());
   options.start_margin = 0;
+  EXPECT_THROW(run(options), std::invalid_argument);
+  options = Options(Norm::L2());
+  const std::vector<Multiplier> too_few(3);
+  options.known_multipliers = &too_few;
   EXPECT_THROW(run(options), std::invalid_argument);
   scene.estimate.points[0] *= -1;
   EXPECT_THROW(run(Options(Norm::L2())), std::invalid_argument);

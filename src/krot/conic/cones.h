@@ -140,4 +140,26 @@ Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
   return T;
 }
 
+// A z of the cone with T'z = (lambda; y), where ||y||_dual <= lambda.
+template <int kDim>
+Eigen::Matrix<double, kDim, 1> FromMultiplier(Norm norm, double lambda,
+                                              const Eigen::Vector2d& y) {
+  Eigen::Matrix<double, kDim, 1> z;
+  if constexpr (kDim == 3) {
+    z << lambda, y;
+  } else if (norm.p == 1) {
+    if (!(lambda > 0)) return z.setZero();
+    const Eigen::Array2d plus = 1 + y.array() / lambda;
+    const Eigen::Array2d minus = 1 - y.array() / lambda;
+    z << plus[0] * plus[1], plus[0] * minus[1], minus[0] * plus[1],
+        minus[0] * minus[1];
+    z *= lambda / 4;
+  } else {
+    z << std::max(y[0], 0.0), std::max(-y[0], 0.0), std::max(y[1], 0.0),
+        std::max(-y[1], 0.0);
+    z.array() += (lambda - y.lpNorm<1>()) / 4;
+  }
+  return z;
+}
+
 }  // namespace krot

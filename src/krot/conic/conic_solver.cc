@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "krot/conic/centrality.h"
+#include "krot/conic/start_multipliers.h"
 
 namespace krot {
 namespace {
@@ -64,7 +65,7 @@ ConicSolver<Cone>::ConicSolver(const KnownRotationProblem& problem,
   now_.z.resize(problem.observations.size());
   trial_ = now_;
   ViewAll(&now_);
-  CentreMultipliers();
+  FindStartMultipliers();
   best_cost_ = program_.IsLinear() ? scalar : now_.cost;
 }
 
@@ -77,26 +78,23 @@ void ConicSolver<Cone>::ViewAll(State* state) const {
       [&](int64_t i) { return -ResidualOf(state->viewed[i], options_.norm); });
 }
 
-// z = mu s^-1: perfectly centred. Scaled so that the row of g holds or, in the
-// linear programme, so that from the middle of the cones they are soon
+// Centred, and scaled so that the row of g holds; likewise near known ones; or,
+// in the linear programme, so that from the middle of the cones they are soon
 // balanced.
 template <typename Cone>
-void ConicSolver<Cone>::CentreMultipliers() {
-  system_.loop().ForEach([&](int64_t i) {
-    now_.z[i] = Cone::Divide(system_.Slack(now_.viewed[i], now_.scalar),
-                             Cone::Identity());
-  });
+void ConicSolver<Cone>::FindStartMultipliers() {
+  CentreMultipliers(system_, now_.viewed, now_.scalar, &now_.z);
   if (program_.IsLinear()) {
     if (!Factorize()) return;
     const double mu = kMuPerLength * system_.ObjectiveLength();
     system_.loop().ForEach([&](int64_t i) { now_.z[i] *= mu; });
     return;
   }
-  const double sum = system_.loop().Sum([&](int64_t i) {
-    return system_.ToMultiplier(now_.z[i])[0] *
-           program_.TopPerScalar(now_.viewed[i].depth);
-  });
-  system_.loop().ForEach([&](int64_t i) { now_.z[i] /= sum; });
+  ScaleMultipliers(system_, program_, now_.viewed, &now_.z);
+  if (options_.known_multipliers != nullptr && program_.IsCost()) {
+    JoinKnownMultipliers(system_, options_.norm, now_.viewed,
+                         *options_.known_multipliers, &now_.z);
+  }
 }
 
 // The predictor's f is 0; the corrector's has lambda o f = sigma mu e - ds o

@@ -58,7 +58,7 @@ class ConicSolver {
   };
 
   void ViewAll(State* state) const;
-  void CentreMultipliers();
+  void FindStartMultipliers();
   bool Factorize() {
     return system_.Factorize(now_.viewed, now_.scalar, now_.z);
   }

@@ -58,6 +58,12 @@ InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
       Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(std::isfinite(cost), "cost of the start", cost,
                 "finite: all depths positive");
+  if (options.known_multipliers != nullptr) {
+    const size_t count = options.known_multipliers->size();
+    CheckArgument(count == problem.observations.size(),
+                  "number of known multipliers", count,
+                  "that of the observations");
+  }
   if (!(cost > 0)) {  // already at the lowest possible
     multipliers->assign(problem.observations.size(), {});
     InteriorPointSummary summary;

@@ -30,8 +30,11 @@ struct ConicIterate {
 };
 
 struct InteriorPointOptions {
-  Norm norm;                   // p = 1, 2 or infinity
-  double start_margin = 0.1;   // gamma starts at (1 + margin) cost; > 0
+  Norm norm;                  // p = 1, 2 or infinity
+  double start_margin = 0.1;  // gamma starts at (1 + margin) cost; > 0
+  // MinimizeJointly: those of a similar problem's last iterate, per
+  // observation, zero where they are not known. It starts near them.
+  const std::vector<Multiplier>* known_multipliers = nullptr;
   double smallest_gap = 1e-9;  // stop there, relative; > 0
   int max_iterations = 200;    // >= 1
   // Called after every iteration; true ends the solve.

@@ -33,6 +33,7 @@ constexpr int kPatience = 30;
 constexpr double kFirstWidth = 1e-2;
 constexpr double kShareOfWidth = 0.25;
 constexpr double kStartMargin = 0.1;
+constexpr double kWarmStartMargin = 0.03;
 constexpr double kFreshStartMargin = 1e-2;
 // Smaller depths, of the median, are those of points in a camera.
 constexpr double kDepthInCamera = 1e-6;
@@ -56,13 +57,16 @@ CertificateOptions Sufficient(double bound) {
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
                                const Context& context, const Estimate& start,
-                               double known_bound)
+                               double known_bound,
+                               std::vector<Multiplier> known_multipliers)
     : problem_(problem),
       options_(options),
       context_(context),
       estimate_(start),
       cost_(Cost(problem, start, options.norm, context.num_threads)),
-      lower_bound_(known_bound) {}
+      lower_bound_(known_bound),
+      multipliers_(std::move(known_multipliers)),
+      are_multipliers_known_(!multipliers_.empty()) {}
 
 void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
   if (!certificate) return;
@@ -80,6 +84,7 @@ InteriorPointTermination CertifiedSolve::RunFrom(
   InteriorPointOptions options;
   options.norm = options_.norm;
   options.start_margin = start_margin;
+  if (are_multipliers_known_) options.known_multipliers = &multipliers_;
   options.max_iterations = std::max(1, max_iterations_ - iterations_);
   options.smallest_gap = kFarBelow * options_.relative_gap;
   double next_gap = options_.relative_gap;
@@ -116,8 +121,7 @@ InteriorPointTermination CertifiedSolve::RunFrom(
            (iterate.iteration >= kIterationsPerStart &&
             iterate.gap > kLargeGap);
   };
-  std::vector<Multiplier> multipliers;
-  return MinimizeJointly(problem_, options, context_, &start, &multipliers)
+  return MinimizeJointly(problem_, options, context_, &start, &multipliers_)
       .termination;
 }
 
@@ -210,13 +214,13 @@ JointTermination CertifiedSolve::Run(int max_iterations,
   max_iterations_ = max_iterations;
   width_ = kFirstWidth;
   if (IsLowEnough()) return JointTermination::kGapReached;
-  double start_margin = kStartMargin;
+  double start_margin =
+      are_multipliers_known_ ? kWarmStartMargin : kStartMargin;
   Estimate start = estimate_;
   LeaveCameras(report, &start);
   for (;;) {
     const InteriorPointTermination termination =
         RunFrom(start, start_margin, take, report);
-    start_margin = kFreshStartMargin;
     if (IsGapReached()) return JointTermination::kGapReached;
     if (is_given_up_) return JointTermination::kStalled;
     if (termination == InteriorPointTermination::kInterrupted) {
@@ -225,6 +229,12 @@ JointTermination CertifiedSolve::Run(int max_iterations,
     if (iterations_ >= max_iterations_) {
       return JointTermination::kMaxIterations;
     }
+    if (std::exchange(are_multipliers_known_, false)) {
+      start = estimate_;
+      start_margin = kStartMargin;
+      continue;
+    }
+    start_margin = kFreshStartMargin;
     const bool is_fresh = FindFreshStart(report);
     if (IsGapReached()) return JointTermination::kGapReached;
     if (context_.IsCancelled()) return JointTermination::kInterrupted;

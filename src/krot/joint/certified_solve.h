@@ -2,7 +2,9 @@
 
 #include <functional>
 #include <optional>
+#include <vector>
 
+#include "krot/conic/interior_point.h"
 #include "krot/joint/feasible_start.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
@@ -24,10 +26,12 @@ class CertifiedSolve {
   using TakeEstimate = std::function<bool(const Estimate&)>;
 
   // Keeps a reference to `problem`. All depths of `start` are positive. A cost
-  // that is as low as `known_bound`, pixels, allows is low enough.
+  // that is as low as `known_bound`, pixels, allows is low enough. Known
+  // multipliers are a similar problem's, zero where unknown, or empty.
   CertifiedSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Context& context,
-                 const Estimate& start, double known_bound);
+                 const Estimate& start, double known_bound,
+                 std::vector<Multiplier> known_multipliers);
 
   // Takes at most `max_iterations`, except for those towards a fresh start,
   // which it ends once begun. Hands an estimate to `take` now and then, and
@@ -42,6 +46,8 @@ class CertifiedSolve {
   // What the certificate proves, pixels; without one, the known bound.
   double lower_bound() const { return lower_bound_; }
   const std::optional<Certificate>& certificate() const { return certificate_; }
+  // Of the interior point's last run; empty if there was none.
+  const std::vector<Multiplier>& multipliers() const { return multipliers_; }
   // Those towards a fresh start included.
   int iterations() const { return iterations_; }
 
@@ -70,6 +76,8 @@ class CertifiedSolve {
   double cost_ = 0;
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
+  std::vector<Multiplier> multipliers_;
+  bool are_multipliers_known_;  // to the next run
   int iterations_ = 0;
   int max_iterations_ = 0;
   double width_ = 0;  // of the next bisection, relative

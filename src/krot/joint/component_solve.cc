@@ -46,13 +46,26 @@ std::optional<Certificate> InWhole(const GatheredPart& part,
 
 ComponentSolve::ComponentSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
-                               const Context& context, const Estimate& start)
+                               const Context& context, const Estimate& start,
+                               KnownMultipliers* known)
     : problem_(problem),
       options_(options),
       context_(context),
       estimate_(start),
       cost_(CostOf(start)),
+      known_(*known),
       set_(FirstWorkingSet(problem, start, options.norm, cost_, context)) {}
+
+std::vector<int64_t> ComponentSolve::Place::InWhole(
+    const ProblemSubset& part) const {
+  std::vector<int64_t> names(part.problem().observations.size());
+  std::iota(names.begin(), names.end(), 0);
+  names = part.InWhole(std::move(names));
+  if (in_whole != nullptr) {
+    for (int64_t& name : names) name = (*in_whole)[name];
+  }
+  return names;
+}
 
 // A working set whose solution leaves other points above it is not worth a
 // proof, but more points.
@@ -63,7 +76,9 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
   if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
   const Context here = context_.Alone();
   const Estimate start = part.Restrict(place.best);
-  CertifiedSolve solve(part.problem(), options, here, start, lower_bound_);
+  const std::vector<int64_t> names = place.InWhole(part);
+  CertifiedSolve solve(part.problem(), options, here, start, lower_bound_,
+                       known_.Of(names));
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
@@ -86,6 +101,7 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
         report(iteration);
       });
   iterations_ += solve.iterations();
+  if (!solve.multipliers().empty()) known_.Keep(names, solve.multipliers());
   if (solve.lower_bound() > lower_bound_) {
     lower_bound_ = solve.lower_bound();
     certificate_ = InWhole(part, *solve.certificate());
@@ -116,9 +132,9 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
       context_.Sum(static_cast<int64_t>(observations.size()));
   do_others_fit_ = true;
   if (context_.ranks != nullptr) return SolveGathered(report, candidate);
-  return SolveParts(
-      {problem_, estimate_, candidate, [&] { return FitOthers(candidate); }},
-      std::move(observations), report);
+  return SolveParts({problem_, estimate_, candidate,
+                     [&] { return FitOthers(candidate); }, nullptr},
+                    std::move(observations), report);
 }
 
 // The first rank solves the set; whenever it asks whether the others' points
@@ -147,7 +163,8 @@ JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
     std::vector<int64_t> all(gathered.in_whole().size());
     std::iota(all.begin(), all.end(), 0);
     const Place place = {gathered.problem(), best, &moved,
-                         [&] { return is_asked(1) && fit_others(); }};
+                         [&] { return is_asked(1) && fit_others(); },
+                         &gathered.in_whole()};
     termination = SolveParts(place, std::move(all), report);
     is_asked(0);
   } else {

@@ -9,6 +9,7 @@
 
 #include "krot/joint/certified_solve.h"
 #include "krot/joint/joint.h"
+#include "krot/joint/known_multipliers.h"
 #include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
@@ -23,9 +24,11 @@ namespace krot {
 // certificate, whose observations are numbered through the whole.
 class ComponentSolve {
  public:
+  // `known` are multipliers of a similar problem with the same observations,
+  // and then the last working set's.
   ComponentSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Context& context,
-                 const Estimate& start);
+                 const Estimate& start, KnownMultipliers* known);
 
   // `report` is called after every iteration, with gap and target filled in.
   JointTermination Run(const IterationReport& report);
@@ -54,6 +57,10 @@ class ComponentSolve {
     const Estimate& best;                 // of that problem, so far
     Estimate* candidate;                  // likewise
     std::function<bool()> fit_others;     // FitOthers of the candidate
+    // Its observations in the whole; null: called the same.
+    const std::vector<int64_t>* in_whole;
+
+    std::vector<int64_t> InWhole(const ProblemSubset& part) const;
   };
 
   JointTermination SolveWorkingSet(const IterationReport& report,
@@ -73,6 +80,7 @@ class ComponentSolve {
   const Context context_;
   Estimate estimate_;  // the best so far
   double cost_ = 0;
+  KnownMultipliers& known_;  // named as in the whole
   WorkingSet set_;
   // By a solve of all points that is under way.
   double reached_ = std::numeric_limits<double>::infinity();

@@ -30,7 +30,7 @@ void CheckOptions(const JointOptions& options) {
 
 JointSummary SolveJoint(const KnownRotationProblem& problem,
                         const JointOptions& options, const Context& context,
-                        Estimate* estimate) {
+                        Estimate* estimate, KnownMultipliers* known) {
   CheckOptions(options);
   const Timer timer;
   JointSummary summary;
@@ -55,8 +55,11 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
         context.ranks == nullptr
             ? ProblemSubset(problem, std::move(observations))
             : ProblemSubset(problem);
+    KnownMultipliers own;
+    const bool is_one = summary.num_components == 1;
     ComponentSolve solve(part.problem(), options, context,
-                         part.Restrict(*estimate));
+                         part.Restrict(*estimate),
+                         known != nullptr && is_one ? known : &own);
     const JointTermination termination =
         solve.Run([&](JointIteration iteration) {
           iteration.cost = std::max(cost_of_solved, solve.cost());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/joint/known_multipliers.h"
 #include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
@@ -69,9 +70,11 @@ struct JointSummary {
 // Improves `estimate`, all of whose depths must be positive (throws
 // std::invalid_argument otherwise, and for options out of range). Never worse
 // than the start. Frames and points without observations stay. Memory: see
-// EstimateInteriorPointMemory.
+// EstimateInteriorPointMemory. Where there is one component, `known` are
+// multipliers of a similar problem with the same observations, which save
+// iterations, and then this one's.
 JointSummary SolveJoint(const KnownRotationProblem& problem,
                         const JointOptions& options, const Context& context,
-                        Estimate* estimate);
+                        Estimate* estimate, KnownMultipliers* known = nullptr);
 
 }  // namespace krot

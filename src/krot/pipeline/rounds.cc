@@ -132,6 +132,8 @@ class Rounds {
   // called among the rows, or -1; empty: the same.
   std::optional<Certificate> rows_certificate_;
   std::vector<int64_t> observation_of_;
+  // Of the last round without bounds.
+  KnownMultipliers known_multipliers_;
   std::optional<PixelCertificate> certificate_;
 };
 
@@ -200,7 +202,8 @@ bool Rounds::RunOne() {
       [this](const Estimate& swept, double linear_cost) {
         return HaveRowsServed(swept, linear_cost);
       },
-      context_, timer_, &solved, &summary_);
+      context_, timer_, &solved, bounded ? nullptr : &known_multipliers_,
+      &summary_);
   if (options_.res_int.update_frames) {
     RestoreGaugeIfHarmless(rows, estimate_, options_.norm, context_, &solved);
   }

@@ -59,7 +59,7 @@ class Schedule {
 
   void Sweeps(ResIntOptions res_int);
   void LeadingSweeps();
-  std::optional<Certificate> Joint();
+  std::optional<Certificate> Joint(KnownMultipliers* known);
   // Leaves an estimate that is still worse than a start found from nothing.
   void StartAfresh();
 
@@ -103,12 +103,13 @@ void Schedule::LeadingSweeps() {
   Sweeps(res_int);
 }
 
-std::optional<Certificate> Schedule::Joint() {
+std::optional<Certificate> Schedule::Joint(KnownMultipliers* known) {
   JointOptions joint = options_.joint;
   joint.norm = options_.norm;
   joint.relative_gap *= kShareOfGap;
   joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
-  const JointSummary result = SolveJoint(problem_, joint, context_, &estimate_);
+  const JointSummary result =
+      SolveJoint(problem_, joint, context_, &estimate_, known);
   summary_.termination = FromJoint(result.termination);
   cost_ = result.cost_final;
   summary_.num_working_observations = result.num_working_observations;
@@ -140,7 +141,7 @@ std::optional<Certificate> SolveRows(
     const std::function<bool(const Estimate& swept, double linear_cost)>&
         have_rows_served,
     const Context& context, const Timer& timer, Estimate* estimate,
-    SolveSummary* summary) {
+    KnownMultipliers* known, SolveSummary* summary) {
   Schedule schedule(problem, options, context, timer, estimate, summary);
   switch (method) {
     case SolveMethod::kResInt: {
@@ -152,7 +153,7 @@ std::optional<Certificate> SolveRows(
       return std::nullopt;
     }
     case SolveMethod::kJoint:
-      return schedule.Joint();
+      return schedule.Joint(known);
     case SolveMethod::kAuto:
       break;
   }
@@ -167,7 +168,7 @@ std::optional<Certificate> SolveRows(
     summary->termination = SolveTermination::kStalled;
     return std::nullopt;
   }
-  return schedule.Joint();
+  return schedule.Joint(known);
 }
 
 }  // namespace krot

@@ -23,6 +23,6 @@ std::optional<Certificate> SolveRows(
     const std::function<bool(const Estimate& swept, double linear_cost)>&
         have_rows_served,
     const Context& context, const Timer& timer, Estimate* estimate,
-    SolveSummary* summary);
+    KnownMultipliers* known, SolveSummary* summary);
 
 }  // namespace krot

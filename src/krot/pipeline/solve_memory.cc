@@ -42,6 +42,12 @@ int64_t PartBytes(const KnownRotationProblem& problem) {
   return ProblemBytes(problem) + Size(problem.observations.size(), 8);
 }
 
+int64_t JointBytes(const KnownRotationProblem& problem, Norm norm) {
+  return EstimateInteriorPointMemory(problem, norm) +
+         KnownMultipliers::MemoryBytes(
+             static_cast<int64_t>(problem.observations.size()));
+}
+
 // The points that the joint solver looks at first.
 ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm) {
   const KnownRotationProblem& problem = built.problem;
@@ -79,8 +85,7 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
       held + Size(problem.observations.size(), 16) +
       (summary.num_components > 1 ? PartBytes(problem) : 0);
   memory.at_most =
-      std::max(memory.at_most,
-               component + EstimateInteriorPointMemory(problem, summary.norm));
+      std::max(memory.at_most, component + JointBytes(problem, summary.norm));
   if (summary.init == SolveInit::kFeasible) {
     memory.likely = memory.at_most;
     return memory;
@@ -89,10 +94,10 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
   // it did not look at become a problem in turn.
   const ProblemSubset subset = FirstWorkingProblem(built, summary.norm);
   const KnownRotationProblem& working = subset.problem();
-  memory.likely = std::max(
-      memory.likely, component + PartBytes(working) +
-                         EstimateInteriorPointMemory(working, summary.norm) +
-                         PartBytes(problem));
+  memory.likely =
+      std::max(memory.likely, component + PartBytes(working) +
+                                  JointBytes(working, summary.norm) +
+                                  PartBytes(problem));
   if (summary.method == SolveMethod::kAuto) {
     const bool rows_are_taken_anew = !Reprojection(model, built).IsLinear();
     memory.likely = std::max(memory.likely,

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/conic/interior_point.h"
+#include "krot/proof/certificate_check.h"
+
+namespace krot {
+
+// What a solve leaves to the next, similar one: multipliers of some of a
+// problem's observations, named by increasing numbers. Only those that are
+// known take memory.
+class KnownMultipliers {
+ public:
+  // `multipliers` of the observations that `names` ascend through take the
+  // place of what was known of them. O(known + names).
+  void Keep(const std::vector<int64_t>& names,
+            const std::vector<Multiplier>& multipliers);
+
+  // Of the observations that `names` ascend through, zero where it is not
+  // known; empty if none is. O(known + names).
+  std::vector<Multiplier> Of(const std::vector<int64_t>& names) const;
+
+  // What it and its user hold for so many observations, bytes.
+  static int64_t MemoryBytes(int64_t num_observations) {
+    constexpr int64_t kPerObservation =
+        sizeof(CertifiedObservation) + sizeof(Multiplier) + sizeof(int64_t);
+    return num_observations * kPerObservation;
+  }
+
+ private:
+  std::vector<CertifiedObservation> known_;
+};
+
+}  // namespace krot
