@@ -28,6 +28,7 @@ constexpr int kIterationsPerStart = 60;
 constexpr double kLargeGap = 0.1;
 // So many iterations must halve the gap, or the start is given up.
 constexpr int kPatience = 30;
+constexpr int kWarmPatience = 15;
 // A fresh start is found by bisection, to this width, relative to the cost; if
 // that was in vain, to a share of it.
 constexpr double kFirstWidth = 1e-2;
@@ -85,6 +86,7 @@ InteriorPointTermination CertifiedSolve::RunFrom(
   options.norm = options_.norm;
   options.start_margin = start_margin;
   if (are_multipliers_known_) options.known_multipliers = &multipliers_;
+  const int patience = are_multipliers_known_ ? kWarmPatience : kPatience;
   options.max_iterations = std::max(1, max_iterations_ - iterations_);
   options.smallest_gap = kFarBelow * options_.relative_gap;
   double next_gap = options_.relative_gap;
@@ -117,7 +119,7 @@ InteriorPointTermination CertifiedSolve::RunFrom(
     iteration.gap = gap_;
     report(iteration);
     return is_given_up_ || IsGapReached() ||
-           iterate.iteration >= milestone_iteration + kPatience ||
+           iterate.iteration >= milestone_iteration + patience ||
            (iterate.iteration >= kIterationsPerStart &&
             iterate.gap > kLargeGap);
   };
@@ -229,8 +231,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
     if (iterations_ >= max_iterations_) {
       return JointTermination::kMaxIterations;
     }
-    if (std::exchange(are_multipliers_known_, false)) {
-      start = estimate_;
+    if (std::exchange(are_multipliers_known_, false) && gap_ > kLargeGap) {
       start_margin = kStartMargin;
       continue;
     }

@@ -5,6 +5,7 @@
 
 #include "krot/joint/extend_solution.h"
 #include "krot/problem/components.h"
+#include "krot/problem/fixed.h"
 #include "krot/problem/gathered_part.h"
 #include "krot/problem/gauge.h"
 #include "krot/proof/certificate.h"
@@ -24,6 +25,20 @@ constexpr int kMaxRounds = 12;
 // A component of fewer points for each frame is solved as it is: ties alone
 // take in most of it.
 constexpr int kFewPointsPerFrame = 10;
+// Of the median depth.
+constexpr double kSizeThatSetsScale = 1e-3;
+
+// A scale that only tiny baselines set is the last that multipliers come to
+// balance in: far from the path they may not.
+bool CanStartWarm(const KnownRotationProblem& problem,
+                  const Estimate& estimate) {
+  if (IsScaleFree(problem)) return true;
+  double size = FixedExtent(problem);
+  for (const View& view : problem.views) {
+    size = std::max(size, view.cam_from_rig_translation.norm());
+  }
+  return size >= kSizeThatSetsScale * MedianDepth(problem, estimate);
+}
 
 // The first rank's certificate of a gathered part, on every rank.
 std::optional<Certificate> InWhole(const GatheredPart& part,
@@ -78,7 +93,9 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
   const Estimate start = part.Restrict(place.best);
   const std::vector<int64_t> names = place.InWhole(part);
   CertifiedSolve solve(part.problem(), options, here, start, lower_bound_,
-                       known_.Of(names));
+                       CanStartWarm(part.problem(), start)
+                           ? known_.Of(names)
+                           : std::vector<Multiplier>());
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
