@@ -70,6 +70,22 @@ TEST(LeastNormSolver, FindsWhatAnOrthogonalDecompositionFinds) {
   }
 }
 
+// Their equations share nothing with others.
+TEST(LeastNormSolver, KnowsPointsThatOnlyTheFrameWithoutEquationsSees) {
+  LeastNormProblem problem = RandomProblem(false);
+  for (LeastNormProblem::Columns& c : problem.columns) {
+    if (c.point == 4 || c.point == 11) c.frame = 0;
+  }
+  const MatrixXd M = Dense(problem);
+  const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
+  const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
+  for (const int64_t max_dense_rows : {0, 1000}) {
+    LeastNormSolver solver(max_dense_rows);
+    ASSERT_TRUE(solver.Factorize(problem));
+    EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
+  }
+}
+
 // With reflections, that is; the frames' normal equations are not.
 TEST(LeastNormSolver, IsAsAccurateAsInLongDoubleWhereMultipliersSpanDecades) {
   LeastNormProblem problem = RandomProblem(true);

@@ -250,7 +250,7 @@ bool Rounds::RunOne() {
   if (has_level) return true;
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
   num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
-  if (cost_ <= kFarFromRows * before) known_multipliers_ = KnownMultipliers();
+  if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};
   if (num_bounded == 0) return !is_idle;
   return num_idle_rounds_ < kPatience;
 }

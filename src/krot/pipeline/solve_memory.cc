@@ -56,11 +56,10 @@ ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm) {
   return ProblemSubset(problem, set.Observations());
 }
 
-}  // namespace
-
-SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
-                                const SolveSummary& summary) {
-  constexpr int64_t kProcess = 12000000;  // code and libraries
+// What is in use when most is.
+SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
+                             const SolveSummary& summary) {
+  constexpr int64_t kProcess = 14000000;  // code and libraries
   // The record of a block, in sweeps.
   constexpr int64_t kBytesPerBlock = 200;
   // The start, the estimate, and those that sweeps and iterations compare.
@@ -106,6 +105,19 @@ SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
   }
   memory.at_most = std::max(memory.at_most, memory.likely);
   return memory;
+}
+
+}  // namespace
+
+SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
+                                const SolveSummary& summary) {
+  // What the allocator keeps beside what is in use.
+  constexpr double kAllocated = 1.05;
+  const auto resident = [](int64_t bytes) {
+    return static_cast<int64_t>(kAllocated * static_cast<double>(bytes));
+  };
+  const SolveMemory counted = CountSolveMemory(model, built, summary);
+  return {resident(counted.likely), resident(counted.at_most)};
 }
 
 }  // namespace krot

@@ -38,7 +38,9 @@ BlockAngularQr::BlockAngularQr(int64_t num_shared_columns)
 void BlockAngularQr::Append(const MatrixXd& own, std::vector<int64_t> columns,
                             const MatrixXd& shared) {
   Block block{Qr(own), std::move(columns), shared};
-  block.shared.applyOnTheLeft(block.qr.householderQ().adjoint());
+  if (shared.cols() > 0) {  // Eigen would move a null pointer
+    block.shared.applyOnTheLeft(block.qr.householderQ().adjoint());
+  }
   is_independent_ =
       is_independent_ &&
       AreIndependent(block.qr, own.colwise().squaredNorm().transpose());
