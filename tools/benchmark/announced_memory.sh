@@ -5,8 +5,7 @@
 #   announced_memory.sh KROT MODELS
 #
 # `announced`: what will be needed, and at most, where that is more; `peak`: the
-# largest resident set; `of it`: the former over the latter. Solves that end
-# without a model are left out.
+# largest resident set. Solves that end without a model are left out.
 set -euo pipefail
 
 krot=$(realpath "$1")
@@ -18,7 +17,7 @@ trap 'rm -rf "$work"' EXIT
 megabytes() { awk '{ print $2 == "GB" ? 1000 * $1 : $2 == "KB" ? $1 / 1000 : $1 }'; }
 
 cat <<'TABLE'
-| model | start | announced | at most | peak | of it |
+| model | start | announced | at most | peak | announced / peak |
 |---|---|---:|---:|---:|---:|
 TABLE
 for model in "$models"/*/; do
