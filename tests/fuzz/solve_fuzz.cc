@@ -112,7 +112,9 @@ void Solve(const Model& model, uint8_t kind) {
   const SolveModelResult result = SolveModel(model, options, {1});
   ValidateModel(result.model);
   const SolveSummary& summary = result.summary;
-  if (summary.lower_bound && std::isfinite(summary.cost_final)) {
+  // Of what is infeasible there is a bound, and no cost.
+  if (summary.lower_bound && std::isfinite(summary.cost_final) &&
+      summary.termination != SolveTermination::kInfeasible) {
     Require(*summary.lower_bound <= summary.cost_final * (1 + kRounding),
             "no bound above the cost");
   }

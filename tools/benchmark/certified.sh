@@ -25,12 +25,13 @@ for model in "$models"/*/; do
     --overwrite 1 --report_path "$work/report.json" --log_level 0 \
     >"$work/log" 2>&1 || continue
   jq -r --arg name "$(basename "$model")" '
-    def digits(n): . * pow(10; n) | round / pow(10; n);
+    def digits(n):
+      if . == null then "-" else . * pow(10; n) | round / pow(10; n) end;
     (.finish.lowest_cost // .cost_final) as $lowest
     | (.lower_bound // 0) as $bound
     | "| \($name) | \(.rounds | length) | \(.sweeps | length)"
       + " | \([.iterations[] | select(.method == "joint")] | length)"
-      + " | \(.working_observations / ([.num_observations, 1] | max)
+      + " | \((.working_observations // 0) / ([.num_observations, 1] | max)
               | . * 100 | digits(1)) %"
       + " | \(.finish.num_iterations // "-") | \(.seconds.total | digits(2))"
       + " | \(.pixel_error.before.max | digits(4)) | \($lowest | digits(5))"
