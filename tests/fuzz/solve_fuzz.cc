@@ -143,6 +143,8 @@ void Run(ByteSource source) {
     case 0: {
       OutlierFilterOptions options;
       options.max_error = 2;
+      // With wild lenses a proof in pixels may take a second.
+      options.find_conflicts = (kind & 4) != 0;
       options.solve.joint.max_iterations = kMaxIterations;
       const OutlierFilterResult result = FilterOutliers(model, options, {1});
       ValidateModel(result.model);

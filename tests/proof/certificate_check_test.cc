@@ -105,6 +105,36 @@ TEST(CheckCertificate, DoesNotDependOnTheSizeOfTheMultipliers) {
   }
 }
 
+// What it says of changes holds in the certificate's own unit: y's with the
+// multipliers, the depth's relative to them. A y that is off by 2^-30 makes
+// them of that order.
+TEST(CheckCertificate, SaysByHowMuchMultipliersHaveToChange) {
+  Twice twice = MakeTwice(4.0 / 1024);
+  twice.certificate.observations[0].y[0] += 0x1p-30;
+  twice.certificate.defect = 1e-6;
+  const std::vector<MultiplierChange> changes =
+      CheckCertificate(twice.problem, Norm::L2(), twice.certificate).changes;
+  ASSERT_EQ(changes.size(), 2u);
+  double largest = 0;
+  for (const MultiplierChange& change : changes) {
+    largest = std::max(largest, change.y);
+  }
+  EXPECT_GE(largest, 0x1p-31);
+  EXPECT_LE(largest, 0x1p-28);
+  const double scale = 0x1p20;
+  for (CertifiedObservation& o : twice.certificate.observations) {
+    o.lambda *= scale;
+    o.y *= scale;
+  }
+  const std::vector<MultiplierChange> scaled =
+      CheckCertificate(twice.problem, Norm::L2(), twice.certificate).changes;
+  ASSERT_EQ(scaled.size(), 2u);
+  for (size_t i = 0; i < 2; ++i) {
+    EXPECT_DOUBLE_EQ(scaled[i].y, scale * changes[i].y);
+    EXPECT_DOUBLE_EQ(scaled[i].depth, changes[i].depth);
+  }
+}
+
 // The claim is ten times the truth, and yet (1) is missed by no more than
 // 2e-8 of its terms: the rays nearly agree, so tiny changes bound nothing.
 TEST(CheckCertificate, RefusesAFalseClaimWhoseDefectIsTiny) {
