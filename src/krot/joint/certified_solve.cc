@@ -232,7 +232,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
       return JointTermination::kMaxIterations;
     }
     if (std::exchange(are_multipliers_known_, false) && gap_ > kLargeGap) {
-      start_margin = kStartMargin;
+      start_margin = kStartMargin;  // again, as if nothing were known
       continue;
     }
     start_margin = kFreshStartMargin;
