@@ -45,13 +45,16 @@ Twice MakeTwice(double separation) {
 }
 
 TEST(CheckCertificate, AcceptsTheOneOfAPointSeenTwiceByHand) {
-  const Twice twice = MakeTwice(4.0 / 1024);
-  for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
-    const CertificateCheck check =
-        CheckCertificate(twice.problem, norm, twice.certificate);
-    EXPECT_TRUE(check.is_accepted) << check.refusal;
-    EXPECT_LE(check.proved_bound, twice.certificate.lower_bound);
-    EXPECT_GE(check.proved_bound, twice.certificate.lower_bound * (1 - 1e-11));
+  for (const double separation : {4.0 / 1024, 1.0 / 1024}) {
+    const Twice twice = MakeTwice(separation);
+    for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
+      const CertificateCheck check =
+          CheckCertificate(twice.problem, norm, twice.certificate);
+      EXPECT_TRUE(check.is_accepted) << check.refusal;
+      EXPECT_LE(check.proved_bound, twice.certificate.lower_bound);
+      EXPECT_GE(check.proved_bound,
+                twice.certificate.lower_bound * (1 - 1e-11));
+    }
   }
 }
 
