@@ -211,6 +211,21 @@ TEST_P(SolveJointTest, HasTheSameBitsAtAnyNumberOfThreads) {
   }
 }
 
+TEST_P(SolveJointTest, IsThereSoonerFromMultipliersOfAnEarlierSolve) {
+  const RandomScene scene = MakeSmallScene(54);
+  KnownMultipliers known;
+  const auto solve = [&] {
+    Estimate estimate = scene.estimate;
+    const JointSummary summary =
+        SolveJoint(scene.problem, Options(norm()), {}, &estimate, &known);
+    ExpectCertified(scene.problem, norm(), estimate, summary);
+    return summary;
+  };
+  const JointSummary cold = solve();
+  const JointSummary warm = solve();
+  EXPECT_LT(warm.iterations.size(), cold.iterations.size());
+}
+
 std::string NameOf(const testing::TestParamInfo<double>& test) {
   return test.param == 1 ? "L1" : test.param == 2 ? "L2" : "LInf";
 }

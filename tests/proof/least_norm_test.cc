@@ -56,17 +56,21 @@ MatrixXd Dense(const LeastNormProblem& problem) {
   return M;
 }
 
+// By the dense equations M, whichever way they are factorised.
+void ExpectLeastNorm(const LeastNormProblem& problem, const MatrixXd& M) {
+  const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
+  const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
+  for (const int64_t max_dense_rows : {0, 1000}) {
+    LeastNormSolver solver(max_dense_rows);
+    ASSERT_TRUE(solver.Factorize(problem));
+    EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
+  }
+}
+
 TEST(LeastNormSolver, FindsWhatAnOrthogonalDecompositionFinds) {
   for (const bool has_last_row : {false, true}) {
     const LeastNormProblem problem = RandomProblem(has_last_row);
-    const MatrixXd M = Dense(problem);
-    const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
-    const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
-    for (const int64_t max_dense_rows : {0, 1000}) {
-      LeastNormSolver solver(max_dense_rows);
-      ASSERT_TRUE(solver.Factorize(problem));
-      EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
-    }
+    ExpectLeastNorm(problem, Dense(problem));
   }
 }
 
@@ -76,14 +80,7 @@ TEST(LeastNormSolver, KnowsPointsThatOnlyTheFrameWithoutEquationsSees) {
   for (LeastNormProblem::Columns& c : problem.columns) {
     if (c.point == 4 || c.point == 11) c.frame = 0;
   }
-  const MatrixXd M = Dense(problem);
-  const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
-  const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
-  for (const int64_t max_dense_rows : {0, 1000}) {
-    LeastNormSolver solver(max_dense_rows);
-    ASSERT_TRUE(solver.Factorize(problem));
-    EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
-  }
+  ExpectLeastNorm(problem, Dense(problem));
 }
 
 // With reflections, that is; the frames' normal equations are not.
@@ -116,13 +113,7 @@ TEST(LeastNormSolver, LeavesOutTheEquationsOfFixedPoints) {
     ASSERT_EQ(problem.num_rows(), all.rows() - 6);
     MatrixXd M(problem.num_rows(), all.cols());
     M << all.middleRows(3, 18), all.bottomRows(all.rows() - 24);
-    const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
-    const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
-    for (const int64_t max_dense_rows : {0, 1000}) {
-      LeastNormSolver solver(max_dense_rows);
-      ASSERT_TRUE(solver.Factorize(problem));
-      EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
-    }
+    ExpectLeastNorm(problem, M);
   }
 }
 

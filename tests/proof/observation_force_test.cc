@@ -12,7 +12,6 @@
 namespace krot {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // By the inverse, and outwards by a billionth; rows of lengths that differ by
