@@ -72,6 +72,32 @@ TEST_P(DescentGoalTest, ACoarseDescentEndsNearTheOptimumAfterFewerSteps) {
   EXPECT_LT(coarse_steps, fine_steps);
 }
 
+TEST_P(DescentGoalTest, ADescentEndsWithTheStepThatIsSufficient) {
+  int num_early = 0;
+  for (int rays = 4; rays <= 40; ++rays) {
+    const ResidualProblem problem = generator_.Triangulation(rays, 5);
+    Fill(problem, &descent_.residuals());
+    const Vector3d start = generator_.Start(problem, 0.1);
+    Vector3d x = start;
+    const DescentSummary whole = descent_.Minimize(&x);
+    DescentGoal goal;
+    goal.sufficient = (whole.cost + whole.cost_initial) / 2;
+    ActiveResiduals none;
+    Vector3d y = start;
+    const DescentSummary early = descent_.Minimize(goal, &none, &y);
+    EXPECT_LE(early.cost, goal.sufficient);
+    EXPECT_EQ(early.cost, descent_.residuals().Evaluate(y, norm()));
+    EXPECT_LE(early.iterations, whole.iterations);
+    num_early += early.termination == DescentTermination::kLowEnough;
+
+    goal.sufficient = 0.99 * whole.cost;  // is out of reach
+    Vector3d z = start;
+    none = {};
+    EXPECT_EQ(descent_.Minimize(goal, &none, &z).cost, whole.cost);
+  }
+  EXPECT_GE(num_early, 30);
+}
+
 TEST_P(DescentGoalTest, AStartAtTheLevelStaysWhereItIs) {
   const ResidualProblem problem = generator_.Triangulation(10, 5);
   Fill(problem, &descent_.residuals());

@@ -10,6 +10,7 @@
 
 #include "krot/joint/feasible_start.h"
 #include "krot/problem/cost.h"
+#include "krot/proof/certificate_search.h"
 #include "krot/proof/support.h"
 #include "tests/problem/random_problem.h"
 #include "tests/proof/joint_iterate.h"
@@ -178,6 +179,55 @@ TEST(SelectBalanced, FindsASupportAmongForcesThatDoNotBalance) {
   EXPECT_THAT(SelectBalanced(scene.problem, certificate->lower_bound,
                              multipliers, support, 1e-2),
               testing::IsEmpty());
+}
+
+// What sets the maximum may be too much to be found among what comes close.
+TEST_P(CertificateOfNorm, ComesOfAllMultipliersAtOnce) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeScene(seed, 2, 0.3);
+    const JointIterate iterate =
+        SolveToGap(scene.problem, norm(), scene.estimate, 1e-3);
+    CertificateSearch search(scene.problem, norm(), {}, {});
+    search.TryAll(iterate.estimate, iterate.multipliers);
+    const std::optional<Certificate> certificate = search.best();
+    ASSERT_TRUE(certificate);
+    const CertificateCheck check =
+        CheckCertificate(scene.problem, norm(), *certificate);
+    EXPECT_TRUE(check.is_accepted);
+    const double cost = Cost(scene.problem, iterate.estimate, norm(), 1);
+    EXPECT_GE(check.proved_bound, (1 - 2e-3) * cost);
+  }
+}
+
+TEST(SelectForFrames, KeepsPointsWholeAndOfAllFramesEnough) {
+  const RandomScene scene = MakeScene(1, 2, 0.3);
+  const std::vector<Multiplier> multipliers =
+      SolveToGap(scene.problem, Norm::L2(), scene.estimate, 1e-2).multipliers;
+  size_t num_before = scene.problem.observations.size() + 1;
+  for (const double share : {0.0, 0.01, 0.1, 0.5}) {
+    SCOPED_TRACE(share);
+    const std::vector<int64_t> selected =
+        SelectForFrames(scene.problem, multipliers, share);
+    EXPECT_LT(selected.size(), num_before);
+    num_before = selected.size();
+    std::set<int64_t> is_selected(selected.begin(), selected.end());
+    std::vector<double> lost(scene.problem.num_frames, 0);
+    std::vector<double> all(scene.problem.num_frames, 0);
+    for (size_t i = 0; i < multipliers.size(); ++i) {
+      const Observation& o = scene.problem.observations[i];
+      const int32_t frame = scene.problem.views[o.view].frame;
+      all[frame] += multipliers[i].lambda;
+      EXPECT_EQ(is_selected.count(static_cast<int64_t>(i)),
+                is_selected.count(scene.problem.point_begin[o.point]));
+      if (is_selected.count(static_cast<int64_t>(i)) == 0) {
+        lost[frame] += multipliers[i].lambda;
+      }
+    }
+    for (int32_t f = 0; f < scene.problem.num_frames; ++f) {
+      EXPECT_LE(lost[f], share * all[f] * (1 + 1e-12));
+    }
+  }
 }
 
 TEST(MakeCertificate, GivesNoneFromMultipliersThatMeanNothing) {

@@ -61,7 +61,7 @@ void ExpectLeastNorm(const LeastNormProblem& problem, const MatrixXd& M) {
   const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
   const VectorXd expected = M.completeOrthogonalDecomposition().solve(rhs);
   for (const int64_t max_dense_rows : {0, 1000}) {
-    LeastNormSolver solver(max_dense_rows);
+    LeastNormSolver solver(1, max_dense_rows);
     ASSERT_TRUE(solver.Factorize(problem));
     EXPECT_LE((solver.Solve(rhs) - expected).norm(), 1e-10);
   }
@@ -98,7 +98,7 @@ TEST(LeastNormSolver, IsAsAccurateAsInLongDoubleWhereMultipliersSpanDecades) {
   const VectorXd rhs = VectorXd::LinSpaced(M.rows(), -1, 3);
   const VectorXr expected =
       M.completeOrthogonalDecomposition().solve(rhs.cast<long double>());
-  LeastNormSolver solver;
+  LeastNormSolver solver(1);
   ASSERT_TRUE(solver.Factorize(problem));
   const VectorXr x = solver.Solve(rhs).cast<long double>();
   EXPECT_LE((x - expected).norm(), 1e-11L * expected.norm());
@@ -126,8 +126,8 @@ TEST(LeastNormSolver, RefusesEquationsThatMayHaveNoSolution) {
     if (c.point == 3) c.last_row = c.point_rows.col(1);
   }
   for (const int64_t max_dense_rows : {0, 1000}) {
-    EXPECT_FALSE(LeastNormSolver(max_dense_rows).Factorize(few));
-    EXPECT_FALSE(LeastNormSolver(max_dense_rows).Factorize(repeated));
+    EXPECT_FALSE(LeastNormSolver(1, max_dense_rows).Factorize(few));
+    EXPECT_FALSE(LeastNormSolver(1, max_dense_rows).Factorize(repeated));
   }
 }
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "krot/conic/tile_products.h"
@@ -15,14 +18,25 @@ class DenseCholesky {
   // to rounding; there is nothing to solve with then. O(n^3 / 3).
   bool Factorize(const Eigen::MatrixXd& matrix, int num_threads);
 
-  // matrix^-1 rhs.
+  // matrix^-1 rhs. O(2 n^2).
   Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
 
- private:
-  bool FactorizeDiagonal(int64_t k);
-  Tile TileAt(int64_t i, int64_t j);
+  // What the factor of an n x n matrix occupies.
+  static int64_t MemoryBytes(int64_t n);
 
-  Eigen::MatrixXd L_;  // lower triangle
+ private:
+  using ConstTile = Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+
+  bool FactorizeDiagonal(int64_t k);
+  int64_t stride() const;                     // of every tile
+  int64_t Begin(int64_t i, int64_t j) const;  // of a tile; j <= i
+  Tile TileAt(int64_t i, int64_t j);
+  ConstTile Read(int64_t i, int64_t j) const;
+
+  int64_t size_ = 0;
+  // Of the lower triangle, row by row, each tile for itself: in a matrix as a
+  // whole a tile's columns would lie pages apart.
+  std::vector<double> tiles_;
 };
 
 }  // namespace krot

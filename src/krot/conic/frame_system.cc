@@ -1,6 +1,7 @@
 #include "krot/conic/frame_system.h"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 
 #include "krot/base/parallel_for.h"
@@ -64,16 +65,41 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   num_columns_ = 3 * num_free;
   num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
   if (num_free > kAlwaysDenseFrames) {
-    FindPattern(structure, ranks);
-    const double share = static_cast<double>(block_row_.size()) /
-                         (0.5 * static_cast<double>(num_free * num_free));
-    is_dense_ = num_free <= kMaxDenseFrames && share > kSparseShare;
+    is_dense_ = num_free <= kMaxDenseFrames &&
+                ShareOfBlocks(structure, ranks) > kSparseShare;
+    if (!is_dense_) FindPattern(structure, ranks);
   }
   if (is_dense_) {
     dense_.resize(num_parts_);
   } else {
     values_.resize(num_parts_);
   }
+}
+
+// Of the pairs of frames, those that the points of any rank have.
+double FrameSystem::ShareOfBlocks(const BlockStructure& structure,
+                                  Ranks* ranks) const {
+  const int64_t num_free = num_columns_ / 3;
+  std::vector<char> is_there(num_free * num_free, 0);
+  for (int64_t k = 0; k < structure.num_points(); ++k) {
+    for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
+         ++i) {
+      const int32_t a = column(structure.frame_of[i]);
+      if (a < 0) continue;
+      for (int64_t j = structure.point_begin[k];
+           j < structure.point_begin[k + 1]; ++j) {
+        const int32_t b = column(structure.frame_of[j]);
+        if (b >= 0 && a >= b) is_there[a / 3 * num_free + b / 3] = 1;
+      }
+    }
+  }
+  if (ranks != nullptr) {
+    ranks->Reduce(std::bit_or<char>(), &is_there);
+  }
+  for (int64_t f = 0; f < num_free; ++f) is_there[f * (num_free + 1)] = 1;
+  return static_cast<double>(
+             std::count(is_there.begin(), is_there.end(), char{1})) /
+         (0.5 * static_cast<double>(num_free * num_free));
 }
 
 void FrameSystem::FindPattern(const BlockStructure& structure, Ranks* ranks) {
@@ -259,11 +285,13 @@ Eigen::VectorXd FrameSystem::Solve(const Eigen::VectorXd& rhs) const {
 }
 
 int64_t FrameSystem::MemoryBytes() const {
-  const int64_t doubles =
-      is_dense_
-          ? (num_parts_ + 1) * num_columns_ * num_columns_
-          : (num_parts_ + 8) * 9 * static_cast<int64_t>(block_row_.size());
-  return doubles * static_cast<int64_t>(sizeof(double));
+  constexpr int64_t kDouble = sizeof(double);
+  if (is_dense_) {
+    return num_parts_ * num_columns_ * num_columns_ * kDouble +
+           DenseCholesky::MemoryBytes(num_columns_);
+  }
+  return (num_parts_ + 8) * 9 * static_cast<int64_t>(block_row_.size()) *
+         kDouble;
 }
 
 }  // namespace krot

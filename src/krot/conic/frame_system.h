@@ -64,6 +64,7 @@ class FrameSystem {
     int64_t stride;
   };
 
+  double ShareOfBlocks(const BlockStructure& structure, Ranks* ranks) const;
   void FindPattern(const BlockStructure& structure, Ranks* ranks);
   Block BlockOf(int part, int32_t a, int32_t b);
 

@@ -11,6 +11,9 @@
 namespace krot {
 namespace {
 
+// A point that is to fit in need not go further below the level: less than what
+// would have the working set take it in (component_solve.cc).
+constexpr double kSufficientShareOfLevel = 0.7;
 // Sweeps move the blocks above this share of the highest cost allowed, as far
 // as this tolerance. They end with the one that leaves more than that share of
 // the excess.
@@ -39,8 +42,12 @@ bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
   if (!observations.empty()) {
     const ProblemSubset part(problem, std::move(observations));
     Estimate placed = part.Restrict(*estimate);
-    BlockSweep(part.problem(), FastDescentOptions(), norm, context.Alone())
-        .IntersectPoints(&placed);
+    BlockSweep blocks(part.problem(), FastDescentOptions(), norm,
+                      context.Alone());
+    DescentGoal goal;
+    goal.sufficient = kSufficientShareOfLevel * level;
+    blocks.SetGoal(goal);
+    blocks.IntersectPoints(&placed);
     part.Replace(placed, estimate);
   }
   return !context.Any(is_behind);

@@ -137,6 +137,7 @@ void Descent::Start(const Vector3d& x, double cost,
 DescentTermination Descent::Run(int max_iterations) {
   while (iterations_ < max_iterations) {
     if (!(cost_ > kZeroPixels)) return DescentTermination::kZeroCost;
+    if (cost_ <= goal_.sufficient) return DescentTermination::kLowEnough;
     const Proposal proposal = Propose();
     if (proposal.promises_nothing && LowerKappaAtOnce()) continue;
     if (IsFarAway(model_.DepthGrowth(), proposal.promise / cost_)) {

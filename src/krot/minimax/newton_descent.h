@@ -14,7 +14,7 @@ enum class DescentTermination {
   kBehind,      // the start is not feasible: a depth there is not positive
   kStationary,  // no direction lowers the maximum, up to the tolerance
   kZeroCost,    // all residuals vanish
-  kLowEnough,   // the start is at the level of the goal or below it
+  kLowEnough,   // the start is at the goal's level, or a step sufficed
   kFarAway,     // a depth reached its limit: the infimum lies at infinity
   kNoDecrease,  // the best step does not lower the cost: rounding
   kMaxIterations,
@@ -34,6 +34,8 @@ struct DescentGoal {
   double tolerance = 1e-11;
   // It does nothing where the cost is this low; pixels, >= 0.
   double level = 0;
+  // It ends with the step that makes the cost this low; pixels, >= 0.
+  double sufficient = 0;
 };
 
 // Minimises max_i r_i(x) by sequential quadratic programming: every step

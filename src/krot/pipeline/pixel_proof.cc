@@ -9,6 +9,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/subset.h"
+#include "krot/proof/certificate_search.h"
 
 namespace krot {
 namespace {
@@ -19,6 +20,35 @@ constexpr double kGap = 1e-7;
 // another solve.
 constexpr double kNegligibleLoss = 1e-6;
 constexpr int kMaxSolves = 4;
+// A support of more observations is not solved once more: that would take as
+// long as the problem did.
+constexpr size_t kLargeSupport = 20000;
+
+// The multipliers of a certificate of rows that have been taken anew since,
+// repaired for those.
+std::optional<PixelCertificate> ProveByRepair(const Model& model,
+                                              const BuiltProblem& built,
+                                              const Estimate& x_hat, Norm norm,
+                                              const Certificate& certificate,
+                                              double sufficient,
+                                              const Context& context) {
+  std::vector<int64_t> support;
+  std::vector<Multiplier> multipliers;
+  for (const CertifiedObservation& o : certificate.observations) {
+    support.push_back(o.observation);
+    multipliers.push_back({o.lambda, o.y});
+  }
+  const ProblemSubset part(built.problem, support);
+  CertificateOptions options;
+  options.sufficient_bound = (1 + kNegligibleLoss) * sufficient;
+  CertificateSearch search(part.problem(), norm, options, context);
+  search.TryAll(part.Restrict(x_hat), multipliers);
+  if (!search.best()) return std::nullopt;
+  const Certificate rows = InWhole(part, *search.best());
+  return MakePixelCertificate(model, built, norm, rows,
+                              BearingsOfPoints(model, built, x_hat, rows),
+                              context);
+}
 
 }  // namespace
 
@@ -92,6 +122,23 @@ std::optional<PixelCertificate> ProveLinear(const Model& model,
       BearingsOfPoints(model, built, x_hat, certificate), context);
 }
 
+// From a certificate whose observations are those of `built`, or whose
+// `support` is; on this rank.
+std::optional<PixelCertificate> ProveHere(
+    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
+    Norm norm, const Certificate& certificate, bool has_names_of_built,
+    const std::vector<int64_t>& support, double sufficient,
+    const Context& context) {
+  if (Reprojection(model, built).IsLinear()) {
+    return ProveLinear(model, built, x_hat, norm, certificate, context);
+  }
+  if (has_names_of_built && support.size() > kLargeSupport) {
+    return ProveByRepair(model, built, x_hat, norm, certificate, sufficient,
+                         context);
+  }
+  return ProveInPixels(model, built, x_hat, norm, support, sufficient, context);
+}
+
 std::optional<PixelCertificate> ProveSharedRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
     Norm norm, const Certificate& certificate,
@@ -113,12 +160,10 @@ std::optional<PixelCertificate> ProveSharedRows(
       GatherSupport(model, built, x_hat, own, &ranks);
   std::optional<PixelCertificate> proof;
   if (ranks.IsFirst()) {
-    proof =
-        Reprojection(gathered.model, gathered.built).IsLinear()
-            ? ProveLinear(gathered.model, gathered.built, gathered.estimate,
-                          norm, gathered.FromWhole(certificate), here)
-            : ProveInPixels(gathered.model, gathered.built, gathered.estimate,
-                            norm, gathered.observations, sufficient, here);
+    const bool has_names = observation_of.empty();
+    proof = ProveHere(gathered.model, gathered.built, gathered.estimate, norm,
+                      has_names ? gathered.FromWhole(certificate) : certificate,
+                      has_names, gathered.observations, sufficient, here);
     if (proof) proof->rows = gathered.ToWhole(std::move(proof->rows));
   }
   bool is_proved = proof.has_value();
@@ -140,12 +185,9 @@ std::optional<PixelCertificate> ProveRows(
     return ProveSharedRows(model, built, x_hat, norm, certificate,
                            observation_of, sufficient, context);
   }
-  if (Reprojection(model, built).IsLinear()) {
-    return ProveLinear(model, built, x_hat, norm, certificate, context);
-  }
-  return ProveInPixels(model, built, x_hat, norm,
-                       SupportOf(certificate, observation_of), sufficient,
-                       context);
+  return ProveHere(model, built, x_hat, norm, certificate,
+                   observation_of.empty(),
+                   SupportOf(certificate, observation_of), sufficient, context);
 }
 
 std::vector<int64_t> SupportOf(const Certificate& certificate,

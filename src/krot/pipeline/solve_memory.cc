@@ -8,6 +8,7 @@
 #include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
+#include "krot/proof/dual_repair.h"
 
 namespace krot {
 namespace {
@@ -84,7 +85,8 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
       held + Size(problem.observations.size(), 16) +
       (summary.num_components > 1 ? PartBytes(problem) : 0);
   memory.at_most =
-      std::max(memory.at_most, component + JointBytes(problem, summary.norm));
+      std::max(memory.at_most, component + JointBytes(problem, summary.norm) +
+                                   EstimateRepairMemory(problem));
   if (summary.init == SolveInit::kFeasible) {
     memory.likely = memory.at_most;
     return memory;

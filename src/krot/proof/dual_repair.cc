@@ -72,12 +72,15 @@ DualFrame MakeDualFrame(const Vector2d& eta, Norm norm) {
 class Repair {
  public:
   Repair(const KnownRotationProblem& problem, Norm norm, double delta,
-         const std::vector<Multiplier>& multipliers)
+         const std::vector<Multiplier>& multipliers,
+         const RepairOptions& options)
       : norm_(norm),
         delta_(delta),
         system_(problem, delta, multipliers, kConstantMargin),
         original_(multipliers),
-        now_(multipliers) {}
+        solver_(options.num_threads),
+        now_(multipliers),
+        sufficient_bound_(options.sufficient_bound) {}
 
   RepairedMultipliers Run();
 
@@ -96,6 +99,7 @@ class Repair {
   std::vector<Matrix2d> axes_;  // unit changes of y / lambda
   LeastNormSolver solver_;
   std::vector<Multiplier> now_;
+  const double sufficient_bound_;
 };
 
 bool Repair::Factorize() {
@@ -176,6 +180,7 @@ RepairedMultipliers Repair::Run() {
     const double bound = delta_ / ratio;
     const double before = best ? best->lower_bound : 0;
     if (bound > before) best = Divided(ratio);
+    if (bound >= sufficient_bound_) break;
     if (bound < before * (1 + kSmallestGain) && step > 1) break;
     Shorten();
   }
@@ -186,9 +191,19 @@ RepairedMultipliers Repair::Run() {
 
 RepairedMultipliers RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, double delta,
-    const std::vector<Multiplier>& multipliers) {
+    const std::vector<Multiplier>& multipliers, const RepairOptions& options) {
   if (multipliers.empty()) return {};
-  return Repair(problem, norm, delta, multipliers).Run();
+  return Repair(problem, norm, delta, multipliers, options).Run();
+}
+
+int64_t EstimateRepairMemory(const KnownRotationProblem& problem) {
+  // The multipliers, theirs and the problem's as a part, and a step of them.
+  constexpr int64_t kPerObservation = 4 * sizeof(Multiplier) +
+                                      sizeof(Matrix2d) + sizeof(Observation) +
+                                      3 * sizeof(double);
+  return static_cast<int64_t>(problem.observations.size()) *
+             (kPerObservation + DualSystem::kBytesPerObservation) +
+         LeastNormSolver::MemoryBytes(problem);
 }
 
 }  // namespace krot

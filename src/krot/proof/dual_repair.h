@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -9,6 +10,12 @@
 #include "krot/proof/certificate_check.h"
 
 namespace krot {
+
+struct RepairOptions {
+  int num_threads = 1;
+  // It ends with the first multipliers that prove as much, pixels.
+  double sufficient_bound = std::numeric_limits<double>::infinity();
+};
 
 // Makes multipliers that satisfy the identities (1) and (2) of
 // certificate_check.h approximately for `delta` > 0, pixels, satisfy them to
@@ -31,6 +38,10 @@ struct RepairedMultipliers {
 
 RepairedMultipliers RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, double delta,
-    const std::vector<Multiplier>& multipliers);
+    const std::vector<Multiplier>& multipliers,
+    const RepairOptions& options = {});
+
+// What a repair of all of the problem's multipliers occupies, bytes.
+int64_t EstimateRepairMemory(const KnownRotationProblem& problem);
 
 }  // namespace krot

@@ -59,6 +59,11 @@ class DualSystem {
     int32_t frame_index = 0;      // 0: omitted
   };
 
+ public:
+  static constexpr int64_t kBytesPerObservation =
+      sizeof(Block) + sizeof(Multiplier);
+
+ private:
   std::vector<int32_t> OmitFrames(const KnownRotationProblem& problem);
 
   const std::vector<Multiplier> multipliers_;

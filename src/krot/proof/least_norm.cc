@@ -12,8 +12,6 @@ using Eigen::VectorXd;
 // A last row that keeps less than this of its length (squared) follows from
 // the others.
 constexpr double kSmallestLastRow = 1e-20;
-// A factorisation takes seconds at most.
-constexpr int kNumThreads = 1;
 
 }  // namespace
 
@@ -109,7 +107,8 @@ bool LeastNormSolver::FactorizeByPoints() {
   structure_.frame_is_fixed.assign(problem_.num_frames, 0);
   structure_.frame_is_fixed[0] = 1;
   structure_.point_is_fixed = problem_.point_is_fixed;
-  elimination_ = std::make_unique<PointElimination<3>>(structure_, kNumThreads);
+  elimination_ =
+      std::make_unique<PointElimination<3>>(structure_, num_threads_);
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   for (size_t i = 0; i < problem_.columns.size(); ++i) {
     const LeastNormProblem::Columns& c = problem_.columns[i];
@@ -162,6 +161,14 @@ VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {
     solution += rest / last_row_norm2_ * last_row_;
   }
   return solution;
+}
+
+int64_t LeastNormSolver::MemoryBytes(const KnownRotationProblem& problem) {
+  // Of the elimination: the rows by point and frame, Q, and their order.
+  constexpr int64_t kPerObservation =
+      sizeof(LeastNormProblem::Columns) + 3 * sizeof(Eigen::Matrix3d) + 8;
+  return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
+         FrameSystem(AnchoredStructure(problem)).MemoryBytes();
 }
 
 }  // namespace krot

@@ -10,6 +10,7 @@
 
 #include "krot/conic/block_structure.h"
 #include "krot/conic/point_elimination.h"
+#include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/block_angular_qr.h"
 
 namespace krot {
@@ -69,11 +70,14 @@ struct LeastNormProblem {
 class LeastNormSolver {
  public:
   // The cost of the dense way grows with the rows and the frames' square.
-  explicit LeastNormSolver(int64_t max_dense_rows = 1500)
-      : max_dense_rows_(max_dense_rows) {}
+  explicit LeastNormSolver(int num_threads, int64_t max_dense_rows = 1500)
+      : num_threads_(num_threads), max_dense_rows_(max_dense_rows) {}
 
   // False if the equations may have no solution.
   bool Factorize(LeastNormProblem problem);
+
+  // What a solver of a repair of all of the problem's multipliers occupies.
+  static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
   // Three unknowns per observation.
   Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
@@ -84,6 +88,7 @@ class LeastNormSolver {
   bool FactorizeByPoints();
   Eigen::VectorXd SolveByPoints(const Eigen::VectorXd& rhs) const;
 
+  const int num_threads_;
   const int64_t max_dense_rows_;
   LeastNormProblem problem_;
   // Dense: of the transposed equations.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "krot/problem/cost.h"
@@ -90,6 +91,47 @@ std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
     }
   }
   return large;
+}
+
+std::vector<int64_t> SelectForFrames(const KnownRotationProblem& problem,
+                                     const std::vector<Multiplier>& multipliers,
+                                     double share) {
+  const auto frame_of = [&](int64_t i) {
+    return problem.views[problem.observations[i].view].frame;
+  };
+  std::vector<double> of_point(problem.num_points, 0);
+  std::vector<double> spare(problem.num_frames, 0);
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    of_point[problem.observations[i].point] += multipliers[i].lambda;
+    spare[frame_of(static_cast<int64_t>(i))] += share * multipliers[i].lambda;
+  }
+  std::vector<int32_t> lightest(problem.num_points);
+  std::iota(lightest.begin(), lightest.end(), 0);
+  std::stable_sort(lightest.begin(), lightest.end(), [&](int32_t a, int32_t b) {
+    return of_point[a] < of_point[b];
+  });
+  std::vector<char> is_left(problem.num_points, 0);
+  for (const int32_t k : lightest) {
+    bool can_leave = true;
+    int64_t i = problem.point_begin[k];
+    for (; i < problem.point_begin[k + 1] && can_leave; ++i) {
+      double& left = spare[frame_of(i)];
+      left -= multipliers[i].lambda;
+      can_leave = left >= 0 || problem.IsFixedFrame(frame_of(i));
+    }
+    if (can_leave) continue;
+    is_left[k] = 1;
+    while (--i >= problem.point_begin[k]) {
+      spare[frame_of(i)] += multipliers[i].lambda;
+    }
+  }
+  std::vector<int64_t> selected;
+  for (size_t i = 0; i < multipliers.size(); ++i) {
+    if (is_left[problem.observations[i].point]) {
+      selected.push_back(static_cast<int64_t>(i));
+    }
+  }
+  return selected;
 }
 
 std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,

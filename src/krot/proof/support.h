@@ -31,6 +31,13 @@ std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
 std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
                                  double share);
 
+// All observations of the points that are left when points leave, those with
+// the smallest lambdas first, where no frame that moves loses more than `share`
+// of its own. What balances with all of them nearly does with these.
+std::vector<int64_t> SelectForFrames(const KnownRotationProblem& problem,
+                                     const std::vector<Multiplier>& multipliers,
+                                     double share);
+
 // The largest part of the `candidates`, ascending, in which the forces of the
 // multipliers at `delta` pixels (force_balance.h) balance at every point and
 // frame that is not fixed, up to `tolerance` > 0 of the largest delta lambda
