@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
+#include "krot/problem/components.h"
 #include "tests/joint/small_scenes.h"
 #include "tests/problem/random_problem.h"
 
@@ -117,6 +119,37 @@ Eigen::MatrixXd WidestWays(const KnownRotationProblem& problem,
     }
   }
   return width;
+}
+
+// What the two ends of a component's strongest observation miss goes no farther
+// than along it, and what others miss comes to its frame.
+TEST(BoundCorrections, LeadToTheFrameOfEachComponentsStrongestObservation) {
+  const KnownRotationProblem problem = MakeProblem();
+  const std::vector<Real> strengths =
+      RandomStrengths(problem.observations.size());
+  for (const std::vector<int64_t>& component : SplitIntoComponents(problem)) {
+    const int64_t strongest = *std::max_element(
+        component.begin(), component.end(),
+        [&](int64_t a, int64_t b) { return strengths[a] < strengths[b]; });
+    const Observation& observation = problem.observations[strongest];
+    const int32_t frame = problem.views[observation.view].frame;
+    const auto sum = [&](int32_t point_that_misses, int32_t frame_that_misses) {
+      Imbalance imbalance{std::vector<Real>(problem.num_points, 0),
+                          std::vector<Real>(problem.num_frames, 0)};
+      if (point_that_misses >= 0) imbalance.of_point[point_that_misses] = 1;
+      if (frame_that_misses >= 0) imbalance.of_frame[frame_that_misses] = 1;
+      const std::vector<Real> bounds =
+          BoundCorrections(problem, strengths, imbalance);
+      return std::accumulate(bounds.begin(), bounds.end(), Real{0});
+    };
+    EXPECT_EQ(sum(-1, frame), 0);
+    EXPECT_NEAR(static_cast<double>(sum(observation.point, -1)), 1, 1e-8);
+    for (const int64_t i : component) {
+      const int32_t other = problem.views[problem.observations[i].view].frame;
+      if (other == frame) continue;
+      EXPECT_GE(sum(-1, other), 2);
+    }
+  }
 }
 
 TEST(BoundCorrections, SendsForcesAlongTheStrongestWays) {

@@ -1,10 +1,13 @@
 """Changes the certificate checker in one place at a time; its tests must notice.
 
 Usage: mutate_checker.py BUILD [--count N] [--skip N] [--seed S] [--jobs N]
+                         [--only FILE[:LINE]]...
 BUILD is a build folder with proof_test (Ninja). Each mutant is one operator,
 bound or constant of the checker's sources that becomes another; it is compiled,
 linked into proof_test and run. Prints the mutants that no test notices, with
-their line, and a summary for docs/reliability.md.
+their line, and a summary for docs/reliability.md. Those that change nothing, or
+nothing that can be told, stand in equivalent_mutants.txt with the reason. The
+exit code is 0 if no other went unnoticed, and all of that list are mutants.
 """
 
 import argparse
@@ -23,7 +26,8 @@ PROOF = ROOT / "src" / "krot" / "proof"
 CHECKER = ("certificate_check.cc", "certificate_input.cc", "extent_check.cc",
            "fixed_constants.cc", "force_balance.cc", "force_checker.cc",
            "observation_force.cc", "pull.cc")
-TIMEOUT = 120  # seconds of a test: what takes longer hangs, and is noticed
+EQUIVALENT = pathlib.Path(__file__).with_name("equivalent_mutants.txt")
+TIMEOUT = 60  # seconds of a test: what takes longer hangs, and is noticed
 
 # Operators stand between blanks, template brackets do not.
 CHANGES = [
@@ -53,6 +57,35 @@ def mutants():
                     changed = (code[:match.start()] +
                                match.expand(replacement) + code[match.end():])
                     yield name, number, changed
+
+
+def original(mutant):
+    name, line, _ = mutant
+    return (PROOF / name).read_text().splitlines()[line].split("//")[0]
+
+
+def key(mutant):
+    """What the list of equivalent mutants knows it by: no line number."""
+    return mutant[0], original(mutant).strip(), mutant[2].strip()
+
+
+def read_equivalent():
+    """The reason by key, from blocks of four lines with an empty one between:
+    the file, the line as it stands, as it becomes, and the reason."""
+    reasons = {}
+    for block in EQUIVALENT.read_text().split("\n\n"):
+        lines = [line.strip() for line in block.splitlines()
+                 if line and not line.startswith("#")]
+        if lines:
+            name, before, after, *reason = lines
+            reasons[name, before, after] = " ".join(reason)
+    return reasons
+
+
+def is_chosen(mutant, places):
+    return not places or any(
+        place in (mutant[0], f"{mutant[0]}:{mutant[1] + 1}")
+        for place in places)
 
 
 class Bench:
@@ -127,15 +160,22 @@ class Bench:
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
-    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--count", type=int, default=1000)
     parser.add_argument("--skip", type=int, default=0,
                         help="of the first, which were tried before")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--only", action="append", metavar="FILE[:LINE]")
     options = parser.parse_args()
-    chosen = list(mutants())
+    possible = list(mutants())
+    reasons = read_equivalent()
+    stale = set(reasons) - {key(mutant) for mutant in possible}
+    for name, before, after in sorted(stale):
+        print(f"no longer a mutant: {name}: {before} -> {after}")
+    chosen = [mutant for mutant in possible if is_chosen(mutant, options.only)]
     random.Random(options.seed).shuffle(chosen)
     noticed = 0
+    equivalent = []
     unnoticed = []
     with tempfile.TemporaryDirectory(prefix="krot-mutants-") as folder, \
             concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
@@ -144,15 +184,23 @@ def main():
         todo = chosen[options.skip:options.skip + options.count]
         for mutant, result in zip(todo, pool.map(bench.is_noticed, todo,
                                                  range(len(todo)))):
+            name, line, text = mutant
+            place = f"{name}:{line + 1}: {text.strip()}"
             if result:
                 noticed += 1
+                if key(mutant) in reasons:
+                    print(f"noticed, though listed: {place}", flush=True)
+            elif result is not None and key(mutant) in reasons:
+                equivalent.append(mutant)
+                print(f"equivalent, because {reasons[key(mutant)]}: {place}",
+                      flush=True)
             elif result is not None:
                 unnoticed.append(mutant)
-                name, line, text = mutant
-                print(f"{name}:{line + 1}: {text.strip()}", flush=True)
-    print(f"{noticed + len(unnoticed)} mutants, of {len(chosen)} possible "
-          f"changes: {noticed} noticed, {len(unnoticed)} not")
-    return 0
+                print(f"unnoticed: {place}", flush=True)
+    print(f"{noticed + len(equivalent) + len(unnoticed)} mutants, of "
+          f"{len(possible)} possible changes: {noticed} noticed, "
+          f"{len(equivalent)} equivalent, {len(unnoticed)} unnoticed")
+    return 1 if unnoticed or stale else 0
 
 
 if __name__ == "__main__":

@@ -29,12 +29,13 @@ void Turn(View* view) {
   view->cam_from_rig_rotation = kTurned;
 }
 
-// Two sensors in one place, far from the rig's origin, see one point at rays
-// that differ.
-KnownRotationProblem TwoSensorsInOnePlace() {
+// Two sensors see one point at rays that differ; in one place, far from the
+// rig's origin, or elsewhere.
+KnownRotationProblem TwoSensors(const Vector3d& first = kFar,
+                                const Vector3d& second = kFar) {
   KnownRotationProblem problem;
   problem.num_frames = problem.num_points = 1;
-  problem.views = {ViewAt(kFar, 0), ViewAt(kFar, 0)};
+  problem.views = {ViewAt(first, 0), ViewAt(second, 0)};
   const Eigen::Matrix2d J = 1000 * Eigen::Matrix2d::Identity();
   problem.observations = {{RowAtRay({-0.001, 0}, J), 0, 0},
                           {RowAtRay({0.001, 0}, J), 1, 0}};
@@ -49,31 +50,44 @@ TEST(RoundingAllowance, CoversOffsetsOfSensorsThatAreFarFromTheirFrame) {
     EXPECT_FALSE(checker.Balance());
     return checker.SumConstants();
   };
-  KnownRotationProblem problem = TwoSensorsInOnePlace();
-  const ForceChecker::Constants before = constants(problem);
-  EXPECT_EQ(before.value, 0);
+  const Vector3d here = Vector3d::Zero();
+  for (KnownRotationProblem& problem :
+       std::vector{TwoSensors(), TwoSensors(kFar, here), TwoSensors(here, kFar),
+                   TwoSensors(kFar, -kFar)}) {
+    for (const int turned : {0, 1}) {
+      const ForceChecker::Constants before = constants(problem);
+      View& view = problem.views[turned];
+      const View original = view;
+      Turn(&view);
+      const ForceChecker::Constants after = constants(problem);
+      view = original;
+      EXPECT_LE(std::abs(after.value - before.value), before.error);
+    }
+  }
+  KnownRotationProblem problem = TwoSensors();
+  EXPECT_EQ(constants(problem).value, 0);
   Turn(&problem.views[1]);
-  const ForceChecker::Constants after = constants(problem);
-  EXPECT_GT(std::abs(after.value), 1e-7L);
-  EXPECT_LE(std::abs(after.value), before.error);
+  EXPECT_GT(std::abs(constants(problem).value), 1e-7L);
 }
 
 TEST(RoundingAllowance, CoversOffsetsOfWhatIsPulled) {
   const Certificate certificate = {1, 1e-9, {{0, 1, {-1, 0}}, {1, 1, {1, 0}}}};
-  const Pull pull{Pull::Kind::kView, 1, {1, -1, 0}};
+  const Pull pull{Pull::Kind::kView, 1, {2, -1, -1}};
   const auto constants = [&](const KnownRotationProblem& problem,
                              const std::vector<Pull>& pulls) {
     ForceChecker checker(problem, Norm::L2(), certificate, pulls);
     EXPECT_FALSE(checker.Balance());
     return checker.SumConstants();
   };
-  KnownRotationProblem problem = TwoSensorsInOnePlace();
+  KnownRotationProblem problem = TwoSensors();
   const auto by_pull = [&](auto part) {
     return constants(problem, {pull}).*part - constants(problem, {}).*part;
   };
   const auto allowed = by_pull(&ForceChecker::Constants::error);
   problem.views[1].cam_from_rig_rotation = kTurned;
-  EXPECT_LE(std::abs(by_pull(&ForceChecker::Constants::value)), allowed);
+  const auto change = std::abs(by_pull(&ForceChecker::Constants::value));
+  EXPECT_GT(change, 1e-10L);
+  EXPECT_LE(change, allowed);
 }
 
 TEST(RoundingAllowance, CoversWhereFixedFramesAndPointsStand) {
@@ -102,6 +116,37 @@ TEST(RoundingAllowance, CoversWhereFixedFramesAndPointsStand) {
   expect_covered(fixed.OfFrame(problem.views[1]), fixed.OfFrame(turned));
   expect_covered(fixed.OfPoint(problem.views[1], 0), fixed.OfPoint(turned, 0));
   EXPECT_EQ(fixed.OfPoint(problem.views[1], 1).size, 0);
+}
+
+// A translation is lost beside the place of its sensor.
+TEST(RoundingAllowance, CoversSumsOfTranslationsThatDifferInSize) {
+  KnownRotationProblem problem = TwoSensors(Vector3d::Zero(), {0x1p70, 0, 0});
+  problem.num_frames = 2;
+  problem.views[1].frame = 1;
+  problem.fixed_translations = {Vector3d::Zero(), Vector3d(1, 0, 0)};
+  IndexObservations(&problem);
+  const FixedConstants::Part part =
+      FixedConstants(problem).OfFrame(problem.views[1]);
+  ASSERT_EQ(part.x_cam.x(), 0x1p70L);
+  EXPECT_GE(part.size * kRotationError, 1);
+}
+
+TEST(FixedConstants, CountsFromTheFirstFixedPointWhereNoFrameIsFixed) {
+  KnownRotationProblem problem = TwoSensors();
+  problem.num_points = 4;
+  problem.fixed_points = {std::nullopt, Vector3d(7, -11, 13), Vector3d(1, 2, 3),
+                          std::nullopt};
+  IndexObservations(&problem);
+  const FixedConstants fixed(problem);
+  EXPECT_EQ(fixed.origin(), Vector3d(7, -11, 13).cast<FixedConstants::Real>());
+  EXPECT_EQ(fixed.origin_size(), 0);
+  EXPECT_FALSE(fixed.IsAwayFromOrigin(0));
+  const FixedConstants::Part nothing = fixed.OfPoint(problem.views[0], 1);
+  EXPECT_EQ(nothing.x_cam, FixedConstants::Vector3::Zero());
+  EXPECT_EQ(nothing.size, 0);
+  const FixedConstants::Part away = fixed.OfPoint(problem.views[0], 2);
+  EXPECT_EQ(away.x_cam, FixedConstants::Vector3(-6, 13, -10));
+  EXPECT_EQ(away.size, 29);
 }
 
 }  // namespace

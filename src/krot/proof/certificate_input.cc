@@ -66,9 +66,8 @@ std::optional<std::string> RefuseNumbers(const KnownRotationProblem& problem,
 
 std::optional<std::string> RefuseRotations(
     const KnownRotationProblem& problem) {
-  std::vector<int32_t> first_view(problem.num_frames, -1);
-  for (size_t v = 0; v < problem.views.size(); ++v) {
-    const View& view = problem.views[v];
+  std::vector<const View*> first_view(problem.num_frames);
+  for (const View& view : problem.views) {
     const Matrix3 R_sr = view.cam_from_rig_rotation.cast<Real>();
     const Matrix3 R_cw = view.cam_from_world_rotation.cast<Real>();
     for (const Matrix3& R : {R_sr, R_cw}) {
@@ -76,12 +75,11 @@ std::optional<std::string> RefuseRotations(
           (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
       if (!(error <= 1e-12)) return "a rotation of its views is none";
     }
-    int32_t& first = first_view[view.frame];
-    if (first < 0) first = static_cast<int32_t>(v);
-    const View& reference = problem.views[first];
+    const View*& first = first_view[view.frame];
+    if (!first) first = &view;
     const Matrix3 R_rw =
-        Matrix3(reference.cam_from_rig_rotation.cast<Real>()).inverse() *
-        reference.cam_from_world_rotation.cast<Real>();
+        Matrix3(first->cam_from_rig_rotation.cast<Real>()).inverse() *
+        first->cam_from_world_rotation.cast<Real>();
     if (!((R_cw - R_sr * R_rw).cwiseAbs().maxCoeff() <= kRotationError)) {
       return "the rotations of a frame's views contradict each other";
     }

@@ -15,8 +15,9 @@ namespace {
 using Real = ForceChecker::Real;
 using Vector3 = ForceChecker::Vector3;
 
-// Of the last sums in long double and their cast to double.
-constexpr Real kCastError = 2 * std::numeric_limits<double>::epsilon();
+// Half of it is the cast's of the last sum to double, and the rest enough for
+// its terms in long double.
+constexpr Real kCastError = std::numeric_limits<double>::epsilon();
 
 // Whether forces that balance wherever something moves need not balance where
 // they are left over: each component has something fixed.
@@ -58,17 +59,18 @@ ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
     return Refused(
         Sentence("balance takes y to ", *rho, " times the length of lambda"));
   }
-  // kappa bounds the positions' distances from the origin.
+  // kappa bounds the positions' distances from the origin; its error covers
+  // what the cast makes of it.
   const ForceChecker::Constants constants = checker.SumConstants();
   Real extent = constants.value + constants.error;
-  Real terms = std::abs(constants.value);
   for (const Pull& pull : certificate.pulls) {
     const Vector3 direction = pull.direction.cast<Real>();
     extent += direction.dot(constants.origin);
-    terms += direction.cwiseAbs().dot(constants.origin.cwiseAbs());
+    extent +=
+        direction.cwiseAbs().dot(constants.origin.cwiseAbs()) * kCastError;
     extent += direction.cwiseAbs().sum() * constants.origin_error;
   }
-  check.extent = static_cast<double>(extent + kCastError * terms);
+  check.extent = static_cast<double>(extent);
   check.is_accepted = std::isfinite(check.extent);
   if (!check.is_accepted) check.refusal = "its extent is no finite number";
   return check;

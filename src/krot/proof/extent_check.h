@@ -41,7 +41,8 @@ struct ExtentCheck {
 // with what it trusts: (1) holds exactly for multipliers beside the
 // certificate's, none of which leaves |y_i|_dual <= lambda_i, and the extent
 // covers every rounding. Refuses a support one of whose components holds
-// nothing that is fixed. Never an exception. O(support log support).
+// nothing that is fixed, and pulls at what is fixed, where any force is taken,
+// that of the pull as well. Never an exception. O(support log support).
 ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
                         const ExtentCertificate& certificate);
 

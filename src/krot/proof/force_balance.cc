@@ -1,9 +1,9 @@
 #include "krot/proof/force_balance.h"
 
 #include <algorithm>
-#include <numeric>
 #include <queue>
 #include <tuple>
+#include <utility>
 
 namespace krot {
 namespace {
@@ -12,9 +12,9 @@ using Real = long double;
 
 // Points are nodes 0, 1, ...; frames come after them.
 struct Branch {
-  int32_t node = 0;
-  int32_t parent = 0;
-  int64_t observation = 0;
+  int32_t node;
+  int32_t parent;
+  int64_t observation;
 };
 
 // A maximum spanning forest [Prim 1957], parents before their children.
@@ -24,7 +24,7 @@ class StrongestForest {
                   const std::vector<Real>& strength)
       : problem_(problem),
         strength_(strength),
-        is_reached_(problem.num_points + problem.num_frames, 0) {}
+        is_reached_(problem.num_points + problem.num_frames, false) {}
 
   std::vector<Branch> Grow();
 
@@ -40,7 +40,7 @@ class StrongestForest {
 
   const KnownRotationProblem& problem_;
   const std::vector<Real>& strength_;
-  std::vector<char> is_reached_;
+  std::vector<bool> is_reached_;
   std::vector<Branch> branches_;
   // By strength, then the first observation; with the two ends of the branch.
   using Candidate = std::tuple<Real, int64_t, int32_t, int32_t>;
@@ -66,7 +66,7 @@ void StrongestForest::ForObservationsOf(int32_t node,
 }
 
 void StrongestForest::Reach(int32_t node) {
-  is_reached_[node] = 1;
+  is_reached_[node] = true;
   ForObservationsOf(node, [&](int64_t i, int32_t other) {
     if (!is_reached_[other]) candidates_.emplace(strength_[i], -i, node, other);
   });
@@ -91,12 +91,12 @@ std::vector<Branch> StrongestForest::Grow() {
     if (problem_.IsFixedFrame(f)) Reach(problem_.num_points + f);
   }
   Spread();
-  std::vector<int64_t> order(strength_.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int64_t a, int64_t b) {
-    return strength_[a] > strength_[b];
-  });
-  for (const int64_t i : order) {
+  std::vector<std::pair<Real, int64_t>> order;  // the strongest first
+  for (const Real strength : strength_) {
+    order.emplace_back(-strength, static_cast<int64_t>(order.size()));
+  }
+  std::sort(order.begin(), order.end());
+  for (const auto& [negative, i] : order) {
     if (is_reached_[FrameNode(i)]) continue;
     Reach(FrameNode(i));
     Spread();

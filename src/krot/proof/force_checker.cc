@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <Eigen/LU>
@@ -18,18 +17,17 @@ using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Vector2 = ForceChecker::Vector2;
 using Vector3 = ForceChecker::Vector3;
 
-constexpr Real kRealRoundoff = std::numeric_limits<Real>::epsilon();
 constexpr Real kRootTwo = 1.4142135623730951L;  // above it
 // Smaller multipliers, relative, might underflow.
 constexpr double kSmallestShare = 1e-100;
 // No lambda may have to change by more, relative.
 constexpr Real kLargestChange = 0.5L;
 
-// The forces at a point or frame, their uncertainty, and what they sum up.
+// The forces at a point or frame, and the sum of the absolute values of what
+// they sum up.
 struct NodeBalance {
   Vector3 sum = Vector3::Zero();
-  Vector3 terms = Vector3::Zero();
-  Real rotation_error = 0;
+  Real terms = 0;
 };
 
 std::vector<int64_t> ObservationsOf(const Certificate& certificate) {
@@ -67,12 +65,9 @@ std::optional<std::string> ForceChecker::ScaleMultipliers() {
                   std::ldexp(Real{o.y[1]}, -exponent_)});
     forces_.push_back(MakeForce(observation, y_.back(),
                                 certificate_.lower_bound * lambda_.back()));
-    compliances_.push_back(MakeCompliance(observation));
-    if (!forces_.back().terms.allFinite() ||
-        !std::isfinite(compliances_.back().y) ||
-        !std::isfinite(compliances_.back().delta_lambda)) {
-      return "a ray of its observations is no finite number";
-    }
+    const std::optional<Compliance> compliance = MakeCompliance(observation);
+    if (!compliance) return "a ray of its observations is no finite number";
+    compliances_.push_back(*compliance);
   }
   return RefuseRotations(part_.problem());
 }
@@ -87,6 +82,7 @@ std::optional<std::string> ForceChecker::PlacePulls() {
     if (pull.index < 0 || pull.index >= count) {
       return "it pulls at what is not there";
     }
+    if (IsFixedPosition(whole_, pull)) return "it pulls at what is fixed";
     const std::optional<Pull> placed = InPart(part_, pull);
     if (!placed) return "its support does not hold what is pulled";
     pull = *placed;
@@ -94,12 +90,11 @@ std::optional<std::string> ForceChecker::PlacePulls() {
   return std::nullopt;
 }
 
-Real ForceChecker::SumError() const {
-  return (static_cast<Real>(lambda_.size() + pulls_.size()) + 12) *
-         kRealRoundoff;
+// Of sums over the support.
+Real ForceChecker::ErrorOfSums() const {
+  return ForceError(forces_.size() + pulls_.size());
 }
 
-// Of forces turned into the world by rotations known to kRotationError.
 Imbalance ForceChecker::BoundImbalance() const {
   const KnownRotationProblem& problem = part_.problem();
   std::vector<NodeBalance> of_point(problem.num_points);
@@ -110,12 +105,10 @@ Imbalance ForceChecker::BoundImbalance() const {
     const Matrix3 world_from_cam =
         view.cam_from_world_rotation.transpose().cast<Real>();
     const Vector3 force = world_from_cam * forces_[i].sum;
-    const Vector3 terms = world_from_cam.cwiseAbs() * forces_[i].terms;
     for (NodeBalance* balance :
          {&of_point[observation.point], &of_frame[view.frame]}) {
       balance->sum += force;
-      balance->terms += terms;
-      balance->rotation_error += kRotationError * forces_[i].terms.sum();
+      balance->terms += forces_[i].terms.sum();
     }
   }
   const Real scale = std::ldexp(Real{1}, -exponent_);
@@ -125,12 +118,10 @@ Imbalance ForceChecker::BoundImbalance() const {
     NodeBalance* balance = is_view ? &of_frame[problem.views[pull.index].frame]
                                    : &of_point[pull.index];
     balance->sum += is_view ? Vector3(-direction) : direction;
-    balance->terms += direction.cwiseAbs();
+    balance->terms += direction.cwiseAbs().sum();
   }
   const auto bound = [&](const NodeBalance& balance) -> Real {
-    const Vector3 sum = balance.sum.cwiseAbs() + SumError() * balance.terms +
-                        Vector3::Constant(balance.rotation_error);
-    return sum.norm() * kOutward;
+    return balance.sum.norm() + ErrorOfSums() * balance.terms;
   };
   Imbalance imbalance;
   for (const NodeBalance& b : of_point) imbalance.of_point.push_back(bound(b));
@@ -156,12 +147,13 @@ std::optional<std::string> ForceChecker::Balance() {
   return std::nullopt;
 }
 
-std::vector<int32_t> ForceChecker::FirstViews() const {
+std::vector<std::optional<int32_t>> ForceChecker::FirstViews() const {
   const KnownRotationProblem& problem = part_.problem();
-  std::vector<int32_t> first_views(problem.num_frames, -1);
+  std::vector<std::optional<int32_t>> first_views(problem.num_frames);
   for (const Observation& observation : problem.observations) {
-    int32_t& first = first_views[problem.views[observation.view].frame];
-    if (first < 0) first = observation.view;
+    std::optional<int32_t>& first =
+        first_views[problem.views[observation.view].frame];
+    if (!first) first = observation.view;
   }
   return first_views;
 }
@@ -180,13 +172,18 @@ ForceChecker::Offset ForceChecker::FromFirstView(int32_t view,
       t.cwiseAbs().sum() + t_first.cwiseAbs().sum()};
 }
 
+// Rotations known to kRotationError make at most 5 of it, times its size, of an
+// offset, and 2 more of what they turn a pull to; a correction is less than
+// half of the force's terms (BoundRho). So 16 of it covers an offset's error in
+// all of them, and all roundings.
 ForceChecker::Constants ForceChecker::SumConstants() const {
   const KnownRotationProblem& problem = part_.problem();
   const FixedConstants fixed(problem);
-  const std::vector<int32_t> first_views = FirstViews();
+  const std::vector<std::optional<int32_t>> first_views = FirstViews();
+  const Real relative_error = 8 * ErrorOfSums();
   Constants constants;
   constants.origin = fixed.origin();
-  constants.origin_error = 16 * kRotationError * fixed.origin_size();
+  constants.origin_error = relative_error * fixed.origin_size();
   for (size_t i = 0; i < forces_.size(); ++i) {
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
@@ -200,41 +197,38 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
       size += of_frame.size;
     } else {
       const Offset in_frame =
-          FromFirstView(observation.view, first_views[view.frame]);
+          FromFirstView(observation.view, *first_views[view.frame]);
       offset += in_frame.x_cam;
       size += in_frame.size;
     }
-    const Real offset_error = 16 * kRotationError * size;
     constants.value += forces_[i].sum.dot(offset);
-    constants.error +=
-        forces_[i].terms.sum() * offset_error +
-        forces_[i].terms.dot(offset.cwiseAbs()) * SumError() +
-        corrections_[i] * (offset.cwiseAbs().sum() + offset_error);
+    constants.error += forces_[i].terms.sum() * relative_error * size +
+                       corrections_[i] * offset.cwiseAbs().sum();
   }
   const Real scale = std::ldexp(Real{1}, -exponent_);
   for (const Pull& pull : pulls_) {
     if (pull.kind != Pull::Kind::kView) continue;
     const View& view = problem.views[pull.index];
-    const Offset in_frame = FromFirstView(pull.index, first_views[view.frame]);
+    const Offset in_frame = FromFirstView(pull.index, *first_views[view.frame]);
     const Vector3 direction =
         scale * (view.cam_from_world_rotation.cast<Real>() *
                  pull.direction.cast<Real>());
     constants.value -= direction.dot(in_frame.x_cam);
     constants.error +=
-        32 * kRotationError * in_frame.size * direction.cwiseAbs().sum();
+        direction.cwiseAbs().sum() * relative_error * in_frame.size;
   }
   constants.value = std::ldexp(constants.value, exponent_);
-  constants.error = std::ldexp(constants.error * kOutward, exponent_);
+  constants.error = std::ldexp(constants.error, exponent_);
   return constants;
 }
 
 // A vector of some length has the longest dual norm along the diagonal, for
 // p = infinity: sqrt(2) of it.
 std::optional<double> ForceChecker::BoundRho(std::string* refusal) const {
-  const Real per_length = norm_.p == 1 || norm_.p == 2 ? 1 : kRootTwo;
+  const Real per_length = std::isinf(norm_.p) ? kRootTwo : 1;
   Real rho = 0;
   for (size_t i = 0; i < lambda_.size(); ++i) {
-    const Real correction = corrections_[i] / lambda_[i] * kOutward;
+    const Real correction = corrections_[i] / lambda_[i];
     const Real change =
         correction * compliances_[i].delta_lambda / certificate_.lower_bound;
     if (!(change < kLargestChange)) {
@@ -252,7 +246,7 @@ std::vector<MultiplierChange> ForceChecker::Changes() const {
   std::vector<MultiplierChange> changes;
   for (size_t i = 0; i < lambda_.size(); ++i) {
     const Real unit = certificate_.observations[i].lambda / lambda_[i];
-    const Real correction = corrections_[i] * kOutward * kOutward;
+    const Real correction = corrections_[i];
     changes.push_back(
         {static_cast<double>(correction * unit * compliances_[i].y),
          static_cast<double>(correction * compliances_[i].delta_lambda /

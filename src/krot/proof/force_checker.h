@@ -67,16 +67,15 @@ class ForceChecker {
   std::optional<std::string> PlacePulls();
   Imbalance BoundImbalance() const;
   void FindCorrections();
-  // Of sums over the support, relative to the sum of absolute values: every
-  // term goes through at most 12 roundings, and each sum adds one.
-  Real SumError() const;
+  Real ErrorOfSums() const;
   // Of a view's centre from that of the first view of its frame, in its camera.
   struct Offset {
     Vector3 x_cam = Vector3::Zero();
     Real size = 0;
   };
   Offset FromFirstView(int32_t view, int32_t first) const;
-  std::vector<int32_t> FirstViews() const;
+  // Of the support, per frame.
+  std::vector<std::optional<int32_t>> FirstViews() const;
 
   const KnownRotationProblem& whole_;
   const Norm norm_;

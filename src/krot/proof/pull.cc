@@ -20,6 +20,12 @@ double Along(const KnownRotationProblem& problem, const Estimate& estimate,
   return pull.direction.dot(PositionOf(problem, estimate, pull));
 }
 
+bool IsFixedPosition(const KnownRotationProblem& problem, const Pull& pull) {
+  return pull.kind == Pull::Kind::kPoint
+             ? problem.IsFixedPoint(pull.index)
+             : problem.IsFixedFrame(problem.views[pull.index].frame);
+}
+
 std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull) {
   const std::optional<int32_t> index = pull.kind == Pull::Kind::kPoint
                                            ? part.FindPoint(pull.index)

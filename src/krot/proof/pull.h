@@ -27,6 +27,9 @@ Eigen::Vector3d PositionOf(const KnownRotationProblem& problem,
 double Along(const KnownRotationProblem& problem, const Estimate& estimate,
              const Pull& pull);
 
+// Whether it pulls at what does not move.
+bool IsFixedPosition(const KnownRotationProblem& problem, const Pull& pull);
+
 // The same pull in a part of the problem; none if that does not hold it.
 std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull);
 

@@ -183,12 +183,6 @@ BoxEnd BoxSearch::FindEnd(int axis, double sign) {
 
 }  // namespace
 
-bool IsFixedPosition(const KnownRotationProblem& problem, const Pull& target) {
-  return target.kind == Pull::Kind::kPoint
-             ? problem.IsFixedPoint(target.index)
-             : problem.IsFixedFrame(problem.views[target.index].frame);
-}
-
 PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
                     double tolerance, const Context& context) {
   PositionBox box;

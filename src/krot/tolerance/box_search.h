@@ -24,9 +24,6 @@ struct PositionBox {
   int64_t num_programmes = 0;  // that were solved
 };
 
-// Whether the problem has it in its place.
-bool IsFixedPosition(const KnownRotationProblem& problem, const Pull& target);
-
 // Finds them by working sets: an end that is proved on some of the observations
 // is one for all, and it is reached where the other points fit in, too
 // (docs/method.md, "What the data allow"). Ends agree to `tolerance` of the way
