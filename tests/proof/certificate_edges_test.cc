@@ -97,6 +97,37 @@ TEST(CheckCertificate, ProvesMoreThanItSaysWhereAllYAreShort) {
   EXPECT_GE(check.proved_bound, optimum * (1 - 1e-11));
 }
 
+TEST(CheckCertificate, ProvesAsMuchInAnyUnitOfPixels) {
+  for (const double unit : {1e-9, 1e-3, 1e9}) {
+    Twice twice = MakeTwice(kSeparation);
+    for (Observation& observation : twice.problem.observations) {
+      observation.E.bottomRows<2>() *= unit;
+    }
+    twice.certificate.lower_bound *= unit;
+    const CertificateCheck check =
+        CheckCertificate(twice.problem, Norm::L2(), twice.certificate);
+    EXPECT_TRUE(check.is_accepted) << check.refusal;
+    EXPECT_GE(check.proved_bound, twice.certificate.lower_bound * (1 - 1e-11));
+  }
+}
+
+// Of a point and a frame that are fixed there is one estimate.
+TEST(CheckCertificate, ProvesTheErrorOfWhatIsFixedAndNoMore) {
+  Twice twice = MakeTwice(kSeparation);
+  KnownRotationProblem& problem = twice.problem;
+  problem.fixed_translations = {Vector3d(-7, 11, -13)};
+  problem.fixed_points = {Vector3d(10, -10, 18)};
+  const Vector3d row = problem.observations[0].E * Vector3d(3, 1, 5);
+  const Eigen::Vector2d v = row.tail<2>();
+  const double error = v.norm() / row[0];
+  for (const double share : {1 - 1e-9, 1 + 1e-9}) {
+    twice.certificate = {error * share, 1e-9, {{0, 1, -v.normalized()}}};
+    const CertificateCheck check =
+        CheckCertificate(problem, Norm::L2(), twice.certificate);
+    EXPECT_EQ(check.is_accepted, share < 1) << check.refusal;
+  }
+}
+
 TEST(CheckCertificate, TakesNoObservationBeforeTheFirst) {
   EXPECT_THAT(Refusal([](Twice* t) {
                 t->certificate.observations[0].observation = -1;
