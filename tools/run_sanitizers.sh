@@ -17,9 +17,11 @@ for preset in asan tsan; do
   cmake --build "$root/build-$preset" --parallel "$(nproc)"
   say "Testing with $preset"
   # The end of a test is not the end of its threads: the pool is never
-  # destroyed. Allocations that cannot be served are tested for.
+  # destroyed. Allocations that cannot be served are tested for, and so are
+  # threads of a child that was forked.
   ASAN_OPTIONS=allocator_may_return_null=1 \
-    UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=second_deadlock_stack=1 \
+    UBSAN_OPTIONS=print_stacktrace=1 \
+    TSAN_OPTIONS="second_deadlock_stack=1 die_after_fork=0" \
     ctest --test-dir "$root/build-$preset" --output-on-failure -j"$(nproc)" \
     "$@" || status=$?
 done
