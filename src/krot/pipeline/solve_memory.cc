@@ -84,11 +84,11 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
   const int64_t component =
       held + Size(problem.observations.size(), 16) +
       (summary.num_components > 1 ? PartBytes(problem) : 0);
+  const int64_t joint = component + JointBytes(problem, summary.norm);
   memory.at_most =
-      std::max(memory.at_most, component + JointBytes(problem, summary.norm) +
-                                   EstimateRepairMemory(problem));
+      std::max(memory.at_most, joint + EstimateRepairMemory(problem));
   if (summary.init == SolveInit::kFeasible) {
-    memory.likely = memory.at_most;
+    memory.likely = std::max(memory.likely, joint);
     return memory;
   }
   // The allocator keeps what the interior point has freed when the points that

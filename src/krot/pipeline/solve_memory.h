@@ -14,7 +14,8 @@ namespace krot {
 struct SolveMemory {
   // If the joint solver gets by with the points that it looks at first.
   int64_t likely = 0;
-  // If it takes in every observation, as it does on its way to a start.
+  // If it takes in every observation, as it does on its way to a start, and
+  // repairs all multipliers at once.
   int64_t at_most = 0;
 };
 
