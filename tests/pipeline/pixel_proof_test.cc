@@ -1,0 +1,57 @@
+#include "krot/pipeline/pixel_proof.h"
+
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "krot/bridge/reprojection.h"
+#include "krot/conic/interior_point.h"
+#include "krot/proof/certificate_search.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+// Where thousands of observations set the maximum, or are not told from those
+// that do: the certificate is of rows at one estimate, the proof of those at
+// another.
+TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
+  SceneOptions scene;
+  scene.num_frames = 40;
+  scene.num_points = 4000;
+  scene.track_length = 10;
+  scene.pixel_noise = 1;
+  scene.start_translation_noise = 0.003;
+  scene.start_point_noise = 0.003;
+  const Model model = SynthesizeScene(scene).model;
+  const Norm norm = Norm::L2();
+  BuiltProblem built = BuildProblem(model, {});
+  const Reprojection reprojection(model, built);
+  ASSERT_FALSE(reprojection.IsLinear());
+
+  Estimate estimate = built.start;
+  reprojection.TakeRows(estimate, 1, &built.problem);
+  InteriorPointOptions options;
+  options.smallest_gap = 1e-2;
+  std::vector<Multiplier> multipliers;
+  MinimizeJointly(built.problem, options, {}, &estimate, &multipliers);
+  const double cost = reprojection.TrueCost(estimate, norm, 1);
+  const double sufficient = 0.97 * cost;
+  CertificateSearch search(built.problem, norm, {sufficient}, {});
+  search.TryAll(estimate, multipliers);
+  ASSERT_TRUE(search.best());
+  ASSERT_GT(search.best()->observations.size(), 20000U);
+
+  reprojection.TakeRows(estimate, 1, &built.problem);
+  const std::optional<PixelCertificate> proof = ProveRows(
+      model, built, estimate, norm, *search.best(), {}, sufficient, {});
+  ASSERT_TRUE(proof);
+  const PixelCertificateCheck check =
+      CheckPixelCertificate(model, built, norm, *proof, {});
+  EXPECT_TRUE(check.is_accepted) << check.refusal;
+  EXPECT_GE(check.lower_bound, 0.96 * cost);
+  EXPECT_LE(check.lower_bound, cost);
+}
+
+}  // namespace
+}  // namespace krot
