@@ -41,6 +41,12 @@ TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
   search.TryAll(estimate, multipliers);
   ASSERT_TRUE(search.best());
   ASSERT_GT(search.best()->observations.size(), 20000U);
+  Context threads;
+  threads.num_threads = 3;
+  CertificateSearch again(built.problem, norm, {sufficient}, threads);
+  again.TryAll(estimate, multipliers);
+  ASSERT_TRUE(again.best());
+  EXPECT_EQ(again.best()->lower_bound, search.best()->lower_bound);
 
   reprojection.TakeRows(estimate, 1, &built.problem);
   const std::optional<PixelCertificate> proof = ProveRows(

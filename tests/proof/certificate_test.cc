@@ -11,6 +11,7 @@
 #include "krot/joint/feasible_start.h"
 #include "krot/problem/cost.h"
 #include "krot/proof/certificate_search.h"
+#include "krot/proof/dual_repair.h"
 #include "krot/proof/support.h"
 #include "tests/problem/random_problem.h"
 #include "tests/proof/joint_iterate.h"
@@ -198,6 +199,27 @@ TEST_P(CertificateOfNorm, ComesOfAllMultipliersAtOnce) {
     const double cost = Cost(scene.problem, iterate.estimate, norm(), 1);
     EXPECT_GE(check.proved_bound, (1 - 2e-3) * cost);
   }
+}
+
+TEST(RepairMultipliers, EndsWithTheFirstThatAreSufficient) {
+  const RandomScene scene = MakeScene(1, 2, 0.3);
+  const JointIterate iterate =
+      SolveToGap(scene.problem, Norm::L2(), scene.estimate, 0.1);
+  const double delta =
+      SuggestedBound(scene.problem, iterate.estimate, iterate.multipliers);
+  const std::optional<Certificate> best =
+      RepairMultipliers(scene.problem, Norm::L2(), delta, iterate.multipliers)
+          .certificate;
+  ASSERT_TRUE(best);
+  RepairOptions options;
+  options.sufficient_bound = 0.5 * best->lower_bound;
+  const std::optional<Certificate> first =
+      RepairMultipliers(scene.problem, Norm::L2(), delta, iterate.multipliers,
+                        options)
+          .certificate;
+  ASSERT_TRUE(first);
+  EXPECT_GE(first->lower_bound, options.sufficient_bound);
+  EXPECT_LT(first->lower_bound, best->lower_bound);
 }
 
 TEST(SelectForFrames, KeepsPointsWholeAndOfAllFramesEnough) {

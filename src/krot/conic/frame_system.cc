@@ -76,26 +76,34 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   }
 }
 
+// Where a point's frames have blocks, in frames that are free: rows and columns
+// of the lower triangle.
+template <typename Function>
+void FrameSystem::ForBlocksOfPoint(const BlockStructure& structure, int64_t k,
+                                   const Function& function) const {
+  for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
+       ++i) {
+    const int32_t a = column(structure.frame_of[i]);
+    if (a < 0) continue;
+    for (int64_t j = structure.point_begin[k]; j < structure.point_begin[k + 1];
+         ++j) {
+      const int32_t b = column(structure.frame_of[j]);
+      if (b >= 0 && a >= b) function(a / 3, b / 3);
+    }
+  }
+}
+
 // Of the pairs of frames, those that the points of any rank have.
 double FrameSystem::ShareOfBlocks(const BlockStructure& structure,
                                   Ranks* ranks) const {
   const int64_t num_free = num_columns_ / 3;
   std::vector<char> is_there(num_free * num_free, 0);
   for (int64_t k = 0; k < structure.num_points(); ++k) {
-    for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
-         ++i) {
-      const int32_t a = column(structure.frame_of[i]);
-      if (a < 0) continue;
-      for (int64_t j = structure.point_begin[k];
-           j < structure.point_begin[k + 1]; ++j) {
-        const int32_t b = column(structure.frame_of[j]);
-        if (b >= 0 && a >= b) is_there[a / 3 * num_free + b / 3] = 1;
-      }
-    }
+    ForBlocksOfPoint(structure, k, [&](int32_t row, int32_t column) {
+      is_there[row * num_free + column] = 1;
+    });
   }
-  if (ranks != nullptr) {
-    ranks->Reduce(std::bit_or<char>(), &is_there);
-  }
+  if (ranks != nullptr) ranks->Reduce(std::bit_or<char>(), &is_there);
   for (int64_t f = 0; f < num_free; ++f) is_there[f * (num_free + 1)] = 1;
   return static_cast<double>(
              std::count(is_there.begin(), is_there.end(), char{1})) /
@@ -105,16 +113,9 @@ double FrameSystem::ShareOfBlocks(const BlockStructure& structure,
 void FrameSystem::FindPattern(const BlockStructure& structure, Ranks* ranks) {
   std::vector<std::vector<int32_t>> rows(num_columns_ / 3);
   for (int64_t k = 0; k < structure.num_points(); ++k) {
-    for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
-         ++i) {
-      const int32_t a = column(structure.frame_of[i]);
-      if (a < 0) continue;
-      for (int64_t j = structure.point_begin[k];
-           j < structure.point_begin[k + 1]; ++j) {
-        const int32_t b = column(structure.frame_of[j]);
-        if (b >= 0 && a >= b) rows[b / 3].push_back(a / 3);
-      }
-    }
+    ForBlocksOfPoint(structure, k, [&](int32_t row, int32_t column) {
+      rows[column].push_back(row);
+    });
     // Keep the lists short while they grow.
     if (k % 4096 == 4095 || k + 1 == structure.num_points()) {
       for (std::vector<int32_t>& list : rows) SortAndUnite(&list);

@@ -64,6 +64,9 @@ class FrameSystem {
     int64_t stride;
   };
 
+  template <typename Function>
+  void ForBlocksOfPoint(const BlockStructure& structure, int64_t k,
+                        const Function& function) const;
   double ShareOfBlocks(const BlockStructure& structure, Ranks* ranks) const;
   void FindPattern(const BlockStructure& structure, Ranks* ranks);
   Block BlockOf(int part, int32_t a, int32_t b);

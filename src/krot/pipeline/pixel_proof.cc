@@ -122,18 +122,20 @@ std::optional<PixelCertificate> ProveLinear(const Model& model,
       BearingsOfPoints(model, built, x_hat, certificate), context);
 }
 
-// From a certificate whose observations are those of `built`, or whose
-// `support` is; on this rank.
-std::optional<PixelCertificate> ProveHere(
-    const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    Norm norm, const Certificate& certificate, bool has_names_of_built,
-    const std::vector<int64_t>& support, double sufficient,
-    const Context& context) {
-  if (Reprojection(model, built).IsLinear()) {
-    return ProveLinear(model, built, x_hat, norm, certificate, context);
+// On this rank. `certificate` is null where its rows were not those of `built`
+// alone: then there is only the support.
+std::optional<PixelCertificate> ProveHere(const Model& model,
+                                          const BuiltProblem& built,
+                                          const Estimate& x_hat, Norm norm,
+                                          const Certificate* certificate,
+                                          const std::vector<int64_t>& support,
+                                          double sufficient,
+                                          const Context& context) {
+  if (certificate != nullptr && Reprojection(model, built).IsLinear()) {
+    return ProveLinear(model, built, x_hat, norm, *certificate, context);
   }
-  if (has_names_of_built && support.size() > kLargeSupport) {
-    return ProveByRepair(model, built, x_hat, norm, certificate, sufficient,
+  if (certificate != nullptr && support.size() > kLargeSupport) {
+    return ProveByRepair(model, built, x_hat, norm, *certificate, sufficient,
                          context);
   }
   return ProveInPixels(model, built, x_hat, norm, support, sufficient, context);
@@ -160,10 +162,11 @@ std::optional<PixelCertificate> ProveSharedRows(
       GatherSupport(model, built, x_hat, own, &ranks);
   std::optional<PixelCertificate> proof;
   if (ranks.IsFirst()) {
-    const bool has_names = observation_of.empty();
+    std::optional<Certificate> of_built;
+    if (observation_of.empty()) of_built = gathered.FromWhole(certificate);
     proof = ProveHere(gathered.model, gathered.built, gathered.estimate, norm,
-                      has_names ? gathered.FromWhole(certificate) : certificate,
-                      has_names, gathered.observations, sufficient, here);
+                      of_built ? &*of_built : nullptr, gathered.observations,
+                      sufficient, here);
     if (proof) proof->rows = gathered.ToWhole(std::move(proof->rows));
   }
   bool is_proved = proof.has_value();
@@ -185,8 +188,8 @@ std::optional<PixelCertificate> ProveRows(
     return ProveSharedRows(model, built, x_hat, norm, certificate,
                            observation_of, sufficient, context);
   }
-  return ProveHere(model, built, x_hat, norm, certificate,
-                   observation_of.empty(),
+  return ProveHere(model, built, x_hat, norm,
+                   observation_of.empty() ? &certificate : nullptr,
                    SupportOf(certificate, observation_of), sufficient, context);
 }
 

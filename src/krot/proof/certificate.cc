@@ -50,29 +50,27 @@ std::optional<Certificate> MakeCertificate(
   const std::vector<double> scores =
       SupportScores(problem, norm, estimate, gamma, multipliers);
   CertificateSearch search(problem, norm, options, context);
-  if (IsSpread(problem, scores)) {
+  const auto try_supports = [&](bool solve) {
+    std::vector<int64_t> previous;
     for (const double threshold : kThresholds) {
-      for (const std::vector<int64_t>& component : SplitIntoComponents(
-               problem, SelectSupport(problem, scores, threshold))) {
-        search.TryAsTheyAre(component, estimate, multipliers);
-        if (search.IsEnough()) return search.best();
+      const std::vector<int64_t> support =
+          SelectSupport(problem, scores, threshold);
+      if (support == previous) continue;
+      previous = support;
+      for (const std::vector<int64_t>& component :
+           SplitIntoComponents(problem, support)) {
+        search.Try(component, estimate, multipliers,
+                   solve ? std::optional(threshold) : std::nullopt);
+        if (search.IsEnough()) return;
       }
     }
-    search.TryAll(estimate, multipliers);
-    if (search.IsEnough()) return search.best();
+  };
+  if (IsSpread(problem, scores)) {
+    try_supports(/*solve=*/false);
+    if (!search.IsEnough()) search.TryAll(estimate, multipliers);
   }
-  std::vector<int64_t> previous;
-  for (const double threshold : kThresholds) {
-    const std::vector<int64_t> support =
-        SelectSupport(problem, scores, threshold);
-    if (support == previous) continue;
-    previous = support;
-    for (const std::vector<int64_t>& component :
-         SplitIntoComponents(problem, support)) {
-      search.Try(component, estimate, multipliers, threshold);
-      if (search.IsEnough()) return search.best();
-    }
-  }
+  if (!search.IsEnough()) try_supports(/*solve=*/true);
+  if (search.IsEnough()) return search.best();
   // Scores do not tell an observation whose depth vanishes at the optimum.
   const double delta = SuggestedBound(problem, estimate, multipliers);
   for (const double share : kSharesBesideScores) {

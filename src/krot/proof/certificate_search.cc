@@ -63,9 +63,10 @@ int64_t NumUnknowns(const KnownRotationProblem& problem) {
   return 3 * (int64_t{problem.num_points} + problem.num_frames - 1);
 }
 
-void CertificateSearch::TryAsTheyAre(
-    const std::vector<int64_t>& observations, const Estimate& estimate,
-    const std::vector<Multiplier>& multipliers) {
+void CertificateSearch::Try(const std::vector<int64_t>& observations,
+                            const Estimate& estimate,
+                            const std::vector<Multiplier>& multipliers,
+                            std::optional<double> threshold_to_solve) {
   const ProblemSubset part(problem_, observations);
   if (NumUnknowns(part.problem()) > options_.max_unknowns) return;
   const std::vector<Multiplier> known = Pick(multipliers, observations);
@@ -73,16 +74,9 @@ void CertificateSearch::TryAsTheyAre(
       SuggestedBound(part.problem(), part.Restrict(estimate), known);
   Offer(part, delta, known);
   if (!IsEnough()) TryBalanced(delta, multipliers, observations);
-}
-
-void CertificateSearch::Try(const std::vector<int64_t>& observations,
-                            const Estimate& estimate,
-                            const std::vector<Multiplier>& multipliers,
-                            double threshold) {
-  TryAsTheyAre(observations, estimate, multipliers);
-  const ProblemSubset part(problem_, observations);
-  if (IsEnough() || NumUnknowns(part.problem()) > options_.max_unknowns) return;
-  SolveAndReduce(part, estimate, threshold, kMaxReductions);
+  if (!IsEnough() && threshold_to_solve) {
+    SolveAndReduce(part, estimate, *threshold_to_solve, kMaxReductions);
+  }
 }
 
 void CertificateSearch::TryBalanced(double delta,

@@ -34,15 +34,12 @@ class CertificateSearch {
       : problem_(problem), norm_(norm), options_(options), context_(context) {}
 
   // Tries the multipliers of these observations, connected, as they are; then
-  // what balances of them.
-  void TryAsTheyAre(const std::vector<int64_t>& observations,
-                    const Estimate& estimate,
-                    const std::vector<Multiplier>& multipliers);
-
-  // The same; then those of their sub-problem, solved from `estimate` of the
-  // whole; then that of what sets its maximum, and so on.
+  // what balances of them. With a threshold of SelectSupport, then those of
+  // their sub-problem, solved from `estimate` of the whole; then that of what
+  // sets its maximum, and so on.
   void Try(const std::vector<int64_t>& observations, const Estimate& estimate,
-           const std::vector<Multiplier>& multipliers, double threshold);
+           const std::vector<Multiplier>& multipliers,
+           std::optional<double> threshold_to_solve);
 
   // Tries the multipliers of all observations at once, but for what the frames
   // can spare.

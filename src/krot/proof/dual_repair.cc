@@ -202,7 +202,7 @@ int64_t EstimateRepairMemory(const KnownRotationProblem& problem) {
                                       sizeof(Matrix2d) + sizeof(Observation) +
                                       3 * sizeof(double);
   return static_cast<int64_t>(problem.observations.size()) *
-             (kPerObservation + DualSystem::kBytesPerObservation) +
+             (kPerObservation + DualSystem::BytesPerObservation()) +
          LeastNormSolver::MemoryBytes(problem);
 }
 

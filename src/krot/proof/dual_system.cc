@@ -123,4 +123,8 @@ LeastNormProblem DualSystem::Changes(
   return equations;
 }
 
+int64_t DualSystem::BytesPerObservation() {
+  return sizeof(Block) + sizeof(Multiplier);
+}
+
 }  // namespace krot

@@ -44,6 +44,8 @@ class DualSystem {
   // of lambda_i: of y_i by axes[i]' x_1,2, and of both y_i and lambda_i by x_3.
   LeastNormProblem Changes(const std::vector<Eigen::Matrix2d>& axes) const;
 
+  static int64_t BytesPerObservation();
+
  private:
   using Real = long double;
   using Matrix3r = Eigen::Matrix<Real, 3, 3>;
@@ -59,11 +61,6 @@ class DualSystem {
     int32_t frame_index = 0;      // 0: omitted
   };
 
- public:
-  static constexpr int64_t kBytesPerObservation =
-      sizeof(Block) + sizeof(Multiplier);
-
- private:
   std::vector<int32_t> OmitFrames(const KnownRotationProblem& problem);
 
   const std::vector<Multiplier> multipliers_;
