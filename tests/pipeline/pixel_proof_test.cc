@@ -49,8 +49,10 @@ TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
   EXPECT_EQ(again.best()->lower_bound, search.best()->lower_bound);
 
   reprojection.TakeRows(estimate, 1, &built.problem);
+  SolveModelOptions solve;
+  solve.norm = norm;
   const std::optional<PixelCertificate> proof = ProveRows(
-      model, built, estimate, norm, *search.best(), {}, sufficient, {});
+      model, built, estimate, solve, *search.best(), {}, sufficient, {});
   ASSERT_TRUE(proof);
   const PixelCertificateCheck check =
       CheckPixelCertificate(model, built, norm, *proof, {});

@@ -1,9 +1,9 @@
 // What ranks that share the points make of a model has the bits of what one
 // process makes of it.
 
-#include <cstring>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -12,11 +12,11 @@
 #include "krot/bridge/certificate_file.h"
 #include "krot/conic/observation_loop.h"
 #include "krot/joint/working_set.h"
-#include "krot/model/binary_io.h"
 #include "krot/model/model_share.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
+#include "tests/pipeline/solve_by_ranks.h"
 #include "tests/testing/thread_ranks.h"
 
 namespace krot {
@@ -33,64 +33,14 @@ SceneOptions Scene() {
   return options;
 }
 
-// Puts the shares' points into their places in the whole.
-void PutPoints(const Model& whole, int rank, int count, const Model& share,
-               Model* joined) {
-  const std::vector<int32_t> points = CutPoints(whole, count)[rank];
-  for (size_t n = 0; n < points.size(); ++n) {
-    joined->points3D[points[n]].xyz = share.points3D[n].xyz;
-    joined->points3D[points[n]].error = share.points3D[n].error;
-  }
-}
-
-struct Solved {
-  Model model;
-  SolveSummary summary;  // of the first rank
-};
-
-Solved SolveByRanks(const Model& whole, const SolveModelOptions& options,
-                    int count) {
-  Solved solved;
-  std::vector<Model> shares(count);
-  ThreadRanks::Run(count, [&](Ranks* ranks) {
-    const ModelShare share =
-        TakeShare(whole, CutPoints(whole, count)[ranks->rank()]);
-    Context context{1};
-    context.ranks = ranks;
-    SolveModelResult result = SolveModel(share.model, options, context);
-    shares[ranks->rank()] = std::move(result.model);
-    if (ranks->IsFirst()) solved.summary = std::move(result.summary);
-  });
-  solved.model = whole;
-  solved.model.frames = shares[0].frames;
-  for (size_t n = 0; n < whole.images.size(); ++n) {
-    solved.model.images[n].cam_from_world = shares[0].images[n].cam_from_world;
-  }
-  for (int r = 0; r < count; ++r) {
-    PutPoints(whole, r, count, shares[r], &solved.model);
-  }
-  return solved;
-}
-
-void ExpectSameBits(const Solved& a, const SolveModelResult& b) {
-  EXPECT_EQ(FormatImagesBinary(a.model), FormatImagesBinary(b.model));
-  EXPECT_EQ(FormatFramesBinary(a.model), FormatFramesBinary(b.model));
-  EXPECT_EQ(FormatPoints3DBinary(a.model), FormatPoints3DBinary(b.model));
-  EXPECT_EQ(a.summary.termination, b.summary.termination);
-  EXPECT_EQ(a.summary.cost_final, b.summary.cost_final);
-  EXPECT_EQ(a.summary.lower_bound, b.summary.lower_bound);
-  EXPECT_EQ(a.summary.rounds.size(), b.summary.rounds.size());
-  EXPECT_EQ(a.summary.num_observations, b.summary.num_observations);
-  EXPECT_EQ(a.summary.support.size(), b.summary.support.size());
-}
-
 class SolveByRanksTest : public ::testing::TestWithParam<int> {
  protected:
   static void Compare(const SceneOptions& scene,
                       const SolveModelOptions& options) {
     const Model whole = SynthesizeScene(scene).model;
-    const SolveModelResult alone = SolveModel(whole, options, Context{1});
-    ExpectSameBits(SolveByRanks(whole, options, GetParam()), alone);
+    SolveModelResult alone = SolveModel(whole, options, Context{1});
+    ExpectSameBits(SolveByRanks(whole, options, GetParam()),
+                   {std::move(alone.model), std::move(alone.summary)});
   }
 };
 

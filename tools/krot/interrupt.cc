@@ -47,6 +47,8 @@ void EndOnInterrupt(const std::string& who) {
   Handle(&End, 0);
 }
 
+void Interrupt() { interrupted.store(true); }
+
 const CancelFlag& DeferInterrupts() {
   Handle(&SetInterrupted, static_cast<int>(SA_RESETHAND) | SA_RESTART);
   return interrupted;

@@ -17,4 +17,7 @@ void EndOnInterrupt(const std::string& who);
 // once.
 const CancelFlag& DeferInterrupts();
 
+// Sets that flag.
+void Interrupt();
+
 }  // namespace krot

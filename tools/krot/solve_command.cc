@@ -1,6 +1,7 @@
 #include "tools/krot/solve_command.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -70,11 +71,12 @@ void CheckMemory(const SolveSummary& summary) {
 // The solve with its progress on stderr. Throws CommandError where there is
 // nothing to write afterwards.
 Model Solve(const SolveCommand& command, const Model& model, const Context& how,
-            SolveReport* report) {
+            Checkpoint* checkpoint, SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
   options.solve.problem.fixed = ReadFixedParts(command.paths, model);
   options.solve.problem.positions = ReadKnownPositions(command.paths, model);
+  options.solve.checkpoint = checkpoint;
   Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
   progress.Follow(&options.solve, &context);
@@ -227,15 +229,20 @@ int RunSolveCommand(const SolveCommand& command) {
                 paths.output_path);
   CheckSidePath("factor_certificate_path", command.factor_certificate_path,
                 paths.output_path);
+  CheckSidePath("checkpoint_path", command.checkpoint.path);
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
   Model model = ReadInput(paths, log, &report.run);
+  const std::unique_ptr<Checkpoint> checkpoint =
+      OpenCheckpoint(command.checkpoint, paths, model, command.context, log);
   if (command.take_share) model = command.take_share(model);
 
   Context context = command.context;
-  if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
-  Model solved = Solve(command, model, context, &report);
+  if (paths.write_on_interrupt || command.checkpoint.is_all) {
+    context.cancel = &DeferInterrupts();
+  }
+  Model solved = Solve(command, model, context, checkpoint.get(), &report);
   DeferInterrupts();
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);
@@ -260,6 +267,7 @@ int RunSolveCommand(const SolveCommand& command) {
                solved, command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
   if (context.IsCancelled()) ThrowInterrupted(paths);
+  RemoveCheckpoint(command.checkpoint);
   WarnOfMissedGap(command, report.summary);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;
   return is_copy ? kExitGivenBack : kExitDone;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "krot/outliers/tolerant_solve.h"
+#include "tools/krot/checkpoint.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
 
@@ -18,6 +19,7 @@ struct SolveCommand {
   std::string certificate_path;         // "": not wanted
   std::string conflicts_path;           // "": not wanted
   std::string factor_certificate_path;  // "": not wanted
+  CheckpointOptions checkpoint;
   CommonOptions common;
   TolerantSolveOptions options;  // its callbacks are set by the run
   Context context;               // likewise, and the flag

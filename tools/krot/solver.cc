@@ -32,6 +32,8 @@ int RunSolver(const std::vector<std::string>& arguments) {
                       "coordinate frame stay");
   AddModelPaths(&command.paths, &parser);
   AddWriteOnInterrupt(&command.paths, &parser);
+  AddCheckpointPath(&command.checkpoint, &parser);
+  AddCheckpointOnly(&command.checkpoint, &parser);
   AddRotationsPath(&command.paths, &parser);
   AddFixedPaths(&command.paths, &parser);
   AddPositionsPath(&command.paths, &parser);
@@ -56,6 +58,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   ResolveSolverOptions(parser, &command.options.solve);
+  ResolveCheckpoint(parser, &command.checkpoint);
   ExplainMethod(command);
   return RunSolveCommand(command);
 }

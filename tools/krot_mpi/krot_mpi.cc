@@ -49,6 +49,7 @@ int RunSharedSolver(const std::vector<std::string>& arguments,
                       "as mpirun starts; each holds a share of the points",
                       "krot_mpi");
   AddModelPaths(&command.paths, &parser);
+  AddCheckpointPath(&command.checkpoint, &parser);
   AddRotationsPath(&command.paths, &parser);
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON");
@@ -60,6 +61,7 @@ int RunSharedSolver(const std::vector<std::string>& arguments,
     return kExitDone;
   }
   ResolveSolverOptions(parser, &command.options.solve);
+  ResolveCheckpoint(parser, &command.checkpoint);
   command.context.ranks = ranks;
   if (command.options.max_error) {
     command.context.RequireAlone("Solver.max_error");
@@ -115,6 +117,8 @@ int Main(const std::vector<std::string>& arguments, MpiRanks* ranks) {
   } catch (const OptionError& error) {
     Fail(error.what(), kExitOptions, ranks);
   } catch (const RanksError& error) {
+    Fail(error.what(), kExitOptions, ranks);
+  } catch (const CheckpointError& error) {
     Fail(error.what(), kExitOptions, ranks);
   } catch (const ModelError& error) {
     Fail(error.what(), kExitModel, ranks);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "krot/joint/extend_solution.h"
+#include "krot/joint/step_values.h"
 #include "krot/problem/components.h"
 #include "krot/problem/fixed.h"
 #include "krot/problem/gathered_part.h"
@@ -216,6 +217,44 @@ void ComponentSolve::Keep(const Estimate& candidate) {
   estimate_ = candidate;
 }
 
+// A working set is a step of its own.
+JointTermination ComponentSolve::SolveOrTake(const IterationReport& report,
+                                             Estimate* candidate) {
+  JointTermination termination = JointTermination::kNotRun;
+  std::vector<JointIteration> iterations;
+  size_t num_reported = 0;
+  RunStep(
+      options_.checkpoint, context_,
+      [&] {
+        termination = SolveWorkingSet(
+            [&](JointIteration iteration) {
+              iteration.cost = cost();
+              if (lower_bound_ > 0) iteration.lower_bound = lower_bound_;
+              iterations.push_back(iteration);
+              report(iterations[num_reported++]);
+            },
+            candidate);
+        if (do_others_fit_) do_others_fit_ = FitOthers(candidate);
+      },
+      [&](StepValues* values) {
+        values->Value(&termination);
+        values->OnFirst(&iterations);
+        NameValues(values, candidate);
+        NameValues(values, &estimate_);
+        values->Value(&cost_);
+        values->Value(&reached_);
+        values->Value(&level_);
+        values->Value(&do_others_fit_);
+        values->Value(&lower_bound_);
+        NameValues(values, &certificate_);
+        known_.NameValues(values);
+        values->Value(&iterations_);
+        values->Value(&num_working_observations_);
+      });
+  while (num_reported < iterations.size()) report(iterations[num_reported++]);
+  return termination;
+}
+
 JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (IsLowEnough()) return JointTermination::kGapReached;
   if (context_.Sum(problem_.num_points) <
@@ -224,8 +263,7 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
   }
   for (int round = 1;; ++round) {
     Estimate candidate = estimate_;
-    const JointTermination termination = SolveWorkingSet(report, &candidate);
-    if (do_others_fit_) do_others_fit_ = FitOthers(&candidate);
+    const JointTermination termination = SolveOrTake(report, &candidate);
     if (IsGapReached()) return JointTermination::kGapReached;
     if (set_.IsAll() || termination == JointTermination::kInterrupted ||
         termination == JointTermination::kMaxIterations) {

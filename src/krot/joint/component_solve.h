@@ -30,7 +30,7 @@ class ComponentSolve {
                  const JointOptions& options, const Context& context,
                  const Estimate& start, KnownMultipliers* known);
 
-  // `report` is called after every iteration, with gap and target filled in.
+  // `report` is called after every iteration, with all but the time filled in.
   JointTermination Run(const IterationReport& report);
 
   const Estimate& estimate() const { return estimate_; }
@@ -63,6 +63,8 @@ class ComponentSolve {
     std::vector<int64_t> InWhole(const ProblemSubset& part) const;
   };
 
+  JointTermination SolveOrTake(const IterationReport& report,
+                               Estimate* candidate);
   JointTermination SolveWorkingSet(const IterationReport& report,
                                    Estimate* candidate);
   JointTermination SolveGathered(const IterationReport& report,

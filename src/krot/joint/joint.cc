@@ -62,9 +62,9 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
                          known != nullptr && is_one ? known : &own);
     const JointTermination termination =
         solve.Run([&](JointIteration iteration) {
-          iteration.cost = std::max(cost_of_solved, solve.cost());
+          iteration.cost = std::max(cost_of_solved, *iteration.cost);
           const double bound =
-              std::max(summary.lower_bound, solve.lower_bound());
+              std::max(summary.lower_bound, iteration.lower_bound.value_or(0));
           if (bound > 0) iteration.lower_bound = bound;
           iteration.seconds = timer.Seconds();
           summary.iterations.push_back(iteration);

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "krot/base/checkpoint.h"
 #include "krot/base/context.h"
 #include "krot/joint/known_multipliers.h"
 #include "krot/minimax/norm.h"
@@ -34,11 +35,12 @@ using JointCallback =
     std::function<void(int iteration, const JointIteration& state)>;
 
 struct JointOptions {
-  Norm norm;                   // p = 1, 2 or infinity
-  double relative_gap = 1e-4;  // (cost - lower_bound) / cost; > 0
-  int max_iterations = 2000;   // per component; >= 1
-  double sufficient_cost = 0;  // nothing below it is sought, pixels; >= 0
-  JointCallback callback;      // counts over all components; may be empty
+  Norm norm;                         // p = 1, 2 or infinity
+  double relative_gap = 1e-4;        // (cost - lower_bound) / cost; > 0
+  int max_iterations = 2000;         // per component; >= 1
+  double sufficient_cost = 0;        // nothing below it is sought, pixels; >= 0
+  JointCallback callback;            // counts over all components; may be empty
+  Checkpoint* checkpoint = nullptr;  // of working sets; may be null
 };
 
 enum class JointTermination {

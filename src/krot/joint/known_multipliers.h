@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "krot/base/checkpoint.h"
 #include "krot/conic/interior_point.h"
 #include "krot/proof/certificate_check.h"
 
@@ -21,6 +22,9 @@ class KnownMultipliers {
   // Of the observations that `names` ascend through, zero where it is not
   // known; empty if none is. O(known + names).
   std::vector<Multiplier> Of(const std::vector<int64_t>& names) const;
+
+  // For a checkpoint; where ranks share a problem, the first one's.
+  void NameValues(StepValues* values) { values->OnFirst(&known_); }
 
   // What it and its user hold for so many observations, bytes.
   static int64_t MemoryBytes(int64_t num_observations) {

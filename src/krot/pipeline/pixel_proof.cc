@@ -122,6 +122,16 @@ std::optional<PixelCertificate> ProveLinear(const Model& model,
       BearingsOfPoints(model, built, x_hat, certificate), context);
 }
 
+void NameValues(StepValues* values, std::optional<PixelCertificate>* proof) {
+  values->Optional(proof, [&](PixelCertificate* p) {
+    values->Value(&p->lower_bound);
+    values->Value(&p->rows.lower_bound);
+    values->Value(&p->rows.defect);
+    values->OnFirst(&p->rows.observations);
+    values->OnFirst(&p->bearings);
+  });
+}
+
 // On this rank. `certificate` is null where its rows were not those of `built`
 // alone: then there is only the support.
 std::optional<PixelCertificate> ProveHere(const Model& model,
@@ -181,16 +191,23 @@ std::optional<PixelCertificate> ProveSharedRows(
 
 std::optional<PixelCertificate> ProveRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    Norm norm, const Certificate& certificate,
+    const SolveModelOptions& options, const Certificate& certificate,
     const std::vector<int64_t>& observation_of, double sufficient,
     const Context& context) {
-  if (context.ranks != nullptr) {
-    return ProveSharedRows(model, built, x_hat, norm, certificate,
-                           observation_of, sufficient, context);
-  }
-  return ProveHere(model, built, x_hat, norm,
-                   observation_of.empty() ? &certificate : nullptr,
-                   SupportOf(certificate, observation_of), sufficient, context);
+  std::optional<PixelCertificate> proof;
+  const auto prove = [&] {
+    proof =
+        context.ranks != nullptr
+            ? ProveSharedRows(model, built, x_hat, options.norm, certificate,
+                              observation_of, sufficient, context)
+            : ProveHere(model, built, x_hat, options.norm,
+                        observation_of.empty() ? &certificate : nullptr,
+                        SupportOf(certificate, observation_of), sufficient,
+                        context);
+  };
+  RunStep(options.checkpoint, context, prove,
+          [&](StepValues* values) { NameValues(values, &proof); });
+  return proof;
 }
 
 std::vector<int64_t> SupportOf(const Certificate& certificate,

@@ -9,6 +9,7 @@
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
+#include "krot/pipeline/solve_model.h"
 
 namespace krot {
 
@@ -32,10 +33,11 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
 // i is `observation_of[i]` of built.problem, -1: none; empty: i. Where rows do
 // not depend on where they are taken it is that certificate's own. Where ranks
 // share the points the first one has the result, in the numbers of the whole
-// (gathered_support.h), the others its lower bound.
+// (gathered_support.h), the others its lower bound. Of the options it takes
+// norm and checkpoint: it is a step.
 std::optional<PixelCertificate> ProveRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    Norm norm, const Certificate& certificate,
+    const SolveModelOptions& options, const Certificate& certificate,
     const std::vector<int64_t>& observation_of, double sufficient,
     const Context& context);
 

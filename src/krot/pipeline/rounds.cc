@@ -148,7 +148,7 @@ void Rounds::Prove() {
       positions_.Any()
           ? positions_.Prove(estimate_, SupportOf(certificate, observation_of_),
                              sufficient)
-          : ProveRows(model_, built_, estimate_, options_.norm, certificate,
+          : ProveRows(model_, built_, estimate_, options_, certificate,
                       observation_of_, sufficient, context_);
   if (proof &&
       (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {

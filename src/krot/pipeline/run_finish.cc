@@ -6,6 +6,7 @@
 
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/joint/step_values.h"
 #include "krot/pipeline/position_level.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
@@ -62,7 +63,16 @@ void FinishByLeastSquares(const Reprojection& reprojection,
     };
   }
   Estimate finished = *estimate;
-  finish.solve = MinimizeBounded(built->problem, bounded, context, &finished);
+  RunStep(
+      options.checkpoint, context,
+      [&] {
+        finish.solve =
+            MinimizeBounded(built->problem, bounded, context, &finished);
+      },
+      [&](StepValues* values) {
+        values->Value(&finish.solve);
+        NameValues(values, &finished);
+      });
   const double cost = context.Max(
       reprojection.TrueCost(finished, options.norm, context.num_threads));
   if (!(cost <= finish.cap) ||

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "krot/joint/step_values.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/cost.h"
@@ -89,10 +90,20 @@ class Schedule {
 void Schedule::Sweeps(ResIntOptions res_int) {
   res_int.norm = options_.norm;
   res_int.callback = [this](int, const Sweep& sweep) { AddSweep(sweep.cost); };
-  const ResIntSummary result =
-      SolveResInt(problem_, res_int, context_, &estimate_);
-  summary_.termination = FromResInt(result.termination);
-  cost_ = result.cost_final;
+  RunStep(
+      options_.checkpoint, context_,
+      [&] {
+        const ResIntSummary result =
+            SolveResInt(problem_, res_int, context_, &estimate_);
+        summary_.termination = FromResInt(result.termination);
+        cost_ = result.cost_final;
+      },
+      [&](StepValues* values) {
+        NameValues(values, &estimate_);
+        values->Value(&summary_.termination);
+        values->Value(&cost_);
+        values->Values(&summary_.sweeps);
+      });
 }
 
 void Schedule::LeadingSweeps() {
@@ -107,6 +118,7 @@ std::optional<Certificate> Schedule::Joint(KnownMultipliers* known) {
   JointOptions joint = options_.joint;
   joint.norm = options_.norm;
   joint.relative_gap *= kShareOfGap;
+  joint.checkpoint = options_.checkpoint;
   joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
   const JointSummary result =
       SolveJoint(problem_, joint, context_, &estimate_, known);

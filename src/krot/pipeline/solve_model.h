@@ -179,6 +179,9 @@ struct SolveModelOptions {
 
   FinishOptions finish;  // of kAuto
 
+  // Takes the place of that in the stages' own options; null: of none.
+  Checkpoint* checkpoint = nullptr;
+
   // Called once, with the counts filled in, before the solve; may be empty.
   std::function<void(const SolveSummary&)> on_built;
 };

@@ -7,6 +7,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/geometry/rigid_transform.h"
 #include "krot/joint/initializer.h"
+#include "krot/joint/step_values.h"
 
 namespace krot {
 namespace {
@@ -124,11 +125,26 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
   InitializerOptions initializer;
   initializer.norm = options.norm;
   initializer.max_error = options.init_max_error;
-  initializer.callback = log;
-  FoundStart start;
+  size_t num_logged = 0;
+  initializer.callback = [&](int iteration, const JointIteration& state) {
+    ++num_logged;
+    log(iteration, state);
+  };
   Estimate estimate;
-  InitializerSummary summary =
-      FindStart(problem, initializer, context, &estimate);
+  InitializerSummary summary;
+  RunStep(
+      options.checkpoint, context,
+      [&] { summary = FindStart(problem, initializer, context, &estimate); },
+      [&](StepValues* values) {
+        NameValues(values, &estimate);
+        values->Value(&summary.termination);
+        values->Values(&summary.iterations);
+        NameValues(values, &summary.certificate);
+      });
+  for (; num_logged < summary.iterations.size(); ++num_logged) {
+    log(static_cast<int>(num_logged) + 1, summary.iterations[num_logged]);
+  }
+  FoundStart start;
   switch (summary.termination) {
     case InitializerTermination::kFeasible:
       start.estimate = std::move(estimate);

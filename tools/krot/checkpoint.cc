@@ -1,0 +1,118 @@
+#include "tools/krot/checkpoint.h"
+
+#include <filesystem>
+#include <optional>
+
+#include "krot/bridge/model_digest.h"
+#include "krot/model/file_bytes.h"
+#include "krot/pipeline/checkpoint_file.h"
+#include "krot/report/text_table.h"
+#include "krot/version.h"
+#include "tools/krot/interrupt.h"
+
+namespace krot {
+namespace {
+
+// Ends the run, as an interrupt would, where it goes beyond the steps.
+class CheckpointAlone : public CheckpointFile {
+ public:
+  using CheckpointFile::CheckpointFile;
+
+  std::optional<std::string> Next() override {
+    std::optional<std::string> record = CheckpointFile::Next();
+    if (!record) Interrupt();
+    return record;
+  }
+};
+
+template <typename T>
+void AppendValues(const T& values, std::string* bytes) {
+  bytes->append(reinterpret_cast<const char*>(values.data()),
+                sizeof(values[0]) * static_cast<size_t>(values.size()));
+}
+
+// What a model's digest leaves out: where the solve starts.
+std::string StartDigest(const Model& model) {
+  std::string bytes;
+  for (const Frame& frame : model.frames) {
+    AppendValues(frame.rig_from_world.translation, &bytes);
+  }
+  for (const Point3D& point : model.points3D) AppendValues(point.xyz, &bytes);
+  return Sha256(bytes);
+}
+
+std::string FileDigest(const std::string& path) {
+  return path.empty() ? "none" : Sha256(ReadFileBytes(path).bytes);
+}
+
+// Of all that the result depends on.
+std::string RunDigest(const CheckpointOptions& options, const ModelPaths& paths,
+                      const Model& model) {
+  std::string text = "krot " KROT_VERSION "\n" + options.settings;
+  text += ModelSha256(model) + "\n" + StartDigest(model) + "\n";
+  for (const std::string* path :
+       {&paths.fixed_images_path, &paths.fixed_points_path,
+        &paths.positions_path, &paths.point_positions_path}) {
+    text += FileDigest(*path) + "\n";
+  }
+  return Sha256(text);
+}
+
+}  // namespace
+
+void AddCheckpointPath(CheckpointOptions* options, OptionParser* parser) {
+  parser->AddOutputFile(
+      "checkpoint_path", &options->path,
+      "Where the steps that are done are kept until the output is written: the "
+      "same command goes on from there if it was killed, to the same bits");
+}
+
+void AddCheckpointOnly(CheckpointOptions* options, OptionParser* parser) {
+  parser->AddBool("checkpoint_only", &options->is_all,
+                  "Write the best estimate of the checkpoint, and solve "
+                  "nothing beyond it");
+}
+
+void ResolveCheckpoint(const OptionParser& parser, CheckpointOptions* options) {
+  if (options->path.empty()) {
+    parser.Refuse("checkpoint_only", "without checkpoint_path");
+  }
+  for (const Option& option : parser.options()) {
+    const bool is_setting = option.name.find('.') != std::string::npos &&
+                            option.name != "Solver.num_threads";
+    if (!is_setting) continue;
+    options->settings += option.name + "=" + parser.Text(option.name) + "\n";
+  }
+}
+
+std::unique_ptr<Checkpoint> OpenCheckpoint(const CheckpointOptions& options,
+                                           const ModelPaths& paths,
+                                           const Model& model,
+                                           const Context& context,
+                                           const LogOptions& log) {
+  if (options.path.empty()) return nullptr;
+  if (context.ranks != nullptr && !context.ranks->IsFirst()) {
+    return std::make_unique<Checkpoint>();
+  }
+  const std::string run = RunDigest(options, paths, model);
+  std::unique_ptr<CheckpointFile> file;
+  if (options.is_all) {
+    file = std::make_unique<CheckpointAlone>(options.path, run);
+  } else {
+    file = std::make_unique<CheckpointFile>(options.path, run);
+  }
+  if (file->num_steps() > 0) {
+    LogLine(log, 1,
+            options.path + ": going on behind " +
+                Counted(file->num_steps(), "step") + " of an earlier run");
+  }
+  return file;
+}
+
+void RemoveCheckpoint(const CheckpointOptions& options) {
+  if (options.path.empty()) return;
+  std::error_code ignored;
+  std::filesystem::remove(options.path, ignored);
+}
+
+}  // namespace krot
