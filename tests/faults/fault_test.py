@@ -70,6 +70,8 @@ def test_kind(injector, kind, limit, dice):
     for fault in faults:
         result, has_struck, _ = injector.run(fault)
         complaints = injector.place.judge(result, KINDS[kind])
+        if injector.place.command.checkpoint:
+            complaints += injector.place.judge_again()
         if not has_struck:
             complaints.append("it did not strike")
         num_refused += result.returncode > 0

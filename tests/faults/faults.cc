@@ -228,6 +228,13 @@ ssize_t read(int file, void* bytes, size_t count) {
   return allowed == 0 && count > 0 ? -1 : next(file, bytes, allowed);
 }
 
+ssize_t pread(int file, void* bytes, size_t count, off_t offset) {
+  static const auto next =
+      Next<ssize_t (*)(int, void*, size_t, off_t)>("pread");
+  const size_t allowed = Allowed(kRead, "pread", count);
+  return allowed == 0 && count > 0 ? -1 : next(file, bytes, allowed, offset);
+}
+
 KROT_FAULT_FUNCTION(kList, struct dirent*, nullptr, readdir, (DIR * folder),
                     (folder))
 
@@ -235,6 +242,13 @@ ssize_t write(int file, const void* bytes, size_t count) {
   static const auto next = Next<ssize_t (*)(int, const void*, size_t)>("write");
   const size_t allowed = IsFile(file) ? Allowed(kWrite, "write", count) : count;
   return allowed == 0 && count > 0 ? -1 : next(file, bytes, allowed);
+}
+
+ssize_t pwrite(int file, const void* bytes, size_t count, off_t offset) {
+  static const auto next =
+      Next<ssize_t (*)(int, const void*, size_t, off_t)>("pwrite");
+  const size_t allowed = Allowed(kWrite, "pwrite", count);
+  return allowed == 0 && count > 0 ? -1 : next(file, bytes, allowed, offset);
 }
 
 ssize_t sendfile(int out, int in, off_t* offset, size_t count) {

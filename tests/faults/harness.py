@@ -28,10 +28,12 @@ class Command:
     folders: tuple = ()  # that it replaces
     files: tuple = ()  # that it writes beside them
     format: str = "BIN"
+    checkpoint: str = ""  # a file that lasts until the output is written
 
     @property
     def title(self):
-        return self.name + (", text" if self.format == "TXT" else "")
+        return (self.name + (", text" if self.format == "TXT" else "") +
+                (", checkpoint" if self.checkpoint else ""))
 
 
 SOLVED = ["--input_path", "@input", "--output_path", "@out", "--overwrite", "1"]
@@ -42,6 +44,8 @@ COMMANDS = [
             ("out",), ("report.json", "page.html", "proof.json")),
     Command("solver", SOLVED + ["--report_path", "@report.json"],
             ("out",), ("report.json",), "TXT"),
+    Command("solver", SOLVED + ["--checkpoint_path", "@steps"],
+            ("out",), checkpoint="steps"),
     Command("point_triangulator", SOLVED + ["--report_path", "@report.json"],
             ("out",), ("report.json",)),
     Command("bundle_adjuster", SOLVED + ["--report_path", "@report.json"],
@@ -205,10 +209,23 @@ class Place:
         changed = {name.split("/")[0] for name in {**found, **self.old}
                    if name not in found or name not in self.old or
                    found[name] != self.old[name]}
+        if result.returncode != 0:
+            changed.discard(command.checkpoint)
         for name in sorted(changed.difference(command.folders, command.files)):
             if not (LEFTOVER.match(name) and
                     (is_killed or name in result.stderr)):
                 wrong.append(f"{name} is left or changed")
+        return wrong
+
+    def judge_again(self):
+        """What is wrong with what another run makes of what one has left."""
+        result = self.run()
+        if result.returncode != 0:
+            return [f"the run after it: {result.stderr}"]
+        found = state(self.folder, self.command.folders)
+        wrong = [] if found == self.new else ["the run after it ends otherwise"]
+        if self.command.checkpoint in state(self.folder):
+            wrong.append("the run after it leaves its checkpoint")
         return wrong
 
     def _is_set_aside(self, name, old):

@@ -52,9 +52,7 @@ def kill(place, count, dice):
                                    dice.uniform(0, seconds))
         num_killed += result.returncode < 0
         wrong += place.judge(result, (0, -signal.SIGKILL))
-        again = place.run()
-        if again.returncode != 0:
-            wrong.append(f"the run after it: {again.stderr}")
+        wrong += place.judge_again()
     return num_killed, wrong
 
 

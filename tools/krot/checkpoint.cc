@@ -75,7 +75,7 @@ void AddCheckpointOnly(CheckpointOptions* options, OptionParser* parser) {
 
 void ResolveCheckpoint(const OptionParser& parser, CheckpointOptions* options) {
   if (options->path.empty()) {
-    parser.Refuse("checkpoint_only", "without checkpoint_path");
+    parser.Refuse("checkpoint_only", "without --checkpoint_path");
   }
   for (const Option& option : parser.options()) {
     const bool is_setting = option.name.find('.') != std::string::npos &&
@@ -109,10 +109,14 @@ std::unique_ptr<Checkpoint> OpenCheckpoint(const CheckpointOptions& options,
   return file;
 }
 
-void RemoveCheckpoint(const CheckpointOptions& options) {
+void RemoveCheckpoint(const CheckpointOptions& options, const LogOptions& log) {
+  std::error_code error;
   if (options.path.empty()) return;
-  std::error_code ignored;
-  std::filesystem::remove(options.path, ignored);
+  std::filesystem::remove(options.path, error);
+  if (!error) return;
+  LogLine(
+      log, 0,
+      "warning: " + options.path + " cannot be removed: " + error.message());
 }
 
 }  // namespace krot

@@ -32,7 +32,7 @@ std::unique_ptr<Checkpoint> OpenCheckpoint(const CheckpointOptions& options,
                                            const Context& context,
                                            const LogOptions& log);
 
-// Once all is written.
-void RemoveCheckpoint(const CheckpointOptions& options);
+// Once all is written. Says what is left.
+void RemoveCheckpoint(const CheckpointOptions& options, const LogOptions& log);
 
 }  // namespace krot

@@ -267,7 +267,7 @@ int RunSolveCommand(const SolveCommand& command) {
                solved, command.context.num_threads, log);
   PrintTable(log, SolveTable(report));
   if (context.IsCancelled()) ThrowInterrupted(paths);
-  RemoveCheckpoint(command.checkpoint);
+  RemoveCheckpoint(command.checkpoint, log);
   WarnOfMissedGap(command, report.summary);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;
   return is_copy ? kExitGivenBack : kExitDone;

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "krot/base/checkpoint.h"
 #include "krot/base/file_descriptor.h"
@@ -29,8 +31,9 @@ class CheckpointFile : public Checkpoint {
   void Append(const std::string& record) override;
 
  private:
+  std::string ReadAt(int64_t offset, size_t size) const;
   std::optional<std::string> ReadRecord();
-  void WriteBehind(const std::string& bytes);
+  void WriteBehind(std::initializer_list<std::string_view> parts);
 
   const std::string name_;
   FileDescriptor descriptor_;
