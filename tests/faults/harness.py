@@ -210,10 +210,10 @@ class Place:
                    if name not in found or name not in self.old or
                    found[name] != self.old[name]}
         if result.returncode != 0:
-            changed.discard(command.checkpoint)
+            changed.discard(command.checkpoint)  # the next run goes on with it
         for name in sorted(changed.difference(command.folders, command.files)):
-            if not (LEFTOVER.match(name) and
-                    (is_killed or name in result.stderr)):
+            may_be_left = LEFTOVER.match(name) or name == command.checkpoint
+            if not (may_be_left and (is_killed or name in result.stderr)):
                 wrong.append(f"{name} is left or changed")
         return wrong
 
