@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/base/timer.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
@@ -46,6 +47,17 @@ struct MpiResult {
 
 class KrotMpi : public ::testing::Test {
  protected:
+  // What kills a rank of the run that it is the prefix of: its own process is
+  // found by its environment's name for it.
+  std::string KillLater(double seconds, int rank) const {
+    return "(sleep " + std::to_string(seconds) + "; for p in $(pgrep -f -- '" +
+           (folder_ / "out").string() +
+           "'); do tr '\\0' '\\n' < /proc/$p/environ 2> /dev/null | grep -q "
+           "'^OMPI_COMM_WORLD_RANK=" +
+           std::to_string(rank) +
+           "$' && kill -9 $p; done) & trap \"kill $! 2> /dev/null\" EXIT;";
+  }
+
   // In a shell, so that `prefix` may end it early.
   MpiResult Run(int count, const std::string& arguments,
                 const std::string& prefix = "") const {
@@ -131,7 +143,9 @@ TEST_F(KrotMpi, KilledLeavesTheOldModelOrTheNewAndGoesOn) {
   const char* kills = std::getenv("KROT_KILLS");
   const int num_kills = kills == nullptr ? 10 : std::atoi(kills);
   SceneOptions scene = SmallScene();
-  scene.num_points = 3000;
+  scene.layout = SceneLayout::kStreet;
+  scene.num_frames = 40;
+  scene.num_points = 10000;
   const Model old_model = SynthesizeScene(SmallScene()).model;
   Save(SynthesizeScene(scene).model, folder_ / "in");
   ExpectSameFiles(folder_ / "in", {2});
@@ -143,22 +157,18 @@ TEST_F(KrotMpi, KilledLeavesTheOldModelOrTheNewAndGoesOn) {
       "solver --overwrite 1 --input_path " + (folder_ / "in").string() +
       " --output_path " + (folder_ / "out").string() + " --checkpoint_path " +
       (folder_ / "steps").string();
+  const Timer timer;
+  ASSERT_EQ(Run(3, arguments).exit_code, 0);
+  const double undisturbed = timer.Seconds();
   int num_killed = 0;
   int num_gone_on = 0;
   for (int n = 0; n < num_kills; ++n) {
     fs::remove_all(folder_ / "out");
     Save(old_model, folder_ / "out");
     const double seconds =
-        std::uniform_real_distribution<double>(0.2, 2.0)(random);
-    const std::string rank = std::to_string(random() % 3);
-    // The rank's own process is found by its environment's name for it.
-    const MpiResult killed = Run(
-        3, arguments,
-        "(sleep " + std::to_string(seconds) + "; for p in $(pgrep -f -- '" +
-            (folder_ / "out").string() +
-            "'); do tr '\\0' '\\n' < /proc/$p/environ 2> /dev/null | grep -q "
-            "'^OMPI_COMM_WORLD_RANK=" +
-            rank + "$' && kill -9 $p; done) & ");
+        std::uniform_real_distribution<double>(0.1, 1)(random) * undisturbed;
+    const MpiResult killed =
+        Run(3, arguments, KillLater(seconds, static_cast<int>(random() % 3)));
     const std::string bytes = BytesOfModel(folder_ / "out");
     EXPECT_TRUE(bytes == old || bytes == whole) << seconds << " s";
     num_killed += killed.exit_code != 0;
