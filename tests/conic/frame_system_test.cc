@@ -1,5 +1,6 @@
 #include "krot/conic/frame_system.h"
 
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -83,6 +84,54 @@ VectorXd RandomVector(int64_t size) {
   VectorXd x(size);
   for (double& entry : x) entry = normal(generator);
   return x;
+}
+
+// Points of two to four frames by chance, some of them twice in a frame.
+BlockStructure MakeRandomStructure(unsigned num_frames, unsigned seed) {
+  std::mt19937 random(seed);
+  BlockStructure structure;
+  structure.point_begin = {0};
+  for (unsigned k = 0; k < 2 * num_frames; ++k) {
+    for (auto n = 2 + random() % 3; n > 0; --n) {
+      structure.frame_of.push_back(static_cast<int32_t>(random() % num_frames));
+    }
+    structure.point_begin.push_back(
+        static_cast<int64_t>(structure.frame_of.size()));
+  }
+  structure.frame_is_fixed.assign(num_frames, 0);
+  structure.frame_is_fixed[3] = structure.frame_is_fixed[8] = 1;
+  return structure;
+}
+
+TEST(FramePattern, HasEveryPairOfFreeFramesThatSharesAPoint) {
+  constexpr int kFrames = 12;
+  const BlockStructure structure = MakeRandomStructure(kFrames, 1);
+  std::vector<int> free;
+  for (int f = 0; f < kFrames; ++f) {
+    if (structure.frame_is_fixed[f] == 0) free.push_back(f);
+  }
+  const auto sees = [&](int f, int64_t k) {
+    const auto begin = structure.frame_of.begin();
+    return std::count(begin + structure.point_begin[k],
+                      begin + structure.point_begin[k + 1], f) > 0;
+  };
+  FramePattern expected(free.size());
+  int64_t num_pairs = 0;
+  for (size_t a = 0; a < free.size(); ++a) {
+    for (size_t b = a; b < free.size(); ++b) {
+      bool do_share = a == b;
+      for (int64_t k = 0; k < structure.num_points(); ++k) {
+        do_share |= sees(free[a], k) && sees(free[b], k);
+      }
+      if (!do_share) continue;
+      expected[a].push_back(static_cast<int32_t>(b));
+      ++num_pairs;
+    }
+  }
+  const FramePattern pattern = FindFramePattern(structure);
+  EXPECT_EQ(pattern, expected);
+  EXPECT_DOUBLE_EQ(ShareOfPairs(pattern, nullptr),
+                   static_cast<double>(num_pairs) / 50);  // of 10 x 10 / 2
 }
 
 TEST(FrameSystem, NumbersTheColumnsOfFreeFrames) {

@@ -52,7 +52,7 @@ TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
   SolveModelOptions solve;
   solve.norm = norm;
   const std::optional<PixelCertificate> proof = ProveRows(
-      model, built, estimate, solve, *search.best(), {}, sufficient, {});
+      model, built, estimate, solve, {*search.best(), {}}, sufficient, {});
   ASSERT_TRUE(proof);
   const PixelCertificateCheck check =
       CheckPixelCertificate(model, built, norm, *proof, {});

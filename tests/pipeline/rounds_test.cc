@@ -118,6 +118,23 @@ TEST(SolveInRounds, IsOneRoundForPinholes) {
   EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
 }
 
+// An earlier round's rows have told how low it can get.
+TEST(SolveInRounds, SolveNoRowsOnceSweepsHaveReachedAnEarlierBound) {
+  SolveModelOptions options;
+  options.joint.relative_gap = 1e-2;
+  options.finish.finish = Finish::kNone;
+  int num_by_sweeps = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const SolveSummary summary =
+        SolveModel(DisturbedModel(seed), options, {}).summary;
+    ExpectNoRise(summary);
+    EXPECT_TRUE(summary.is_certified);
+    EXPECT_LE(*summary.relative_gap, options.joint.relative_gap);
+    num_by_sweeps += !summary.rounds.back().linear_lower_bound.has_value();
+  }
+  EXPECT_GE(num_by_sweeps, 1);
+}
+
 TEST(SolveInRounds, LeavesTheRowsOfItsLastEstimate) {
   const Model model = DisturbedModel(1);
   BuiltProblem built = BuildProblem(model, {});

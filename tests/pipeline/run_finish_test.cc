@@ -74,6 +74,19 @@ TEST(RunFinish, LeavesAModelThatItMadeNoWorse) {
               1e-3 * once.summary.pixel_error_after.rms);
 }
 
+TEST(RunFinish, HasRoomAboveAMaximumThatIsKnownToACoarseGap) {
+  SolveModelOptions options = With(Finish::kNone);
+  options.joint.relative_gap = 1e-2;
+  const SolveModelResult lowest = SolveModel(NoisyModel(4), options);
+  ASSERT_GT(*lowest.summary.relative_gap, options.finish.slack);
+  options.finish.finish = Finish::kLeastSquares;
+  const SolveModelResult finished = SolveModel(NoisyModel(4), options);
+  EXPECT_LE(finished.summary.cost_final,
+            (1 + options.finish.slack) * lowest.summary.cost_final);
+  EXPECT_LT(finished.summary.pixel_error_after.rms,
+            0.99 * lowest.summary.pixel_error_after.rms);
+}
+
 TEST(RunFinish, UsesTheRoomThatACapLeavesAboveTheStart) {
   const SolveModelResult once = SolveModel(NoisyModel(4), {});
   SolveModelOptions options;

@@ -1,7 +1,6 @@
 #include "krot/conic/frame_system.h"
 
 #include <algorithm>
-#include <functional>
 #include <limits>
 
 #include "krot/base/parallel_for.h"
@@ -24,33 +23,11 @@ constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;
 
-void SortAndUnite(std::vector<int32_t>* list) {
-  std::sort(list->begin(), list->end());
-  list->erase(std::unique(list->begin(), list->end()), list->end());
-}
-
 // Of a column, what stands in blocks of the lower triangle: nothing else is
 // written.
 template <typename Matrix>
 auto LowerBlocks(int64_t column, Matrix* matrix) {
   return matrix->col(column).tail(matrix->rows() - column / 3 * 3);
-}
-
-// The rows of blocks that the points of any rank have, per column.
-void Unite(Ranks* ranks, std::vector<std::vector<int32_t>>* rows) {
-  std::vector<int32_t> blocks;  // column and row in turn
-  for (size_t column = 0; column < rows->size(); ++column) {
-    for (const int32_t row : (*rows)[column]) {
-      blocks.push_back(static_cast<int32_t>(column));
-      blocks.push_back(row);
-    }
-    (*rows)[column].clear();
-  }
-  blocks = ranks->Gather(blocks);
-  for (size_t n = 0; n < blocks.size(); n += 2) {
-    (*rows)[blocks[n]].push_back(blocks[n + 1]);
-  }
-  for (std::vector<int32_t>& list : *rows) SortAndUnite(&list);
 }
 
 }  // namespace
@@ -65,9 +42,13 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   num_columns_ = 3 * num_free;
   num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
   if (num_free > kAlwaysDenseFrames) {
+    FramePattern pattern = FindFramePattern(structure);
     is_dense_ = num_free <= kMaxDenseFrames &&
-                ShareOfBlocks(structure, ranks) > kSparseShare;
-    if (!is_dense_) FindPattern(structure, ranks);
+                ShareOfPairs(pattern, ranks) > kSparseShare;
+    if (!is_dense_) {
+      UniteOverRanks(ranks, &pattern);
+      TakePattern(pattern);
+    }
   }
   if (is_dense_) {
     dense_.resize(num_parts_);
@@ -76,61 +57,10 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   }
 }
 
-// Where a point's frames have blocks, in frames that are free: rows and columns
-// of the lower triangle.
-template <typename Function>
-void FrameSystem::ForBlocksOfPoint(const BlockStructure& structure, int64_t k,
-                                   const Function& function) const {
-  for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
-       ++i) {
-    const int32_t a = column(structure.frame_of[i]);
-    if (a < 0) continue;
-    for (int64_t j = structure.point_begin[k]; j < structure.point_begin[k + 1];
-         ++j) {
-      const int32_t b = column(structure.frame_of[j]);
-      if (b >= 0 && a >= b) function(a / 3, b / 3);
-    }
-  }
-}
-
-// Of the pairs of frames, those that the points of any rank have.
-double FrameSystem::ShareOfBlocks(const BlockStructure& structure,
-                                  Ranks* ranks) const {
-  const int64_t num_free = num_columns_ / 3;
-  std::vector<char> is_there(num_free * num_free, 0);
-  for (int64_t k = 0; k < structure.num_points(); ++k) {
-    ForBlocksOfPoint(structure, k, [&](int32_t row, int32_t column) {
-      is_there[row * num_free + column] = 1;
-    });
-  }
-  if (ranks != nullptr) ranks->Reduce(std::bit_or<char>(), &is_there);
-  for (int64_t f = 0; f < num_free; ++f) is_there[f * (num_free + 1)] = 1;
-  return static_cast<double>(
-             std::count(is_there.begin(), is_there.end(), char{1})) /
-         (0.5 * static_cast<double>(num_free * num_free));
-}
-
-void FrameSystem::FindPattern(const BlockStructure& structure, Ranks* ranks) {
-  std::vector<std::vector<int32_t>> rows(num_columns_ / 3);
-  for (int64_t k = 0; k < structure.num_points(); ++k) {
-    ForBlocksOfPoint(structure, k, [&](int32_t row, int32_t column) {
-      rows[column].push_back(row);
-    });
-    // Keep the lists short while they grow.
-    if (k % 4096 == 4095 || k + 1 == structure.num_points()) {
-      for (std::vector<int32_t>& list : rows) SortAndUnite(&list);
-    }
-  }
-  if (ranks != nullptr) Unite(ranks, &rows);
+void FrameSystem::TakePattern(const FramePattern& pattern) {
   block_begin_.assign(1, 0);
-  for (size_t column = 0; column < rows.size(); ++column) {
-    // Every diagonal block exists, observed or not.
-    if (rows[column].empty() ||
-        rows[column].front() != static_cast<int32_t>(column)) {
-      rows[column].insert(rows[column].begin(), static_cast<int32_t>(column));
-    }
-    block_row_.insert(block_row_.end(), rows[column].begin(),
-                      rows[column].end());
+  for (const std::vector<int32_t>& rows : pattern) {
+    block_row_.insert(block_row_.end(), rows.begin(), rows.end());
     block_begin_.push_back(static_cast<int64_t>(block_row_.size()));
   }
 }

@@ -10,6 +10,7 @@
 #include "krot/base/ranks.h"
 #include "krot/conic/block_structure.h"
 #include "krot/conic/dense_cholesky.h"
+#include "krot/conic/frame_pattern.h"
 
 namespace krot {
 
@@ -64,11 +65,7 @@ class FrameSystem {
     int64_t stride;
   };
 
-  template <typename Function>
-  void ForBlocksOfPoint(const BlockStructure& structure, int64_t k,
-                        const Function& function) const;
-  double ShareOfBlocks(const BlockStructure& structure, Ranks* ranks) const;
-  void FindPattern(const BlockStructure& structure, Ranks* ranks);
+  void TakePattern(const FramePattern& pattern);
   Block BlockOf(int part, int32_t a, int32_t b);
 
   bool is_dense_ = true;

@@ -8,6 +8,7 @@
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/joint/joint.h"
+#include "krot/joint/step_values.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_search.h"
 
@@ -153,18 +154,16 @@ std::optional<PixelCertificate> ProveHere(const Model& model,
 
 std::optional<PixelCertificate> ProveSharedRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    Norm norm, const Certificate& certificate,
-    const std::vector<int64_t>& observation_of, double sufficient,
+    Norm norm, const RowsCertificate& rows, double sufficient,
     const Context& context) {
   Ranks& ranks = *context.ranks;
   const Context here = context.Alone();
-  const size_t num_rows = built.problem.observations.size();
+  const std::vector<int64_t>& observation_of = rows.observation_of;
+  const auto num_rows = static_cast<int64_t>(
+      observation_of.empty() ? built.problem.observations.size()
+                             : observation_of.size());
   std::vector<int64_t> own;
-  for (const int64_t i : OwnSupport(
-           certificate,
-           static_cast<int64_t>(observation_of.empty() ? num_rows
-                                                       : observation_of.size()),
-           &ranks)) {
+  for (const int64_t i : OwnSupport(rows.certificate, num_rows, &ranks)) {
     const int64_t row = observation_of.empty() ? i : observation_of[i];
     if (row >= 0) own.push_back(row);
   }
@@ -173,7 +172,9 @@ std::optional<PixelCertificate> ProveSharedRows(
   std::optional<PixelCertificate> proof;
   if (ranks.IsFirst()) {
     std::optional<Certificate> of_built;
-    if (observation_of.empty()) of_built = gathered.FromWhole(certificate);
+    if (observation_of.empty()) {
+      of_built = gathered.FromWhole(rows.certificate);
+    }
     proof = ProveHere(gathered.model, gathered.built, gathered.estimate, norm,
                       of_built ? &*of_built : nullptr, gathered.observations,
                       sufficient, here);
@@ -191,31 +192,31 @@ std::optional<PixelCertificate> ProveSharedRows(
 
 std::optional<PixelCertificate> ProveRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    const SolveModelOptions& options, const Certificate& certificate,
-    const std::vector<int64_t>& observation_of, double sufficient,
-    const Context& context) {
+    const SolveModelOptions& options, const RowsCertificate& rows,
+    double sufficient, const Context& context) {
   std::optional<PixelCertificate> proof;
   const auto prove = [&] {
-    proof =
-        context.ranks != nullptr
-            ? ProveSharedRows(model, built, x_hat, options.norm, certificate,
-                              observation_of, sufficient, context)
-            : ProveHere(model, built, x_hat, options.norm,
-                        observation_of.empty() ? &certificate : nullptr,
-                        SupportOf(certificate, observation_of), sufficient,
-                        context);
+    if (context.ranks != nullptr) {
+      proof = ProveSharedRows(model, built, x_hat, options.norm, rows,
+                              sufficient, context);
+    } else {
+      proof =
+          ProveHere(model, built, x_hat, options.norm,
+                    rows.observation_of.empty() ? &rows.certificate : nullptr,
+                    SupportOf(rows), sufficient, context);
+    }
   };
   RunStep(options.checkpoint, context, prove,
           [&](StepValues* values) { NameValues(values, &proof); });
   return proof;
 }
 
-std::vector<int64_t> SupportOf(const Certificate& certificate,
-                               const std::vector<int64_t>& observation_of) {
+std::vector<int64_t> SupportOf(const RowsCertificate& rows) {
   std::vector<int64_t> support;
-  for (const CertifiedObservation& o : certificate.observations) {
-    const int64_t i =
-        observation_of.empty() ? o.observation : observation_of[o.observation];
+  for (const CertifiedObservation& o : rows.certificate.observations) {
+    const int64_t i = rows.observation_of.empty()
+                          ? o.observation
+                          : rows.observation_of[o.observation];
     if (i >= 0) support.push_back(i);
   }
   return support;

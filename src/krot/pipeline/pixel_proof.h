@@ -9,6 +9,7 @@
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/minimax/norm.h"
 #include "krot/model/model.h"
+#include "krot/pipeline/round_bounds.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {
@@ -29,21 +30,18 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               double sufficient,
                                               const Context& context);
 
-// The same from a certificate of the problem that was solved, whose observation
-// i is `observation_of[i]` of built.problem, -1: none; empty: i. Where rows do
-// not depend on where they are taken it is that certificate's own. Where ranks
+// The same from a certificate of the rows that were solved. Where rows do not
+// depend on where they are taken it is that certificate's own. Where ranks
 // share the points the first one has the result, in the numbers of the whole
 // (gathered_support.h), the others its lower bound. Of the options it takes
 // norm and checkpoint: it is a step.
 std::optional<PixelCertificate> ProveRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
-    const SolveModelOptions& options, const Certificate& certificate,
-    const std::vector<int64_t>& observation_of, double sufficient,
-    const Context& context);
+    const SolveModelOptions& options, const RowsCertificate& rows,
+    double sufficient, const Context& context);
 
-// The observations of a certificate, by what they are called: `observation_of`,
-// or as they are if that is empty. Those that are -1 there are left out.
-std::vector<int64_t> SupportOf(const Certificate& certificate,
-                               const std::vector<int64_t>& observation_of);
+// The observations of a certificate, by what they are called in the whole;
+// those that are not there are left out.
+std::vector<int64_t> SupportOf(const RowsCertificate& rows);
 
 }  // namespace krot

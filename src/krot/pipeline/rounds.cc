@@ -9,6 +9,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/pipeline/kept_positions.h"
 #include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/round_bounds.h"
 #include "krot/pipeline/schedule.h"
 #include "krot/pipeline/segment.h"
 #include "krot/pipeline/trust_regions.h"
@@ -25,11 +26,6 @@ constexpr double kStationary = 1e-6;
 constexpr int kPatience = 3;
 // What the rows' cost may be exceeded by for a linear promise to be kept.
 constexpr double kKeptPromise = 1e-5;
-// In gaps.
-constexpr double kWorthProving = 3;
-// Of the gap asked for, what a proof may leave that is sufficient: the rest is
-// for roundings behind it.
-constexpr double kProofShare = 0.95;
 // Rows that have lowered the true cost to this share, and whose own is such a
 // share of that, are taken anew before they are solved.
 constexpr double kFarFromRows = 0.5;
@@ -52,15 +48,16 @@ class Rounds {
         estimate_(*estimate),
         summary_(*summary),
         positions_(model, options_, context_, reprojection_, estimate_, built),
-        cost_(LevelledCost(estimate_)) {
+        cost_(LevelledCost(estimate_)),
+        bounds_(options.joint.relative_gap) {
     if (positions_.Any()) {
       rows_options_.joint.relative_gap *= kShareWithPositions;
     }
   }
 
   void Run();
-  std::optional<PixelCertificate> certificate() && {
-    return std::move(certificate_);
+  const std::optional<PixelCertificate>& certificate() const {
+    return bounds_.proof();
   }
 
  private:
@@ -84,18 +81,7 @@ class Rounds {
   double ReachedCost() const {
     return positions_.Any() ? positions_.cost() : cost_;
   }
-  bool IsGapReached() const {
-    return certificate_ && std::isfinite(ReachedCost()) &&
-           ReachedCost() - certificate_->lower_bound <=
-               options_.joint.relative_gap * ReachedCost();
-  }
-  // Whether the true cost is so near to what is proved of the rows that its own
-  // proof may reach the gap.
-  bool IsWorthProving() const {
-    return rows_certificate_ &&
-           cost_ - rows_certificate_->lower_bound <=
-               kWorthProving * options_.joint.relative_gap * cost_;
-  }
+  bool IsGapReached() const { return bounds_.IsGapReached(ReachedCost()); }
   bool IsRefuted() const {
     return summary_.termination == SolveTermination::kInfeasible;
   }
@@ -109,7 +95,7 @@ class Rounds {
            (summary_.termination == SolveTermination::kMaxSweeps &&
             options_.res_int.update_frames);
   }
-  bool HaveRowsServed(const Estimate& swept, double linear_cost) const;
+  bool HaveRowsServed(const Estimate& swept, double linear_cost);
   bool RunOne();
   void Prove();
   bool TakeLevel(double optimum);
@@ -128,44 +114,35 @@ class Rounds {
   double cost_;  // true, pixels, or by the level of positions if that is more
   TrustRegions trust_;
   int num_idle_rounds_ = 0;
-  // Of the last round: the rows' certificate, and what its observations are
-  // called among the rows, or -1; empty: the same.
-  std::optional<Certificate> rows_certificate_;
-  std::vector<int64_t> observation_of_;
+  RoundBounds bounds_;
+  // Whether, in this round, sweeps alone came as near to a bound of an earlier
+  // one as is asked for.
+  bool is_bound_near_ = false;
   // Of the last round without bounds.
   KnownMultipliers known_multipliers_;
-  std::optional<PixelCertificate> certificate_;
 };
 
 // From the last round's certificate of the rows, which is used up.
 void Rounds::Prove() {
-  if (!rows_certificate_) return;
-  const Certificate certificate =
-      *std::exchange(rows_certificate_, std::nullopt);
-  const double sufficient =
-      (1 - kProofShare * options_.joint.relative_gap) * cost_;
-  std::optional<PixelCertificate> proof =
+  const std::optional<RowsCertificate> rows = bounds_.UseRows();
+  if (!rows) return;
+  const double sufficient = bounds_.Sufficient(cost_);
+  bounds_.Improve(
       positions_.Any()
-          ? positions_.Prove(estimate_, SupportOf(certificate, observation_of_),
-                             sufficient)
-          : ProveRows(model_, built_, estimate_, options_, certificate,
-                      observation_of_, sufficient, context_);
-  if (proof &&
-      (!certificate_ || proof->lower_bound > certificate_->lower_bound)) {
-    certificate_ = std::move(proof);
-  }
+          ? positions_.Prove(estimate_, SupportOf(*rows), sufficient)
+          : ProveRows(model_, built_, estimate_, options_, *rows, sufficient,
+                      context_));
 }
 
 // Where positions are known: whether the next round has another level, or it is
 // proved that there need not be any.
 bool Rounds::TakeLevel(double optimum) {
   positions_.Keep(estimate_);
-  if (rows_certificate_) {
+  if (const auto& rows = bounds_.rows()) {
     std::optional<PixelCertificate> refutation =
-        positions_.Refute(estimate_, *rows_certificate_,
-                          SupportOf(*rows_certificate_, observation_of_));
+        positions_.Refute(estimate_, rows->certificate, SupportOf(*rows));
     if (refutation) {
-      certificate_ = std::move(refutation);
+      bounds_.SetProof(std::move(refutation));
       summary_.termination = SolveTermination::kInfeasible;
       return false;
     }
@@ -175,29 +152,32 @@ bool Rounds::TakeLevel(double optimum) {
   return is_another;
 }
 
-// Whether sweeps came so far that the rows no longer say what is left to gain:
-// solving them would be in vain.
-bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) const {
+// Whether sweeps came so far that solving the rows would be in vain: they no
+// longer say what is left to gain, or there is nothing left.
+bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) {
   if (reprojection_.IsLinear() || positions_.Any()) return false;
   const double cost = TrueCost(swept);
-  return cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost;
+  is_bound_near_ = bounds_.IsNear(cost);
+  return is_bound_near_ ||
+         (cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost);
 }
 
 // Whether another round may lower the cost.
 bool Rounds::RunOne() {
   const KnownRotationProblem& rows = built_.problem;
   std::optional<KnownRotationProblem> bounded;
-  observation_of_.clear();
+  std::vector<int64_t> observation_of;
   const bool is_bounded = context_.Any(!trust_.IsEmpty());
   if (is_bounded) {
-    bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of_);
+    bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
   }
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
   if (!std::isfinite(RowsCost(problem, estimate_))) {
     return false;  // a depth is rounding alone
   }
   Estimate solved = estimate_;
-  rows_certificate_ = SolveRows(
+  is_bound_near_ = false;
+  std::optional<Certificate> of_these = SolveRows(
       problem, rows_options_, method_, summary_.rounds.empty(),
       [this](const Estimate& swept, double linear_cost) {
         return HaveRowsServed(swept, linear_cost);
@@ -210,8 +190,14 @@ bool Rounds::RunOne() {
 
   Round round;
   round.linear_cost = RowsCost(rows, solved);
-  if (rows_certificate_ && !is_bounded) {
-    round.linear_lower_bound = rows_certificate_->lower_bound;
+  if (of_these && !is_bounded) {
+    round.linear_lower_bound = of_these->lower_bound;
+  }
+  if (!is_bound_near_) {
+    bounds_.SetRows(of_these
+                        ? std::optional(RowsCertificate{
+                              *std::move(of_these), std::move(observation_of)})
+                        : std::nullopt);
   }
   const double before = cost_;
   Estimate from = std::exchange(estimate_, Estimate());
@@ -234,10 +220,10 @@ bool Rounds::RunOne() {
   }
   reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
   const bool has_level = positions_.Any() && TakeLevel(round.linear_cost);
-  if (!has_level && !IsRefuted() && IsWorthProving()) Prove();
+  if (!has_level && !IsRefuted() && bounds_.IsWorthProving(cost_)) Prove();
 
   round.cost = PixelCost();
-  if (certificate_) round.lower_bound = certificate_->lower_bound;
+  if (certificate()) round.lower_bound = certificate()->lower_bound;
   round.seconds = timer_.Seconds();
   summary_.rounds.push_back(round);
   // The published algorithms know one linear problem.
@@ -247,7 +233,7 @@ bool Rounds::RunOne() {
       IsInterrupted() || IsGapReached() || IsZeroUpToRounding(cost_)) {
     return false;
   }
-  if (has_level) return true;
+  if (has_level || is_bound_near_) return true;
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
   num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
   if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};
@@ -266,7 +252,7 @@ void Rounds::Run() {
   while (RunOne() && summary_.rounds.size() < kMaxRounds) {
   }
   if (IsRefuted()) return;
-  if (!certificate_ && !IsInterrupted()) Prove();
+  if (!certificate() && !IsInterrupted()) Prove();
   if (std::isfinite(positions_.cost())) {
     estimate_ = positions_.estimate();
     reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
@@ -293,7 +279,7 @@ std::optional<PixelCertificate> SolveInRounds(
   Rounds rounds(model, options, method, context, timer, built, estimate,
                 summary);
   rounds.Run();
-  return std::move(rounds).certificate();
+  return rounds.certificate();
 }
 
 }  // namespace krot

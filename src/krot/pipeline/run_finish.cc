@@ -16,6 +16,8 @@ namespace {
 
 // An estimate that is nearer to the cap, relative, leaves no room.
 constexpr double kLeastRoom = 1e-6;
+// Of the slack, a gap that still leaves room.
+constexpr double kShareOfSlack = 0.5;
 // What rounding may add to the largest error, relative.
 constexpr double kRounding = 1e-7;
 // After them a third would hardly lower any block's own maximum.
@@ -35,9 +37,12 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   FinishSummary finish;
   finish.lowest_cost = summary->cost_final;
   finish.loss = options.finish.loss;
+  // With a gap that leaves little room above the bound, it is the reached one.
+  const double largest_gap = std::min(options.joint.relative_gap,
+                                      kShareOfSlack * options.finish.slack);
   const bool is_lowest_known =
-      lower_bound && finish.lowest_cost - *lower_bound <=
-                         options.joint.relative_gap * finish.lowest_cost;
+      lower_bound &&
+      finish.lowest_cost - *lower_bound <= largest_gap * finish.lowest_cost;
   const double lowest = is_lowest_known ? *lower_bound : finish.lowest_cost;
   // The input's errors say nothing where positions hold it back.
   const double highest =

@@ -12,8 +12,9 @@ namespace krot {
 //
 //   least squares   of true errors, below a cap: max_error or, if there is
 //                   none, (1 + slack) times the lowest maximum (`lower_bound`
-//                   if the gap asked for is reached, else the estimate's own),
-//                   but no more than the start's largest
+//                   if the gap asked for is reached and at most half of the
+//                   slack, else the estimate's own), but no more than the
+//                   start's largest
 //   sweeps          two, that do not raise the largest true error; they count
 //                   among the summary's
 //
