@@ -58,12 +58,13 @@ class RoundBounds {
     return rows_ && cost - rows_->certificate.lower_bound <=
                         kGaps * relative_gap_ * cost;
   }
-  // Whether it is as near to a bound as is asked for, if that of the rows is
-  // one in pixels.
+  // Whether it is as near to a bound as is asked for, or so near to that of the
+  // rows that a proof in pixels, which is below, should be as near.
   bool IsNear(double cost) const {
-    const double sufficient = Sufficient(cost);
-    return (proof_ && proof_->lower_bound >= sufficient) ||
-           (rows_ && rows_->certificate.lower_bound >= sufficient);
+    constexpr double kShareForRows = 0.7;
+    return (proof_ && proof_->lower_bound >= Sufficient(cost)) ||
+           (rows_ && rows_->certificate.lower_bound >=
+                         (1 - kShareForRows * relative_gap_) * cost);
   }
 
  private:
