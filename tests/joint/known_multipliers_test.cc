@@ -29,7 +29,7 @@ std::vector<double> LambdasOf(const KnownMultipliers& known,
 
 TEST(KnownMultipliers, AreZeroWhereTheyAreNotKnown) {
   KnownMultipliers known;
-  known.Keep({2, 5, 9}, WithLambdas({20, 50, 90}));
+  known.Keep({2, 5, 9}, WithLambdas({20, 50, 90}), 1);
   EXPECT_THAT(LambdasOf(known, {2, 5, 9}), ElementsAre(20, 50, 90));
   EXPECT_THAT(LambdasOf(known, {0, 2, 3, 9, 11}), ElementsAre(0, 20, 0, 90, 0));
 }
@@ -37,15 +37,15 @@ TEST(KnownMultipliers, AreZeroWhereTheyAreNotKnown) {
 TEST(KnownMultipliers, AreEmptyWhereNoneIsKnown) {
   KnownMultipliers known;
   EXPECT_THAT(known.Of({0, 1}), IsEmpty());
-  known.Keep({2, 5}, WithLambdas({20, 50}));
+  known.Keep({2, 5}, WithLambdas({20, 50}), 1);
   EXPECT_THAT(known.Of({0, 3, 4, 6}), IsEmpty());
   EXPECT_THAT(known.Of({}), IsEmpty());
 }
 
 TEST(KnownMultipliers, AreTheLatestThatWereKept) {
   KnownMultipliers known;
-  known.Keep({2, 5, 9}, WithLambdas({20, 50, 90}));
-  known.Keep({1, 5, 6}, WithLambdas({10, 55, 60}));
+  known.Keep({2, 5, 9}, WithLambdas({20, 50, 90}), 1);
+  known.Keep({1, 5, 6}, WithLambdas({10, 55, 60}), 1);
   EXPECT_THAT(LambdasOf(known, {1, 2, 5, 6, 9}),
               ElementsAre(10, 20, 55, 60, 90));
 }

@@ -93,7 +93,8 @@ void ConicSolver<Cone>::FindStartMultipliers() {
   ScaleMultipliers(system_, program_, now_.viewed, &now_.z);
   if (options_.known_multipliers != nullptr && program_.IsCost()) {
     JoinKnownMultipliers(system_, options_.norm, now_.viewed,
-                         *options_.known_multipliers, &now_.z);
+                         *options_.known_multipliers, options_.start_margin,
+                         &now_.z);
   }
 }
 

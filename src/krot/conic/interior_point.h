@@ -33,8 +33,8 @@ struct InteriorPointOptions {
   Norm norm;                  // p = 1, 2 or infinity
   double start_margin = 0.1;  // gamma starts at (1 + margin) cost; > 0
   // MinimizeJointly: those of a similar problem's last iterate, per
-  // observation, zero where they are not known. It starts near them. They may
-  // be what it writes to in the end.
+  // observation, zero where they are not known. It starts the nearer to them
+  // the smaller the margin is. They may be what it writes to in the end.
   const std::vector<Multiplier>* known_multipliers = nullptr;
   double smallest_gap = 1e-9;  // stop there, relative; > 0
   int max_iterations = 200;    // >= 1

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "krot/conic/cone_program.h"
@@ -35,20 +36,25 @@ void ScaleMultipliers(const NewtonSystem<Cone>& system,
 }
 
 // Of the cost programme's, which are scaled, all but a small share give way to
-// the known ones: far from the path, but near to where it ends.
+// the known ones: far from the path, but near to where it ends. The share goes
+// with the margin that the start has, so that both are as far from there.
 template <typename Cone>
 void JoinKnownMultipliers(const NewtonSystem<Cone>& system, Norm norm,
                           const std::vector<ViewedPoint>& viewed,
                           const std::vector<Multiplier>& known,
+                          double start_margin,
                           std::vector<typename Cone::Vector>* z) {
-  constexpr double kCentredShare = 0.1;
+  constexpr double kPerMargin = 10. / 3;
+  constexpr double kLargestShare = 0.3;
+  const double centred_share =
+      std::min(kPerMargin * start_margin, kLargestShare);
   const double sum = system.loop().Sum(
       [&](int64_t i) { return known[i].lambda * viewed[i].depth; });
   if (!(sum > 0)) return;
   system.loop().ForEach([&](int64_t i) {
     const typename Cone::Vector of_known =
         FromMultiplier<Cone::kDim>(norm, known[i].lambda, known[i].y);
-    (*z)[i] = kCentredShare * (*z)[i] + (1 - kCentredShare) / sum * of_known;
+    (*z)[i] = centred_share * (*z)[i] + (1 - centred_share) / sum * of_known;
   });
 }
 

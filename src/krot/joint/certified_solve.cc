@@ -34,7 +34,8 @@ constexpr int kWarmPatience = 15;
 constexpr double kFirstWidth = 1e-2;
 constexpr double kShareOfWidth = 0.25;
 constexpr double kStartMargin = 0.1;
-constexpr double kWarmStartMargin = 0.03;
+constexpr double kLargestWarmMargin = 0.03;
+constexpr double kLeastWarmMargin = 1e-3;
 constexpr double kFreshStartMargin = 1e-2;
 // Smaller depths, of the median, are those of points in a camera.
 constexpr double kDepthInCamera = 1e-6;
@@ -59,7 +60,8 @@ CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
                                const Context& context, const Estimate& start,
                                double known_bound,
-                               std::vector<Multiplier> known_multipliers)
+                               std::vector<Multiplier> known_multipliers,
+                               double known_optimum)
     : problem_(problem),
       options_(options),
       context_(context),
@@ -67,7 +69,15 @@ CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
       cost_(Cost(problem, start, options.norm, context.num_threads)),
       lower_bound_(known_bound),
       multipliers_(std::move(known_multipliers)),
-      are_multipliers_known_(!multipliers_.empty()) {}
+      are_multipliers_known_(!multipliers_.empty()),
+      known_optimum_(known_optimum) {}
+
+// As far as the start seems to be from its optimum.
+double CertifiedSolve::WarmMargin() const {
+  const double distance = 1 - known_optimum_ / cost_;
+  if (!(distance > 0)) return kLargestWarmMargin;  // of another component
+  return std::clamp(distance, kLeastWarmMargin, kLargestWarmMargin);
+}
 
 void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
   if (!certificate) return;
@@ -216,8 +226,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
   max_iterations_ = max_iterations;
   width_ = kFirstWidth;
   if (IsLowEnough()) return JointTermination::kGapReached;
-  double start_margin =
-      are_multipliers_known_ ? kWarmStartMargin : kStartMargin;
+  double start_margin = are_multipliers_known_ ? WarmMargin() : kStartMargin;
   Estimate start = estimate_;
   LeaveCameras(report, &start);
   for (;;) {

@@ -27,11 +27,13 @@ class CertifiedSolve {
 
   // Keeps a reference to `problem`. All depths of `start` are positive. A cost
   // that is as low as `known_bound`, pixels, allows is low enough. Known
-  // multipliers are a similar problem's, zero where unknown, or empty.
+  // multipliers are a similar problem's, zero where unknown, or empty; its
+  // optimum was about `known_optimum`, pixels.
   CertifiedSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Context& context,
                  const Estimate& start, double known_bound,
-                 std::vector<Multiplier> known_multipliers);
+                 std::vector<Multiplier> known_multipliers,
+                 double known_optimum);
 
   // Takes at most `max_iterations`, except for those towards a fresh start,
   // which it ends once begun. Hands an estimate to `take` now and then, and
@@ -48,6 +50,8 @@ class CertifiedSolve {
   const std::optional<Certificate>& certificate() const { return certificate_; }
   // Of the interior point's last run; empty if there was none.
   const std::vector<Multiplier>& multipliers() const { return multipliers_; }
+  // Where that would have come to, pixels; no bound.
+  double likely_optimum() const { return (1 - gap_) * cost_; }
   // Those towards a fresh start included.
   int iterations() const { return iterations_; }
 
@@ -56,6 +60,7 @@ class CertifiedSolve {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||
            IsLowEnough();
   }
+  double WarmMargin() const;
   bool IsLowEnough() const {
     return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
   }
@@ -82,6 +87,7 @@ class CertifiedSolve {
   int max_iterations_ = 0;
   double width_ = 0;  // of the next bisection, relative
   double gap_ = 0;    // of the interior point, where its last run ended
+  const double known_optimum_;
   bool is_given_up_ = false;
 };
 

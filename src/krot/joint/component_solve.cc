@@ -96,7 +96,8 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
   CertifiedSolve solve(part.problem(), options, here, start, lower_bound_,
                        CanStartWarm(part.problem(), start)
                            ? known_.Of(names)
-                           : std::vector<Multiplier>());
+                           : std::vector<Multiplier>(),
+                       known_.optimum());
   // What is below another part's bound already is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
@@ -119,7 +120,9 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
         report(iteration);
       });
   iterations_ += solve.iterations();
-  if (!solve.multipliers().empty()) known_.Keep(names, solve.multipliers());
+  if (!solve.multipliers().empty()) {
+    known_.Keep(names, solve.multipliers(), solve.likely_optimum());
+  }
   if (solve.lower_bound() > lower_bound_) {
     lower_bound_ = solve.lower_bound();
     certificate_ = InWhole(part, *solve.certificate());

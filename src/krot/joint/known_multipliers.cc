@@ -15,7 +15,9 @@ bool HasSmallerName(const CertifiedObservation& a,
 }  // namespace
 
 void KnownMultipliers::Keep(const std::vector<int64_t>& names,
-                            const std::vector<Multiplier>& multipliers) {
+                            const std::vector<Multiplier>& multipliers,
+                            double optimum) {
+  optimum_ = {optimum};
   std::vector<CertifiedObservation> kept(names.size());
   for (size_t i = 0; i < names.size(); ++i) {
     kept[i] = {names[i], multipliers[i].lambda, multipliers[i].y};

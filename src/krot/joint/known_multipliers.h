@@ -15,16 +15,23 @@ namespace krot {
 class KnownMultipliers {
  public:
   // `multipliers` of the observations that `names` ascend through take the
-  // place of what was known of them. O(known + names).
+  // place of what was known of them; `optimum`, pixels, is where their solve
+  // would have come to. O(known + names).
   void Keep(const std::vector<int64_t>& names,
-            const std::vector<Multiplier>& multipliers);
+            const std::vector<Multiplier>& multipliers, double optimum);
+
+  // Of the solve that was kept last; 0: none was.
+  double optimum() const { return optimum_.empty() ? 0 : optimum_[0]; }
 
   // Of the observations that `names` ascend through, zero where it is not
   // known; empty if none is. O(known + names).
   std::vector<Multiplier> Of(const std::vector<int64_t>& names) const;
 
   // For a checkpoint; where ranks share a problem, the first one's.
-  void NameValues(StepValues* values) { values->OnFirst(&known_); }
+  void NameValues(StepValues* values) {
+    values->OnFirst(&known_);
+    values->OnFirst(&optimum_);
+  }
 
   // What it and its user hold for so many observations, bytes.
   static int64_t MemoryBytes(int64_t num_observations) {
@@ -35,6 +42,7 @@ class KnownMultipliers {
 
  private:
   std::vector<CertifiedObservation> known_;
+  std::vector<double> optimum_;  // one, if any
 };
 
 }  // namespace krot
