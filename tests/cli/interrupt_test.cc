@@ -1,5 +1,6 @@
 #include <signal.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -123,6 +124,52 @@ TEST_F(Interrupt, OnTheWayToAStartDoesTheSame) {
 TEST_F(Interrupt, ByKillLeavesTheOldModel) {
   EXPECT_EQ(SignalAfterFirstSweep(SIGKILL).exit_code, -SIGKILL);
   ExpectNothingChanged();
+}
+
+TEST_F(Interrupt, ByKillLeavesACheckpointToWriteOrToGoOnFrom) {
+  const auto arguments = [this](const std::string& output) {
+    return std::vector<std::string>{"solver",          "--input_path",
+                                    folder_ / "model", "--output_path",
+                                    folder_ / output,  "--checkpoint_path",
+                                    folder_ / "steps"};
+  };
+  ASSERT_EQ(RunKrot(arguments("undisturbed")).exit_code, 0);
+  KrotProcess process(arguments("out"));
+  process.WaitForErrorText("iteration 1:");
+  process.Signal(SIGKILL);
+  EXPECT_EQ(process.Wait().exit_code, -SIGKILL);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
+
+  std::vector<std::string> only = arguments("so_far");
+  only.insert(only.end(), {"--checkpoint_only", "1"});
+  const KrotResult so_far = RunKrot(only);
+  EXPECT_EQ(so_far.exit_code, 130);
+  EXPECT_LT(Summarize(PixelErrors(Load(folder_ / "so_far"))).max,
+            Summarize(PixelErrors(before_)).max);
+
+  const KrotResult again = RunKrot(arguments("out"));
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_THAT(
+      again.err,
+      ::testing::HasSubstr("steps: going on behind 1 step of an earlier run"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "steps"));
+  EXPECT_THAT(Load(folder_ / "out"), IsModel(Load(folder_ / "undisturbed")));
+}
+
+TEST_F(Interrupt, RefusesACheckpointOfOtherOptions) {
+  std::vector<std::string> arguments = {
+      "solver",        "--input_path",      folder_ / "model", "--output_path",
+      folder_ / "out", "--checkpoint_path", folder_ / "steps"};
+  KrotProcess process(arguments);
+  process.WaitForErrorText("iteration 1:");
+  process.Signal(SIGKILL);
+  process.Wait();
+  arguments.insert(arguments.end(), {"--Solver.relative_gap", "1e-3"});
+  const KrotResult result = RunKrot(arguments);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, IsOneSentence("krot solver",
+                                        "this checkpoint is of another run"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
 // An adjustment of thousands of steps: no tolerance ends it.

@@ -44,7 +44,7 @@ void JoinKnownMultipliers(const NewtonSystem<Cone>& system, Norm norm,
                           const std::vector<Multiplier>& known,
                           double start_margin,
                           std::vector<typename Cone::Vector>* z) {
-  constexpr double kPerMargin = 10. / 3;
+  constexpr double kPerMargin = 100. / 3;
   constexpr double kLargestShare = 0.3;
   const double centred_share =
       std::min(kPerMargin * start_margin, kLargestShare);

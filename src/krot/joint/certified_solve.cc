@@ -34,7 +34,8 @@ constexpr int kWarmPatience = 15;
 constexpr double kFirstWidth = 1e-2;
 constexpr double kShareOfWidth = 0.25;
 constexpr double kStartMargin = 0.1;
-constexpr double kLargestWarmMargin = 0.03;
+constexpr double kWarmMarginOfDistance = 0.06;
+constexpr double kLargestWarmMargin = 3e-3;
 constexpr double kLeastWarmMargin = 1e-3;
 constexpr double kFreshStartMargin = 1e-2;
 // Smaller depths, of the median, are those of points in a camera.
@@ -72,11 +73,12 @@ CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
       are_multipliers_known_(!multipliers_.empty()),
       known_optimum_(known_optimum) {}
 
-// As far as the start seems to be from its optimum.
+// The more, the farther the start seems to be from its optimum.
 double CertifiedSolve::WarmMargin() const {
   const double distance = 1 - known_optimum_ / cost_;
   if (!(distance > 0)) return kLargestWarmMargin;  // of another component
-  return std::clamp(distance, kLeastWarmMargin, kLargestWarmMargin);
+  return std::clamp(kWarmMarginOfDistance * distance, kLeastWarmMargin,
+                    kLargestWarmMargin);
 }
 
 void CertifiedSolve::Adopt(std::optional<Certificate> certificate) {
