@@ -4,18 +4,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/local_frame.h"
+#include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 
@@ -173,6 +178,27 @@ void ExpectProved(const Model& model, const SolveModelResult& result,
   const CertificateVerdict verdict =
       VerifyCertificateFile(model, *summary.certificate);
   EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+}
+
+// Rows of a level bound the errors only where their optimum is above it.
+TEST(Positions, OfALevelAboveTheOptimumProveNothing) {
+  const Model model = SynthesizeScene(Options()).model;
+  BuildProblemOptions options;
+  options.positions = Positions(model, 0.03, 1.3, 1);
+  BuiltProblem built = BuildProblem(model, options);
+  std::vector<int64_t> all(built.problem.observations.size());
+  std::iota(all.begin(), all.end(), 0);
+  const auto prove_at = [&](double level) {
+    built.position_level = level;
+    TakePositionRows(built, built.start, &built.problem);
+    return ProveInPixels(model, built, built.start, Norm::L2(), all, 0.0, {});
+  };
+  const std::optional<PixelCertificate> proof = prove_at(0.1);
+  ASSERT_TRUE(proof);
+  const PixelCertificateCheck check =
+      CheckPixelCertificate(model, built, Norm::L2(), *proof, {});
+  EXPECT_TRUE(check.is_accepted) << check.refusal;
+  EXPECT_FALSE(prove_at(100));
 }
 
 TEST(Positions, ThatHoldCamerasBackHaveTheOptimumThatTheirDualProves) {

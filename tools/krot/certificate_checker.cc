@@ -1,4 +1,3 @@
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -17,6 +16,7 @@ struct CheckerOptions {
   std::string input_path;
   std::string certificate_path;
   std::string on_contradiction = "follow_tracks";
+  int num_worst = 10;
   CommonOptions common;
 };
 
@@ -26,6 +26,8 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
   parser->AddPath("certificate_path", &options->certificate_path, true,
                   "a file", "The certificate, or conflicts, as JSON");
   AddOnContradiction(&options->on_contradiction, parser);
+  parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
+                     "How many observations of the support to list");
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
                    &options->common, parser);
 }
@@ -47,8 +49,7 @@ int CheckCertificate(const CheckerOptions& options, const std::string& json) {
   const CertificateVerdict verdict =
       VerifyCertificateFile(ReadSubject(options), file);
   RequireAccepted(verdict);
-  PrintTable(options.common.log,
-             CertificateTable(verdict, std::numeric_limits<int>::max()));
+  PrintTable(options.common.log, CertificateTable(verdict, options.num_worst));
   return kExitDone;
 }
 

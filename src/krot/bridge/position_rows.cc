@@ -254,11 +254,14 @@ double LargestPositionRatio(const BuiltProblem& built,
   return largest;
 }
 
-void LevelPositions(const BuiltProblem& built, Certificate* certificate) {
+bool LevelPositions(const BuiltProblem& built, Certificate* certificate) {
+  const double shorter = built.position_level / certificate->lower_bound;
   for (CertifiedObservation& o : certificate->observations) {
     if (built.HasPixel(o.observation)) continue;
-    o.y *= built.position_level / certificate->lower_bound;
+    if (shorter > 1) return false;
+    o.y *= shorter;
   }
+  return true;
 }
 
 }  // namespace krot

@@ -93,7 +93,8 @@ double LargestPositionRatio(const BuiltProblem& built,
                             const Estimate& estimate);
 
 // Turns the multipliers of rows with built.position_level into those of rows
-// whose level is the certificate's bound, which prove it.
-void LevelPositions(const BuiltProblem& built, Certificate* certificate);
+// whose level is the certificate's bound, which prove it. False where a bound
+// below built.position_level would take longer ones than there may be.
+bool LevelPositions(const BuiltProblem& built, Certificate* certificate);
 
 }  // namespace krot

@@ -1,6 +1,7 @@
 #include "krot/joint/certified_solve.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -37,6 +38,10 @@ constexpr double kStartMargin = 0.1;
 constexpr double kWarmMarginOfDistance = 0.06;
 constexpr double kLargestWarmMargin = 3e-3;
 constexpr double kLeastWarmMargin = 1e-3;
+// Where the known optimum is another problem's: that of another component, or
+// of positions' rows at another level.
+constexpr double kFarFromKnown = 0.5;
+constexpr double kFarMargin = 0.03;
 constexpr double kFreshStartMargin = 1e-2;
 // Smaller depths, of the median, are those of points in a camera.
 constexpr double kDepthInCamera = 1e-6;
@@ -75,8 +80,8 @@ CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
 
 // The more, the farther the start seems to be from its optimum.
 double CertifiedSolve::WarmMargin() const {
-  const double distance = 1 - known_optimum_ / cost_;
-  if (!(distance > 0)) return kLargestWarmMargin;  // of another component
+  const double distance = std::abs(1 - known_optimum_ / cost_);
+  if (distance > kFarFromKnown) return kFarMargin;
   return std::clamp(kWarmMarginOfDistance * distance, kLeastWarmMargin,
                     kLargestWarmMargin);
 }

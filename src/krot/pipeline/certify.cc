@@ -60,7 +60,7 @@ void CertifyInfeasible(const Model& model, const BuiltProblem& built,
                        SolveSummary* summary) {
   if (!certificate) return;
   Certificate levelled = *certificate;
-  LevelPositions(built, &levelled);
+  if (!LevelPositions(built, &levelled)) return;
   Certify(
       model, built, built.start, options, context,
       MakePixelCertificate(model, built, options.norm, levelled,

@@ -75,7 +75,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     for (CertifiedObservation& o : certificate.observations) {
       o.y /= widths[o.observation];
     }
-    LevelPositions(built, &certificate);
+    if (!LevelPositions(built, &certificate)) return best;
     const std::vector<Eigen::Vector3d> bearings =
         BearingsOfPoints(model, built, x_hat, certificate);
     const std::optional<PixelCertificate> candidate = MakePixelCertificate(

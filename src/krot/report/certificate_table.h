@@ -7,11 +7,11 @@
 
 namespace krot {
 
-// The `max_observations` worst of a support.
-// The known positions in a support; empty without any.
+// The first `max_positions` known positions of a support; empty without any.
 std::string PositionsTable(const std::vector<SupportPosition>& positions,
                            int max_positions);
 
+// The `max_observations` worst of a support.
 std::string SupportTable(const std::vector<SupportObservation>& support,
                          int max_observations);
 

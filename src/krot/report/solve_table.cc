@@ -50,9 +50,9 @@ std::string LinearGapSentence(const SolveSummary& summary) {
       *linear_gap > kNoticeablySmaller * *summary.relative_gap) {
     return "";
   }
-  return " With every lens linearised at this estimate the gap is " +
+  return " With every error linearised at this estimate the gap is " +
          GapPercent(*linear_gap) +
-         "; the rest is due to the lenses' curvature.";
+         "; the rest is the curvature of lenses, and rounding.";
 }
 
 // What the room above the lowest maximum was for.
