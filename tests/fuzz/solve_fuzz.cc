@@ -1,9 +1,13 @@
 // Valid models whose structure is changed, and what solver, filter and adjuster
 // make of them: a valid model whose largest error has not risen, and a bound
-// that is not above it.
+// that is not above it; also where they are interrupted.
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
 
 #include "krot/model/model_error.h"
 #include "krot/model/validate.h"
@@ -21,6 +25,42 @@ constexpr int kMaxChanges = 8;
 // Of the joint solver, in each of up to 30 rounds: a matter of seconds under
 // sanitizers.
 constexpr int kMaxIterations = 20;
+// With wild lenses proofs take minutes under sanitizers.
+constexpr std::chrono::seconds kPatience(2);
+
+// Interrupts what outlasts it.
+class Deadline {
+ public:
+  Deadline() : thread_([this] { Wait(); }) {}
+  ~Deadline() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_over_ = true;
+    }
+    ended_.notify_one();
+    thread_.join();
+  }
+  Context context() const {
+    Context context;
+    context.num_threads = 1;
+    context.cancel = &cancel_;
+    return context;
+  }
+
+ private:
+  void Wait() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (!ended_.wait_for(lock, kPatience, [this] { return is_over_; })) {
+      cancel_ = true;
+    }
+  }
+
+  CancelFlag cancel_{false};
+  std::mutex mutex_;
+  std::condition_variable ended_;
+  bool is_over_ = false;
+  std::thread thread_;  // last: it uses all others
+};
 
 template <typename T>
 T& Pick(std::vector<T>* records, ByteSource* source) {
@@ -103,13 +143,13 @@ void Change(Model* model, ByteSource* source) {
 
 double Largest(const PixelErrorStatistics& errors) { return errors.max; }
 
-void Solve(const Model& model, uint8_t kind) {
+void Solve(const Model& model, uint8_t kind, const Context& context) {
   SolveModelOptions options;
   options.res_int.max_sweeps = 5;
   options.joint.max_iterations = kMaxIterations;
   if (kind & 1) options.init = SolveInit::kFeasible;
   if (kind & 2) options.finish.finish = Finish::kNone;
-  const SolveModelResult result = SolveModel(model, options, {1});
+  const SolveModelResult result = SolveModel(model, options, context);
   ValidateModel(result.model);
   const SolveSummary& summary = result.summary;
   // Of what is infeasible there is a bound, and no cost.
@@ -139,6 +179,8 @@ void Run(ByteSource source) {
   } catch (const ModelError&) {
     return;
   }
+  const Deadline deadline;
+  const Context context = deadline.context();
   switch (kind % 4) {
     case 0: {
       OutlierFilterOptions options;
@@ -146,10 +188,12 @@ void Run(ByteSource source) {
       // With wild lenses a proof in pixels may take a second.
       options.find_conflicts = (kind & 4) != 0;
       options.solve.joint.max_iterations = kMaxIterations;
-      const OutlierFilterResult result = FilterOutliers(model, options, {1});
+      const OutlierFilterResult result =
+          FilterOutliers(model, options, context);
       ValidateModel(result.model);
-      Require(result.summary.num_proved <=
-                  static_cast<int64_t>(result.summary.removed.size()),
+      Require(context.IsCancelled() ||
+                  result.summary.num_proved <=
+                      static_cast<int64_t>(result.summary.removed.size()),
               "not more proved than removed");
       break;
     }
@@ -158,13 +202,13 @@ void Run(ByteSource source) {
       options.adjustment.max_num_iterations = 5;
       if (kind & 16) options.adjustment.max_error = 50;
       try {
-        ValidateModel(AdjustModel(model, options, {1}).model);
+        ValidateModel(AdjustModel(model, options, context).model);
       } catch (const ModelError&) {
       }
       break;
     }
     default:
-      Solve(model, kind / 4);
+      Solve(model, kind / 4, context);
       break;
   }
 }

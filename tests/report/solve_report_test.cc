@@ -158,7 +158,7 @@ SolveReport CurvedReport() {
 
 TEST(SolveTable, SaysBothGapsWhereTheTrueOneIsTheLarger) {
   const std::string both =
-      " With every lens linearised at this estimate the gap is 0.0050 %";
+      " With every error linearised at this estimate the gap is 0.0050 %";
   SolveReport report = CurvedReport();
   std::string table = SolveTable(report);
   EXPECT_THAT(table, HasSubstr("proved optimal to 0.5000 %"));
