@@ -155,13 +155,21 @@ TEST_P(RemainderBoundOf, IsNeverExceededAndNearlyReached) {
     const auto trial =
         DrawTrial(GetParam(), params.data(), LargestAngle(GetParam()), &random);
     if (!trial) continue;
-    const auto kappa = RemainderBound(GetParam(), params.data(), trial->pixel,
-                                      trial->x_hat, trial->level_px, trial->p);
+    const auto bound = [&](double sufficient) {
+      return RemainderBound(GetParam(), params.data(), trial->pixel,
+                            trial->x_hat, trial->level_px, trial->p,
+                            sufficient);
+    };
+    const auto kappa = bound(0);
     if (!kappa) continue;
     ++num_bounded;
     const double sampled =
         SampleKappa(GetParam(), params.data(), *trial, &random);
     EXPECT_LE(sampled, *kappa + 1e-9);
+    const auto sufficient = bound(0.1);
+    ASSERT_TRUE(sufficient);
+    EXPECT_LE(sampled, *sufficient + 1e-9);
+    EXPECT_LE(*sufficient, std::max(0.1, *kappa));
     if (is_strong) continue;
     EXPECT_LE(*kappa, 2 * std::max(sampled, 0.0) + 1e-4)
         << "trial " << i << ", level " << trial->level_px << ", p " << trial->p;

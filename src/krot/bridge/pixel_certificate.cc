@@ -22,6 +22,9 @@ constexpr int kMaxCorrections = 8;
 constexpr double kMargin = 1e-9;
 // Support lines that are found at the same time; the next profit from them.
 constexpr int64_t kLinesAtOnce = 32;
+// A remainder below it need not be known: what it stretches is an allowance for
+// roundings.
+constexpr double kSmallRemainder = 0.1;
 
 std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
   if (!built.HasPixel(i)) return "a position";
@@ -83,7 +86,7 @@ bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
   const double gamma = certificate.lower_bound;
   const std::optional<double> kappa = RemainderBound(
       source.model_id, source.params, built.pixels[o.observation],
-      certificate.bearings[n], gamma, norm.p);
+      certificate.bearings[n], gamma, norm.p, kSmallRemainder);
   if (!kappa) return false;
   // |L| <= sqrt(2) |L|_p over S_i.
   const double reach =

@@ -85,7 +85,8 @@ double DualNorm(const Eigen::Vector2d& y, double p) {
 std::optional<double> RemainderBound(int model_id, const double* params,
                                      const Eigen::Vector2d& pixel,
                                      const Eigen::Vector3d& x_hat,
-                                     double level_px, double p) {
+                                     double level_px, double p,
+                                     double sufficient) {
   CheckArguments(level_px, p);
   if (IsPinhole(model_id)) {
     if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
@@ -93,7 +94,8 @@ std::optional<double> RemainderBound(int model_id, const double* params,
   }
   const auto region = FindRegion(model_id, params, pixel, x_hat, level_px, p);
   if (!region) return std::nullopt;
-  const auto largest = LargestLinearError(*region->map, p, region->reach);
+  const auto largest =
+      LargestLinearError(*region->map, p, region->reach, 1 + sufficient);
   if (!largest) return std::nullopt;
   return std::max(0.0, *largest - 1);
 }

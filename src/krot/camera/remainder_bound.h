@@ -28,15 +28,17 @@ namespace krot {
 // A proof: interval arithmetic that rounds outwards, with E as RowAtProjection
 // computes it, to the last bit. A function of its arguments alone. kappa
 // exceeds its smallest value by some 10 % of itself + 1e-6, more where the
-// budget of cells ends first. 0 for pinholes, whose U is all rays with z > 0.
+// budget of cells ends first, or is any value that is at most `sufficient`,
+// which costs much less. 0 for pinholes, whose U is all rays with z > 0.
 // Some hundreds of microseconds for ordinary lenses, milliseconds near
-// folds.
+// folds; tens for a sufficient 0.1.
 //
 // Requires gamma > 0 and p = 1, 2 or infinity.
 std::optional<double> RemainderBound(int model_id, const double* params,
                                      const Eigen::Vector2d& pixel,
                                      const Eigen::Vector3d& x_hat,
-                                     double level_px, double p);
+                                     double level_px, double p,
+                                     double sufficient = 0);
 
 // The least that is known to be at least -y'm(u), pixels times |y|, for all u
 // in U with |f(u)|_p <= gamma: the support function, in the direction -y, of

@@ -213,7 +213,14 @@ bool BoundaryIsOutside(const ErrorMap& map, double p, double reach) {
 }
 
 std::optional<double> LargestLinearError(const ErrorMap& map, double p,
-                                         double reach) {
+                                         double reach, double sufficient) {
+  const auto bound_on = [p](const Enclosure& enclosure) {
+    return BoundLinearError(enclosure, p);
+  };
+  if (sufficient > 1) {
+    const auto bound = Search(map, p, reach, sufficient, bound_on);
+    if (!bound || *bound <= sufficient) return bound;
+  }
   constexpr int kDirections = 16;
   double sampled = 1;
   for (int i = 0; i < kDirections; ++i) {
@@ -226,9 +233,7 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
   }
   const double target =
       sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
-  return Search(map, p, reach, target, [p](const Enclosure& enclosure) {
-    return BoundLinearError(enclosure, p);
-  });
+  return Search(map, p, reach, target, bound_on);
 }
 
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,

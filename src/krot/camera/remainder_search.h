@@ -14,9 +14,10 @@ bool BoundaryIsOutside(const ErrorMap& map, double p, double reach);
 
 // An upper bound of max |m| over the points of the box with |f| <= 1, near it:
 // at most 10 % of (max |m| - 1), or 1e-6, too large unless the budget of cells
-// ends. nullopt if det f' > 0 cannot be proved at all these points.
+// ends, or any that is at most `sufficient`. nullopt if det f' > 0 cannot be
+// proved at all these points.
 std::optional<double> LargestLinearError(const ErrorMap& map, double p,
-                                         double reach);
+                                         double reach, double sufficient);
 
 // An upper bound of max -y'm over the points of the box with |f| <= 1, near it:
 // at most 1e-7 too large unless the budget of cells ends, or any that is at
