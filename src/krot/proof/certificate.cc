@@ -65,12 +65,10 @@ std::optional<Certificate> MakeCertificate(
       }
     }
   };
-  if (IsSpread(problem, scores)) {
-    try_supports(/*solve=*/false);
-    if (!search.IsEnough()) search.TryAll(estimate, multipliers);
-  }
-  if (!search.IsEnough()) try_supports(/*solve=*/true);
-  if (search.IsEnough()) return search.best();
+  const bool is_spread = IsSpread(problem, scores);
+  try_supports(/*solve=*/!is_spread);
+  if (is_spread && !search.IsEnough()) search.TryAll(estimate, multipliers);
+  if (is_spread || search.IsEnough()) return search.best();
   // Scores do not tell an observation whose depth vanishes at the optimum.
   const double delta = SuggestedBound(problem, estimate, multipliers);
   for (const double share : kSharesBesideScores) {
