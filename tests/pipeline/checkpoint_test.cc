@@ -50,20 +50,9 @@ Solved SolveAlone(const Model& model, SolveModelOptions options,
   return {std::move(result.model), std::move(result.summary)};
 }
 
-SceneOptions Scene() {
-  SceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 400;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
-  options.start_translation_noise = 0.005;
-  options.start_point_noise = 0.005;
-  return options;
-}
-
 // Long enough for several working sets; lenses, for several rounds.
 SceneOptions Street() {
-  SceneOptions options = Scene();
+  SceneOptions options = SceneToShare();
   options.layout = SceneLayout::kStreet;
   options.num_frames = 40;
   options.num_points = 4000;
@@ -95,7 +84,8 @@ TEST(Checkpoint, HasTheBitsOfAnUndisturbedRunBehindEveryStep) {
 TEST(Checkpoint, HasTheBitsOfAnUndisturbedRunFromNothing) {
   SolveModelOptions options;
   options.init = SolveInit::kFeasible;
-  ExpectSameBitsBehindEveryStep(SynthesizeScene(Scene()).model, options, 4);
+  ExpectSameBitsBehindEveryStep(SynthesizeScene(SceneToShare()).model, options,
+                                4);
 }
 
 TEST(Checkpoint, HasTheBitsOfAnUndisturbedRunBySweepsAlone) {
@@ -148,7 +138,7 @@ class NoSpace : public Checkpoint {
 };
 
 TEST(Checkpoint, ThatCannotBeWrittenEndsNoRun) {
-  const Model model = SynthesizeScene(Scene()).model;
+  const Model model = SynthesizeScene(SceneToShare()).model;
   SolveModelOptions options;
   NoSpace full;
   options.checkpoint = &full;

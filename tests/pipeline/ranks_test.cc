@@ -22,17 +22,6 @@
 namespace krot {
 namespace {
 
-SceneOptions Scene() {
-  SceneOptions options;
-  options.num_frames = 12;
-  options.num_points = 400;
-  options.track_length = 4;
-  options.pixel_noise = 0.5;
-  options.start_translation_noise = 0.005;
-  options.start_point_noise = 0.005;
-  return options;
-}
-
 class SolveByRanksTest : public ::testing::TestWithParam<int> {
  protected:
   static void Compare(const SceneOptions& scene,
@@ -44,16 +33,18 @@ class SolveByRanksTest : public ::testing::TestWithParam<int> {
   }
 };
 
-TEST_P(SolveByRanksTest, HasTheBitsOfOneProcess) { Compare(Scene(), {}); }
+TEST_P(SolveByRanksTest, HasTheBitsOfOneProcess) {
+  Compare(SceneToShare(), {});
+}
 
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWhereRowsAreTakenAnew) {
-  SceneOptions scene = Scene();
+  SceneOptions scene = SceneToShare();
   scene.camera_model_id = 4;  // OPENCV
   Compare(scene, {});
 }
 
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWithBaselines) {
-  SceneOptions scene = Scene();
+  SceneOptions scene = SceneToShare();
   scene.sensors_per_rig = 2;
   Compare(scene, {});
 }
@@ -61,23 +52,23 @@ TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWithBaselines) {
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessBySweepsAlone) {
   SolveModelOptions options;
   options.method = SolveMethod::kResInt;
-  Compare(Scene(), options);
+  Compare(SceneToShare(), options);
 }
 
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWithAFinishOfSweeps) {
   SolveModelOptions options;
   options.finish.finish = Finish::kSweeps;
-  Compare(Scene(), options);
+  Compare(SceneToShare(), options);
 }
 
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessInTheLargestNorm) {
   SolveModelOptions options;
   options.norm = Norm::LInf();
-  Compare(Scene(), options);
+  Compare(SceneToShare(), options);
 }
 
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWhereWorkingSetsGrow) {
-  SceneOptions scene = Scene();
+  SceneOptions scene = SceneToShare();
   scene.layout = SceneLayout::kStreet;
   scene.num_frames = 40;
   scene.num_points = 4000;
@@ -88,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(OfSoMany, SolveByRanksTest,
                          ::testing::Values(1, 2, 3, 4, 7));
 
 TEST(SolveByRanks, RefusesWhatIsForOneProcess) {
-  const Model whole = SynthesizeScene(Scene()).model;
+  const Model whole = SynthesizeScene(SceneToShare()).model;
   SolveModelOptions options;
   options.init = SolveInit::kFeasible;
   try {
@@ -101,7 +92,7 @@ TEST(SolveByRanks, RefusesWhatIsForOneProcess) {
 }
 
 TEST(CutPoints, GivesEveryPointToOneRankInTheOrderOfIds) {
-  const Model whole = SynthesizeScene(Scene()).model;
+  const Model whole = SynthesizeScene(SceneToShare()).model;
   const std::vector<std::vector<int32_t>> cut = CutPoints(whole, 3);
   std::vector<int32_t> all;
   Point3DId last = 0;
@@ -124,7 +115,7 @@ TEST(CutPoints, GivesEveryPointToOneRankInTheOrderOfIds) {
 }
 
 TEST(TakeShare, KeepsEveryObservationOfItsPoints) {
-  const Model whole = SynthesizeScene(Scene()).model;
+  const Model whole = SynthesizeScene(SceneToShare()).model;
   const std::vector<int32_t> points = CutPoints(whole, 2)[1];
   const ModelShare share = TakeShare(whole, points);
   ASSERT_EQ(share.model.points3D.size(), points.size());

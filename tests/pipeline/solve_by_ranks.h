@@ -10,12 +10,25 @@
 #include "krot/model/binary_io.h"
 #include "krot/model/model_share.h"
 #include "krot/pipeline/solve_model.h"
+#include "krot/synthetic/scene.h"
 #include "tests/testing/thread_ranks.h"
 
 // A solve by ranks that are threads of this process, and what its result is
 // compared by.
 
 namespace krot {
+
+// Small, with enough noise for sweeps and the joint solver.
+inline SceneOptions SceneToShare() {
+  SceneOptions options;
+  options.num_frames = 12;
+  options.num_points = 400;
+  options.track_length = 4;
+  options.pixel_noise = 0.5;
+  options.start_translation_noise = 0.005;
+  options.start_point_noise = 0.005;
+  return options;
+}
 
 // Puts the shares' points into their places in the whole.
 inline void PutPoints(const Model& whole, int rank, int count,
