@@ -15,7 +15,8 @@ cmake -S "$root" --preset coverage
 cmake --build "$folder" --parallel "$(nproc)"
 find "$folder" -name '*.gcda' -delete
 say "Testing"
-ctest --test-dir "$folder" --output-on-failure -j"$(nproc)" "$@"
+status=0
+ctest --test-dir "$folder" --output-on-failure -j"$(nproc)" "$@" || status=$?
 
 say "What the tests reach"
 gcovr --root "$root" --object-directory "$folder" --filter "$root/src/krot/" \
@@ -23,3 +24,4 @@ gcovr --root "$root" --object-directory "$folder" --filter "$root/src/krot/" \
   --json "$folder/coverage.json" "$folder"
 python3 -B "$root/tools/docs/coverage.py" "$folder/coverage.json" \
   "$folder/unreached.txt"
+exit "$status"

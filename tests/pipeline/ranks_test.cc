@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/bridge/certificate_file.h"
+#include "krot/conic/frame_pattern.h"
 #include "krot/conic/observation_loop.h"
 #include "krot/joint/working_set.h"
 #include "krot/model/model_share.h"
@@ -166,6 +167,19 @@ TEST(Ranks, GatherInTheirOrderAndHandOnInTurn) {
         &letters);
     EXPECT_THAT(letters, ::testing::ElementsAre('a', 'b', 'c', 'd'));
     EXPECT_EQ(ranks->SumBefore(10), 10 * ranks->rank());
+  });
+}
+
+TEST(FramePattern, OfSharesIsThatOfTheWhole) {
+  const FramePattern whole = {{0, 1, 3}, {1, 2}, {2}, {3}};
+  const std::vector<FramePattern> shares = {{{0, 1}, {1}, {2}, {3}},
+                                            {{0, 3}, {1, 2}, {2}, {3}},
+                                            {{0, 1}, {1}, {2}, {3}}};
+  ThreadRanks::Run(3, [&](Ranks* ranks) {
+    FramePattern pattern = shares[ranks->rank()];
+    EXPECT_EQ(ShareOfPairs(pattern, ranks), ShareOfPairs(whole, nullptr));
+    UniteOverRanks(ranks, &pattern);
+    EXPECT_EQ(pattern, whole);
   });
 }
 

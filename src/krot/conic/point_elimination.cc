@@ -242,13 +242,6 @@ void PointElimination<kRows>::Solve(const BlockVector& g, const double* r,
   }
 }
 
-template <int kRows>
-int64_t PointElimination<kRows>::MemoryBytes() const {
-  return frame_system_.MemoryBytes() +
-         static_cast<int64_t>((3 * Q_.size()) * sizeof(double) +
-                              R_.size() * sizeof(UpperTriangle));
-}
-
 template class PointElimination<3>;
 template class PointElimination<4>;
 

@@ -66,9 +66,6 @@ class PointElimination {
   // y = A x, laid out like r.
   void Multiply(const BlockVector& x, double* y) const;
 
-  // What an elimination of this structure occupies.
-  int64_t MemoryBytes() const;
-
  private:
   static constexpr int kBlock = 3 * kRows;
 
