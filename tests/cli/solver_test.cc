@@ -192,8 +192,9 @@ TEST_F(Commands, SolverWritesACertificateThatCheckerAndAnalyzerAccept) {
   for (const char* model : {"input", "output"}) {
     const KrotResult check =
         RunKrot({"certificate_checker", "--input_path", folder_ / model,
-                 "--certificate_path", certificate});
+                 "--certificate_path", certificate, "--num_worst", "1"});
     EXPECT_EQ(check.exit_code, 0) << check.err;
+    EXPECT_THAT(check.out, ::testing::HasSubstr("worst first; the first 1\n"));
   }
   const KrotResult analysis =
       RunKrot({"model_analyzer", "--path", folder_ / "output",

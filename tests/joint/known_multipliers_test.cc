@@ -44,8 +44,10 @@ TEST(KnownMultipliers, AreEmptyWhereNoneIsKnown) {
 
 TEST(KnownMultipliers, AreTheLatestThatWereKept) {
   KnownMultipliers known;
+  EXPECT_EQ(known.optimum(), 0);
   known.Keep({2, 5, 9}, WithLambdas({20, 50, 90}), 1);
-  known.Keep({1, 5, 6}, WithLambdas({10, 55, 60}), 1);
+  known.Keep({1, 5, 6}, WithLambdas({10, 55, 60}), 2);
+  EXPECT_EQ(known.optimum(), 2);
   EXPECT_THAT(LambdasOf(known, {1, 2, 5, 6, 9}),
               ElementsAre(10, 20, 55, 60, 90));
 }
