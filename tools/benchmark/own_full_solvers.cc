@@ -21,10 +21,12 @@ class Schedule : public KnownRotationSolver {
   bool Minimize(const KnownRotationProblem& problem, const CancelFlag* cancel,
                 Estimate* estimate) override {
     SolveSummary summary;
+    KnownMultipliers known;
     const Timer timer;
     const Context context{num_threads_, cancel};
     SolveRows(problem, {}, method_, /*is_first_round=*/true,
-              /*have_rows_served=*/{}, context, timer, estimate, &summary);
+              /*have_rows_served=*/{}, context, timer, estimate, &known,
+              &summary);
     return !IsCancelled(cancel);
   }
 
