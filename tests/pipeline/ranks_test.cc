@@ -92,27 +92,50 @@ TEST(SolveByRanks, RefusesWhatIsForOneProcess) {
   }
 }
 
+int64_t NumObservations(const Model& model,
+                        const std::vector<int32_t>& points) {
+  int64_t count = 0;
+  for (const int32_t k : points) {
+    const Point3D& point = model.points3D[k];
+    count += static_cast<int64_t>(point.track_end - point.track_begin);
+  }
+  return count;
+}
+
 TEST(CutPoints, GivesEveryPointToOneRankInTheOrderOfIds) {
   const Model whole = SynthesizeScene(SceneToShare()).model;
-  const std::vector<std::vector<int32_t>> cut = CutPoints(whole, 3);
-  std::vector<int32_t> all;
-  Point3DId last = 0;
-  for (const std::vector<int32_t>& points : cut) {
-    Point3DId largest = last;
-    int64_t num_observations = 0;
-    for (const int32_t k : points) {
-      const Point3D& point = whole.points3D[k];
-      EXPECT_TRUE(last == 0 || point.id > last);
-      largest = std::max(largest, point.id);
-      num_observations +=
-          static_cast<int64_t>(point.track_end - point.track_begin);
-      all.push_back(k);
+  for (const int count : {1, 2, 3, 7}) {
+    std::vector<int32_t> all;
+    Point3DId last = 0;
+    for (const std::vector<int32_t>& points : CutPoints(whole, count)) {
+      EXPECT_TRUE(std::is_sorted(points.begin(), points.end()));
+      Point3DId largest = last;
+      for (const int32_t k : points) {
+        EXPECT_TRUE(last == 0 || whole.points3D[k].id > last);
+        largest = std::max(largest, whole.points3D[k].id);
+        all.push_back(k);
+      }
+      last = largest;
     }
-    last = largest;
-    EXPECT_NEAR(static_cast<double>(num_observations),
-                static_cast<double>(whole.track_elements.size()) / 3, 40);
+    std::sort(all.begin(), all.end());
+    EXPECT_EQ(std::unique(all.begin(), all.end()), all.end());
+    EXPECT_EQ(all.size(), whole.points3D.size());
   }
-  EXPECT_EQ(all.size(), whole.points3D.size());
+}
+
+TEST(CutPoints, LeavesTheFirstRankToTheWorkingSets) {
+  const Model whole = SynthesizeScene(SceneToShare()).model;
+  const auto expect_shares = [&](const std::vector<double>& shares) {
+    const auto cut = CutPoints(whole, static_cast<int>(shares.size()));
+    for (size_t rank = 0; rank < shares.size(); ++rank) {
+      EXPECT_NEAR(
+          static_cast<double>(NumObservations(whole, cut[rank])),
+          shares[rank] * static_cast<double>(whole.track_elements.size()), 20);
+    }
+  };
+  expect_shares({1});
+  expect_shares({1. / 4, 3. / 4});
+  expect_shares({0, 1. / 3, 1. / 3, 1. / 3});
 }
 
 TEST(TakeShare, KeepsEveryObservationOfItsPoints) {

@@ -14,13 +14,20 @@ std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
     return whole.points3D[a].id < whole.points3D[b].id;
   });
   std::vector<std::vector<int32_t>> cut(count);
-  const uint64_t total = whole.track_elements.size();
-  uint64_t sum = 0;
-  size_t share = 0;
+  const auto total = static_cast<int64_t>(whole.track_elements.size());
+  const int64_t first = total * std::max(0, 3 - count) / (2 * count);
+  // The observations of all shares up to this one.
+  const auto end_of = [&](int share) {
+    return share + 1 == count ? total
+                              : first + (total - first) * share / (count - 1);
+  };
+  int64_t sum = 0;
+  int share = 0;
   for (const int32_t k : by_id) {
-    if (sum * count > total * (share + 1)) ++share;
+    while (share + 1 < count && sum >= end_of(share)) ++share;
     cut[share].push_back(k);
-    sum += whole.points3D[k].track_end - whole.points3D[k].track_begin;
+    const Point3D& point = whole.points3D[k];
+    sum += static_cast<int64_t>(point.track_end - point.track_begin);
   }
   for (std::vector<int32_t>& points : cut) {
     std::sort(points.begin(), points.end());
