@@ -56,7 +56,6 @@ ConicSolver<Cone>::ConicSolver(const KnownRotationProblem& problem,
       context_(context),
       program_(program),
       system_(problem, program, options.norm, context.num_threads),
-      dz_(problem.observations.size()),
       best_(start),
       multipliers_(problem.observations.size()) {
   now_.x = start;
@@ -177,15 +176,15 @@ bool ConicSolver<Cone>::IsInside(const State& trial) const {
 // shorter of the two; 0 if none do.
 template <typename Cone>
 double ConicSolver<Cone>::TakeStep() {
-  system_.loop().ForEach([&](int64_t i) { dz_[i] = system_.UnscaledDz(i); });
   for (StepLengths step = MaxSteps(kDamping); step.Least() >= kSmallestStep;
        step.primal *= kBacktracking, step.dual *= kBacktracking) {
     trial_.x = now_.x;
     Move(system_.direction().dx, step.primal, &trial_.x);
     trial_.scalar = now_.scalar + step.primal * system_.direction().dscalar;
     ViewAll(&trial_);
-    system_.loop().ForEach(
-        [&](int64_t i) { trial_.z[i] = now_.z[i] + step.dual * dz_[i]; });
+    system_.loop().ForEach([&](int64_t i) {
+      trial_.z[i] = now_.z[i] + step.dual * system_.UnscaledDz(i);
+    });
     trial_.gap = system_.loop().Sum([&](int64_t i) {
       return system_.Slack(trial_.viewed[i], trial_.scalar).dot(trial_.z[i]);
     });
@@ -285,7 +284,7 @@ InteriorPointSummary ConicSolver<Cone>::Run() {
 template <typename Cone>
 int64_t ConicSolver<Cone>::MemoryBytes(const KnownRotationProblem& problem) {
   constexpr int64_t kPerObservation =
-      sizeof(Multiplier) + 5 * sizeof(Vector) + 2 * sizeof(ViewedPoint);
+      sizeof(Multiplier) + 4 * sizeof(Vector) + 2 * sizeof(ViewedPoint);
   constexpr int64_t kPerUnknown = 4 * sizeof(Eigen::Vector3d);
   return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
          (problem.num_points + problem.num_frames) * kPerUnknown +

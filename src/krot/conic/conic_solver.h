@@ -84,9 +84,8 @@ class ConicSolver {
   // Linear programme: stationarity holds up to rounding. Until then steps only
   // centre: where nothing is active it would be missed by as much as there is.
   bool is_balanced_ = false;
-  double start_ = 0;        // g there
-  double step_ = 1;         // that led to now_
-  std::vector<Vector> dz_;  // not scaled
+  double start_ = 0;  // g there
+  double step_ = 1;   // that led to now_
   Estimate best_;
   double best_cost_ = 0;  // or the lowest h'x
   std::vector<Multiplier> multipliers_;
