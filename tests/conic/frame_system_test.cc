@@ -116,7 +116,6 @@ TEST(FramePattern, HasEveryPairOfFreeFramesThatSharesAPoint) {
                       begin + structure.point_begin[k + 1], f) > 0;
   };
   FramePattern expected(free.size());
-  int64_t num_pairs = 0;
   for (size_t a = 0; a < free.size(); ++a) {
     for (size_t b = a; b < free.size(); ++b) {
       bool do_share = a == b;
@@ -125,13 +124,42 @@ TEST(FramePattern, HasEveryPairOfFreeFramesThatSharesAPoint) {
       }
       if (!do_share) continue;
       expected[a].push_back(static_cast<int32_t>(b));
-      ++num_pairs;
     }
   }
-  const FramePattern pattern = FindFramePattern(structure);
-  EXPECT_EQ(pattern, expected);
-  EXPECT_DOUBLE_EQ(ShareOfPairs(pattern, nullptr),
-                   static_cast<double>(num_pairs) / 50);  // of 10 x 10 / 2
+  EXPECT_EQ(FindFramePattern(structure), expected);
+}
+
+// Eliminated from its ends a chain is never filled, nor is a star.
+TEST(FramePattern, OfAChainOrAStarHasAFactorWithoutFill) {
+  constexpr int kFrames = 50;
+  FramePattern star(kFrames);
+  for (int f = 0; f < kFrames; ++f) {
+    star[0].push_back(f);
+    if (f > 0) star[f] = {f};
+  }
+  for (const FramePattern& pattern :
+       {star, FindFramePattern(MakeChain(kFrames + 1, 0))}) {
+    int64_t num_blocks = 0;
+    for (const auto& list : pattern) {
+      num_blocks += static_cast<int64_t>(list.size());
+    }
+    // Of a block on the diagonal, the lower triangle.
+    EXPECT_EQ(FindSparseFactorSize(pattern).numbers,
+              9 * num_blocks - 3 * kFrames);
+  }
+}
+
+TEST(FramePattern, OfAllPairsHasADenseFactor) {
+  constexpr int kFrames = 40;
+  constexpr int kColumns = 3 * kFrames;
+  const SparseFactorSize factor = FindSparseFactorSize(
+      FindFramePattern(WithPointSeenByAll(MakeChain(kFrames + 1, 0))));
+  EXPECT_EQ(factor.numbers, kColumns * (kColumns + 1) / 2);
+  double operations = 0;  // a pair for every number of every update
+  for (int column = 0; column < kColumns; ++column) {
+    operations += column * column;
+  }
+  EXPECT_DOUBLE_EQ(factor.operations, operations);
 }
 
 TEST(FrameSystem, NumbersTheColumnsOfFreeFrames) {
@@ -169,6 +197,14 @@ TEST(FrameSystem, SolvesALongChainSparselyAsItDoesDensely) {
     ASSERT_TRUE(system->Factorize(2));
     EXPECT_LT((system->Solve(rhs) - x_true).norm(), 1e-11 * x_true.norm());
   }
+}
+
+// Few pairs of frames share a point, but eliminated in any order they fill the
+// matrix.
+TEST(FrameSystem, IsDenseWhereASparseFactorWouldFillUp) {
+  const FrameSystem system(MakeRandomStructure(kSparseFrames, 1));
+  EXPECT_TRUE(system.is_dense());
+  EXPECT_FALSE(FrameSystem(MakeChain(kSparseFrames, 7)).is_dense());
 }
 
 // Tracks with gaps across the fixed frame, on top of a chain that is large

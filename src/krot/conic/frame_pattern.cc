@@ -1,7 +1,9 @@
 #include "krot/conic/frame_pattern.h"
 
 #include <algorithm>
-#include <functional>
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 
 namespace krot {
 namespace {
@@ -15,6 +17,20 @@ std::vector<int32_t> NumberFreeFrames(const BlockStructure& structure) {
   }
   return numbers;
 }
+
+using PatternMatrix = Eigen::SparseMatrix<double>;
+
+// Eigen counts, and keeps it to itself.
+class SymbolicFactor : private Eigen::SimplicialLLT<PatternMatrix, Eigen::Lower,
+                                                    Eigen::AMDOrdering<int>> {
+ public:
+  explicit SymbolicFactor(const PatternMatrix& matrix) {
+    analyzePattern(matrix);
+  }
+
+  // Of each column, below the diagonal.
+  const Eigen::VectorXi& counts() const { return m_nonZerosPerCol; }
+};
 
 }  // namespace
 
@@ -52,27 +68,6 @@ FramePattern FindFramePattern(const BlockStructure& structure) {
   return pattern;
 }
 
-double ShareOfPairs(const FramePattern& pattern, Ranks* ranks) {
-  const auto num_frames = static_cast<int64_t>(pattern.size());
-  int64_t num_pairs = 0;
-  if (ranks == nullptr) {
-    for (const std::vector<int32_t>& list : pattern) {
-      num_pairs += static_cast<int64_t>(list.size());
-    }
-  } else {
-    std::vector<char> is_there(num_frames * num_frames, 0);
-    for (int64_t f = 0; f < num_frames; ++f) {
-      for (const int32_t other : pattern[f]) {
-        is_there[f * num_frames + other] = 1;
-      }
-    }
-    ranks->Reduce(std::bit_or<char>(), &is_there);
-    num_pairs = std::count(is_there.begin(), is_there.end(), char{1});
-  }
-  return static_cast<double>(num_pairs) /
-         (0.5 * static_cast<double>(num_frames * num_frames));
-}
-
 void UniteOverRanks(Ranks* ranks, FramePattern* pattern) {
   if (ranks == nullptr) return;
   std::vector<int32_t> pairs;  // both frames in turn
@@ -91,6 +86,29 @@ void UniteOverRanks(Ranks* ranks, FramePattern* pattern) {
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
   }
+}
+
+SparseFactorSize FindSparseFactorSize(const FramePattern& pattern) {
+  const auto num_frames = static_cast<Eigen::Index>(pattern.size());
+  PatternMatrix matrix(num_frames, num_frames);
+  Eigen::VectorXi sizes(num_frames);
+  for (Eigen::Index f = 0; f < num_frames; ++f) {
+    sizes[f] = static_cast<int>(pattern[f].size());
+  }
+  matrix.reserve(sizes);
+  for (Eigen::Index f = 0; f < num_frames; ++f) {
+    for (const int32_t other : pattern[f]) matrix.insert(other, f) = 1;
+  }
+  matrix.makeCompressed();
+  SparseFactorSize size = {0, 0};
+  const SymbolicFactor factor(matrix);
+  for (const int count : factor.counts()) {
+    for (int64_t below : {3 * count, 3 * count + 1, 3 * count + 2}) {
+      size.numbers += below + 1;
+      size.operations += static_cast<double>(below * below);
+    }
+  }
+  return size;
 }
 
 }  // namespace krot

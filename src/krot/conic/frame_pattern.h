@@ -16,9 +16,19 @@ using FramePattern = std::vector<std::vector<int32_t>>;
 // O(sum of the squared lengths of tracks), and the pattern's size.
 FramePattern FindFramePattern(const BlockStructure& structure);
 
-// Where ranks share the points, each with the pattern of its own: of all pairs
-// of frames, those that share a point of any rank; and what they are.
-double ShareOfPairs(const FramePattern& pattern, Ranks* ranks);
+// Where ranks share the points, each with the pattern of its own: the pairs
+// that share a point of any rank.
 void UniteOverRanks(Ranks* ranks, FramePattern* pattern);
+
+// The sparse Cholesky factor of a matrix with a 3x3 block for every pair of a
+// pattern, in Eigen's fill-reducing order.
+struct SparseFactorSize {
+  int64_t numbers;
+  double operations;  // additions and multiplications that make it
+};
+
+// Takes time as the factor of a matrix with one number for every pair does
+// before any of its numbers is known.
+SparseFactorSize FindSparseFactorSize(const FramePattern& pattern);
 
 }  // namespace krot

@@ -12,16 +12,24 @@ namespace {
 // Relative to the diagonal. Refinement removes the error it causes.
 constexpr double kRegularization = 1e-14;
 constexpr double kLargestRegularization = 1e-7;
-// Up to here a dense factor is the faster one whatever the pattern, and it
-// stays so up to the second count unless few frames share points.
+// Up to here a dense factor is the faster one whatever the pattern; beyond, it
+// makes so many operations in the time that a sparse one takes for one. With
+// 800 to 3000 frames of many patterns 12 to 21 were measured, on one thread.
 constexpr int64_t kAlwaysDenseFrames = 500;
-constexpr int64_t kMaxDenseFrames = 4000;
-constexpr double kSparseShare = 0.2;
+constexpr double kDenseSpeed = 15;
 // Parts of the sum, and so the threads that can eliminate points; fewer where
-// each is large: a dense part of 1500 frames takes 162 MB.
+// each is large: a dense part of 1500 frames takes 162 MB, one of 6000 frames,
+// where the factor takes most of the time, 2.6 GB.
 constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;
+constexpr int64_t kLargestFrames = 6000;
+
+// Additions and multiplications of a dense Cholesky factor.
+double DenseOperations(int64_t num_columns) {
+  const auto n = static_cast<double>(num_columns);
+  return n * n * n / 3;
+}
 
 // Of a column, what stands in blocks of the lower triangle: nothing else is
 // written.
@@ -43,14 +51,18 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
   if (num_free > kAlwaysDenseFrames) {
     FramePattern pattern = FindFramePattern(structure);
-    is_dense_ = num_free <= kMaxDenseFrames &&
-                ShareOfPairs(pattern, ranks) > kSparseShare;
+    UniteOverRanks(ranks, &pattern);
+    const SparseFactorSize factor = FindSparseFactorSize(pattern);
+    is_dense_ =
+        DenseOperations(num_columns_) < kDenseSpeed * factor.operations ||
+        factor.numbers > std::numeric_limits<int>::max();  // Eigen's indices
     if (!is_dense_) {
-      UniteOverRanks(ranks, &pattern);
       TakePattern(pattern);
+      num_factor_numbers_ = factor.numbers;
     }
   }
   if (is_dense_) {
+    if (num_free > kLargestFrames) num_parts_ = 1;
     dense_.resize(num_parts_);
   } else {
     values_.resize(num_parts_);
@@ -221,8 +233,10 @@ int64_t FrameSystem::MemoryBytes() const {
     return num_parts_ * num_columns_ * num_columns_ * kDouble +
            DenseCholesky::MemoryBytes(num_columns_);
   }
-  return (num_parts_ + 8) * 9 * static_cast<int64_t>(block_row_.size()) *
-         kDouble;
+  constexpr int64_t kSparse = sizeof(double) + sizeof(int32_t);
+  const int64_t num_numbers = 9 * static_cast<int64_t>(block_row_.size());
+  return num_parts_ * num_numbers * kDouble +
+         (2 * num_numbers + num_factor_numbers_) * kSparse;
 }
 
 }  // namespace krot

@@ -16,13 +16,13 @@ namespace krot {
 
 // The normal equations of the frames once the points are eliminated, or of
 // whatever else comes in threes of columns (adjust/barrier_system.h): 3x3
-// blocks, symmetric, positive definite up to rounding. Dense for up to a few
-// thousand frames or where most frames share points; beyond, sparse with a
-// fill-reducing order.
+// blocks, symmetric, positive definite up to rounding. For a few hundred frames
+// it is dense; for more, dense or sparse with a fill-reducing order, whichever
+// factor is predicted to take less time.
 //
 // The sum over points is taken in `num_parts` parts, whose number and order
 // depend on the structure alone: the same bits at any number of threads. More
-// threads than parts, four or, for many frames, two, do not make it faster.
+// threads than parts, four or, for many frames, fewer, do not make it faster.
 class FrameSystem {
  public:
   // Where ranks share the points they make one each, of their shares.
@@ -78,6 +78,7 @@ class FrameSystem {
   // Sparse: the block columns of the lower triangle.
   std::vector<int64_t> block_begin_;
   std::vector<int32_t> block_row_;
+  int64_t num_factor_numbers_ = 0;
   std::vector<std::vector<double>> values_;  // per part, as of sparse_
   Eigen::SparseMatrix<double> sparse_;
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower,
