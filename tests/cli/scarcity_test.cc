@@ -7,10 +7,7 @@
 
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define KROT_UNDER_SANITIZER 1
-#endif
+#include "tests/testing/sanitizer.h"
 
 namespace krot {
 namespace {
@@ -22,9 +19,9 @@ constexpr uint64_t kMegabyte = 1000000;
 class Scarcity : public ::testing::Test {
  protected:
   void SetUp() override {
-#ifdef KROT_UNDER_SANITIZER
-    GTEST_SKIP() << "the address space cannot be bounded under a sanitizer";
-#endif
+    if (kIsSanitized) {
+      GTEST_SKIP() << "the address space cannot be bounded under a sanitizer";
+    }
   }
 
   TempFolder folder_;

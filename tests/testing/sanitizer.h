@@ -1,0 +1,12 @@
+#pragma once
+
+namespace krot {
+
+// Whether the tests are built with a sanitizer that takes memory of its own.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kIsSanitized = true;
+#else
+inline constexpr bool kIsSanitized = false;
+#endif
+
+}  // namespace krot
