@@ -134,7 +134,7 @@ TEST(CutPoints, LeavesTheFirstRankToTheWorkingSets) {
     }
   };
   expect_shares({1});
-  expect_shares({1. / 4, 3. / 4});
+  expect_shares({1. / 2, 1. / 2});
   expect_shares({0, 1. / 3, 1. / 3, 1. / 3});
 }
 

@@ -15,7 +15,7 @@ std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
   });
   std::vector<std::vector<int32_t>> cut(count);
   const auto total = static_cast<int64_t>(whole.track_elements.size());
-  const int64_t first = total * std::max(0, 3 - count) / (2 * count);
+  const int64_t first = total * std::max(0, 3 - count) / 2;
   // The observations of all shares up to this one.
   const auto end_of = [&](int share) {
     return share + 1 == count ? total

@@ -9,9 +9,8 @@ namespace krot {
 
 // The points that each of `count` processes takes of a model, as indices of its
 // points3D, ascending: consecutive ones in the order of their ids, with about
-// as many observations but for the first, which solves the working sets of all:
-// of two it takes a quarter of the observations, of three and more none.
-// O(points log points).
+// as many observations; but of three and more the first has none, as it solves
+// the working sets of all. O(points log points).
 std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count);
 
 // All of a model but for the other points, their tracks, and the 2D points that
