@@ -219,14 +219,23 @@ class Place:
 
     def judge_again(self):
         """What is wrong with what another run makes of what one has left."""
+        # An old folder that was set aside keeps what is not of the model.
+        expected = {key: value for key, value in self.new.items()
+                    if (self.folder / key.split("/")[0]).exists() or
+                    not self._is_of_the_user(key)}
         result = self.run()
         if result.returncode != 0:
             return [f"the run after it: {result.stderr}"]
         found = state(self.folder, self.command.folders)
-        wrong = [] if found == self.new else ["the run after it ends otherwise"]
+        wrong = [] if found == expected else ["the run after it ends otherwise"]
         if self.command.checkpoint in state(self.folder):
             wrong.append("the run after it leaves its checkpoint")
         return wrong
+
+    def _is_of_the_user(self, key):
+        """Whether it is in the old folder, but no part of its model."""
+        folder, _, name = key.partition("/")
+        return bool(name) and not (self.pristine / "old" / name).exists()
 
     def _is_set_aside(self, name, old):
         """Whether the old folder bears the name of its own that it has between
