@@ -1,7 +1,11 @@
 #include "tools/krot/solve_progress.h"
 
 #include <algorithm>
+#include <iostream>
 #include <optional>
+#include <streambuf>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -32,6 +36,35 @@ TEST(SolveProgress, PrintsOneLinePerStepWhereNoTerminalIs) {
             "estimated gap 1.0e-02, 1.50 s\n"
             "iteration 2: cost 7.000000 px, proved bound 6.999900 px, "
             "estimated gap 1.0e-03, 2.00 s\n");
+}
+
+// What arrives at once.
+class Pieces : public std::streambuf {
+ public:
+  std::vector<std::string> all;
+
+ protected:
+  std::streamsize xsputn(const char* text, std::streamsize size) override {
+    all.emplace_back(text, size);
+    return size;
+  }
+  int overflow(int letter) override {
+    all.emplace_back(1, static_cast<char>(letter));
+    return letter;
+  }
+};
+
+// A signal may come between two pieces, and its sentence begins a line.
+TEST(SolveProgress, WritesEveryLineInOnePiece) {
+  Pieces pieces;
+  std::streambuf* const usual = std::cerr.rdbuf(&pieces);
+  SolveProgress progress({}, {1e-4, 100, 1e-4}, SolveProgress::Style::kLines);
+  progress.Update(1, Sweep{8.0, 0.5});
+  progress.Update(2, Sweep{7.5, 1.0});
+  std::cerr.rdbuf(usual);
+  EXPECT_THAT(pieces.all,
+              ::testing::ElementsAre("sweep 1: cost 8.000000 px, 0.50 s\n",
+                                     "sweep 2: cost 7.500000 px, 1.00 s\n"));
 }
 
 TEST(SolveProgress, SaysWhatAStartIsToMeet) {

@@ -18,7 +18,8 @@ void LogToSink(const std::string& text) {
 
 void LogLine(const LogOptions& options, int level, const std::string& line) {
   LogToSink(line);
-  if (options.level >= level) std::cerr << line << std::endl;
+  // In one piece: a signal's sentence begins a line of its own.
+  if (options.level >= level) std::cerr << line + '\n' << std::flush;
 }
 
 std::function<void(const std::string&)> WarnOn(const LogOptions& options) {

@@ -116,7 +116,7 @@ void SolveProgress::Show(double fraction, const std::string& words) {
   const std::string bar =
       std::string(filled, '#') + std::string(kBarWidth - filled, '.');
   // Back to the margin; what is left of a longer line is erased.
-  std::cerr << "\r[" << bar << "] " << words << "\033[K" << std::flush;
+  std::cerr << "\r[" + bar + "] " + words + "\033[K" << std::flush;
   line_is_open_ = true;
 }
 

@@ -27,7 +27,9 @@ class AdjustmentTracks {
     return structure_.frame_of.data() + structure_.point_begin[k + 1];
   }
   // Where among these ErrorJacobians::blocks(i) stand.
-  const int32_t* slots(int64_t i) const { return slots_.data() + slot_begin_[i]; }
+  const int32_t* slots(int64_t i) const {
+    return slots_.data() + slot_begin_[i];
+  }
 
   // The same for a FrameSystem, with blocks for frames.
   const BlockStructure& structure() const { return structure_; }

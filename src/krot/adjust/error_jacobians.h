@@ -32,7 +32,9 @@ class ErrorJacobians {
     return D_[begin_[i] + 1 + n];
   }
   // Ascending.
-  const int32_t* blocks(int64_t i) const { return blocks_.data() + begin_[i] + 1; }
+  const int32_t* blocks(int64_t i) const {
+    return blocks_.data() + begin_[i] + 1;
+  }
   int num_blocks(int64_t i) const {
     return static_cast<int>(begin_[i + 1] - begin_[i] - 1);
   }
