@@ -107,7 +107,8 @@ void BoundedSystem<Cap>::SolveForTarget() {
     const double x = -pull[0] / U.a;
     d_[i] << x, (-pull[1] - U.b * x) / U.c, 0;
   });
-  elimination_.Solve(d_.data()->data(), &dx_);
+  // A rank may have no observation.
+  elimination_.Solve(d_.empty() ? nullptr : d_[0].data(), &dx_);
   for (size_t f = 0; f < dx_.frames.size(); ++f) {  // t = -R_rw c
     dx_.frames[f] = -(frame_rotations_[f] * dx_.frames[f]);
   }
