@@ -101,11 +101,13 @@ def vanishing_parent(krot, rounds, dice):
                 time.sleep(dice.uniform(0, 0.2))
                 # At once: piece by piece, it would be this test that leaves
                 # pieces of what is put there meanwhile.
-                deep.rename(place.folder / "gone")
+                gone = place.folder / "gone"
+                deep.rename(gone)
                 with contextlib.suppress(OSError):
                     if becomes_file:
                         deep.write_text("a file")
                 _, err = process.communicate()
+            shutil.rmtree(gone)  # with what was in the making
             out = deep / "out"
             refused += process.returncode != 0
             done += process.returncode == 0
