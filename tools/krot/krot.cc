@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <exception>
 #include <functional>
@@ -197,14 +198,22 @@ int RunOrFail(const std::string& who,
 }
 
 std::string out_of_memory;  // as a sentence, while there is some
+std::atomic<bool> has_memory_ended{false};
 
-// Libraries whose destructors allocate (nlohmann/json) end the process where
-// memory does: with the sentence and the code of any other place, at least.
+[[noreturn]] void OnMemoryEnd() {
+  has_memory_ended = true;
+  throw std::bad_alloc();
+}
+
+// Libraries whose destructors allocate (nlohmann/json, Ceres) end the process
+// where memory does: with the sentence and the code of any other place, at
+// least. What was thrown is not always told.
 [[noreturn]] void EndWithoutUnwinding() {
   try {
     if (const std::exception_ptr error = std::current_exception()) {
       std::rethrow_exception(error);
     }
+    if (has_memory_ended) throw std::bad_alloc();
   } catch (const std::bad_alloc&) {
     if (::write(STDERR_FILENO, out_of_memory.data(), out_of_memory.size()) <
         0) {
@@ -224,6 +233,7 @@ int Main(const std::vector<std::string>& arguments) {
           : "krot " + arguments.front();
   EndOnInterrupt(who);
   out_of_memory = who + ": out of memory\n";
+  std::set_new_handler(&OnMemoryEnd);
   std::set_terminate(&EndWithoutUnwinding);
   const int exit_code = RunOrFail(who, arguments);
   EndRunLog(exit_code);
