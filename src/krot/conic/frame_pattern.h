@@ -27,8 +27,8 @@ struct SparseFactorSize {
   double operations;  // additions and multiplications that make it
 };
 
-// Takes time as the factor of a matrix with one number for every pair does
-// before any of its numbers is known.
+// By a symbolic factor of one number for every pair: next to nothing beside the
+// factor itself.
 SparseFactorSize FindSparseFactorSize(const FramePattern& pattern);
 
 }  // namespace krot
