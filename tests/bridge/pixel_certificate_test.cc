@@ -104,6 +104,22 @@ TEST_P(PixelCertificateOf, IsRefusedForAnyHigherBound) {
   });
 }
 
+TEST_P(PixelCertificateOf, IsLoweredALittleIfThatMakesItAccepted) {
+  PixelCertificate certificate = optimum_.certificate;
+  certificate.lower_bound *= 1 + 9e-7;
+  ASSERT_FALSE(Check(certificate).is_accepted);
+  const PixelCertificateCheck check =
+      LowerUntilAccepted(model_, built_, norm(), {}, &certificate);
+  EXPECT_TRUE(check.is_accepted) << check.refusal;
+  EXPECT_EQ(check.lower_bound, certificate.lower_bound);
+  EXPECT_GT(check.lower_bound, (1 - 1e-6) * optimum_.certificate.lower_bound);
+  EXPECT_TRUE(Check(certificate).is_accepted);
+
+  certificate.lower_bound *= 1 + 1e-5;
+  EXPECT_FALSE(
+      LowerUntilAccepted(model_, built_, norm(), {}, &certificate).is_accepted);
+}
+
 TEST_P(PixelCertificateOf, IsRefusedIfAnyNumberOfItChanges) {
   const size_t count = optimum_.certificate.bearings.size();
   double largest = 0;

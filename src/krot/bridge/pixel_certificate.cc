@@ -20,6 +20,8 @@ constexpr double kNoRegion = std::numeric_limits<double>::infinity();
 constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
 constexpr double kMargin = 1e-9;
+// By how much a certificate that is refused is lowered, relative.
+constexpr double kLower[] = {1e-8, 1e-7, 1e-6};
 // Support lines that are found at the same time; the next profit from them.
 constexpr int64_t kLinesAtOnce = 32;
 // A remainder below it need not be known: what it stretches is an allowance for
@@ -239,6 +241,21 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
   check.is_accepted = true;
   check.lower_bound = gamma;
   check.defect = rows.defect;
+  return check;
+}
+
+PixelCertificateCheck LowerUntilAccepted(const Model& model,
+                                         const BuiltProblem& built, Norm norm,
+                                         const Context& context,
+                                         PixelCertificate* certificate) {
+  const double bound = certificate->lower_bound;
+  PixelCertificateCheck check =
+      CheckPixelCertificate(model, built, norm, *certificate, context);
+  for (const double share : kLower) {
+    if (check.is_accepted) break;
+    certificate->lower_bound = (1 - share) * bound;
+    check = CheckPixelCertificate(model, built, norm, *certificate, context);
+  }
   return check;
 }
 

@@ -60,6 +60,14 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
                                             const PixelCertificate& certificate,
                                             const Context& context);
 
+// The same of a certificate as it is or, if it is refused, up to 1e-6 lower:
+// its making leaves room for roundings by a guess, which a multiplier that is
+// tiny beside the others may exceed.
+PixelCertificateCheck LowerUntilAccepted(const Model& model,
+                                         const BuiltProblem& built, Norm norm,
+                                         const Context& context,
+                                         PixelCertificate* certificate);
+
 // Where the rows of a certificate's observations were taken: at the points of
 // an estimate, or, for a start from nothing, at the pixels' own rays.
 std::vector<Eigen::Vector3d> BearingsOfPoints(const Model& model,

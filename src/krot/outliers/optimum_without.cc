@@ -41,7 +41,7 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
       reprojection.TrueCost(estimate, norm, context.num_threads);
   if (optimum.proof) {
     optimum.lower_bound =
-        CheckPixelCertificate(model, part, norm, *optimum.proof, context)
+        LowerUntilAccepted(model, part, norm, context, &*optimum.proof)
             .lower_bound;
     optimum.proof->rows = InWhole(subset, std::move(optimum.proof->rows));
   }

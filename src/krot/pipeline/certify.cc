@@ -1,5 +1,7 @@
 #include "krot/pipeline/certify.h"
 
+#include <utility>
+
 #include "krot/base/timer.h"
 #include "krot/bridge/gathered_support.h"
 #include "krot/bridge/position_rows.h"
@@ -20,7 +22,7 @@ void CertifyShared(const Model& model, const BuiltProblem& built,
   if (!ranks.IsFirst()) return;
   certificate.rows = support.FromWhole(std::move(certificate.rows));
   Certify(support.model, support.built, support.estimate, options,
-          context.Alone(), certificate, summary);
+          context.Alone(), std::move(certificate), summary);
 }
 
 }  // namespace
@@ -28,17 +30,17 @@ void CertifyShared(const Model& model, const BuiltProblem& built,
 void Certify(const Model& model, const BuiltProblem& built,
              const Estimate& estimate, const SolveModelOptions& options,
              const Context& context,
-             const std::optional<PixelCertificate>& certificate,
+             std::optional<PixelCertificate> certificate,
              SolveSummary* summary) {
   if (!certificate) return;
   if (context.ranks != nullptr) {
-    CertifyShared(model, built, estimate, options, context, *certificate,
-                  summary);
+    CertifyShared(model, built, estimate, options, context,
+                  std::move(*certificate), summary);
     return;
   }
   const Timer timer;
   const PixelCertificateCheck check =
-      CheckPixelCertificate(model, built, options.norm, *certificate, context);
+      LowerUntilAccepted(model, built, options.norm, context, &*certificate);
   if (check.is_accepted) {
     summary->is_certified = true;
     summary->lower_bound = check.lower_bound;

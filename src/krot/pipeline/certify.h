@@ -15,7 +15,7 @@ namespace krot {
 void Certify(const Model& model, const BuiltProblem& built,
              const Estimate& estimate, const SolveModelOptions& options,
              const Context& context,
-             const std::optional<PixelCertificate>& certificate,
+             std::optional<PixelCertificate> certificate,
              SolveSummary* summary);
 
 // That no estimate is below a start's bound, in true pixels.
