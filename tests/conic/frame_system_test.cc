@@ -126,7 +126,9 @@ TEST(FramePattern, HasEveryPairOfFreeFramesThatSharesAPoint) {
       expected[a].push_back(static_cast<int32_t>(b));
     }
   }
-  EXPECT_EQ(FindFramePattern(structure), expected);
+  for (const int64_t words : {1, 3, 1000}) {  // a frame at a time, 3, all
+    EXPECT_EQ(FindFramePattern(structure, words), expected);
+  }
 }
 
 // Eliminated from its ends a chain is never filled, nor is a star.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/joint/joint.h"
+#include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "tests/problem/random_problem.h"
@@ -40,7 +41,7 @@ struct Solved {
   }
   bool Extend(double highest, Estimate* extended) const {
     *extended = estimate;
-    return ExtendSolution(scene.problem, set, Norm::L2(), {}, level, highest,
+    return ExtendSolution(scene.problem, Norm::L2(), {}, level, highest,
                           extended);
   }
 
@@ -87,8 +88,8 @@ TEST(ExtendSolution, LeavesAloneWhatFits) {
   const Solved solved(1, 40, 15);
   const double cost = solved.CostOf(solved.estimate);
   Estimate extended = solved.estimate;
-  EXPECT_TRUE(ExtendSolution(solved.scene.problem, solved.set, Norm::L2(), {},
-                             cost, cost, &extended));
+  EXPECT_TRUE(ExtendSolution(solved.scene.problem, Norm::L2(), {}, cost, cost,
+                             &extended));
   EXPECT_EQ(extended.points, solved.estimate.points);
   EXPECT_EQ(extended.translations, solved.estimate.translations);
 }
@@ -108,7 +109,7 @@ TEST(ExtendSolution, HasTheSameBitsAtAnyNumberOfThreads) {
   Estimate expected;
   for (const int num_threads : {1, 2, 3}) {
     Estimate extended = solved.estimate;
-    ExtendSolution(solved.scene.problem, solved.set, Norm::L2(), {num_threads},
+    ExtendSolution(solved.scene.problem, Norm::L2(), {num_threads},
                    solved.level, kRoom * solved.level, &extended);
     if (num_threads == 1) expected = extended;
     EXPECT_EQ(extended.points, expected.points);

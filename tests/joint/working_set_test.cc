@@ -71,6 +71,54 @@ TEST(WorkingSet, TakesInAPointBehindACameraFirst) {
   EXPECT_TRUE(set.Contains(31));
 }
 
+// Every observation of the points that come in is above the share of the level
+// or among the worst four of its point; and no other that is so stays outside.
+TEST(WorkingSet, TakesOfAPointWhatIsNearTheLevelAndFourAtLeast) {
+  const RandomScene scene = MakeScene();
+  const KnownRotationProblem& problem = scene.problem;
+  const double level =
+      0.5 * Cost(problem, scene.estimate, Norm::L2(), /*num_threads=*/1);
+  WorkingSet set(problem);
+  const int64_t num_added =
+      set.AddAbove(scene.estimate, Norm::L2(), level, 60, 0.7);
+  EXPECT_GT(num_added, 5);
+  EXPECT_EQ(set.num_points(), num_added);
+  const std::vector<int64_t> taken = set.Observations();
+  EXPECT_LT(taken.size(), 5 * static_cast<size_t>(num_added));  // of six
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    const bool is_above =
+        PointCost(problem, scene.estimate, Norm::L2(), k) > level;
+    EXPECT_EQ(set.Contains(k), is_above);
+    std::vector<double> errors;
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      errors.push_back(ErrorOf(scene, problem.observations[i]));
+    }
+    std::sort(errors.rbegin(), errors.rend());
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      const double error = ErrorOf(scene, problem.observations[i]);
+      EXPECT_EQ(std::binary_search(taken.begin(), taken.end(), i),
+                is_above && (error >= 0.7 * level || error >= errors[3]));
+    }
+  }
+}
+
+// What is inside of the set is no reason to take a point in once more.
+TEST(WorkingSet, TakesAPointInAgainForWhatIsOutside) {
+  const RandomScene scene = MakeScene();
+  const double cost = Cost(scene.problem, scene.estimate, Norm::L2(), 1);
+  WorkingSet set(scene.problem);
+  const int64_t first =
+      set.AddAbove(scene.estimate, Norm::L2(), 0.9 * cost, 60, 1);
+  EXPECT_GT(first, 0);
+  EXPECT_EQ(set.AddAbove(scene.estimate, Norm::L2(), 0.9 * cost, 60), 0);
+  EXPECT_FALSE(set.IsAll());
+  EXPECT_EQ(set.AddAbove(scene.estimate, Norm::L2(), 0, 60), 60);
+  EXPECT_EQ(set.num_points(), 60);
+  EXPECT_TRUE(set.IsAll());
+}
+
 TEST(WorkingSet, TiesEveryFrameAndTakesNoMoreThanThatNeeds) {
   const RandomScene scene = MakeScene();
   WorkingSet set(scene.problem);

@@ -100,7 +100,7 @@ function draw_matrix(    k, f, g, row, together) {
 function draw_working_set(    k, f, frames, points, edges, errors, top, height) {
   open_svg(680, 330)
   left = 40
-  split("1 0.4 0.3 0.88 0.5 0.6 0.35 0.2", errors, " ")
+  split("1 0.4 0.3 0.94 0.5 0.6 0.35 0.2", errors, " ")
   split("", points)
   points[1] = points[4] = red
   points[3] = points[6] = points[7] = blue
@@ -116,9 +116,9 @@ function draw_working_set(    k, f, frames, points, edges, errors, top, height) 
         points[k] ? points[k] : pale)
   }
   line(left - 12, top, point_x(8) + 20, top, "#333", 1)
-  line(left - 12, top + 18, point_x(8) + 20, top + 18, "#999", 1)
-  text(point_x(8) + 26, top + 4, "start", "cost")
-  text(point_x(8) + 26, top + 24, "start", "0.8 of it")
+  line(left - 12, top + 9, point_x(8) + 20, top + 9, "#999", 1)
+  text(point_x(8) + 26, top, "start", "cost")
+  text(point_x(8) + 26, top + 18, "start", "0.9 of it")
   text(left, 308, "start", "each point's largest residual")
   disc(410, 68, 7, red)
   text(426, 73, "start", "in the set for its residual")

@@ -59,14 +59,16 @@ GatheredSupport GatherSupport(const Model& model, const BuiltProblem& built,
   }
   std::vector<Point3DId> ids;
   std::vector<Sighting> sightings;
+  std::vector<int64_t> of_points;
   for (const int32_t k : points) {
     ids.push_back(model.points3D[built.point_of[k]].id);
     for (int64_t i = built.problem.point_begin[k];
          i < built.problem.point_begin[k + 1]; ++i) {
       sightings.push_back({built.pixels[i], built.point2D_of[i]});
+      of_points.push_back(i);
     }
   }
-  const GatheredPart part(built.problem, points, ranks);
+  const GatheredPart part(built.problem, of_points, ranks);
   GatheredSupport support;
   support.model = WithoutPoints(model);
   support.built.problem = part.problem();

@@ -34,36 +34,52 @@ class SymbolicFactor : private Eigen::SimplicialLLT<PatternMatrix, Eigen::Lower,
 
 }  // namespace
 
-FramePattern FindFramePattern(const BlockStructure& structure) {
+// Pairs are marked in a matrix of bits, of as many rows at a time as there is
+// room for: points are gone through in their order, once for each time.
+FramePattern FindFramePattern(const BlockStructure& structure,
+                              int64_t most_words) {
   const std::vector<int32_t> numbers = NumberFreeFrames(structure);
-  const auto number_of = [&](int64_t i) {
-    return numbers[structure.frame_of[i]];
-  };
-  std::vector<std::vector<int32_t>> points_of(
-      std::count(structure.frame_is_fixed.begin(),
-                 structure.frame_is_fixed.end(), char{0}));
-  for (int64_t k = 0; k < structure.num_points(); ++k) {
-    for (int64_t i = structure.point_begin[k]; i < structure.point_begin[k + 1];
-         ++i) {
-      if (number_of(i) < 0) continue;
-      points_of[number_of(i)].push_back(static_cast<int32_t>(k));
-    }
-  }
-  FramePattern pattern(points_of.size());
-  std::vector<int32_t> last_met(points_of.size(), -1);  // in whose list it is
-  for (int32_t f = 0; f < static_cast<int32_t>(pattern.size()); ++f) {
-    pattern[f] = {f};
-    last_met[f] = f;
-    for (const int32_t k : points_of[f]) {
+  const int64_t num_free = std::count(structure.frame_is_fixed.begin(),
+                                      structure.frame_is_fixed.end(), char{0});
+  const int64_t words_per_row = num_free / 64 + 1;
+  const int64_t rows_at_a_time =
+      std::min(num_free, std::max<int64_t>(1, most_words / words_per_row));
+  FramePattern pattern(num_free);
+  std::vector<uint64_t> bits;
+  std::vector<int64_t> seeing;  // free frames
+  for (int64_t first = 0; first < num_free; first += rows_at_a_time) {
+    const int64_t behind = std::min(first + rows_at_a_time, num_free);
+    bits.assign((behind - first) * words_per_row, 0);
+    const auto row_of = [&](int64_t f) {
+      return bits.data() + (f - first) * words_per_row;
+    };
+    for (int64_t k = 0; k < structure.num_points(); ++k) {
+      seeing.clear();
       for (int64_t i = structure.point_begin[k];
            i < structure.point_begin[k + 1]; ++i) {
-        const int32_t other = number_of(i);
-        if (other < f || last_met[other] == f) continue;
-        last_met[other] = f;
-        pattern[f].push_back(other);
+        const int32_t f = numbers[structure.frame_of[i]];
+        if (f >= first) seeing.push_back(f);
+      }
+      for (const int64_t f : seeing) {
+        if (f >= behind) continue;
+        uint64_t* const row = row_of(f);
+        for (const int64_t other : seeing) {
+          row[other / 64] |= uint64_t{1} << (other % 64);
+        }
       }
     }
-    std::sort(pattern[f].begin(), pattern[f].end());
+    for (int64_t f = first; f < behind; ++f) {
+      pattern[f] = {static_cast<int32_t>(f)};
+      const uint64_t* const row = row_of(f);
+      for (int64_t other = f + 1; other < num_free; ++other) {
+        const uint64_t rest = row[other / 64] >> (other % 64);
+        if (rest == 0) {
+          other |= 63;  // none in this word
+        } else if ((rest & 1) != 0) {
+          pattern[f].push_back(static_cast<int32_t>(other));
+        }
+      }
+    }
   }
   return pattern;
 }

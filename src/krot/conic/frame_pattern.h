@@ -13,8 +13,10 @@ namespace krot {
 // first.
 using FramePattern = std::vector<std::vector<int32_t>>;
 
-// O(sum of the squared lengths of tracks), and the pattern's size.
-FramePattern FindFramePattern(const BlockStructure& structure);
+// O(sum of the squared lengths of tracks + frames^2 / 64), in scratch memory of
+// 8 most_words bytes, or what a frame's row of bits takes.
+FramePattern FindFramePattern(const BlockStructure& structure,
+                              int64_t most_words = int64_t{1} << 23);
 
 // Where ranks share the points, each with the pattern of its own: the pairs
 // that share a point of any rank.

@@ -83,9 +83,13 @@ FrameSystem::Block FrameSystem::BlockOf(int part, int32_t a, int32_t b) {
   if (is_dense_) return {&dense_[part](row, col), num_columns_};
   const int64_t begin = block_begin_[col / 3];
   const int64_t end = block_begin_[col / 3 + 1];
-  const auto found = std::lower_bound(block_row_.begin() + begin,
-                                      block_row_.begin() + end, row / 3);
-  const int64_t n = found - block_row_.begin() - begin;
+  // Where a column has no gaps, as in a band: no search.
+  int64_t n = (row - col) / 3;
+  if (n >= end - begin || block_row_[begin + n] != row / 3) {
+    n = std::lower_bound(block_row_.begin() + begin, block_row_.begin() + end,
+                         row / 3) -
+        block_row_.begin() - begin;
+  }
   return {values_[part].data() + 9 * begin + 3 * n, 3 * (end - begin)};
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 // A working set takes in the points that do not fit in below this share of its
 // optimum, the worst first, and grows by this factor at most.
-constexpr double kShareOfLevel = 0.8;
+constexpr double kShareOfLevel = 0.9;
 constexpr double kMaxGrowth = 3;
 // Of the gap asked for, the share that a working set's own proof may leave; the
 // rest is what other points may exceed its cost by.
@@ -163,7 +163,7 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
 JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
                                                Estimate* candidate) {
   Ranks& ranks = *context_.ranks;
-  const GatheredPart gathered(problem_, set_.Points(), &ranks);
+  const GatheredPart gathered(problem_, set_.Observations(), &ranks);
   Estimate best = gathered.Collect(estimate_);
   Estimate moved = gathered.Collect(*candidate);
   const auto fit_others = [&] {
@@ -207,8 +207,8 @@ bool ComponentSolve::FitOthers(Estimate* candidate) {
   level_ = set_.Cost(*candidate, options_.norm);
   const double highest =
       level_ / (1 - (1 - kShareOfGapForProof) * options_.relative_gap);
-  const bool do_fit = ExtendSolution(problem_, set_, options_.norm, context_,
-                                     level_, highest, candidate);
+  const bool do_fit = ExtendSolution(problem_, options_.norm, context_, level_,
+                                     highest, candidate);
   Keep(*candidate);
   return do_fit;
 }
@@ -276,7 +276,8 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
         candidate, options_.norm, kShareOfLevel * level_,
         static_cast<int64_t>((kMaxGrowth - 1) *
                              static_cast<double>(set_.num_points())) +
-            1);
+            1,
+        kShareOfLevelNear);
     if (do_others_fit_ || num_added == 0 || round == kMaxRounds) set_.AddAll();
   }
 }

@@ -2,10 +2,8 @@
 
 #include <cmath>
 #include <utility>
-#include <vector>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
 
 namespace krot {
@@ -24,39 +22,20 @@ constexpr int kMaxSweeps = 10;
 
 }  // namespace
 
-bool PlaceOthers(const KnownRotationProblem& problem, const WorkingSet& set,
-                 Norm norm, const Context& context, double level,
-                 Estimate* estimate) {
-  std::vector<int64_t> observations;
-  bool is_behind = false;
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    if (set.Contains(k)) continue;
-    const double cost = PointCost(problem, *estimate, norm, k);
-    is_behind |= !std::isfinite(cost);
-    if (cost <= level || !std::isfinite(cost)) continue;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      observations.push_back(i);
-    }
-  }
-  if (!observations.empty()) {
-    const ProblemSubset part(problem, std::move(observations));
-    Estimate placed = part.Restrict(*estimate);
-    BlockSweep blocks(part.problem(), FastDescentOptions(), norm,
-                      context.Alone());
-    DescentGoal goal;
-    goal.sufficient = kSufficientShareOfLevel * level;
-    blocks.SetGoal(goal);
-    blocks.IntersectPoints(&placed);
-    part.Replace(placed, estimate);
-  }
-  return !context.Any(is_behind);
+bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
+                 const Context& context, double level, Estimate* estimate) {
+  BlockSweep blocks(problem, FastDescentOptions(), norm, context);
+  DescentGoal goal;
+  goal.level = level;
+  goal.sufficient = kSufficientShareOfLevel * level;
+  blocks.SetGoal(goal);
+  return std::isfinite(blocks.IntersectPoints(estimate));
 }
 
-bool ExtendSolution(const KnownRotationProblem& problem, const WorkingSet& set,
-                    Norm norm, const Context& context, double level,
-                    double highest, Estimate* estimate) {
-  if (!PlaceOthers(problem, set, norm, context, level, estimate)) return false;
+bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
+                    const Context& context, double level, double highest,
+                    Estimate* estimate) {
+  if (!PlacePoints(problem, norm, context, level, estimate)) return false;
   const auto excess = [&] {
     return context.Max(Cost(problem, *estimate, norm, context.num_threads)) -
            highest;

@@ -5,16 +5,21 @@
 #include <limits>
 #include <utility>
 
+#include "krot/base/parallel_for.h"
 #include "krot/joint/frame_ties.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
 namespace {
 
-constexpr double kShareOfCost = 0.8;
+constexpr double kShareOfCost = 0.9;
 constexpr int kTiesPerFrame = 20;
+// Of a point that comes in for some of its observations, so many at least.
+// With fewer the others soon have it come in again.
+constexpr size_t kLeastPerPoint = 4;
+constexpr int64_t kPointsPerChunk = 1024;
 
-using Candidate = std::pair<double, int64_t>;  // -cost, point
+using Candidate = std::pair<double, int64_t>;  // -residual, whose
 
 void KeepWorst(int64_t count, std::vector<Candidate>* candidates) {
   if (static_cast<int64_t>(candidates->size()) <= count) return;
@@ -30,89 +35,141 @@ WorkingSet::WorkingSet(const KnownRotationProblem& problem,
     : problem_(problem),
       context_(context),
       contains_(problem.num_points, 0),
-      num_points_of_whole_(context.Sum(problem.num_points)) {
+      takes_(problem.observations.size(), 0),
+      num_observations_of_whole_(
+          context.Sum(static_cast<int64_t>(problem.observations.size()))) {
   if (context.ranks != nullptr) {
     first_point_ = context.ranks->SumBefore(problem.num_points);
   }
 }
 
+void WorkingSet::Take(int64_t observation) {
+  char& takes = takes_[observation];
+  num_observations_here_ += 1 - takes;
+  takes = 1;
+  char& contains = contains_[problem_.observations[observation].point];
+  num_points_here_ += 1 - contains;
+  contains = 1;
+}
+
+void WorkingSet::CountTaken() {
+  num_points_ = context_.Sum(num_points_here_);
+  num_observations_ = context_.Sum(num_observations_here_);
+}
+
+// 0 if there is none.
+double WorkingSet::LargestOutside(const std::vector<AffineMap>& cameras,
+                                  const Estimate& estimate, Norm norm,
+                                  int32_t k) const {
+  double largest = 0;
+  for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+       ++i) {
+    if (takes_[i] != 0) continue;
+    const Observation& o = problem_.observations[i];
+    largest = std::max(
+        largest,
+        ResidualOf(ViewPoint(cameras[o.view], o, estimate.points[k]), norm));
+  }
+  return largest;
+}
+
 int64_t WorkingSet::AddAbove(const Estimate& estimate, Norm norm, double level,
-                             int64_t max_points) {
+                             int64_t max_points, double share) {
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem_, estimate.translations);
+  std::vector<double> outside(problem_.num_points);
+  ParallelFor(problem_.num_points, kPointsPerChunk, context_.num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                for (int64_t k = begin; k < end; ++k) {
+                  outside[k] = LargestOutside(cameras, estimate, norm,
+                                              static_cast<int32_t>(k));
+                }
+              });
   std::vector<Candidate> above;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (Contains(k)) continue;
-    const double cost = PointCost(problem_, estimate, norm, k);
-    if (cost > level) above.emplace_back(-cost, first_point_ + k);
+    if (outside[k] > level) above.emplace_back(-outside[k], first_point_ + k);
   }
   KeepWorst(max_points, &above);
   if (context_.ranks != nullptr) {
     above = context_.ranks->Gather(above);
     KeepWorst(max_points, &above);
   }
+  std::vector<Candidate> residuals;  // of a point
   for (const Candidate& worst : above) {
     const int64_t k = worst.second - first_point_;
-    if (k >= 0 && k < problem_.num_points) contains_[k] = 1;
+    if (k < 0 || k >= problem_.num_points) continue;
+    residuals.clear();
+    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+         ++i) {
+      const Observation& o = problem_.observations[i];
+      residuals.emplace_back(
+          -ResidualOf(ViewPoint(cameras[o.view], o, estimate.points[k]), norm),
+          i);
+    }
+    std::sort(residuals.begin(), residuals.end());
+    for (size_t n = 0; n < residuals.size(); ++n) {
+      if (n >= kLeastPerPoint && -residuals[n].first < share * level) break;
+      Take(residuals[n].second);
+    }
   }
-  num_points_ += static_cast<int64_t>(above.size());
+  CountTaken();
   return static_cast<int64_t>(above.size());
 }
 
 void WorkingSet::AddTies(int count) {
   std::vector<int64_t> tied(problem_.num_frames, 0);
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (!Contains(k)) continue;
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      ++tied[problem_.views[problem_.observations[i].view].frame];
-    }
+  for (const int64_t i : Observations()) {
+    ++tied[problem_.views[problem_.observations[i].view].frame];
   }
   context_.Reduce(std::plus<int64_t>(), &tied);
   std::vector<int32_t> others;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (!Contains(k)) others.push_back(k);
+    const auto begin = takes_.begin() + problem_.point_begin[k];
+    const auto end = takes_.begin() + problem_.point_begin[k + 1];
+    if (std::find(begin, end, 0) != end) others.push_back(k);
   }
   const std::vector<int32_t> ties =
       FindTies(problem_, std::move(others), count, std::move(tied), context_);
-  for (const int32_t k : ties) contains_[k] = 1;
-  num_points_ += context_.Sum(static_cast<int64_t>(ties.size()));
+  for (const int32_t k : ties) TakePoint(k);
+  CountTaken();
+}
+
+void WorkingSet::TakePoint(int32_t point) {
+  for (int64_t i = problem_.point_begin[point];
+       i < problem_.point_begin[point + 1]; ++i) {
+    Take(i);
+  }
 }
 
 void WorkingSet::AddPoint(int32_t point) {
-  if (Contains(point)) return;
-  contains_[point] = 1;
-  ++num_points_;
+  TakePoint(point);
+  CountTaken();
 }
 
 void WorkingSet::AddAll() {
-  std::fill(contains_.begin(), contains_.end(), 1);
-  num_points_ = num_points_of_whole_;
-}
-
-std::vector<int32_t> WorkingSet::Points() const {
-  std::vector<int32_t> points;
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (Contains(k)) points.push_back(k);
-  }
-  return points;
+  for (size_t i = 0; i < takes_.size(); ++i) Take(static_cast<int64_t>(i));
+  CountTaken();
 }
 
 std::vector<int64_t> WorkingSet::Observations() const {
   std::vector<int64_t> observations;
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (!Contains(k)) continue;
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      observations.push_back(i);
-    }
+  observations.reserve(num_observations_here_);
+  for (size_t i = 0; i < takes_.size(); ++i) {
+    if (takes_[i] != 0) observations.push_back(static_cast<int64_t>(i));
   }
   return observations;
 }
 
 double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem_, estimate.translations);
   double cost = 0;
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    if (!Contains(k)) continue;
-    cost = std::max(cost, PointCost(problem_, estimate, norm, k));
+  for (size_t i = 0; i < takes_.size(); ++i) {
+    if (takes_[i] == 0) continue;
+    const Observation& o = problem_.observations[i];
+    cost = std::max(cost, ResidualOf(ViewPoint(cameras[o.view], o,
+                                               estimate.points[o.point]),
+                                     norm));
   }
   return context_.Max(cost);
 }
@@ -122,7 +179,7 @@ WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Context& context) {
   WorkingSet set(problem, context);
   set.AddAbove(estimate, norm, kShareOfCost * cost,
-               std::numeric_limits<int64_t>::max());
+               std::numeric_limits<int64_t>::max(), kShareOfLevelNear);
   set.AddTies(kTiesPerFrame);
   return set;
 }

@@ -5,14 +5,15 @@
 
 #include "krot/base/context.h"
 #include "krot/minimax/norm.h"
+#include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 
-// The points of a problem, with all their observations, that the joint solver
-// looks at: those whose residuals come near the maximum, and enough others to
-// tie every frame. The optimum of a working set is a lower bound on that of
-// the whole, and equals it as soon as the other points fit in below.
+// The observations of a problem that the joint solver looks at: of points whose
+// residuals come near the maximum those that do, and enough others to tie every
+// frame. The optimum of a working set is a lower bound on that of the whole,
+// and equals it as soon as all other observations fit in below.
 //
 // Where ranks share the points each has its share of the set, which is the one
 // that one process has; they call what is O(observations) together.
@@ -22,34 +23,49 @@ class WorkingSet {
   explicit WorkingSet(const KnownRotationProblem& problem,
                       const Context& context = {});
 
-  // Adds the points with a residual above `level`, pixels, the worst first and
-  // at most `max_points` of them; returns how many. O(observations).
+  // Takes in points that have an observation outside of the set whose residual
+  // is above `level`, pixels, the worst first and at most `max_points` of them;
+  // returns how many. Of each it takes the observations above `share` of the
+  // level, and a few more if these are few: the least that holds a point well.
+  // With a share of 0 it takes all. O(observations).
   int64_t AddAbove(const Estimate& estimate, Norm norm, double level,
-                   int64_t max_points);
+                   int64_t max_points, double share = 0);
 
-  // Adds points, the longest tracks first, until every frame has `count`
+  // Adds whole points, the longest tracks first, until every frame has `count`
   // observations in the set or all it has. O(observations).
   void AddTies(int count);
 
-  void AddPoint(int32_t point);
+  void AddPoint(int32_t point);  // with all its observations
   void AddAll();
 
+  // Whether the set has an observation of the point.
   bool Contains(int32_t point) const { return contains_[point] != 0; }
-  bool IsAll() const { return num_points_ == num_points_of_whole_; }
-  int64_t num_points() const { return num_points_; }  // of the whole set
+  bool IsAll() const { return num_observations_ == num_observations_of_whole_; }
+  // Of the whole set.
+  int64_t num_points() const { return num_points_; }
   // Of the share here, ascending.
-  std::vector<int32_t> Points() const;
   std::vector<int64_t> Observations() const;
-  // The largest residual of its points, pixels. O(observations).
+  // The largest residual of its observations, pixels. O(observations).
   double Cost(const Estimate& estimate, Norm norm) const;
 
  private:
+  double LargestOutside(const std::vector<AffineMap>& cameras,
+                        const Estimate& estimate, Norm norm, int32_t k) const;
+  void Take(int64_t observation);
+  void TakePoint(int32_t point);
+  void CountTaken();
+
   const KnownRotationProblem& problem_;
   const Context context_;
   std::vector<char> contains_;  // per point
-  // Of the whole: the set's, all, and those before the share here.
+  std::vector<char> takes_;     // per observation
+  // Of the share here.
+  int64_t num_points_here_ = 0;
+  int64_t num_observations_here_ = 0;
+  // Of the whole: the set's, all, and the points before the share here.
   int64_t num_points_ = 0;
-  int64_t num_points_of_whole_;
+  int64_t num_observations_ = 0;
+  int64_t num_observations_of_whole_;
   int64_t first_point_ = 0;
 };
 
@@ -59,5 +75,9 @@ class WorkingSet {
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost,
                            const Context& context = {});
+
+// The share of a level, pixels, above which the joint solver's sets take in the
+// observations of a point that is above it.
+inline constexpr double kShareOfLevelNear = 0.7;
 
 }  // namespace krot

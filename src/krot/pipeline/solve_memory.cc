@@ -49,17 +49,20 @@ int64_t JointBytes(const KnownRotationProblem& problem, Norm norm) {
              static_cast<int64_t>(problem.observations.size()));
 }
 
-// The points that the joint solver looks at first.
-ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm) {
+// What the joint solver looks at first.
+ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm,
+                                  const Context& context) {
   const KnownRotationProblem& problem = built.problem;
-  const double cost = Cost(problem, built.start, norm, /*num_threads=*/1);
-  const WorkingSet set = FirstWorkingSet(problem, built.start, norm, cost);
+  const double cost = Cost(problem, built.start, norm, context.num_threads);
+  const WorkingSet set =
+      FirstWorkingSet(problem, built.start, norm, cost, context);
   return ProblemSubset(problem, set.Observations());
 }
 
 // What is in use when most is.
 SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
-                             const SolveSummary& summary) {
+                             const SolveSummary& summary,
+                             const Context& context) {
   constexpr int64_t kProcess = 14000000;  // code and libraries
   // The record of a block, in sweeps.
   constexpr int64_t kBytesPerBlock = 200;
@@ -91,14 +94,13 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
     memory.likely = std::max(memory.likely, joint);
     return memory;
   }
-  // The allocator keeps what the interior point has freed when the points that
-  // it did not look at become a problem in turn.
-  const ProblemSubset subset = FirstWorkingProblem(built, summary.norm);
+  // Beside the interior point, sweeps place what it does not look at.
+  const ProblemSubset subset =
+      FirstWorkingProblem(built, summary.norm, context);
   const KnownRotationProblem& working = subset.problem();
   memory.likely =
       std::max(memory.likely, component + PartBytes(working) +
-                                  JointBytes(working, summary.norm) +
-                                  PartBytes(problem));
+                                  JointBytes(working, summary.norm) + sweeps);
   if (summary.method == SolveMethod::kAuto) {
     const bool rows_are_taken_anew = !Reprojection(model, built).IsLinear();
     memory.likely = std::max(memory.likely,
@@ -112,13 +114,14 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
 }  // namespace
 
 SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
-                                const SolveSummary& summary) {
+                                const SolveSummary& summary,
+                                const Context& context) {
   // What the allocator keeps beside what is in use.
   constexpr double kAllocated = 1.05;
   const auto resident = [](int64_t bytes) {
     return static_cast<int64_t>(kAllocated * static_cast<double>(bytes));
   };
-  const SolveMemory counted = CountSolveMemory(model, built, summary);
+  const SolveMemory counted = CountSolveMemory(model, built, summary, context);
   return {resident(counted.likely), resident(counted.at_most)};
 }
 

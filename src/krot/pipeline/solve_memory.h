@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/model/model.h"
 #include "krot/pipeline/solve_model.h"
@@ -12,7 +13,7 @@ namespace krot {
 // SolveModel on it. How near that comes is measured in docs/method.md, "The
 // schedule of auto".
 struct SolveMemory {
-  // If the joint solver gets by with the points that it looks at first.
+  // If the joint solver gets by with what it looks at first.
   int64_t likely = 0;
   // If it takes in every observation, as it does on its way to a start, and
   // repairs all multipliers at once.
@@ -21,6 +22,7 @@ struct SolveMemory {
 
 // For summary.method, summary.init and summary.norm. O(problem).
 SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
-                                const SolveSummary& summary);
+                                const SolveSummary& summary,
+                                const Context& context = {});
 
 }  // namespace krot

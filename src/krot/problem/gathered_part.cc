@@ -5,27 +5,32 @@
 namespace krot {
 
 GatheredPart::GatheredPart(const KnownRotationProblem& problem,
-                           std::vector<int32_t> points, Ranks* ranks)
-    : ranks_(*ranks), points_(std::move(points)) {
+                           const std::vector<int64_t>& observations,
+                           Ranks* ranks)
+    : ranks_(*ranks) {
   const int64_t first_in_whole =
       ranks->SumBefore(static_cast<int64_t>(problem.observations.size()));
+  for (const int64_t i : observations) {
+    const int32_t k = problem.observations[i].point;
+    if (points_.empty() || points_.back() != k) points_.push_back(k);
+  }
   num_points_ =
       ranks->Gather(std::vector<int64_t>{static_cast<int64_t>(points_.size())});
-  const auto first_point = static_cast<int32_t>(
-      ranks->SumBefore(static_cast<int64_t>(points_.size())));
-  std::vector<Observation> observations;
+  auto point = static_cast<int32_t>(
+                   ranks->SumBefore(static_cast<int64_t>(points_.size()))) -
+               1;
+  int32_t last = -1;  // its name here
+  std::vector<Observation> own;
   std::vector<int64_t> in_whole;
-  for (size_t n = 0; n < points_.size(); ++n) {
-    for (int64_t i = problem.point_begin[points_[n]];
-         i < problem.point_begin[points_[n] + 1]; ++i) {
-      observations.push_back(problem.observations[i]);
-      observations.back().point = first_point + static_cast<int32_t>(n);
-      in_whole.push_back(first_in_whole + i);
-    }
+  for (const int64_t i : observations) {
+    own.push_back(problem.observations[i]);
+    if (own.back().point != last) ++point;
+    last = std::exchange(own.back().point, point);
+    in_whole.push_back(first_in_whole + i);
   }
   problem_.num_frames = problem.num_frames;
   problem_.views = problem.views;
-  problem_.observations = ranks->GatherOnFirst(observations);
+  problem_.observations = ranks->GatherOnFirst(own);
   in_whole_ = ranks->GatherOnFirst(in_whole);
   if (ranks->IsFirst()) {
     for (const int64_t count : num_points_) {

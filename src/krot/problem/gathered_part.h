@@ -8,16 +8,16 @@
 
 namespace krot {
 
-// Some points of a problem whose points ranks share, with all of their
-// observations, on the first rank. Numbers of observations "in the whole" count
+// Some observations of a problem whose points ranks share, and the points that
+// they see, on the first rank. Numbers of observations "in the whole" count
 // through the ranks' problems, one after another.
 //
 // Every rank makes one, and they call Collect and Scatter together.
 class GatheredPart {
  public:
-  // `points` of this rank's `problem`, ascending.
-  GatheredPart(const KnownRotationProblem& problem, std::vector<int32_t> points,
-               Ranks* ranks);
+  // `observations` of this rank's `problem`, ascending.
+  GatheredPart(const KnownRotationProblem& problem,
+               const std::vector<int64_t>& observations, Ranks* ranks);
 
   // On the first rank: all frames and views, the points in the order of the
   // whole. On others: without points.

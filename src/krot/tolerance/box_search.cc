@@ -45,6 +45,8 @@ class BoxSearch {
  private:
   const KnownRotationProblem& problem() const { return usable_.problem(); }
   ProblemSubset ConnectedSet();
+  void PlaceOthers(const KnownRotationProblem& whole, const WorkingSet& set,
+                   Estimate* estimate) const;
   Estimate Complete(const ProblemSubset& part, const Estimate& estimate,
                     Estimate* of_usable) const;
   double ReachAllowed(const Pull& pull, const Estimate& far_end) const;
@@ -100,6 +102,17 @@ ProblemSubset BoxSearch::ConnectedSet() {
   }
 }
 
+// Points outside of the set go where they fit in best; its own stay, be they
+// above the bound by a rounding.
+void BoxSearch::PlaceOthers(const KnownRotationProblem& whole,
+                            const WorkingSet& set, Estimate* estimate) const {
+  Estimate placed = *estimate;
+  PlacePoints(whole, shared_.norm(), context_, shared_.bound(), &placed);
+  for (int32_t k = 0; k < whole.num_points; ++k) {
+    if (!set.Contains(k)) estimate->points[k] = placed.points[k];
+  }
+}
+
 // The set's estimate with all other points where they fit in best.
 Estimate BoxSearch::Complete(const ProblemSubset& part,
                              const Estimate& estimate,
@@ -107,11 +120,9 @@ Estimate BoxSearch::Complete(const ProblemSubset& part,
   Estimate whole = shared_.centre();
   *of_usable = usable_.Restrict(whole);
   part.Replace(estimate, of_usable);
-  PlaceOthers(problem(), set_, shared_.norm(), context_, shared_.bound(),
-              of_usable);
+  PlaceOthers(problem(), set_, of_usable);
   usable_.Replace(*of_usable, &whole);
-  PlaceOthers(shared_.problem(), usables_, shared_.norm(), context_,
-              shared_.bound(), &whole);
+  PlaceOthers(shared_.problem(), usables_, &whole);
   return whole;
 }
 
