@@ -277,7 +277,7 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
         static_cast<int64_t>((kMaxGrowth - 1) *
                              static_cast<double>(set_.num_points())) +
             1,
-        kShareOfLevelNear);
+        ShareOfLevel(problem_, candidate, context_));
     if (do_others_fit_ || num_added == 0 || round == kMaxRounds) set_.AddAll();
   }
 }

@@ -1,8 +1,10 @@
 #include "krot/joint/working_set.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "krot/base/parallel_for.h"
@@ -14,12 +16,33 @@ namespace {
 
 constexpr double kShareOfCost = 0.9;
 constexpr int kTiesPerFrame = 20;
+constexpr double kNearShare = 0.7;
+// Of the median depth.
+constexpr double kTinyBaseline = 1e-3;
 // Of a point that comes in for some of its observations, so many at least.
 // With fewer the others soon have it come in again.
 constexpr size_t kLeastPerPoint = 4;
 constexpr int64_t kPointsPerChunk = 1024;
 
 using Candidate = std::pair<double, int64_t>;  // -residual, whose
+
+// The power of two below the median depth: counts are the same for all ranks,
+// where the median itself is not to be had.
+double CoarseMedianDepth(const KnownRotationProblem& problem,
+                         const Estimate& estimate, const Context& context) {
+  constexpr int kLowest = std::numeric_limits<double>::min_exponent - 1;
+  std::vector<int64_t> count(
+      std::numeric_limits<double>::max_exponent - kLowest, 0);
+  for (const Observation& observation : problem.observations) {
+    const double depth = ViewPoint(problem, observation, estimate).depth;
+    if (std::isnormal(depth) && depth > 0) ++count[std::ilogb(depth) - kLowest];
+  }
+  context.Reduce(std::plus<int64_t>(), &count);
+  int64_t left = std::accumulate(count.begin(), count.end(), int64_t{0}) / 2;
+  size_t n = 0;
+  while (n + 1 < count.size() && left >= count[n]) left -= count[n++];
+  return std::ldexp(1.0, static_cast<int>(n) + kLowest);
+}
 
 void KeepWorst(int64_t count, std::vector<Candidate>* candidates) {
   if (static_cast<int64_t>(candidates->size()) <= count) return;
@@ -174,12 +197,25 @@ double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {
   return context_.Max(cost);
 }
 
+double ShareOfLevel(const KnownRotationProblem& problem,
+                    const Estimate& estimate, const Context& context) {
+  if (!HasBaseline(problem)) return kNearShare;
+  double longest = 0;
+  for (const View& view : problem.views) {
+    longest = std::max(longest, view.cam_from_rig_translation.norm());
+  }
+  const bool is_tiny =
+      longest < kTinyBaseline * CoarseMedianDepth(problem, estimate, context);
+  return is_tiny ? 0 : kNearShare;
+}
+
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost,
                            const Context& context) {
   WorkingSet set(problem, context);
   set.AddAbove(estimate, norm, kShareOfCost * cost,
-               std::numeric_limits<int64_t>::max(), kShareOfLevelNear);
+               std::numeric_limits<int64_t>::max(),
+               ShareOfLevel(problem, estimate, context));
   set.AddTies(kTiesPerFrame);
   return set;
 }

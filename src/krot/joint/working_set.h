@@ -69,15 +69,18 @@ class WorkingSet {
   int64_t first_point_ = 0;
 };
 
-// The one that the joint solver begins with at an estimate of positive depths:
-// the points above some share of `cost`, pixels, which is the estimate's, and
-// ties of every frame. O(observations).
+// The share with which the joint solver calls AddAbove; 0 where the baselines
+// that set the scale are tiny beside the depths: what a few observations tell
+// of it is lost in roundings. O(observations), by all ranks together.
+double ShareOfLevel(const KnownRotationProblem& problem,
+                    const Estimate& estimate, const Context& context);
+
+// The set that the joint solver begins with at an estimate of positive depths:
+// the points above some share of `cost`, pixels, which is the estimate's, with
+// their observations above ShareOfLevel, and ties of every frame.
+// O(observations).
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost,
                            const Context& context = {});
-
-// The share of a level, pixels, above which the joint solver's sets take in the
-// observations of a point that is above it.
-inline constexpr double kShareOfLevelNear = 0.7;
 
 }  // namespace krot

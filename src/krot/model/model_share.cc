@@ -15,12 +15,8 @@ std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
   });
   std::vector<std::vector<int32_t>> cut(count);
   const auto total = static_cast<int64_t>(whole.track_elements.size());
-  const int64_t first = total * std::max(0, 3 - count) / 2;
   // The observations of all shares up to this one.
-  const auto end_of = [&](int share) {
-    return share + 1 == count ? total
-                              : first + (total - first) * share / (count - 1);
-  };
+  const auto end_of = [&](int share) { return total * (share + 1) / count; };
   int64_t sum = 0;
   int share = 0;
   for (const int32_t k : by_id) {

@@ -9,8 +9,7 @@ namespace krot {
 
 // The points that each of `count` processes takes of a model, as indices of its
 // points3D, ascending: consecutive ones in the order of their ids, with about
-// as many observations; but of three and more the first has none, as it solves
-// the working sets of all. O(points log points).
+// as many observations. O(points log points).
 std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count);
 
 // All of a model but for the other points, their tracks, and the 2D points that

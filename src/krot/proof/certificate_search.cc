@@ -20,7 +20,7 @@ constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
 constexpr int kMaxDrops = 20;
 // What frames can spare: less makes a larger certificate, more may need too
 // large changes of what is left. And how often misfits are dropped there.
-constexpr double kSparedShares[] = {0.1, 1e-2, 0};
+constexpr double kSparedShares[] = {1e-2, 0};
 constexpr int kMaxDropsOfAll = 3;
 // Of the sub-problems: far below any gap that is asked for, as what is left of
 // it is missing from the bound.
