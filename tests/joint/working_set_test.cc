@@ -119,6 +119,21 @@ TEST(WorkingSet, TakesAPointInAgainForWhatIsOutside) {
   EXPECT_TRUE(set.IsAll());
 }
 
+// The scale is free, or set by baselines of a share of the depths.
+TEST(ShareOfLevel, IsOneOfWholePointsWhereBaselinesAreTiny) {
+  const auto share_of = [](double baseline) {
+    RandomSceneOptions options;
+    options.views_per_frame = 2;
+    options.baseline = baseline;
+    const RandomScene scene = MakeRandomScene(options);
+    return ShareOfLevel(scene.problem, scene.estimate, {});
+  };
+  EXPECT_GT(share_of(0), 0);
+  EXPECT_EQ(share_of(1e-6), 0);
+  EXPECT_EQ(share_of(1e-4), 0);
+  EXPECT_GT(share_of(1), 0);
+}
+
 TEST(WorkingSet, TiesEveryFrameAndTakesNoMoreThanThatNeeds) {
   const RandomScene scene = MakeScene();
   WorkingSet set(scene.problem);
