@@ -26,7 +26,7 @@ TEST(DenseCholesky, SolvesAsAnLuFactorisationDoes) {
     const VectorXd rhs = VectorXd::LinSpaced(size, -1, 2);
     MatrixXd lower = matrix;
     lower.triangularView<Eigen::StrictlyUpper>().setConstant(1e300);
-    DenseCholesky cholesky;
+    DenseCholesky<double> cholesky;
     ASSERT_TRUE(cholesky.Factorize(lower, 2));
     const VectorXd expected = matrix.partialPivLu().solve(rhs);
     EXPECT_LE((cholesky.Solve(rhs) - expected).norm(), 1e-9 * expected.norm())
@@ -38,7 +38,7 @@ TEST(DenseCholesky, HasTheSameBitsAtAnyNumberOfThreads) {
   std::mt19937 generator(2);
   const MatrixXd matrix = RandomPositiveDefinite(700, &generator);
   const VectorXd rhs = VectorXd::Ones(700);
-  DenseCholesky cholesky;
+  DenseCholesky<double> cholesky;
   ASSERT_TRUE(cholesky.Factorize(matrix, 1));
   const VectorXd expected = cholesky.Solve(rhs);
   for (const int num_threads : {2, 3, 8}) {
@@ -51,7 +51,7 @@ TEST(DenseCholesky, RefusesWhatIsNotPositiveDefinite) {
   std::mt19937 generator(3);
   MatrixXd matrix = RandomPositiveDefinite(400, &generator);
   matrix(350, 350) = -1;
-  EXPECT_FALSE(DenseCholesky().Factorize(matrix, 2));
+  EXPECT_FALSE(DenseCholesky<double>().Factorize(matrix, 2));
 }
 
 }  // namespace

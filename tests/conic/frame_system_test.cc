@@ -205,8 +205,9 @@ TEST(FrameSystem, SolvesALongChainSparselyAsItDoesDensely) {
 // matrix.
 TEST(FrameSystem, IsDenseWhereASparseFactorWouldFillUp) {
   const FrameSystem system(MakeRandomStructure(kSparseFrames, 1));
-  EXPECT_TRUE(system.is_dense());
-  EXPECT_FALSE(FrameSystem(MakeChain(kSparseFrames, 7)).is_dense());
+  EXPECT_EQ(system.kind(), FrameSystem::Kind::kPreconditioned);
+  EXPECT_EQ(FrameSystem(MakeChain(kSparseFrames, 7)).kind(),
+            FrameSystem::Kind::kSparse);
 }
 
 // Tracks with gaps across the fixed frame, on top of a chain that is large

@@ -50,7 +50,14 @@ class BarrierPath {
   int64_t NumActive() const;
   // As bundle adjustment's summary has it.
   const char* SolverName() const {
-    return system_.is_dense() ? "dense_schur" : "sparse_schur";
+    switch (system_.kind()) {
+      case FrameSystem::Kind::kSparse:
+        return "sparse_schur";
+      case FrameSystem::Kind::kPreconditioned:
+        return "iterative_schur";
+      default:
+        return "dense_schur";
+    }
   }
 
  private:

@@ -72,7 +72,7 @@ class BarrierSystem {
   double SingleGains() const;
 
   const ObservationLoop& loop() const { return loop_; }
-  bool is_dense() const { return reduced_.is_dense(); }
+  FrameSystem::Kind kind() const { return reduced_.kind(); }
 
  private:
   double SlackOf(int64_t i) const {

@@ -25,45 +25,72 @@ int64_t SizeOf(int64_t n, int64_t i) { return std::min(kTile, n - i * kTile); }
 
 }  // namespace
 
-int64_t DenseCholesky::stride() const { return std::min(kTile, size_); }
+template <typename Scalar>
+int64_t DenseCholesky<Scalar>::stride() const {
+  return std::min(kTile, size_);
+}
 
-int64_t DenseCholesky::Begin(int64_t i, int64_t j) const {
+template <typename Scalar>
+int64_t DenseCholesky<Scalar>::Begin(int64_t i, int64_t j) const {
   return (i * (i + 1) / 2 + j) * stride() * stride();
 }
 
-Tile DenseCholesky::TileAt(int64_t i, int64_t j) {
+template <typename Scalar>
+Tile<Scalar> DenseCholesky<Scalar>::TileAt(int64_t i, int64_t j) {
   return {&tiles_[Begin(i, j)], SizeOf(size_, i), SizeOf(size_, j), stride()};
 }
 
-DenseCholesky::ConstTile DenseCholesky::Read(int64_t i, int64_t j) const {
+template <typename Scalar>
+typename DenseCholesky<Scalar>::ConstTile DenseCholesky<Scalar>::Read(
+    int64_t i, int64_t j) const {
   return ConstTile(&tiles_[Begin(i, j)], SizeOf(size_, i), SizeOf(size_, j),
                    Eigen::OuterStride<>(stride()));
 }
 
 // A_kk = L_kk L_kk'.
-bool DenseCholesky::FactorizeDiagonal(int64_t k) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(Read(k, k));
+template <typename Scalar>
+bool DenseCholesky<Scalar>::FactorizeDiagonal(int64_t k) {
+  const Eigen::LLT<Matrix> llt(Read(k, k));
   if (llt.info() != Eigen::Success) return false;
-  const Tile tile = TileAt(k, k);
-  Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>(
+  const Tile<Scalar> tile = TileAt(k, k);
+  Eigen::Map<Matrix, 0, Eigen::OuterStride<>>(
       tile.data, tile.rows, tile.cols, Eigen::OuterStride<>(tile.stride)) =
       llt.matrixLLT();
   return true;
 }
 
-bool DenseCholesky::Factorize(const Eigen::MatrixXd& matrix, int num_threads) {
+template <typename Scalar>
+void DenseCholesky<Scalar>::SetZero(int64_t n) {
+  size_ = n;
+  tiles_.assign(Room(n), 0);
+}
+
+template <typename Scalar>
+Scalar& DenseCholesky<Scalar>::At(int64_t row, int64_t column) {
+  return tiles_[Begin(row / kTile, column / kTile) + column % kTile * stride() +
+                row % kTile];
+}
+
+template <typename Scalar>
+bool DenseCholesky<Scalar>::Factorize(const Matrix& matrix, int num_threads) {
   size_ = matrix.rows();
   tiles_.resize(Room(size_));
+  ParallelFor(NumChunks(size_, kTile), 1, num_threads,
+              [&](int64_t i, int64_t, int) {
+                for (int64_t j = 0; j <= i; ++j) {
+                  const Tile<Scalar> tile = TileAt(i, j);
+                  for (int64_t c = 0; c < tile.cols; ++c) {
+                    std::copy_n(&matrix(i * kTile, j * kTile + c), tile.rows,
+                                tile.data + c * tile.stride);
+                  }
+                }
+              });
+  return Factorize(num_threads);
+}
+
+template <typename Scalar>
+bool DenseCholesky<Scalar>::Factorize(int num_threads) {
   const int64_t num_tiles = NumChunks(size_, kTile);
-  ParallelFor(num_tiles, 1, num_threads, [&](int64_t i, int64_t, int) {
-    for (int64_t j = 0; j <= i; ++j) {
-      const Tile tile = TileAt(i, j);
-      for (int64_t c = 0; c < tile.cols; ++c) {
-        std::copy_n(&matrix(i * kTile, j * kTile + c), tile.rows,
-                    tile.data + c * tile.stride);
-      }
-    }
-  });
   std::vector<std::pair<int64_t, int64_t>> rest;
   for (int64_t k = 0; k < num_tiles; ++k) {
     if (!FactorizeDiagonal(k)) return false;
@@ -88,18 +115,21 @@ bool DenseCholesky::Factorize(const Eigen::MatrixXd& matrix, int num_threads) {
   return true;
 }
 
-Eigen::VectorXd DenseCholesky::Solve(const Eigen::VectorXd& rhs) const {
-  Eigen::VectorXd x = rhs;
+template <typename Scalar>
+typename DenseCholesky<Scalar>::Vector DenseCholesky<Scalar>::Solve(
+    const Vector& rhs) const {
+  Vector x = rhs;
   const auto part = [&](int64_t i) {
     return x.segment(i * kTile, SizeOf(size_, i));
   };
   const int64_t num_tiles = NumChunks(size_, kTile);
   for (int64_t i = 0; i < num_tiles; ++i) {
     for (int64_t j = 0; j < i; ++j) part(i).noalias() -= Read(i, j) * part(j);
-    Read(i, i).triangularView<Eigen::Lower>().solveInPlace(part(i));
+    Read(i, i).template triangularView<Eigen::Lower>().solveInPlace(part(i));
   }
   for (int64_t i = num_tiles - 1; i >= 0; --i) {
-    Read(i, i).transpose().triangularView<Eigen::Upper>().solveInPlace(part(i));
+    Read(i, i).transpose().template triangularView<Eigen::Upper>().solveInPlace(
+        part(i));
     for (int64_t j = 0; j < i; ++j) {
       part(j).noalias() -= Read(i, j).transpose() * part(i);
     }
@@ -107,8 +137,12 @@ Eigen::VectorXd DenseCholesky::Solve(const Eigen::VectorXd& rhs) const {
   return x;
 }
 
-int64_t DenseCholesky::MemoryBytes(int64_t n) {
-  return Room(n) * static_cast<int64_t>(sizeof(double));
+template <typename Scalar>
+int64_t DenseCholesky<Scalar>::MemoryBytes(int64_t n) {
+  return Room(n) * static_cast<int64_t>(sizeof(Scalar));
 }
+
+template class DenseCholesky<float>;
+template class DenseCholesky<double>;
 
 }  // namespace krot

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "krot/base/parallel_for.h"
 #include "krot/conic/block_update.h"
@@ -12,11 +13,11 @@ namespace {
 // Relative to the diagonal. Refinement removes the error it causes.
 constexpr double kRegularization = 1e-14;
 constexpr double kLargestRegularization = 1e-7;
-// Up to here a dense factor is the faster one whatever the pattern; beyond, it
-// makes so many operations in the time that a sparse one takes for one. With
-// 800 to 3000 frames of many patterns 12 to 21 were measured, on one thread.
+// Up to here a dense factor is the fastest way whatever the pattern.
 constexpr int64_t kAlwaysDenseFrames = 500;
-constexpr double kDenseSpeed = 15;
+// Beyond, what an operation of a sparse factor takes, by one of a dense one: 12
+// to 21 were measured with 800 to 3000 frames of many patterns, on one thread.
+constexpr double kSparseOperation = 15;
 // Parts of the sum, and so the threads that can eliminate points; fewer where
 // each is large: a dense part of 1500 frames takes 162 MB, one of 6000 frames,
 // where the factor takes most of the time, 2.6 GB.
@@ -24,12 +25,6 @@ constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;
 constexpr int64_t kLargestFrames = 6000;
-
-// Additions and multiplications of a dense Cholesky factor.
-double DenseOperations(int64_t num_columns) {
-  const auto n = static_cast<double>(num_columns);
-  return n * n * n / 3;
-}
 
 // Of a column, what stands in blocks of the lower triangle: nothing else is
 // written.
@@ -49,46 +44,45 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   }
   num_columns_ = 3 * num_free;
   num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
-  if (num_free > kAlwaysDenseFrames) {
-    FramePattern pattern = FindFramePattern(structure);
-    UniteOverRanks(ranks, &pattern);
-    const SparseFactorSize factor = FindSparseFactorSize(pattern);
-    is_dense_ =
-        DenseOperations(num_columns_) < kDenseSpeed * factor.operations ||
-        factor.numbers > std::numeric_limits<int>::max();  // Eigen's indices
-    if (!is_dense_) {
-      TakePattern(pattern);
-      num_factor_numbers_ = factor.numbers;
-    }
-  }
-  if (is_dense_) {
-    if (num_free > kLargestFrames) num_parts_ = 1;
+  if (num_free <= kAlwaysDenseFrames) {
     dense_.resize(num_parts_);
+    return;
+  }
+  FramePattern pattern = FindFramePattern(structure);
+  UniteOverRanks(ranks, &pattern);
+  TakePattern(pattern);
+  values_.resize(num_parts_);
+  const SparseFactorSize factor = FindSparseFactorSize(pattern);
+  if (kSparseOperation * factor.operations <
+          PreconditionedSystem::Cost(pattern_) &&
+      factor.numbers <= std::numeric_limits<int>::max()) {  // Eigen's indices
+    kind_ = Kind::kSparse;
+    num_factor_numbers_ = factor.numbers;
   } else {
-    values_.resize(num_parts_);
+    kind_ = Kind::kPreconditioned;
+    preconditioned_ = std::make_unique<PreconditionedSystem>(pattern_);
   }
 }
 
 void FrameSystem::TakePattern(const FramePattern& pattern) {
-  block_begin_.assign(1, 0);
   for (const std::vector<int32_t>& rows : pattern) {
-    block_row_.insert(block_row_.end(), rows.begin(), rows.end());
-    block_begin_.push_back(static_cast<int64_t>(block_row_.size()));
+    pattern_.row.insert(pattern_.row.end(), rows.begin(), rows.end());
+    pattern_.begin.push_back(pattern_.num_blocks());
   }
 }
 
 FrameSystem::Block FrameSystem::BlockOf(int part, int32_t a, int32_t b) {
   const int32_t row = column(a);
   const int32_t col = column(b);
-  if (is_dense_) return {&dense_[part](row, col), num_columns_};
-  const int64_t begin = block_begin_[col / 3];
-  const int64_t end = block_begin_[col / 3 + 1];
+  if (is_dense()) return {&dense_[part](row, col), num_columns_};
+  const int64_t begin = pattern_.begin[col / 3];
+  const int64_t end = pattern_.begin[col / 3 + 1];
   // Where a column has no gaps, as in a band: no search.
   int64_t n = (row - col) / 3;
-  if (n >= end - begin || block_row_[begin + n] != row / 3) {
-    n = std::lower_bound(block_row_.begin() + begin, block_row_.begin() + end,
-                         row / 3) -
-        block_row_.begin() - begin;
+  if (n >= end - begin || pattern_.row[begin + n] != row / 3) {
+    n = std::lower_bound(pattern_.row.begin() + begin,
+                         pattern_.row.begin() + end, row / 3) -
+        pattern_.row.begin() - begin;
   }
   return {values_[part].data() + 9 * begin + 3 * n, 3 * (end - begin)};
 }
@@ -98,8 +92,8 @@ void FrameSystem::SetZero() {
 }
 
 void FrameSystem::SetZero(int part) {
-  if (!is_dense_) {
-    values_[part].assign(9 * block_row_.size(), 0.0);
+  if (!is_dense()) {
+    values_[part].assign(9 * pattern_.row.size(), 0.0);
     return;
   }
   dense_[part].resize(num_columns_, num_columns_);
@@ -109,7 +103,7 @@ void FrameSystem::SetZero(int part) {
 }
 
 std::vector<double> FrameSystem::Part(int part) const {
-  if (!is_dense_) return values_[part];
+  if (!is_dense()) return values_[part];
   std::vector<double> numbers;
   for (int64_t c = 0; c < num_columns_; ++c) {
     const auto column = LowerBlocks(c, &dense_[part]);
@@ -119,7 +113,7 @@ std::vector<double> FrameSystem::Part(int part) const {
 }
 
 void FrameSystem::SetPart(int part, const std::vector<double>& numbers) {
-  if (!is_dense_) {
+  if (!is_dense()) {
     values_[part] = numbers;
     return;
   }
@@ -170,46 +164,78 @@ void FrameSystem::SubtractSquare(int part, const std::vector<int32_t>& frames,
   }
 }
 
-bool FrameSystem::Factorize(int num_threads) {
-  if (is_dense_) {
-    ParallelFor(
-        num_columns_, 64, num_threads, [&](int64_t begin, int64_t end, int) {
-          for (int part = 1; part < num_parts_; ++part) {
-            for (int64_t c = begin; c < end; ++c) {
-              LowerBlocks(c, &dense_[0]) += LowerBlocks(c, &dense_[part]);
-            }
-          }
-        });
-  } else {
-    using Index = Eigen::SparseMatrix<double>::StorageIndex;
-    sparse_.resize(num_columns_, num_columns_);
-    sparse_.resizeNonZeros(static_cast<Index>(9 * block_row_.size()));
-    Index entry = 0;
-    for (int64_t column = 0; column < num_columns_; ++column) {
-      sparse_.outerIndexPtr()[column] = entry;
-      for (int64_t n = block_begin_[column / 3];
-           n < block_begin_[column / 3 + 1]; ++n) {
-        for (int r = 0; r < 3; ++r, ++entry) {
-          double sum = 0;
-          for (int part = 0; part < num_parts_; ++part) {
-            sum += values_[part][entry];
-          }
-          sparse_.innerIndexPtr()[entry] =
-              static_cast<Index>(3 * block_row_[n] + r);
-          sparse_.valuePtr()[entry] = sum;
+void FrameSystem::SumDense(int num_threads) {
+  ParallelFor(num_columns_, 64, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                for (int part = 1; part < num_parts_; ++part) {
+                  for (int64_t c = begin; c < end; ++c) {
+                    LowerBlocks(c, &dense_[0]) += LowerBlocks(c, &dense_[part]);
+                  }
+                }
+              });
+}
+
+void FrameSystem::SumSparse() {
+  using Index = Eigen::SparseMatrix<double>::StorageIndex;
+  sparse_.resize(num_columns_, num_columns_);
+  sparse_.resizeNonZeros(static_cast<Index>(9 * pattern_.num_blocks()));
+  Index entry = 0;
+  for (int64_t column = 0; column < num_columns_; ++column) {
+    sparse_.outerIndexPtr()[column] = entry;
+    for (int64_t n = pattern_.begin[column / 3];
+         n < pattern_.begin[column / 3 + 1]; ++n) {
+      for (int r = 0; r < 3; ++r, ++entry) {
+        double sum = 0;
+        for (int part = 0; part < num_parts_; ++part) {
+          sum += values_[part][entry];
         }
+        sparse_.innerIndexPtr()[entry] =
+            static_cast<Index>(3 * pattern_.row[n] + r);
+        sparse_.valuePtr()[entry] = sum;
       }
     }
-    sparse_.outerIndexPtr()[num_columns_] = entry;
-    if (!is_analyzed_) {
-      sparse_factor_.analyzePattern(sparse_);
-      is_analyzed_ = true;
+  }
+  sparse_.outerIndexPtr()[num_columns_] = entry;
+}
+
+std::vector<Eigen::Matrix3d> FrameSystem::SumBlocks() const {
+  std::vector<Eigen::Matrix3d> blocks;
+  blocks.reserve(pattern_.num_blocks());
+  for (int32_t j = 0; j < pattern_.num_columns(); ++j) {
+    const int64_t begin = pattern_.begin[j];
+    const int64_t count = pattern_.begin[j + 1] - begin;
+    for (int64_t n = 0; n < count; ++n) {
+      blocks.emplace_back(Eigen::Matrix3d::Zero());
+      for (const std::vector<double>& values : values_) {
+        blocks.back() +=
+            Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<>>(
+                &values[9 * begin + 3 * n], Eigen::OuterStride<>(3 * count));
+      }
     }
   }
+  return blocks;
+}
+
+bool FrameSystem::Factorize(int num_threads) {
+  if (preconditioned_) {
+    return preconditioned_->Factorize(SumBlocks(), num_threads);
+  }
+  if (is_dense()) {
+    SumDense(num_threads);
+  } else {
+    SumSparse();
+    if (!std::exchange(is_analyzed_, true)) {
+      sparse_factor_.analyzePattern(sparse_);
+    }
+  }
+  return FactorizeRegularized(num_threads);
+}
+
+bool FrameSystem::FactorizeRegularized(int num_threads) {
+  constexpr double kTiny = std::numeric_limits<double>::min();
   for (double regularization = kRegularization;
        regularization < kLargestRegularization; regularization *= 100) {
-    constexpr double kTiny = std::numeric_limits<double>::min();
-    if (is_dense_) {
+    if (is_dense()) {
       dense_[0].diagonal() *= 1 + regularization;
       dense_[0].diagonal().array() += kTiny;
       if (dense_factor_.Factorize(dense_[0], num_threads)) return true;
@@ -225,22 +251,27 @@ bool FrameSystem::Factorize(int num_threads) {
   return false;
 }
 
-Eigen::VectorXd FrameSystem::Solve(const Eigen::VectorXd& rhs) const {
+Eigen::VectorXd FrameSystem::Solve(const Eigen::VectorXd& rhs,
+                                   double tolerance) const {
   if (num_columns_ == 0) return rhs;
-  return is_dense_ ? dense_factor_.Solve(rhs)
-                   : Eigen::VectorXd(sparse_factor_.solve(rhs));
+  if (preconditioned_) return preconditioned_->Solve(rhs, tolerance);
+  return is_dense() ? dense_factor_.Solve(rhs)
+                    : Eigen::VectorXd(sparse_factor_.solve(rhs));
 }
 
 int64_t FrameSystem::MemoryBytes() const {
   constexpr int64_t kDouble = sizeof(double);
-  if (is_dense_) {
+  if (is_dense()) {
     return num_parts_ * num_columns_ * num_columns_ * kDouble +
-           DenseCholesky::MemoryBytes(num_columns_);
+           DenseCholesky<double>::MemoryBytes(num_columns_);
   }
-  constexpr int64_t kSparse = sizeof(double) + sizeof(int32_t);
-  const int64_t num_numbers = 9 * static_cast<int64_t>(block_row_.size());
-  return num_parts_ * num_numbers * kDouble +
-         (2 * num_numbers + num_factor_numbers_) * kSparse;
+  const int64_t num_numbers = 9 * pattern_.num_blocks();
+  const int64_t in_parts = num_parts_ * num_numbers * kDouble;
+  if (preconditioned_) {
+    return in_parts + PreconditionedSystem::MemoryBytes(pattern_);
+  }
+  constexpr int64_t kSparseNumber = sizeof(double) + sizeof(int32_t);
+  return in_parts + (2 * num_numbers + num_factor_numbers_) * kSparseNumber;
 }
 
 }  // namespace krot

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -8,17 +9,20 @@
 #include <Eigen/SparseCore>
 
 #include "krot/base/ranks.h"
+#include "krot/conic/block_pattern.h"
 #include "krot/conic/block_structure.h"
 #include "krot/conic/dense_cholesky.h"
 #include "krot/conic/frame_pattern.h"
+#include "krot/conic/preconditioned_system.h"
 
 namespace krot {
 
 // The normal equations of the frames once the points are eliminated, or of
 // whatever else comes in threes of columns (adjust/barrier_system.h): 3x3
 // blocks, symmetric, positive definite up to rounding. For a few hundred frames
-// it is dense; for more, dense or sparse with a fill-reducing order, whichever
-// factor is predicted to take less time.
+// it is dense; for more, whatever is predicted to take the least time: a sparse
+// factor in a fill-reducing order, or conjugate gradients
+// (preconditioned_system.h).
 //
 // The sum over points is taken in `num_parts` parts, whose number and order
 // depend on the structure alone: the same bits at any number of threads. More
@@ -28,7 +32,9 @@ class FrameSystem {
   // Where ranks share the points they make one each, of their shares.
   explicit FrameSystem(const BlockStructure& structure, Ranks* ranks = nullptr);
 
-  bool is_dense() const { return is_dense_; }
+  enum class Kind { kDense, kSparse, kPreconditioned };
+
+  Kind kind() const { return kind_; }
   int num_parts() const { return num_parts_; }
   int64_t num_columns() const { return num_columns_; }
   // The first column of a frame; -1 if it is fixed.
@@ -52,7 +58,10 @@ class FrameSystem {
   // Cholesky factor of the sum of the parts, with growing regularisation
   // until it exists; false if it never does.
   bool Factorize(int num_threads);
-  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
+  // The error in the energy norm is about `tolerance` at most, relative, and
+  // rounding's.
+  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs,
+                        double tolerance = 1e-10) const;
 
   // What a system of this structure will occupy.
   int64_t MemoryBytes() const;
@@ -65,26 +74,33 @@ class FrameSystem {
     int64_t stride;
   };
 
+  bool is_dense() const { return kind_ == Kind::kDense; }
   void TakePattern(const FramePattern& pattern);
   Block BlockOf(int part, int32_t a, int32_t b);
+  void SumDense(int num_threads);
+  void SumSparse();
+  std::vector<Eigen::Matrix3d> SumBlocks() const;
+  bool FactorizeRegularized(int num_threads);
 
-  bool is_dense_ = true;
+  Kind kind_ = Kind::kDense;
   int num_parts_ = 1;
   int64_t num_columns_ = 0;
   std::vector<int32_t> column_of_frame_;
   // Dense.
   std::vector<Eigen::MatrixXd> dense_;  // per part; lower triangle
-  DenseCholesky dense_factor_;
-  // Sparse: the block columns of the lower triangle.
-  std::vector<int64_t> block_begin_;
-  std::vector<int32_t> block_row_;
+  DenseCholesky<double> dense_factor_;
+  // Otherwise by block columns: per part, three columns of numbers for each.
+  BlockPattern pattern_;
+  std::vector<std::vector<double>> values_;
+  // Of these, sparse.
   int64_t num_factor_numbers_ = 0;
-  std::vector<std::vector<double>> values_;  // per part, as of sparse_
   Eigen::SparseMatrix<double> sparse_;
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower,
                        Eigen::AMDOrdering<int>>
       sparse_factor_;
   bool is_analyzed_ = false;
+  // Or by iterations.
+  std::unique_ptr<PreconditionedSystem> preconditioned_;
 };
 
 }  // namespace krot

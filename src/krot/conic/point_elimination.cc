@@ -22,6 +22,8 @@ using Rows = Eigen::Matrix<double, kRows, 1>;
 constexpr double kHighLeverage = 0.5;
 // |Q|^2 = 3 allows fewer, but for rounding.
 constexpr int kMaxHighLeverage = 6;
+// Of the frames' system's solutions: a refinement squares it.
+constexpr double kTolerance = 1e-6;
 // Waking a thread takes longer than its share of so few observations: with
 // threads, certificates of small models took twice the time.
 constexpr int64_t kFewObservations = 4000;
@@ -206,7 +208,7 @@ void PointElimination<kRows>::SolveOnce(const BlockVector& g, const double* r,
     const int32_t column = frame_system_.column(static_cast<int32_t>(f));
     if (column >= 0) rhs[0].segment<3>(column) += g.frames[f];
   }
-  const VectorXd t = frame_system_.Solve(rhs[0]);
+  const VectorXd t = frame_system_.Solve(rhs[0], kTolerance);
   for (int64_t f = 0; f < structure_.num_frames(); ++f) {
     const int32_t column = frame_system_.column(static_cast<int32_t>(f));
     if (column >= 0) x->frames[f] = t.segment<3>(column);

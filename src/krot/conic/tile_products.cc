@@ -10,29 +10,43 @@
 namespace krot {
 namespace {
 
-using Matrix = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-
-Matrix MatrixOf(const Tile& tile) {
-  return Matrix(tile.data, tile.rows, tile.cols,
-                Eigen::OuterStride<>(tile.stride));
+template <typename Scalar>
+auto MatrixOf(const Tile<Scalar>& tile) {
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  return Eigen::Map<Matrix, 0, Eigen::OuterStride<>>(
+      tile.data, tile.rows, tile.cols, Eigen::OuterStride<>(tile.stride));
 }
 
 }  // namespace
 
-void DivideByTransposed(const Tile& L, const Tile& A) {
-  Matrix a = MatrixOf(A);
+template <typename Scalar>
+void DivideByTransposed(const Tile<Scalar>& L, const Tile<Scalar>& A) {
+  auto a = MatrixOf(A);
   MatrixOf(L)
-      .triangularView<Eigen::Lower>()
+      .template triangularView<Eigen::Lower>()
       .transpose()
-      .solveInPlace<Eigen::OnTheRight>(a);
+      .template solveInPlace<Eigen::OnTheRight>(a);
 }
 
-void SubtractSquare(const Tile& A, const Tile& C) {
-  MatrixOf(C).selfadjointView<Eigen::Lower>().rankUpdate(MatrixOf(A), -1);
+template <typename Scalar>
+void SubtractSquare(const Tile<Scalar>& A, const Tile<Scalar>& C) {
+  MatrixOf(C).template selfadjointView<Eigen::Lower>().rankUpdate(MatrixOf(A),
+                                                                  -1);
 }
 
-void SubtractProduct(const Tile& A, const Tile& B, const Tile& C) {
+template <typename Scalar>
+void SubtractProduct(const Tile<Scalar>& A, const Tile<Scalar>& B,
+                     const Tile<Scalar>& C) {
   MatrixOf(C).noalias() -= MatrixOf(A) * MatrixOf(B).transpose();
 }
+
+template void DivideByTransposed(const Tile<float>&, const Tile<float>&);
+template void DivideByTransposed(const Tile<double>&, const Tile<double>&);
+template void SubtractSquare(const Tile<float>&, const Tile<float>&);
+template void SubtractSquare(const Tile<double>&, const Tile<double>&);
+template void SubtractProduct(const Tile<float>&, const Tile<float>&,
+                              const Tile<float>&);
+template void SubtractProduct(const Tile<double>&, const Tile<double>&,
+                              const Tile<double>&);
 
 }  // namespace krot

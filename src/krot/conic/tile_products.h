@@ -4,24 +4,29 @@
 
 namespace krot {
 
-// A rectangle of a matrix, by columns, `stride` apart.
+// A rectangle of a matrix, by columns, `stride` apart; Scalar: float, double.
+template <typename Scalar>
 struct Tile {
-  double* data;
+  Scalar* data;
   int64_t rows, cols;
   int64_t stride;
 };
 
 // The products of a Cholesky factorization by tiles, on the calling thread, by
-// Eigen; any number of threads may call them. Not by BLAS: the serial OpenBLAS of
-// Debian 12 lets two threads use one buffer.
+// Eigen; any number of threads may call them. Not by BLAS: the serial OpenBLAS
+// of Debian 12 lets two threads use one buffer.
 
 // A := A L'^-1, of L's lower triangle.
-void DivideByTransposed(const Tile& L, const Tile& A);
+template <typename Scalar>
+void DivideByTransposed(const Tile<Scalar>& L, const Tile<Scalar>& A);
 
 // C := C - A A', the lower triangle alone.
-void SubtractSquare(const Tile& A, const Tile& C);
+template <typename Scalar>
+void SubtractSquare(const Tile<Scalar>& A, const Tile<Scalar>& C);
 
 // C := C - A B'.
-void SubtractProduct(const Tile& A, const Tile& B, const Tile& C);
+template <typename Scalar>
+void SubtractProduct(const Tile<Scalar>& A, const Tile<Scalar>& B,
+                     const Tile<Scalar>& C);
 
 }  // namespace krot
