@@ -23,7 +23,7 @@ constexpr double kHighLeverage = 0.5;
 // |Q|^2 = 3 allows fewer, but for rounding.
 constexpr int kMaxHighLeverage = 6;
 // Of the frames' system's solutions: a refinement squares it.
-constexpr double kTolerance = 1e-6;
+constexpr double kTolerance = 1e-4;
 // Waking a thread takes longer than its share of so few observations: with
 // threads, certificates of small models took twice the time.
 constexpr int64_t kFewObservations = 4000;
