@@ -13,7 +13,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// More would not end either.
+// More would not end either, or not soon.
 constexpr int kMaxIterations = 2000;
 // What an operation takes, by one of a dense factor in double precision: in
 // single precision; in an incomplete factor; and for a number of a matrix that
@@ -117,7 +117,44 @@ bool PreconditionedSystem::Factorize(std::vector<Matrix3d> blocks,
   blocks_ = std::move(blocks);
   num_threads_ = num_threads;
   Whiten();
-  Escalate();
+  if (IsNextCheaper(std::exchange(most_iterations_, 0))) Escalate();
+  return FactorizePreconditioner();
+}
+
+// Than this one, if it takes so many iterations.
+bool PreconditionedSystem::IsNextCheaper(int num_iterations) const {
+  const double cost = CostOf(preconditioner_, pattern_, num_iterations);
+  switch (preconditioner_) {
+    case Preconditioner::kIncomplete:
+      return cost > SingleCost(pattern_);
+    case Preconditioner::kSingle:
+      return cost > DoubleCost(pattern_);
+    case Preconditioner::kDouble:
+      break;
+  }
+  return false;
+}
+
+void PreconditionedSystem::Escalate() {
+  if (preconditioner_ == Preconditioner::kIncomplete) {
+    preconditioner_ = Preconditioner::kSingle;
+    incomplete_ = {};
+  } else {
+    preconditioner_ = Preconditioner::kDouble;
+    single_ = {};
+  }
+}
+
+// This one or, if it has none, the next.
+bool PreconditionedSystem::FactorizePreconditioner() {
+  while (!TryPreconditioner()) {
+    if (preconditioner_ == Preconditioner::kDouble) return false;
+    Escalate();
+  }
+  return true;
+}
+
+bool PreconditionedSystem::TryPreconditioner() {
   switch (preconditioner_) {
     case Preconditioner::kIncomplete:
       return incomplete_.Factorize(pattern_, blocks_);
@@ -127,21 +164,6 @@ bool PreconditionedSystem::Factorize(std::vector<Matrix3d> blocks,
       return FactorizeDense(kShiftInDouble, &double_);
   }
   return false;
-}
-
-// By the iterations that the last factor took.
-void PreconditionedSystem::Escalate() {
-  const double cost =
-      CostOf(preconditioner_, pattern_, std::exchange(most_iterations_, 0));
-  if (preconditioner_ == Preconditioner::kIncomplete &&
-      cost > SingleCost(pattern_)) {
-    preconditioner_ = Preconditioner::kSingle;
-    incomplete_ = {};
-  } else if (preconditioner_ == Preconditioner::kSingle &&
-             cost > DoubleCost(pattern_)) {
-    preconditioner_ = Preconditioner::kDouble;
-    single_ = {};
-  }
 }
 
 void PreconditionedSystem::Whiten() {
@@ -219,24 +241,29 @@ VectorXd PreconditionedSystem::Multiply(const VectorXd& x) const {
   return parts[0];
 }
 
-VectorXd PreconditionedSystem::Solve(const VectorXd& rhs,
-                                     double tolerance) const {
-  VectorXd y(rhs.size());
-  for (int32_t j = 0; j < pattern_.num_columns(); ++j) {
-    y.segment<3>(3 * int64_t{j}) = W_[j] * rhs.segment<3>(3 * int64_t{j});
+VectorXd PreconditionedSystem::Solve(const VectorXd& rhs, double tolerance) {
+  const int64_t num_columns = NumColumns(pattern_);
+  VectorXd whitened(num_columns);
+  for (int64_t k = 0; k < num_columns; k += 3) {
+    whitened.segment<3>(k) = W_[k / 3] * rhs.segment<3>(k);
   }
-  y = Iterate(std::move(y), tolerance);
-  for (int32_t j = 0; j < pattern_.num_columns(); ++j) {
-    y.segment<3>(3 * int64_t{j}) =
-        (W_[j].transpose() * y.segment<3>(3 * int64_t{j})).eval();
+  VectorXd y;
+  while (!Iterate(whitened, tolerance, &y) &&
+         preconditioner_ != Preconditioner::kDouble) {
+    Escalate();
+    if (!FactorizePreconditioner()) break;
+  }
+  for (int64_t k = 0; k < num_columns; k += 3) {
+    y.segment<3>(k) = (W_[k / 3].transpose() * y.segment<3>(k)).eval();
   }
   return y;
 }
 
-// From y = 0. With M the preconditioner, |error|_A^2 = r'A^-1 r is about r'M r.
-VectorXd PreconditionedSystem::Iterate(VectorXd residual,
-                                       double tolerance) const {
-  VectorXd y = VectorXd::Zero(residual.size());
+// From y = 0; false if it does not end. With M the preconditioner, |error|_A^2
+// = r'A^-1 r is about r'M r.
+bool PreconditionedSystem::Iterate(VectorXd residual, double tolerance,
+                                   VectorXd* y) {
+  *y = VectorXd::Zero(residual.size());
   VectorXd preconditioned = Precondition(residual);
   VectorXd direction = preconditioned;
   double error = residual.dot(preconditioned);
@@ -247,7 +274,7 @@ VectorXd PreconditionedSystem::Iterate(VectorXd residual,
     const double curvature = direction.dot(image);
     if (!(curvature > 0)) break;  // rounding
     const double step = error / curvature;
-    y += step * direction;
+    *y += step * direction;
     const VectorXd change = -step * image;
     residual += change;
     preconditioned = Precondition(residual);
@@ -256,7 +283,7 @@ VectorXd PreconditionedSystem::Iterate(VectorXd residual,
     ++num_iterations_;
   }
   most_iterations_ = std::max(most_iterations_, num_iterations_);
-  return y;
+  return num_iterations_ < kMaxIterations;
 }
 
 int64_t PreconditionedSystem::MemoryBytes(const BlockPattern& pattern) {

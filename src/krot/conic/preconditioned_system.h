@@ -25,8 +25,9 @@ enum class Preconditioner {
 //
 // preconditioned with less precision, and so flexibly [Notay 2000]. It begins
 // with the preconditioner that is predicted to take the least time, and takes
-// the next one once the iterations that were needed make that the cheaper: the
-// nearer an interior point is to its end, the farther rows are apart.
+// the next one once the iterations that were needed make that the cheaper, or
+// do not end: the nearer an interior point is to its end, the farther rows are
+// apart.
 //
 // The same bits at any number of threads.
 class PreconditionedSystem {
@@ -35,12 +36,12 @@ class PreconditionedSystem {
   explicit PreconditionedSystem(const BlockPattern& pattern);
 
   // `blocks` in the order of the pattern, those of the diagonal whole. False
-  // if the preconditioner has no factor.
+  // if no preconditioner has a factor.
   bool Factorize(std::vector<Eigen::Matrix3d> blocks, int num_threads);
 
   // Ends when |error|_A, by the preconditioner's estimate, has fallen to
   // `tolerance`, relative. An iteration reads A and the preconditioner once.
-  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs, double tolerance) const;
+  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs, double tolerance);
 
   Preconditioner preconditioner() const { return preconditioner_; }
   int num_iterations() const { return num_iterations_; }  // of the last Solve
@@ -52,13 +53,16 @@ class PreconditionedSystem {
   static int64_t MemoryBytes(const BlockPattern& pattern);
 
  private:
-  void Escalate();
   void Whiten();
+  bool IsNextCheaper(int num_iterations) const;
+  void Escalate();
+  bool FactorizePreconditioner();
+  bool TryPreconditioner();
   template <typename Scalar>
   bool FactorizeDense(Scalar first_shift, DenseCholesky<Scalar>* factor);
   Eigen::VectorXd Precondition(const Eigen::VectorXd& residual) const;
   Eigen::VectorXd Multiply(const Eigen::VectorXd& x) const;
-  Eigen::VectorXd Iterate(Eigen::VectorXd residual, double tolerance) const;
+  bool Iterate(Eigen::VectorXd residual, double tolerance, Eigen::VectorXd* y);
 
   const BlockPattern& pattern_;
   Preconditioner preconditioner_;
@@ -69,8 +73,8 @@ class PreconditionedSystem {
   IncompleteCholesky incomplete_;
   DenseCholesky<float> single_;
   DenseCholesky<double> double_;
-  mutable int num_iterations_ = 0;
-  mutable int most_iterations_ = 0;  // since the last Factorize
+  int num_iterations_ = 0;
+  int most_iterations_ = 0;  // since the last Factorize
 };
 
 }  // namespace krot
