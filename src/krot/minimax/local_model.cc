@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/minimax/descent_constants.h"
+
 namespace krot {
 namespace {
 
@@ -11,22 +13,6 @@ using Eigen::Vector3d;
 
 constexpr int kZeroPiece = 0;
 constexpr int kNoMember = -1;
-// Weights that the residuals bear together below this are rounding.
-constexpr double kSmallestWeight = 1e-9;
-// Falls of depths below the first, relative, count as none: steps that are cut
-// short cost iterations. No depth falls below the second of what it is.
-constexpr double kSmallFall = 0.1;
-constexpr double kSmallestDepthShare = 0.1;
-constexpr double kLargestFall = 1 - kSmallestDepthShare;
-// Keeps H invertible where rounding would not: relative to its trace.
-constexpr double kPivotRounding = 1e-14;
-// G serves as long as (what has changed since, relative)^2 is below this. Kept
-// wherever kappa is small, it missed optima at infinity; cold points take 2 %
-// longer for this (docs/benchmarks.md, "Res-Int, the first ten sweeps").
-constexpr double kMetricReach = 1e-2;
-
-// Up to this growth of depths DepthGrowth may be a bound, which costs nothing.
-constexpr double kNearby = 1e3;
 
 // How far x is from where v and w vanish: from the camera or, if that is what
 // moves, from its point. Up to a factor near 1.
@@ -242,7 +228,8 @@ bool LocalModel::RaiseMultipliers() {
   if (!UpdateLastMultipliers()) return false;
   bool grown = false;
   for (Member& member : members_) {
-    grown |= member.last_multiplier > 2 * member.multiplier + 1e-3;
+    grown |=
+        member.last_multiplier > kMuchGrowth * member.multiplier + kLeastGrowth;
     member.multiplier = std::max(member.multiplier, member.last_multiplier);
   }
   return grown;

@@ -5,6 +5,8 @@
 #include <limits>
 #include <optional>
 
+#include "krot/minimax/descent_constants.h"
+
 namespace krot {
 namespace {
 
@@ -15,42 +17,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Residuals become members so many at a time, the largest first. More make
 // every step dearer, fewer take more trials to find those that matter.
 constexpr int kMaxAdded = 8;
-// Residuals this small are zero, in pixels.
-constexpr double kZeroPixels = 1e-10;
-
-// kappa. A small one makes steps Newton's, a large one safe; the first and the
-// smallest are those with the fewest steps on random triangulations, of 1e-3,
-// 1e-2, 3e-2 and of 1e-6, 1e-5 (docs/benchmarks.md, "One triangulation").
-// Rounding in the model is about 1e-16 / kappa.
-constexpr double kFirstKappa = 1e-2;
-constexpr double kSmallestKappa = 1e-5;
-constexpr double kLargestKappa = 1e9;
-// What it is multiplied by after a good trial and after a failed one.
-constexpr double kKappaFall = 0.01;
-constexpr double kKappaRise = 10;
-
-// Shares of its promise that a trial keeps: it is taken beyond the first, good
-// beyond the second. Taking less would move on by next to nothing.
-constexpr double kSufficientShare = 0.1;
-constexpr double kGoodShare = 0.5;
-// Promises below this, relative, are rounding if the trial does not keep them:
-// at two cameras they were tried again and again (docs/benchmarks.md, "One
-// triangulation", step 4).
-constexpr double kPromiseRounding = 1e-10;
-constexpr double kFinestTolerance = DescentGoal{}.tolerance;
-
-// So often a failed trial may teach the model before kappa rises, and a lesson
-// after which the next trial costs no less than this share of the one before
-// was none. Without an end to lessons, frames whose residuals all point the
-// same way stay where they are (tests/minimax/degenerate_test.cc).
-constexpr int kMaxLessons = 5;
-constexpr double kLessonWorth = 0.99;
 
 // Whether the minimiser lies so far away that going on has no point: where
 // depths have grown a millionfold nothing changes by more than 1e-6 of it any
 // more, and long before that little is left to gain.
 bool IsFarAway(double depth_growth, double relative_promise) {
-  return depth_growth > 1e6 || (depth_growth > 1e3 && relative_promise < 1e-8);
+  return depth_growth > 1e6 ||
+         (depth_growth > kNearby && relative_promise < 1e-8);
 }
 
 // One descent from a feasible x.

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/minimax/descent_constants.h"
 #include "krot/minimax/local_model.h"
 #include "krot/minimax/residual_set.h"
 
@@ -31,7 +32,7 @@ struct DescentSummary {
 struct DescentGoal {
   // It ends with the step that promises less than this or, so far as the step
   // itself can tell, leaves less than this to the next; relative, >= 1e-11.
-  double tolerance = 1e-11;
+  double tolerance = kFinestTolerance;
   // It does nothing where the cost is this low; pixels, >= 0.
   double level = 0;
   // It ends with the step that makes the cost this low; pixels, >= 0.
