@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/minimax/fast_descent.h"
+#include "krot/minimax/side_by_side_descent.h"
 #include "tests/testing/random_residuals.h"
 
 namespace {
@@ -79,6 +80,35 @@ TEST(Allocation, FastDescentMakesNoneOnceWarm) {
   for (const double p : {1.0, 1.5, 2.0, 3.0, Norm::LInf().p}) {
     ExpectNoAllocationOnceWarm(FastDescentSettings::kFast, p);
   }
+}
+
+TEST(Allocation, ProblemsSideBySideMakeNoneOnceWarm) {
+  SideBySideDescent descent(FastDescentOptions{}, Norm::L2());
+  ProblemGenerator generator(2);
+  std::vector<ResidualProblem> problems;
+  std::vector<Eigen::Vector3d> starts;
+  for (int rays = 2; rays <= 60; ++rays) {
+    problems.push_back(generator.Triangulation(rays, 5));
+    starts.push_back(generator.Start(problems.back(), 0.3));
+  }
+  const auto add_rows = [&](int n, SideBySideDescent::RowWriter* writer) {
+    for (const Residual& residual : problems[n].residuals) {
+      double row[kLaneRow];
+      RowOf(residual, row);
+      writer->Add(row);
+    }
+  };
+  std::vector<Eigen::Vector3d> x(starts);
+  std::vector<ActiveResiduals> active(starts.size());
+  std::vector<SideBySideDescent::Problem> tasks;
+  for (size_t k = 0; k < starts.size(); ++k)
+    tasks.push_back({&x[k], &active[k]});
+  descent.Minimize(DescentGoal{}, add_rows, &tasks);
+  std::copy(starts.begin(), starts.end(), x.begin());
+  std::fill(active.begin(), active.end(), ActiveResiduals{});
+  const long before = num_allocations;
+  descent.Minimize(DescentGoal{}, add_rows, &tasks);
+  EXPECT_EQ(num_allocations - before, 0);
 }
 
 TEST(Allocation, PaperSettingsMakeNoneOnceWarm) {

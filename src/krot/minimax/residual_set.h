@@ -7,12 +7,14 @@
 
 namespace krot {
 
+// a_1, b_1, a_2, b_2, c, d.
+void RowOf(const Residual& residual, double row[kResidualRow]);
+
 // The residuals of one problem (1), stored in blocks of lanes. Refilling it
 // does not allocate once it has held as many.
 class ResidualSet {
  public:
   void Clear() { size_ = 0; }
-  // A row is a_1, b_1, a_2, b_2, c, d.
   void Add(const double row[kResidualRow]) {
     const int lane = size_ % kResidualLanes;
     if (lane == 0) AddBlock();
