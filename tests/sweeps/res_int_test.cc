@@ -309,6 +309,43 @@ TEST(BlockSweep, OfAPointBehindACameraReturnsInfinity) {
   }
 }
 
+// Points are solved side by side; which ones they are together with is nothing
+// to them.
+TEST(BlockSweep, APointEndsAtTheSameBitsWhateverOthersThereAre) {
+  const RandomScene scene = MakeScene(9);
+  const DescentGoal goal{1e-3, 2.0};
+  BlockSweep blocks(scene.problem, FastDescentOptions{}, Norm::L2(),
+                    Context{1});
+  blocks.SetGoal(goal);
+  Estimate all = scene.estimate;
+  blocks.IntersectPoints(&all);
+
+  KnownRotationProblem part = scene.problem;  // without every third point
+  Estimate some = scene.estimate;
+  std::vector<int32_t> kept;
+  for (int32_t k = 0; k < scene.problem.num_points; ++k) {
+    if (k % 3 != 0) kept.push_back(k);
+  }
+  part.observations.clear();
+  for (size_t n = 0; n < kept.size(); ++n) {
+    some.points[n] = scene.estimate.points[kept[n]];
+    for (int64_t i = scene.problem.point_begin[kept[n]];
+         i < scene.problem.point_begin[kept[n] + 1]; ++i) {
+      part.observations.push_back(scene.problem.observations[i]);
+      part.observations.back().point = static_cast<int32_t>(n);
+    }
+  }
+  part.num_points = static_cast<int32_t>(kept.size());
+  some.points.resize(kept.size());
+  IndexObservations(&part);
+  BlockSweep part_blocks(part, FastDescentOptions{}, Norm::L2(), Context{1});
+  part_blocks.SetGoal(goal);
+  part_blocks.IntersectPoints(&some);
+  for (size_t n = 0; n < kept.size(); ++n) {
+    EXPECT_EQ(some.points[n], all.points[kept[n]]);
+  }
+}
+
 // Every point is then at its own optimum for the frames as they are.
 TEST(BlockSweep, ASecondIntersectionGainsNothing) {
   RandomScene scene = MakeScene(5);

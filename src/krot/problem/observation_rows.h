@@ -56,4 +56,27 @@ inline void ResectionRow(const View& view, const Observation& observation,
   internal::AffineRow(observation, map, row);
 }
 
+// Whether R_sr = I: the view's camera is its frame's own.
+inline bool IsReference(const View& view) {
+  return view.cam_from_rig_rotation == Eigen::Matrix3d::Identity();
+}
+
+// ResectionRow of a view with R_sr = I, by 18 products instead of 45: A and c
+// are E's rows.
+inline void ReferenceResectionRow(const View& view,
+                                  const Observation& observation,
+                                  const Eigen::Vector3d& point,
+                                  double row[kResidualRow]) {
+  const auto& E = observation.E;
+  const Eigen::Vector3d o =
+      view.cam_from_world_rotation * point + view.cam_from_rig_translation;
+  const auto write = [&](int r, double* out) {
+    for (int k = 0; k < 3; ++k) out[k] = E(r, k);
+    out[3] = E(r, 0) * o[0] + E(r, 1) * o[1] + E(r, 2) * o[2];
+  };
+  write(1, row);
+  write(2, row + 4);
+  write(0, row + 8);
+}
+
 }  // namespace krot

@@ -5,6 +5,7 @@
 
 #include "krot/base/context.h"
 #include "krot/minimax/fast_descent.h"
+#include "krot/minimax/side_by_side_descent.h"
 #include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/sweeps/frame_share.h"
@@ -12,8 +13,9 @@
 namespace krot {
 
 // The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
-// other and spread over threads; the result does not depend on how many. Each
-// thread keeps one FastDescent, so that sweeps do not allocate once warm.
+// other and spread over threads; the result does not depend on how many. Points
+// are solved side by side, in the order of their numbers of observations. Each
+// thread keeps its descents, so that sweeps do not allocate once warm.
 // Once it is cancelled, the blocks that are left are skipped. What the problem
 // fixes stays.
 //
@@ -40,11 +42,26 @@ class BlockSweep {
   double ResectFrames(Estimate* estimate);
 
  private:
+  // What a thread keeps.
+  struct Worker {
+    FastDescent frame_descent;
+    SideBySideDescent point_descent;
+    std::vector<int32_t> points;
+    std::vector<SideBySideDescent::Problem> problems;
+  };
+
   template <typename Function>
   double LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
                      const Function& minimize);
-  double IntersectPoint(int64_t k, FastDescent* descent, Estimate* estimate);
+  int64_t NumObservations(int32_t point) const {
+    return problem_.point_begin[point + 1] - problem_.point_begin[point];
+  }
+  double IntersectPoints(int64_t begin, int64_t end, int worker,
+                         Estimate* estimate);
+  double ChoosePoints(int64_t begin, int64_t end, const Estimate& estimate,
+                      std::vector<int32_t>* points) const;
   double ResectShare(Estimate* estimate);
+  void AddPointRows(int32_t point, SideBySideDescent::RowWriter* writer) const;
   double ResectFrame(int64_t f, FastDescent* descent, Estimate* estimate);
 
   const KnownRotationProblem& problem_;
@@ -52,8 +69,9 @@ class BlockSweep {
   Norm norm_;
   const Context context_;
   DescentGoal goal_;
-  std::vector<FastDescent> descents_;  // one per thread
-  std::vector<AffineMap> cameras_;     // per view, while points move
+  std::vector<Worker> workers_;     // one per thread
+  std::vector<AffineMap> cameras_;  // per view, while points move
+  std::vector<char> is_reference_;  // per view
   // Every block's warm start.
   std::vector<ActiveResiduals> point_active_;
   std::vector<ActiveResiduals> frame_active_;
