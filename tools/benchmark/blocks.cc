@@ -1,5 +1,6 @@
 // krot_benchmark blocks: single sub-problems of a sweep over real models,
-// points and frames, from a cold start: `fast` settings against `paper` ones.
+// points and frames, from a cold start: `fast` settings, points side by side as
+// sweeps solve them, against `paper` ones.
 
 #include <algorithm>
 #include <string>
@@ -47,12 +48,15 @@ std::vector<Subproblem> Blocks(int32_t count, int32_t max_count,
   return blocks;
 }
 
-Duel Fight(const std::vector<Subproblem>& blocks, int repeats) {
+// The solvers are `fast` and `paper`, in this order.
+Duel Fight(const std::vector<Subproblem>& blocks,
+           const std::vector<std::unique_ptr<SubproblemSolver>>& solvers,
+           int repeats) {
   Duel duel;
   duel.num_blocks = static_cast<int64_t>(blocks.size());
   if (blocks.empty()) return duel;
   const std::vector<Standing> standings =
-      Compete(blocks, Norm::L2(), FastAndPaper(Norm::L2()), repeats);
+      Compete(blocks, Norm::L2(), solvers, repeats);
   duel.fast = standings[0].seconds;
   duel.paper = standings[1].seconds;
   duel.excess = standings[0].max_excess;
@@ -74,11 +78,11 @@ std::vector<Cell> Row(const BlocksOptions& options,
       Blocks(
           problem.num_points, options.max_points, start.points,
           [&](int32_t k) { return IntersectionResiduals(problem, start, k); }),
-      options.common.repeats);
+      SideBySideAndPaper(Norm::L2()), options.common.repeats);
   const Duel frames = Fight(
       Blocks(problem.num_frames, options.max_frames, start.translations,
              [&](int32_t f) { return ResectionResiduals(problem, start, f); }),
-      options.common.repeats);
+      FastAndPaper(Norm::L2()), options.common.repeats);
   std::vector<Cell> row = {TextCell(model.name)};
   AddDuel(points, &row);
   AddDuel(frames, &row);
@@ -115,7 +119,8 @@ int RunBlocksBenchmark(const std::vector<std::string>& arguments) {
   table.name = "blocks";
   table.caption =
       "Microseconds of processor time per sub-problem, p = 2, cold from the "
-      "model's own estimate: points (Int), frames (Res), and the ratio of all "
+      "model's own estimate: points (Int), `fast` ones side by side, frames "
+      "(Res), and the ratio of all "
       "points and frames together, as in a first sweep";
   table.columns = {"model",     "points", "Int fast",        "Int paper",
                    "Int ratio", "frames", "Res fast",        "Res paper",

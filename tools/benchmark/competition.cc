@@ -24,17 +24,16 @@ std::vector<Standing> Compete(
                              std::numeric_limits<double>::infinity());
   for (const auto& solver : solvers) {
     costs.emplace_back();
+    const std::vector<Eigen::Vector3d> points = solver->MinimizeAll(instances);
     for (size_t i = 0; i < instances.size(); ++i) {
-      costs.back().push_back(
-          instances[i].Cost(solver->Minimize(instances[i]), norm));
+      costs.back().push_back(instances[i].Cost(points[i], norm));
       lowest[i] = std::min(lowest[i], costs.back()[i]);
     }
   }
   std::vector<std::function<void()>> runs;
   for (const auto& solver : solvers) {
-    runs.emplace_back([&instances, &solver] {
-      for (const Subproblem& problem : instances) solver->Minimize(problem);
-    });
+    runs.emplace_back(
+        [&instances, &solver] { solver->MinimizeAll(instances); });
   }
   const std::vector<double> seconds =
       TimeInterleaved(runs, repeats, kMinSeconds);

@@ -1,4 +1,7 @@
+#include <algorithm>
+
 #include "krot/minimax/fast_descent.h"
+#include "krot/minimax/side_by_side_descent.h"
 #include "tools/benchmark/subproblem_solver.h"
 
 namespace krot {
@@ -29,6 +32,53 @@ class OwnSolver : public SubproblemSolver {
   FastDescent descent_;
 };
 
+// As sweeps solve points: many at a time, the short ones first.
+class SideBySideSolver : public SubproblemSolver {
+ public:
+  explicit SideBySideSolver(Norm norm) : descent_(FastDescentOptions{}, norm) {}
+
+  std::string Name() const override { return "side by side"; }
+
+  Eigen::Vector3d Minimize(const Subproblem& problem) override {
+    return MinimizeAll({problem}).front();
+  }
+
+  std::vector<Eigen::Vector3d> MinimizeAll(
+      const std::vector<Subproblem>& problems) override {
+    std::vector<Eigen::Vector3d> points(problems.size());
+    std::vector<ActiveResiduals> active(problems.size());
+    std::vector<SideBySideDescent::Problem> tasks;
+    const std::vector<size_t> order = ByLength(problems);
+    for (const size_t i : order) {
+      points[i] = problems[i].start;
+      tasks.push_back({&points[i], &active[i]});
+    }
+    descent_.Minimize(
+        DescentGoal{},
+        [&](int n, SideBySideDescent::RowWriter* writer) {
+          for (const Residual& residual : problems[order[n]].residuals) {
+            double row[kLaneRow];
+            RowOf(residual, row);
+            writer->Add(row);
+          }
+        },
+        &tasks);
+    return points;
+  }
+
+ private:
+  static std::vector<size_t> ByLength(const std::vector<Subproblem>& problems) {
+    std::vector<size_t> order(problems.size());
+    for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      return problems[a].residuals.size() < problems[b].residuals.size();
+    });
+    return order;
+  }
+
+  SideBySideDescent descent_;
+};
+
 using Solvers = std::vector<std::unique_ptr<SubproblemSolver>>;
 
 std::unique_ptr<SubproblemSolver> Fast(Norm norm) {
@@ -51,6 +101,7 @@ Solvers OwnSolvers(Norm norm) {
   solvers.push_back(std::make_unique<OwnSolver>(
       "fast, 1e-6", FastDescentOptions{},
       DescentGoal{kRivalTolerance, /*level=*/0}, norm));
+  if (norm.p == 2) solvers.push_back(std::make_unique<SideBySideSolver>(norm));
   solvers.push_back(Paper(norm));
   return solvers;
 }
@@ -58,6 +109,13 @@ Solvers OwnSolvers(Norm norm) {
 Solvers FastAndPaper(Norm norm) {
   Solvers solvers;
   solvers.push_back(Fast(norm));
+  solvers.push_back(Paper(norm));
+  return solvers;
+}
+
+Solvers SideBySideAndPaper(Norm norm) {
+  Solvers solvers;
+  solvers.push_back(std::make_unique<SideBySideSolver>(norm));
   solvers.push_back(Paper(norm));
   return solvers;
 }

@@ -70,7 +70,8 @@ std::vector<double> Leads(const std::vector<Json>& rows) {
     double least = std::numeric_limits<double>::infinity();
     for (const auto& [column, value] : row.items()) {
       const bool is_rival = column != "cameras" && column != "KROT fast" &&
-                            column != "fast, 1e-6" && value.is_number();
+                            column != "fast, 1e-6" &&
+                            column != "side by side" && value.is_number();
       if (is_rival) least = std::min(least, value.get<double>());
     }
     if (std::isfinite(least)) leads.push_back(least);
