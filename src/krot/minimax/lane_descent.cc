@@ -258,6 +258,8 @@ void LaneDescents::Begin(int lane) {
   calls[lane] = 0;
 }
 
+bool LanesPay() { return kVectorLanes >= 4; }
+
 void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
                LaneDescents* descents, LanePiece* pieces) {
   Stepping({rows, num_rows}, goal, descents, pieces).Run();

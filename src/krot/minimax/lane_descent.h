@@ -55,12 +55,17 @@ struct alignas(64) LaneDescents {
   void Begin(int lane);
 };
 
+// Whether the vectors that the kernel was compiled for are long enough, four
+// numbers or more: with two, lanes take longer than one problem after the
+// other.
+bool LanesPay();
+
 // One step of NewtonDescent, for p = 2, in every lane that has a problem, or
 // part of one where active sets change often: minimises the model of all
 // residuals and tries the step. Failed trials teach the model multipliers, but
 // no tangents. Ends as NewtonDescent does, or gives up. What a lane does
 // depends on its own problem alone. `pieces`: memory for as many as rows, the
-// same in all steps. About 20 ns per row and step, all lanes together, and 400
+// same in all steps. About 30 ns per row and step, all lanes together, and 400
 // ns.
 void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
                LaneDescents* descents, LanePiece* pieces);

@@ -18,7 +18,7 @@ double IdleEntry(int k) { return k == kLaneRow - 1 ? 1 : 0; }
 
 SideBySideDescent::SideBySideDescent(const FastDescentOptions& options,
                                      Norm norm)
-    : uses_lanes_(norm.p == 2 &&
+    : uses_lanes_(LanesPay() && norm.p == 2 &&
                   options.settings == FastDescentSettings::kFast),
       max_iterations_(options.max_iterations),
       alone_(options, norm) {}
