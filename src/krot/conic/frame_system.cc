@@ -19,12 +19,17 @@ constexpr int64_t kAlwaysDenseFrames = 500;
 // to 21 were measured with 800 to 3000 frames of many patterns, on one thread.
 constexpr double kSparseOperation = 15;
 // Parts of the sum, and so the threads that can eliminate points; fewer where
-// each is large: a dense part of 1500 frames takes 162 MB, one of 6000 frames,
-// where the factor takes most of the time, 2.6 GB.
+// each may be large: of 10,000 frames that share points without order, 300 MB.
 constexpr int kNumParts = 4;
 constexpr int kNumLargeParts = 2;
 constexpr int64_t kLargeFrames = 1500;
-constexpr int64_t kLargestFrames = 6000;
+
+// Of a factor that is not filled at all; most patterns need no closer look. A
+// column of c blocks takes 27 c^2, and these are least where all are alike.
+double LeastSparseOperations(const BlockPattern& pattern) {
+  const auto num_blocks = static_cast<double>(pattern.num_blocks());
+  return 27 * num_blocks * num_blocks / pattern.num_columns();
+}
 
 // Of a column, what stands in blocks of the lower triangle: nothing else is
 // written.
@@ -52,16 +57,18 @@ FrameSystem::FrameSystem(const BlockStructure& structure, Ranks* ranks)
   UniteOverRanks(ranks, &pattern);
   TakePattern(pattern);
   values_.resize(num_parts_);
-  const SparseFactorSize factor = FindSparseFactorSize(pattern);
-  if (kSparseOperation * factor.operations <
-          PreconditionedSystem::Cost(pattern_) &&
-      factor.numbers <= std::numeric_limits<int>::max()) {  // Eigen's indices
-    kind_ = Kind::kSparse;
-    num_factor_numbers_ = factor.numbers;
-  } else {
-    kind_ = Kind::kPreconditioned;
-    preconditioned_ = std::make_unique<PreconditionedSystem>(pattern_);
+  const double cost = PreconditionedSystem::Cost(pattern_);
+  if (kSparseOperation * LeastSparseOperations(pattern_) < cost) {
+    const SparseFactorSize factor = FindSparseFactorSize(pattern);
+    if (kSparseOperation * factor.operations < cost &&
+        factor.numbers <= std::numeric_limits<int>::max()) {  // Eigen's indices
+      kind_ = Kind::kSparse;
+      num_factor_numbers_ = factor.numbers;
+      return;
+    }
   }
+  kind_ = Kind::kPreconditioned;
+  preconditioned_ = std::make_unique<PreconditionedSystem>(pattern_);
 }
 
 void FrameSystem::TakePattern(const FramePattern& pattern) {
