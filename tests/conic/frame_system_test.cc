@@ -203,7 +203,7 @@ TEST(FrameSystem, SolvesALongChainSparselyAsItDoesDensely) {
 
 // Few pairs of frames share a point, but eliminated in any order they fill the
 // matrix.
-TEST(FrameSystem, IsDenseWhereASparseFactorWouldFillUp) {
+TEST(FrameSystem, IsPreconditionedWhereASparseFactorWouldFillUp) {
   const FrameSystem system(MakeRandomStructure(kSparseFrames, 1));
   EXPECT_EQ(system.kind(), FrameSystem::Kind::kPreconditioned);
   EXPECT_EQ(FrameSystem(MakeChain(kSparseFrames, 7)).kind(),

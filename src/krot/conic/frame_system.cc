@@ -15,9 +15,6 @@ constexpr double kRegularization = 1e-14;
 constexpr double kLargestRegularization = 1e-7;
 // Up to here a dense factor is the fastest way whatever the pattern.
 constexpr int64_t kAlwaysDenseFrames = 500;
-// Beyond, what an operation of a sparse factor takes, by one of a dense one: 12
-// to 21 were measured with 800 to 3000 frames of many patterns, on one thread.
-constexpr double kSparseOperation = 15;
 // Parts of the sum, and so the threads that can eliminate points; fewer where
 // each may be large: of 10,000 frames that share points without order, 300 MB.
 constexpr int kNumParts = 4;

@@ -55,8 +55,8 @@ class FrameSystem {
                       const std::vector<char>& is_apart,
                       const double* const G[3]);
 
-  // Cholesky factor of the sum of the parts, with growing regularisation
-  // until it exists; false if it never does.
+  // Cholesky factor, or preconditioner, of the sum of the parts, with growing
+  // regularisation until it exists; false if it never does.
   bool Factorize(int num_threads);
   // The error in the energy norm is about `tolerance` at most, relative, and
   // rounding's.

@@ -16,10 +16,9 @@ using Eigen::VectorXd;
 // More would not end either, or not soon.
 constexpr int kMaxIterations = 2000;
 // What an operation takes, by one of a dense factor in double precision: in
-// single precision; in an incomplete factor; and for a number of a matrix that
-// is multiplied by a vector, which waits for memory (docs/scale.md).
+// single precision, and for a number of a matrix that is multiplied by a
+// vector, which waits for memory.
 constexpr double kOperationInSingle = 0.5;
-constexpr double kSparseOperation = 15;
 constexpr double kNumberRead = 60;
 // Systems that are solved with a factor: an interior point's, each refined.
 constexpr int kSolves = 12;
@@ -31,16 +30,16 @@ constexpr int kDoubleIterations = 2;
 // Products are summed in so many parts.
 constexpr int kNumChunks = 4;
 // Relative to the trace of a block: keeps its inverse factor finite.
-constexpr double kSmallestPivot = 1e-14;
+constexpr double kSmallestWhitenedPivot = 1e-14;
 // Added to a dense factor's unit diagonal, until it exists.
 constexpr float kShiftInSingle = 1e-6F;
 constexpr double kShiftInDouble = 1e-14;
-constexpr int kShiftGrowth = 10;
-constexpr int kLargestShift = 10;
+constexpr int kDenseShiftGrowth = 10;
+constexpr int kLargestDenseShift = 10;
 
 // W with W A W' = I, where A has full rank.
 Matrix3d Whitening(const Matrix3d& A) {
-  const double floor = kSmallestPivot * A.trace();
+  const double floor = kSmallestWhitenedPivot * A.trace();
   Matrix3d W = Matrix3d::Zero();
   if (!(floor > 0)) return W;
   const auto inverse_root = [&](double pivot) {
@@ -181,8 +180,8 @@ void PreconditionedSystem::Whiten() {
 template <typename Scalar>
 bool PreconditionedSystem::FactorizeDense(Scalar first_shift,
                                           DenseCholesky<Scalar>* factor) {
-  for (Scalar shift = first_shift; shift <= kLargestShift;
-       shift *= kShiftGrowth) {
+  for (Scalar shift = first_shift; shift <= kLargestDenseShift;
+       shift *= kDenseShiftGrowth) {
     factor->SetZero(NumColumns(pattern_));
     for (int32_t j = 0; j < pattern_.num_columns(); ++j) {
       for (int64_t n = pattern_.begin[j]; n < pattern_.begin[j + 1]; ++n) {

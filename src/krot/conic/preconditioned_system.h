@@ -11,6 +11,10 @@
 
 namespace krot {
 
+// What an operation of a sparse factor takes, by one of a dense one: 12 to 21
+// were measured with 800 to 3000 frames of many patterns, on one thread.
+inline constexpr double kSparseOperation = 15;
+
 // What stands for the inverse of a matrix, in the order of exactness.
 enum class Preconditioner {
   kIncomplete,  // a factor as sparse as the matrix, in single precision
