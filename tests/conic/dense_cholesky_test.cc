@@ -18,10 +18,10 @@ MatrixXd RandomPositiveDefinite(int size, std::mt19937* generator) {
   return A * A.transpose() + MatrixXd::Identity(size, size);
 }
 
-// Below, at and above the size of a tile, and of three.
+// Below, at and above the size of a tile, and of a group of tiles.
 TEST(DenseCholesky, SolvesAsAnLuFactorisationDoes) {
   std::mt19937 generator(1);
-  for (const int size : {1, 5, 127, 128, 129, 300, 385}) {
+  for (const int size : {1, 5, 127, 128, 129, 300, 512, 1100}) {
     const MatrixXd matrix = RandomPositiveDefinite(size, &generator);
     const VectorXd rhs = VectorXd::LinSpaced(size, -1, 2);
     MatrixXd lower = matrix;
@@ -36,8 +36,8 @@ TEST(DenseCholesky, SolvesAsAnLuFactorisationDoes) {
 
 TEST(DenseCholesky, HasTheSameBitsAtAnyNumberOfThreads) {
   std::mt19937 generator(2);
-  const MatrixXd matrix = RandomPositiveDefinite(700, &generator);
-  const VectorXd rhs = VectorXd::Ones(700);
+  const MatrixXd matrix = RandomPositiveDefinite(1100, &generator);
+  const VectorXd rhs = VectorXd::Ones(1100);
   DenseCholesky<double> cholesky;
   ASSERT_TRUE(cholesky.Factorize(matrix, 1));
   const VectorXd expected = cholesky.Solve(rhs);

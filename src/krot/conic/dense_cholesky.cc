@@ -13,6 +13,10 @@ namespace {
 // Eigen's products of tiles of 192 take half as long again per number, for the
 // way it splits them; those of 96 and 160 are between.
 constexpr int64_t kTile = 128;
+// Of tiles, solved one after another before threads take what follows.
+constexpr int64_t kGroup = 4;
+// Waking a thread takes longer than its share of a solve with fewer.
+constexpr int64_t kFewColumns = 1000;
 
 // In numbers. Every tile has that of the largest.
 int64_t Room(int64_t n) {
@@ -37,6 +41,11 @@ int64_t DenseCholesky<Scalar>::Begin(int64_t i, int64_t j) const {
 
 template <typename Scalar>
 Tile<Scalar> DenseCholesky<Scalar>::TileAt(int64_t i, int64_t j) {
+  return {&tiles_[Begin(i, j)], SizeOf(size_, i), SizeOf(size_, j), stride()};
+}
+
+template <typename Scalar>
+Tile<const Scalar> DenseCholesky<Scalar>::TileAt(int64_t i, int64_t j) const {
   return {&tiles_[Begin(i, j)], SizeOf(size_, i), SizeOf(size_, j), stride()};
 }
 
@@ -90,6 +99,7 @@ bool DenseCholesky<Scalar>::Factorize(const Matrix& matrix, int num_threads) {
 
 template <typename Scalar>
 bool DenseCholesky<Scalar>::Factorize(int num_threads) {
+  num_threads_ = num_threads;
   const int64_t num_tiles = NumChunks(size_, kTile);
   std::vector<std::pair<int64_t, int64_t>> rest;
   for (int64_t k = 0; k < num_tiles; ++k) {
@@ -115,25 +125,63 @@ bool DenseCholesky<Scalar>::Factorize(int num_threads) {
   return true;
 }
 
+// L^-1 x, by groups of tiles: what is solved of a group is taken off all parts
+// below at once.
+template <typename Scalar>
+void DenseCholesky<Scalar>::SolveLower(int num_threads, Vector* x) const {
+  const auto part = [x](int64_t i) { return x->data() + i * kTile; };
+  const int64_t num_tiles = NumChunks(size_, kTile);
+  for (int64_t begin = 0; begin < num_tiles; begin += kGroup) {
+    const int64_t end = std::min(begin + kGroup, num_tiles);
+    for (int64_t i = begin; i < end; ++i) {
+      for (int64_t j = begin; j < i; ++j) {
+        SubtractTimesVector(TileAt(i, j), part(j), part(i));
+      }
+      Eigen::Map<Vector> own(part(i), SizeOf(size_, i));
+      Read(i, i).template triangularView<Eigen::Lower>().solveInPlace(own);
+    }
+    ParallelFor(num_tiles - end, 1, num_threads,
+                [&](int64_t below, int64_t, int) {
+                  const int64_t i = end + below;
+                  for (int64_t j = begin; j < end; ++j) {
+                    SubtractTimesVector(TileAt(i, j), part(j), part(i));
+                  }
+                });
+  }
+}
+
+// L'^-1 x, likewise from the last group to the first.
+template <typename Scalar>
+void DenseCholesky<Scalar>::SolveUpper(int num_threads, Vector* x) const {
+  const auto part = [x](int64_t i) { return x->data() + i * kTile; };
+  for (int64_t end = NumChunks(size_, kTile); end > 0;) {
+    const int64_t begin = (end - 1) / kGroup * kGroup;
+    for (int64_t i = end - 1; i >= begin; --i) {
+      Eigen::Map<Vector> own(part(i), SizeOf(size_, i));
+      Read(i, i)
+          .transpose()
+          .template triangularView<Eigen::Upper>()
+          .solveInPlace(own);
+      for (int64_t j = begin; j < i; ++j) {
+        SubtractTransposedTimesVector(TileAt(i, j), part(i), part(j));
+      }
+    }
+    ParallelFor(begin, 1, num_threads, [&](int64_t j, int64_t, int) {
+      for (int64_t i = begin; i < end; ++i) {
+        SubtractTransposedTimesVector(TileAt(i, j), part(i), part(j));
+      }
+    });
+    end = begin;
+  }
+}
+
 template <typename Scalar>
 typename DenseCholesky<Scalar>::Vector DenseCholesky<Scalar>::Solve(
     const Vector& rhs) const {
+  const int num_threads = size_ < kFewColumns ? 1 : num_threads_;
   Vector x = rhs;
-  const auto part = [&](int64_t i) {
-    return x.segment(i * kTile, SizeOf(size_, i));
-  };
-  const int64_t num_tiles = NumChunks(size_, kTile);
-  for (int64_t i = 0; i < num_tiles; ++i) {
-    for (int64_t j = 0; j < i; ++j) part(i).noalias() -= Read(i, j) * part(j);
-    Read(i, i).template triangularView<Eigen::Lower>().solveInPlace(part(i));
-  }
-  for (int64_t i = num_tiles - 1; i >= 0; --i) {
-    Read(i, i).transpose().template triangularView<Eigen::Upper>().solveInPlace(
-        part(i));
-    for (int64_t j = 0; j < i; ++j) {
-      part(j).noalias() -= Read(i, j).transpose() * part(i);
-    }
-  }
+  SolveLower(num_threads, &x);
+  SolveUpper(num_threads, &x);
   return x;
 }
 

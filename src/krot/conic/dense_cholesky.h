@@ -28,7 +28,7 @@ class DenseCholesky {
   Scalar& At(int64_t row, int64_t column);
   bool Factorize(int num_threads);
 
-  // matrix^-1 rhs. O(2 n^2).
+  // matrix^-1 rhs, on as many threads. O(2 n^2): reads the factor twice.
   Vector Solve(const Vector& rhs) const;
 
   // What the factor of an n x n matrix occupies.
@@ -41,9 +41,13 @@ class DenseCholesky {
   int64_t stride() const;                     // of every tile
   int64_t Begin(int64_t i, int64_t j) const;  // of a tile; j <= i
   Tile<Scalar> TileAt(int64_t i, int64_t j);
+  Tile<const Scalar> TileAt(int64_t i, int64_t j) const;
   ConstTile Read(int64_t i, int64_t j) const;
+  void SolveLower(int num_threads, Vector* x) const;
+  void SolveUpper(int num_threads, Vector* x) const;
 
   int64_t size_ = 0;
+  int num_threads_ = 1;
   // Of the lower triangle, row by row, each tile for itself: in a matrix as a
   // whole a tile's columns would lie pages apart.
   std::vector<Scalar> tiles_;

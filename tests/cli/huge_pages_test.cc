@@ -1,0 +1,52 @@
+// Its own executable: with tools/krot/huge_pages.cc, which replaces the global
+// operator new, as programs are.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <new>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace krot {
+namespace {
+
+constexpr std::size_t kMebibyte = std::size_t{1} << 20;
+
+TEST(HugePages, LargeArraysBeginWithAPageOfTheirOwn) {
+  const std::vector<char> large(8 * kMebibyte + 1, 'x');
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(large.data()) % (2 * kMebibyte),
+            0);
+  EXPECT_EQ(large.back(), 'x');
+}
+
+TEST(HugePages, AlignmentIsAsAskedFor) {
+  struct alignas(64) Line {
+    char bytes[64];
+  };
+  for (const std::size_t count : {1, 3, 200000}) {
+    const auto lines = std::make_unique<Line[]>(count);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(lines.get()) % 64, 0);
+    std::memset(lines.get(), 1, count * sizeof(Line));
+  }
+}
+
+TEST(HugePages, WhatCannotBeServedIsToldAsBefore) {
+  const auto too_large =
+      static_cast<std::size_t>(std::numeric_limits<std::ptrdiff_t>::max()) -
+      kMebibyte;
+  EXPECT_THROW(static_cast<void>(std::vector<char>(too_large)), std::bad_alloc);
+  EXPECT_EQ(new (std::nothrow) char[too_large], nullptr);
+}
+
+TEST(HugePages, NothingHasAnAddressTooAndItsOwn) {
+  const std::unique_ptr<char[]> a(new char[0]), b(new char[0]);
+  EXPECT_NE(a, nullptr);
+  EXPECT_NE(a, b);
+}
+
+}  // namespace
+}  // namespace krot
