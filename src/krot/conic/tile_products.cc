@@ -60,8 +60,8 @@ void SubtractTimesVector(const Tile<const Scalar>& A, const Scalar* x,
 }
 
 template <typename Scalar>
-void SubtractTransposedTimesVector(const Tile<const Scalar>& A,
-                                   const Scalar* x, Scalar* y) {
+void SubtractTransposedTimesVector(const Tile<const Scalar>& A, const Scalar* x,
+                                   Scalar* y) {
   VectorOf(y, A.cols).noalias() -=
       MatrixOf(A).transpose() * VectorOf(x, A.rows);
 }

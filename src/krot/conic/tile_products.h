@@ -13,8 +13,8 @@ struct Tile {
 };
 
 // The products of a Cholesky factorization by tiles, and of solves with it, on
-// the calling thread, by Eigen; any number of threads may call them. Not by BLAS: the serial OpenBLAS
-// of Debian 12 lets two threads use one buffer.
+// the calling thread, by Eigen; any number of threads may call them. Not by
+// BLAS: the serial OpenBLAS of Debian 12 lets two threads use one buffer.
 
 // A := A L'^-1, of L's lower triangle.
 template <typename Scalar>
@@ -34,7 +34,7 @@ template <typename Scalar>
 void SubtractTimesVector(const Tile<const Scalar>& A, const Scalar* x,
                          Scalar* y);
 template <typename Scalar>
-void SubtractTransposedTimesVector(const Tile<const Scalar>& A,
-                                   const Scalar* x, Scalar* y);
+void SubtractTransposedTimesVector(const Tile<const Scalar>& A, const Scalar* x,
+                                   Scalar* y);
 
 }  // namespace krot
