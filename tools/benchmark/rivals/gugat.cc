@@ -9,6 +9,10 @@
 namespace krot {
 namespace {
 
+// It takes five to ten; where rounding keeps a step from telling whether gamma
+// can be reached, it would go to and fro between two.
+constexpr int kMaxSteps = 100;
+
 template <typename Cone>
 class Gugat : public SubproblemSolver {
  public:
@@ -19,7 +23,8 @@ class Gugat : public SubproblemSolver {
     double upper = problem.Cost(x, Program::norm());
     double lower = 0;
     double gamma = upper;
-    while (upper - lower > kRivalTolerance * upper) {
+    for (int step = 0;
+         step < kMaxSteps && upper - lower > kRivalTolerance * upper; ++step) {
       program_.Set(problem, x, gamma, Program::Weights::kDepths);
       Eigen::Vector4d y = program_.StartAt(x, /*margin=*/0.1 * gamma);
       ConeProgramOptions options;
