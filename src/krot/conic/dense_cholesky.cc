@@ -45,11 +45,6 @@ Tile<Scalar> DenseCholesky<Scalar>::TileAt(int64_t i, int64_t j) {
 }
 
 template <typename Scalar>
-Tile<const Scalar> DenseCholesky<Scalar>::TileAt(int64_t i, int64_t j) const {
-  return {&tiles_[Begin(i, j)], SizeOf(size_, i), SizeOf(size_, j), stride()};
-}
-
-template <typename Scalar>
 typename DenseCholesky<Scalar>::ConstTile DenseCholesky<Scalar>::Read(
     int64_t i, int64_t j) const {
   return ConstTile(&tiles_[Begin(i, j)], SizeOf(size_, i), SizeOf(size_, j),
@@ -126,25 +121,26 @@ bool DenseCholesky<Scalar>::Factorize(int num_threads) {
 }
 
 // L^-1 x, by groups of tiles: what is solved of a group is taken off all parts
-// below at once.
+// below at once, of each in the order in which it was solved.
 template <typename Scalar>
 void DenseCholesky<Scalar>::SolveLower(int num_threads, Vector* x) const {
-  const auto part = [x](int64_t i) { return x->data() + i * kTile; };
+  const auto part = [&](int64_t i) {
+    return x->segment(i * kTile, SizeOf(size_, i));
+  };
+  const auto subtract = [&](int64_t i, int64_t j) {
+    part(i).noalias() -= Read(i, j) * part(j);
+  };
   const int64_t num_tiles = NumChunks(size_, kTile);
   for (int64_t begin = 0; begin < num_tiles; begin += kGroup) {
     const int64_t end = std::min(begin + kGroup, num_tiles);
     for (int64_t i = begin; i < end; ++i) {
-      for (int64_t j = begin; j < i; ++j) {
-        SubtractTimesVector(TileAt(i, j), part(j), part(i));
-      }
-      Eigen::Map<Vector> own(part(i), SizeOf(size_, i));
-      Read(i, i).template triangularView<Eigen::Lower>().solveInPlace(own);
+      for (int64_t j = begin; j < i; ++j) subtract(i, j);
+      Read(i, i).template triangularView<Eigen::Lower>().solveInPlace(part(i));
     }
     ParallelFor(num_tiles - end, 1, num_threads,
                 [&](int64_t below, int64_t, int) {
-                  const int64_t i = end + below;
                   for (int64_t j = begin; j < end; ++j) {
-                    SubtractTimesVector(TileAt(i, j), part(j), part(i));
+                    subtract(end + below, j);
                   }
                 });
   }
@@ -153,23 +149,23 @@ void DenseCholesky<Scalar>::SolveLower(int num_threads, Vector* x) const {
 // L'^-1 x, likewise from the last group to the first.
 template <typename Scalar>
 void DenseCholesky<Scalar>::SolveUpper(int num_threads, Vector* x) const {
-  const auto part = [x](int64_t i) { return x->data() + i * kTile; };
+  const auto part = [&](int64_t i) {
+    return x->segment(i * kTile, SizeOf(size_, i));
+  };
+  const auto subtract = [&](int64_t i, int64_t j) {
+    part(j).noalias() -= Read(i, j).transpose() * part(i);
+  };
   for (int64_t end = NumChunks(size_, kTile); end > 0;) {
     const int64_t begin = (end - 1) / kGroup * kGroup;
     for (int64_t i = end - 1; i >= begin; --i) {
-      Eigen::Map<Vector> own(part(i), SizeOf(size_, i));
       Read(i, i)
           .transpose()
           .template triangularView<Eigen::Upper>()
-          .solveInPlace(own);
-      for (int64_t j = begin; j < i; ++j) {
-        SubtractTransposedTimesVector(TileAt(i, j), part(i), part(j));
-      }
+          .solveInPlace(part(i));
+      for (int64_t j = begin; j < i; ++j) subtract(i, j);
     }
     ParallelFor(begin, 1, num_threads, [&](int64_t j, int64_t, int) {
-      for (int64_t i = begin; i < end; ++i) {
-        SubtractTransposedTimesVector(TileAt(i, j), part(i), part(j));
-      }
+      for (int64_t i = end - 1; i >= begin; --i) subtract(i, j);
     });
     end = begin;
   }

@@ -41,7 +41,6 @@ class DenseCholesky {
   int64_t stride() const;                     // of every tile
   int64_t Begin(int64_t i, int64_t j) const;  // of a tile; j <= i
   Tile<Scalar> TileAt(int64_t i, int64_t j);
-  Tile<const Scalar> TileAt(int64_t i, int64_t j) const;
   ConstTile Read(int64_t i, int64_t j) const;
   void SolveLower(int num_threads, Vector* x) const;
   void SolveUpper(int num_threads, Vector* x) const;

@@ -5,8 +5,6 @@
 
 #include "krot/conic/tile_products.h"
 
-#include <type_traits>
-
 #include <Eigen/Core>
 
 namespace krot {
@@ -14,20 +12,9 @@ namespace {
 
 template <typename Scalar>
 auto MatrixOf(const Tile<Scalar>& tile) {
-  using Matrix = Eigen::Matrix<std::remove_const_t<Scalar>, Eigen::Dynamic,
-                               Eigen::Dynamic>;
-  using MaybeConst =
-      std::conditional_t<std::is_const_v<Scalar>, const Matrix, Matrix>;
-  return Eigen::Map<MaybeConst, 0, Eigen::OuterStride<>>(
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  return Eigen::Map<Matrix, 0, Eigen::OuterStride<>>(
       tile.data, tile.rows, tile.cols, Eigen::OuterStride<>(tile.stride));
-}
-
-template <typename Scalar>
-auto VectorOf(Scalar* data, int64_t size) {
-  using Vector = Eigen::Matrix<std::remove_const_t<Scalar>, Eigen::Dynamic, 1>;
-  using MaybeConst =
-      std::conditional_t<std::is_const_v<Scalar>, const Vector, Vector>;
-  return Eigen::Map<MaybeConst>(data, size);
 }
 
 }  // namespace
@@ -53,19 +40,6 @@ void SubtractProduct(const Tile<Scalar>& A, const Tile<Scalar>& B,
   MatrixOf(C).noalias() -= MatrixOf(A) * MatrixOf(B).transpose();
 }
 
-template <typename Scalar>
-void SubtractTimesVector(const Tile<const Scalar>& A, const Scalar* x,
-                         Scalar* y) {
-  VectorOf(y, A.rows).noalias() -= MatrixOf(A) * VectorOf(x, A.cols);
-}
-
-template <typename Scalar>
-void SubtractTransposedTimesVector(const Tile<const Scalar>& A, const Scalar* x,
-                                   Scalar* y) {
-  VectorOf(y, A.cols).noalias() -=
-      MatrixOf(A).transpose() * VectorOf(x, A.rows);
-}
-
 template void DivideByTransposed(const Tile<float>&, const Tile<float>&);
 template void DivideByTransposed(const Tile<double>&, const Tile<double>&);
 template void SubtractSquare(const Tile<float>&, const Tile<float>&);
@@ -74,13 +48,5 @@ template void SubtractProduct(const Tile<float>&, const Tile<float>&,
                               const Tile<float>&);
 template void SubtractProduct(const Tile<double>&, const Tile<double>&,
                               const Tile<double>&);
-template void SubtractTimesVector(const Tile<const float>&, const float*,
-                                  float*);
-template void SubtractTimesVector(const Tile<const double>&, const double*,
-                                  double*);
-template void SubtractTransposedTimesVector(const Tile<const float>&,
-                                            const float*, float*);
-template void SubtractTransposedTimesVector(const Tile<const double>&,
-                                            const double*, double*);
 
 }  // namespace krot

@@ -12,9 +12,9 @@ struct Tile {
   int64_t stride;
 };
 
-// The products of a Cholesky factorization by tiles, and of solves with it, on
-// the calling thread, by Eigen; any number of threads may call them. Not by
-// BLAS: the serial OpenBLAS of Debian 12 lets two threads use one buffer.
+// The products of a Cholesky factorization by tiles, on the calling thread, by
+// Eigen; any number of threads may call them. Not by BLAS: the serial OpenBLAS
+// of Debian 12 lets two threads use one buffer.
 
 // A := A L'^-1, of L's lower triangle.
 template <typename Scalar>
@@ -28,13 +28,5 @@ void SubtractSquare(const Tile<Scalar>& A, const Tile<Scalar>& C);
 template <typename Scalar>
 void SubtractProduct(const Tile<Scalar>& A, const Tile<Scalar>& B,
                      const Tile<Scalar>& C);
-
-// y := y - A x, and y := y - A'x.
-template <typename Scalar>
-void SubtractTimesVector(const Tile<const Scalar>& A, const Scalar* x,
-                         Scalar* y);
-template <typename Scalar>
-void SubtractTransposedTimesVector(const Tile<const Scalar>& A, const Scalar* x,
-                                   Scalar* y);
 
 }  // namespace krot
