@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMebibyte = std::size_t{1} << 20;
 
 TEST(HugePages, LargeArraysBeginWithAPageOfTheirOwn) {
-  const std::vector<char> large(8 * kMebibyte + 1, 'x');
+  const std::vector<char> large(16 * kMebibyte + 1, 'x');
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(large.data()) % (2 * kMebibyte),
             0);
   EXPECT_EQ(large.back(), 'x');
@@ -27,7 +27,7 @@ TEST(HugePages, AlignmentIsAsAskedFor) {
   struct alignas(64) Line {
     char bytes[64];
   };
-  for (const std::size_t count : {1, 3, 200000}) {
+  for (const std::size_t count : {1, 3, 300000}) {
     const auto lines = std::make_unique<Line[]>(count);
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(lines.get()) % 64, 0);
     std::memset(lines.get(), 1, count * sizeof(Line));

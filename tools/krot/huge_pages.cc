@@ -19,20 +19,23 @@
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-// Smaller ones lose more to the alignment than they gain.
-constexpr std::size_t kLarge = 2 * kHugePage;
+// An array has up to one of address space before it, which is not much of
+// larger ones.
+constexpr std::size_t kLarge = 8 * kHugePage;
 
 // Null where there is no such memory.
+void* TryAllocateSmall(std::size_t size, std::size_t alignment) {
+  return alignment <= alignof(std::max_align_t)
+             ? std::malloc(std::max<std::size_t>(size, 1))
+             : std::aligned_alloc(alignment,
+                                  (size + alignment - 1) & ~(alignment - 1));
+}
+
 void* TryAllocate(std::size_t size, std::size_t alignment) {
-  if (size < kLarge) {
-    return alignment <= alignof(std::max_align_t)
-               ? std::malloc(std::max<std::size_t>(size, 1))
-               : std::aligned_alloc(alignment,
-                                    (size + alignment - 1) & ~(alignment - 1));
-  }
   void* memory = nullptr;
-  if (posix_memalign(&memory, std::max(alignment, kHugePage), size) != 0) {
-    return nullptr;
+  if (size < kLarge ||
+      posix_memalign(&memory, std::max(alignment, kHugePage), size) != 0) {
+    return TryAllocateSmall(size, alignment);
   }
   // Advice: where it is not taken, pages are small.
   madvise(memory, size & ~(kHugePage - 1), MADV_HUGEPAGE);
