@@ -4,11 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <memory>
 #include <new>
+#include <sstream>
+#include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace krot {
@@ -16,11 +20,34 @@ namespace {
 
 constexpr std::size_t kMebibyte = std::size_t{1} << 20;
 
-TEST(HugePages, LargeArraysBeginWithAPageOfTheirOwn) {
+// What the system says of the mapping at an address: "VmFlags: rd wr ... hg".
+std::string FlagsAt(std::uintptr_t address) {
+  std::ifstream maps("/proc/self/smaps");
+  bool is_there = false;
+  for (std::string line; std::getline(maps, line);) {
+    std::istringstream text(line);
+    std::uintptr_t begin = 0, end = 0;
+    char dash = 0;
+    if (text >> std::hex >> begin >> dash >> end && dash == '-') {
+      is_there = begin <= address && address < end;
+    } else if (is_there && line.rfind("VmFlags:", 0) == 0) {
+      return line;
+    }
+  }
+  return "";
+}
+
+TEST(HugePages, AreAskedForWhereArraysAreLarge) {
   const std::vector<char> large(16 * kMebibyte + 1, 'x');
-  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(large.data()) % (2 * kMebibyte),
-            0);
-  EXPECT_EQ(large.back(), 'x');
+  const auto address = reinterpret_cast<std::uintptr_t>(large.data());
+  EXPECT_EQ(address % (2 * kMebibyte), 0);
+  EXPECT_THAT(FlagsAt(address), ::testing::HasSubstr(" hg"));
+}
+
+TEST(HugePages, AreNotAskedForWhereArraysAreSmall) {
+  const std::vector<char> small(kMebibyte, 'x');
+  EXPECT_THAT(FlagsAt(reinterpret_cast<std::uintptr_t>(small.data())),
+              ::testing::Not(::testing::HasSubstr(" hg")));
 }
 
 TEST(HugePages, AlignmentIsAsAskedFor) {

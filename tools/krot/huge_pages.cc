@@ -19,12 +19,12 @@
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-// An array has up to one of address space before it, which is not much of
-// larger ones.
+// To be aligned an array takes up to one more of address space: little beside
+// these.
 constexpr std::size_t kLarge = 8 * kHugePage;
 
 // Null where there is no such memory.
-void* TryAllocateSmall(std::size_t size, std::size_t alignment) {
+void* TryAllocateAsEver(std::size_t size, std::size_t alignment) {
   return alignment <= alignof(std::max_align_t)
              ? std::malloc(std::max<std::size_t>(size, 1))
              : std::aligned_alloc(alignment,
@@ -35,7 +35,7 @@ void* TryAllocate(std::size_t size, std::size_t alignment) {
   void* memory = nullptr;
   if (size < kLarge ||
       posix_memalign(&memory, std::max(alignment, kHugePage), size) != 0) {
-    return TryAllocateSmall(size, alignment);
+    return TryAllocateAsEver(size, alignment);
   }
   // Advice: where it is not taken, pages are small.
   madvise(memory, size & ~(kHugePage - 1), MADV_HUGEPAGE);

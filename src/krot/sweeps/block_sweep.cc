@@ -63,16 +63,24 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
       options_(options),
       norm_(norm),
       context_(context),
-      workers_(ResolveNumThreads(context.num_threads),
-               Worker{FastDescent(options, norm),
-                      SideBySideDescent(options, norm),
-                      {},
-                      {}}),
+      workers_(ResolveNumThreads(context.num_threads)),
       point_active_(problem.num_points),
       frame_active_(problem.num_frames) {
   for (const View& view : problem.views) {
     is_reference_.push_back(IsReference(view));
   }
+  WorkerOf(0);  // tells of wrong options here
+}
+
+BlockSweep::Worker* BlockSweep::WorkerOf(int worker) {
+  std::unique_ptr<Worker>& its = workers_[worker];
+  if (its == nullptr) {
+    its.reset(new Worker{FastDescent(options_, norm_),
+                         SideBySideDescent(options_, norm_),
+                         {},
+                         {}});
+  }
+  return its.get();
 }
 
 double BlockSweep::IntersectPoints(Estimate* estimate) {
@@ -86,16 +94,16 @@ double BlockSweep::IntersectPoints(Estimate* estimate) {
 
 double BlockSweep::ResectFrames(Estimate* estimate) {
   if (context_.ranks != nullptr) return ResectShare(estimate);
-  return LargestOver(problem_.num_frames, kFramesPerChunk,
-                     [&](int64_t begin, int64_t end, int worker) {
-                       double largest = 0;
-                       for (int64_t f = begin; f < end; ++f) {
-                         FastDescent* descent = &workers_[worker].frame_descent;
-                         largest = std::max(largest,
-                                            ResectFrame(f, descent, estimate));
-                       }
-                       return largest;
-                     });
+  return LargestOver(
+      problem_.num_frames, kFramesPerChunk,
+      [&](int64_t begin, int64_t end, int worker) {
+        double largest = 0;
+        for (int64_t f = begin; f < end; ++f) {
+          FastDescent* descent = &WorkerOf(worker)->frame_descent;
+          largest = std::max(largest, ResectFrame(f, descent, estimate));
+        }
+        return largest;
+      });
 }
 
 double BlockSweep::ResectShare(Estimate* estimate) {
@@ -129,15 +137,16 @@ double BlockSweep::LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
 
 double BlockSweep::IntersectPoints(int64_t begin, int64_t end, int worker,
                                    Estimate* estimate) {
-  std::vector<int32_t>& points = workers_[worker].points;
+  Worker& own = *WorkerOf(worker);
+  std::vector<int32_t>& points = own.points;
   double largest = ChoosePoints(begin, end, *estimate, &points);
-  std::vector<SideBySideDescent::Problem>& problems = workers_[worker].problems;
+  std::vector<SideBySideDescent::Problem>& problems = own.problems;
   problems.clear();
   for (const int32_t k : points) {
     problems.push_back({&estimate->points[k], &point_active_[k]});
   }
   const int count = static_cast<int>(points.size());
-  workers_[worker].point_descent.Minimize(
+  own.point_descent.Minimize(
       goal_,
       [&](int n, SideBySideDescent::RowWriter* writer) {
         if (n + 1 < count) PrefetchPoint(problem_, points[n + 1]);

@@ -50,6 +50,7 @@ class BlockSweep {
     std::vector<SideBySideDescent::Problem> problems;
   };
 
+  Worker* WorkerOf(int worker);
   template <typename Function>
   double LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
                      const Function& minimize);
@@ -69,7 +70,8 @@ class BlockSweep {
   Norm norm_;
   const Context context_;
   DescentGoal goal_;
-  std::vector<Worker> workers_;     // one per thread
+  // One per thread, made when that begins: of a thousand only a few may exist.
+  std::vector<std::unique_ptr<Worker>> workers_;
   std::vector<AffineMap> cameras_;  // per view, while points move
   std::vector<char> is_reference_;  // per view
   // Every block's warm start.

@@ -9,8 +9,8 @@
 namespace krot {
 namespace {
 
-// It takes five to ten; where rounding keeps a step from telling whether gamma
-// can be reached, it would go to and fro between two.
+// Where rounding keeps a step from telling whether gamma can be reached, it
+// would go to and fro between two for good.
 constexpr int kMaxSteps = 100;
 
 template <typename Cone>
