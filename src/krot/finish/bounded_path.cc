@@ -13,27 +13,31 @@ namespace {
 
 // The first mu, as a share of the cost by pair: the start is near the boundary,
 // and has to leave it first.
-constexpr double kStartWeight = 30;
+constexpr double kStartWeight = 10;
 // The first multipliers are those of slacks of this share of the cap's at
 // least. Nearer to the boundary they would let the slack grow by no more than
 // itself in a step.
-constexpr double kStartSlack = 0.1;
-// A step goes so far of the way to the boundary,
-constexpr double kDamping = 0.99;
+constexpr double kStartSlack = 0.01;
+// A step goes so far of the way to the boundary: one that all but reached it
+// would leave a slack that the next direction cannot predict,
+constexpr double kDamping = 0.95;
 // and so far of one that does not lower the barrier cost; one shorter than the
 // last is none.
 constexpr double kBacktracking = 0.5;
 constexpr double kSmallestStep = 1e-6;
 // What rounding may add to the barrier cost, relative.
 constexpr double kCostRounding = 1e-13;
-// Pairs whose products are beyond these shares of mu are centred anew.
-constexpr double kLeastProduct = 1e-3;
-constexpr double kLargestProduct = 1e3;
+// No pair's product is less than this share of mu: what the step leaves of a
+// multiplier may be too little to keep its error off the cap in the next one.
+// Nor is it more than that one.
+constexpr double kLeastProduct = 0.3;
+constexpr double kLargestProduct = 1e5;
 // After a step shorter than this, the next one only centres.
-constexpr double kShortStep = 0.1;
-// With a gap this near to that asked for, in such gaps, so many short steps in
-// a row that gain less of the cost end it: lenses near their fold follow no
-// linear row far.
+constexpr double kShortStep = 0.03;
+// With a gap this near to that asked for, in such gaps, so many steps in a row
+// that are shorter than kIdleStep and gain less of the cost end it: lenses near
+// their fold follow no linear row far.
+constexpr double kIdleStep = 0.1;
 constexpr double kNearGap = 10;
 constexpr double kLeastGain = 0.01;
 constexpr int kPatience = 3;
@@ -135,9 +139,8 @@ double BoundedPath<Cap>::FindDirection() {
 // Mehrotra's choice: the cube of what the predictor leaves of the gap.
 template <typename Cap>
 double BoundedPath<Cap>::AffineSigma() const {
-  const double primal = system_.MaxStep(1);
-  const double dual = system_.MaxDualStep(1);
-  const double gap = system_.GapAfter(primal, dual);
+  const double gap =
+      system_.GapAfter(system_.MaxStep(1), system_.MaxDualStep());
   const double left = std::max(0.0, gap / (Count() * mu_));
   return std::min(1.0, std::max(kSmallestSigma, left * left * left));
 }
@@ -163,17 +166,13 @@ double BoundedPath<Cap>::TakeStep(double mu) {
 // To those of trial_.
 template <typename Cap>
 void BoundedPath<Cap>::MoveMultipliers(double mu) {
-  const double step = system_.MaxDualStep(kDamping);
   const double gap = system_.loop().Sum([&](int64_t i) {
     Vector& l = multipliers_[i];
-    l += step * system_.StepOf(i).dl;
     const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
-    for (int j = 0; j < Cap::kNum; ++j) {
-      const double product = l[j] * h[j];
-      if (!(product >= kLeastProduct * mu && product <= kLargestProduct * mu)) {
-        l[j] = mu / h[j];
-      }
-    }
+    const Vector centred = mu * h.cwiseInverse();
+    l = (l + system_.StepOf(i).dl)
+            .cwiseMax(kLeastProduct * centred)
+            .cwiseMin(kLargestProduct * centred);
     return l.dot(h);
   });
   mu_ = gap / Count();
@@ -216,7 +215,7 @@ std::optional<BoundedTermination> BoundedPath<Cap>::Iterate(
     options_.callback({summary->iterations, now_.cost, RelativeGap(), step_});
   }
   const bool is_idle =
-      step_ < kShortStep &&
+      step_ < kIdleStep &&
       gain < kLeastGain * options_.gap_tolerance * now_.cost &&
       *summary->duality_gap <= kNearGap * options_.gap_tolerance;
   num_idle_ = is_idle ? num_idle_ + 1 : 0;

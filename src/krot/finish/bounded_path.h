@@ -21,10 +21,9 @@ namespace krot {
 //                   not rise: trial_ becomes now_; where none is found along
 //                   the corrector's direction, along Newton's
 //
-// Multipliers have a step length of their own. Pairs that leave a wide
-// neighbourhood of the path are centred anew: the barrier cost alone decides on
-// progress, since that of a problem that is not convex can be trusted no
-// further.
+// Multipliers take their full steps, each by itself, but none falls far below
+// the path: whatever they are, as long as they are positive, a direction leads
+// downwards, and the barrier cost alone decides on progress.
 template <typename Cap>
 class BoundedPath {
  public:

@@ -202,8 +202,8 @@ double BoundedSystem<Cap>::MaxStep(double damping) const {
 }
 
 template <typename Cap>
-double BoundedSystem<Cap>::MaxDualStep(double damping) const {
-  return std::min(1.0, damping * reach_.dual);
+double BoundedSystem<Cap>::MaxDualStep() const {
+  return std::min(1.0, reach_.dual);
 }
 
 template <typename Cap>

@@ -65,10 +65,10 @@ class BoundedSystem {
   };
   PairStep StepOf(int64_t i) const;
   // The longest step <= 1 along dx that keeps all errors below the cap where
-  // rows stay, and the longest along dl, both times `damping`, which is
-  // >= 1 / 2.
+  // rows stay, times `damping`, which is >= 1 / 2.
   double MaxStep(double damping) const;
-  double MaxDualStep(double damping) const;
+  // The longest step <= 1 along all dl that keeps all multipliers positive.
+  double MaxDualStep() const;
   // sum h'l after such steps, to second order.
   double GapAfter(double primal, double dual) const;
   // What a full step gains of the quadratic model, twice; squared pixels.
