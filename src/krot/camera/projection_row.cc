@@ -53,10 +53,11 @@ bool RowOnImagePlane(const double* params, const Eigen::Vector2d& pixel,
       Dual<double> x, y;
       Model::Project(params, Dual<double>{u.x(), 1, 0},
                      Dual<double>{u.y(), 0, 1}, &x, &y);
-      Eigen::Matrix2d J;
-      J << x.du, x.dv, y.du, y.dv;
-      const Eigen::Vector2d error(x.value - pixel.x(), y.value - pixel.y());
-      *E << 0, 0, 1, J, error - J * u;
+      E->row(0) << 0, 0, 1;
+      E->row(1) << x.du, x.dv,
+          x.value - pixel.x() - (x.du * u.x() + x.dv * u.y());
+      E->row(2) << y.du, y.dv,
+          y.value - pixel.y() - (y.du * u.x() + y.dv * u.y());
       return true;
     }
   }

@@ -41,12 +41,9 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
              : Run<PolygonCap>(problem, options, context, estimate);
 }
 
-int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm,
-                              bool rows_are_taken_anew) {
-  return norm.p == 2
-             ? BoundedPath<DiscCap>::MemoryBytes(problem, rows_are_taken_anew)
-             : BoundedPath<PolygonCap>::MemoryBytes(problem,
-                                                    rows_are_taken_anew);
+int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm) {
+  return norm.p == 2 ? BoundedPath<DiscCap>::MemoryBytes(problem)
+                     : BoundedPath<PolygonCap>::MemoryBytes(problem);
 }
 
 }  // namespace krot

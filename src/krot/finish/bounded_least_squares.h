@@ -37,10 +37,10 @@ struct BoundedOptions {
   double gap_tolerance = 1e-3;           // > 0, relative to the cost
   double stationarity_tolerance = 1e-6;  // > 0
   int max_iterations = 200;              // >= 1
-  // Takes all rows of a problem anew where their points project at an estimate,
-  // to first order around; false if one does not project. Empty where rows do
-  // not depend on where they are taken.
-  std::function<bool(const Estimate&, KnownRotationProblem*)> take_rows;
+  // Takes all rows of the problem itself anew where their points project at an
+  // estimate, to first order around; false if one does not project. Empty where
+  // rows do not depend on where they are taken.
+  std::function<bool(const Estimate&)> take_rows;
   std::function<void(const BoundedIterate&)> callback;  // may be empty
 };
 
@@ -69,7 +69,7 @@ struct BoundedSummary {
 
 // Requires an estimate with every residual below the cap (throws
 // std::invalid_argument). Every iterate stays there. Rows of `problem` must be
-// those at `*estimate`. Of every connected component the frame with the most
+// those at `*estimate`, and are so afterwards, where take_rows takes them. Of every connected component the frame with the most
 // observations stays, and the scale is free where no baseline sets it. An
 // iteration takes about as long as one of MinimizeJointly; the same bits at any
 // number of threads.
@@ -78,7 +78,6 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const Context& context, Estimate* estimate);
 
 // What MinimizeBounded will allocate, bytes. O(problem).
-int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm,
-                              bool rows_are_taken_anew);
+int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm);
 
 }  // namespace krot

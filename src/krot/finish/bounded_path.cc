@@ -73,7 +73,6 @@ BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
       multipliers_(problem.observations.size()) {
   now_.x = start;
   now_.viewed.resize(problem.observations.size());
-  if (options_.take_rows) rows_ = problem;
   trial_ = now_;
 }
 
@@ -89,13 +88,13 @@ bool BoundedPath<Cap>::View(State* state) {
       Totals{std::numeric_limits<double>::infinity(), 0, {}},
       [&](int64_t i) -> Totals {
         const ViewedPoint viewed =
-            ViewPoint(rows(), observations()[i], state->x);
+            ViewPoint(problem_, problem_.observations[i], state->x);
         if (!(viewed.depth > 0)) return {-1, 0, {}};
         const Eigen::Vector2d e = viewed.v / viewed.depth;
         state->viewed[i] = {e, viewed.depth};
         const Vector h = system_.cap().Slacks(e);
         if (!(h.minCoeff() > 0)) return {-1, 0, {}};
-        const double loss = observations()[i].view < NumViews()
+        const double loss = problem_.observations[i].view < NumViews()
                                 ? options_.loss.Value(e.squaredNorm())
                                 : 0;
         return {h.minCoeff(), loss / 2,
@@ -183,7 +182,7 @@ template <typename Cap>
 std::optional<BoundedTermination> BoundedPath<Cap>::Iterate(
     BoundedSummary* summary) {
   if (context_.IsCancelled()) return BoundedTermination::kInterrupted;
-  if (!system_.Factorize(observations(), now_.viewed, multipliers_)) {
+  if (!system_.Factorize(now_.viewed, multipliers_)) {
     return BoundedTermination::kSingular;
   }
   summary->duality_gap = RelativeGap();
@@ -250,13 +249,10 @@ BoundedSummary BoundedPath<Cap>::Run() {
 }
 
 template <typename Cap>
-int64_t BoundedPath<Cap>::MemoryBytes(const KnownRotationProblem& problem,
-                                      bool rows_are_taken_anew) {
-  const int64_t per_observation =
-      sizeof(Vector) + 2 * sizeof(ViewedError) +
-      (rows_are_taken_anew ? sizeof(Observation) + sizeof(int32_t) : 0);
+int64_t BoundedPath<Cap>::MemoryBytes(const KnownRotationProblem& problem) {
+  constexpr int64_t kPerObservation = sizeof(Vector) + 2 * sizeof(ViewedError);
   constexpr int64_t kPerUnknown = 2 * sizeof(Eigen::Vector3d);
-  return static_cast<int64_t>(problem.observations.size()) * per_observation +
+  return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
          (problem.num_points + problem.num_frames) * kPerUnknown +
          BoundedSystem<Cap>::MemoryBytes(problem);
 }

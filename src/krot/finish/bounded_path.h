@@ -35,8 +35,7 @@ class BoundedPath {
 
   const Estimate& estimate() const { return now_.x; }
 
-  static int64_t MemoryBytes(const KnownRotationProblem& problem,
-                             bool rows_are_taken_anew);
+  static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
  private:
   using Vector = typename Cap::Vector;
@@ -48,19 +47,12 @@ class BoundedPath {
     double barrier = 0;  // -sum log(h_j(e) / h_j(0))
   };
 
-  // Of the state viewed last.
-  const KnownRotationProblem& rows() const {
-    return options_.take_rows ? rows_ : problem_;
-  }
-  const std::vector<Observation>& observations() const {
-    return rows().observations;
-  }
   int32_t NumViews() const {
     return options_.num_views.value_or(
         static_cast<int32_t>(problem_.views.size()));
   }
   bool TakeRows(const Estimate& x) {
-    return !options_.take_rows || context_.All(options_.take_rows(x, &rows_));
+    return !options_.take_rows || context_.All(options_.take_rows(x));
   }
   // Whether every error is below the cap.
   bool View(State* state);
@@ -87,11 +79,10 @@ class BoundedPath {
   std::optional<BoundedTermination> Iterate(BoundedSummary* summary);
   int64_t NumActive() const;
 
-  const KnownRotationProblem& problem_;
+  const KnownRotationProblem& problem_;  // with the rows of the last state viewed
   const BoundedOptions options_;
   const Context context_;
   BoundedSystem<Cap> system_;
-  KnownRotationProblem rows_;  // where they depend on the state
   State now_;
   State trial_;
   std::vector<Vector> multipliers_;

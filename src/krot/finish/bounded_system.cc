@@ -67,13 +67,12 @@ typename BoundedSystem<Cap>::Root BoundedSystem<Cap>::RootOf(int64_t i) const {
 }
 
 template <typename Cap>
-bool BoundedSystem<Cap>::Factorize(const std::vector<Observation>& observations,
-                                   const std::vector<ViewedError>& viewed,
+bool BoundedSystem<Cap>::Factorize(const std::vector<ViewedError>& viewed,
                                    const std::vector<Vector>& multipliers) {
   viewed_ = &viewed;
   multipliers_ = &multipliers;
   loop_.ForEach([&](int64_t i) {
-    const Observation& o = observations[i];
+    const Observation& o = problem_.observations[i];
     const ViewedError& at = viewed[i];
     const Root U = root_[i] = RootOf(i);
     const double scale = 1 / at.depth;

@@ -40,16 +40,15 @@ class BoundedSystem {
  public:
   using Vector = typename Cap::Vector;
 
-  // Keeps a reference to `problem`, but for its observations' rows. Those of
+  // Keeps a reference to `problem`, whose rows Factorize reads. Observations of
   // views behind the first `num_views` are bounds alone.
   BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
                 const ErrorLoss& loss, int32_t num_views,
                 const Context& context);
 
-  // The system at an iterate, whose rows are those of `observations`; errors
-  // and multipliers must outlive the calls below. False if there is no factor.
-  bool Factorize(const std::vector<Observation>& observations,
-                 const std::vector<ViewedError>& viewed,
+  // The system at an iterate; errors and multipliers must outlive the calls
+  // below. False if there is no factor.
+  bool Factorize(const std::vector<ViewedError>& viewed,
                  const std::vector<Vector>& multipliers);
 
   // Newton's direction for the barrier problem of this mu.

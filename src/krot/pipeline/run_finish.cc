@@ -63,8 +63,8 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   built->position_level = bounded.cap / (1 + kShareOfKept * kKeptPosition);
   TakePositionRows(*built, *estimate, &built->problem);
   if (!reprojection.IsLinear()) {
-    bounded.take_rows = [&](const Estimate& x, KnownRotationProblem* rows) {
-      return reprojection.TakeRows(x, context.num_threads, rows);
+    bounded.take_rows = [&](const Estimate& x) {
+      return reprojection.TakeRows(x, context.num_threads, &built->problem);
     };
   }
   Estimate finished = *estimate;
@@ -80,15 +80,14 @@ void FinishByLeastSquares(const Reprojection& reprojection,
       });
   const double cost = context.Max(
       reprojection.TrueCost(finished, options.norm, context.num_threads));
-  if (!(cost <= finish.cap) ||
-      LargestPositionRatio(*built, finished) > 1 + kKeptPosition) {
-    return;
+  if (cost <= finish.cap &&
+      LargestPositionRatio(*built, finished) <= 1 + kKeptPosition) {
+    *estimate = std::move(finished);
+    summary->cost_final = cost;
+    finish.seconds = timer.Seconds();
+    summary->finish = finish;
   }
-  *estimate = std::move(finished);
   reprojection.TakeRows(*estimate, context.num_threads, &built->problem);
-  summary->cost_final = cost;
-  finish.seconds = timer.Seconds();
-  summary->finish = finish;
 }
 
 void FinishBySweeps(const Reprojection& reprojection,

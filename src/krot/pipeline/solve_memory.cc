@@ -102,10 +102,9 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
       std::max(memory.likely, component + PartBytes(working) +
                                   JointBytes(working, summary.norm) + sweeps);
   if (summary.method == SolveMethod::kAuto) {
-    const bool rows_are_taken_anew = !Reprojection(model, built).IsLinear();
-    memory.likely = std::max(memory.likely,
-                             held + EstimateBoundedMemory(problem, summary.norm,
-                                                          rows_are_taken_anew));
+    memory.likely =
+        std::max(memory.likely,
+                 held + EstimateBoundedMemory(problem, summary.norm));
   }
   memory.at_most = std::max(memory.at_most, memory.likely);
   return memory;
