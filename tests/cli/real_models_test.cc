@@ -71,6 +71,7 @@ void ExpectCertifiedOptimum(const nlohmann::json& report, double optimum_px) {
   // What the finish gives up of it, and what for.
   EXPECT_LE(report["cost_final"], (1 + 5e-4) * bound_px);
   EXPECT_LT(report["finish"]["cost_final"], report["finish"]["cost_initial"]);
+  EXPECT_EQ(report["finish"]["termination"], "converged");
 }
 
 class SolverOnRealModel : public ::testing::TestWithParam<RealModel> {
