@@ -69,10 +69,10 @@ struct BoundedSummary {
 
 // Requires an estimate with every residual below the cap (throws
 // std::invalid_argument). Every iterate stays there. Rows of `problem` must be
-// those at `*estimate`, and are so afterwards, where take_rows takes them. Of every connected component the frame with the most
-// observations stays, and the scale is free where no baseline sets it. An
-// iteration takes about as long as one of MinimizeJointly; the same bits at any
-// number of threads.
+// those at `*estimate`; with take_rows they are so afterwards. Of every
+// connected component the frame with the most observations stays, and the scale
+// is free where no baseline sets it. An iteration takes about as long as one of
+// MinimizeJointly; the same bits at any number of threads.
 BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const BoundedOptions& options,
                                const Context& context, Estimate* estimate);

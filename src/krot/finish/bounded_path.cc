@@ -28,8 +28,8 @@ constexpr double kSmallestStep = 1e-6;
 // What rounding may add to the barrier cost, relative.
 constexpr double kCostRounding = 1e-13;
 // No pair's product is less than this share of mu: what the step leaves of a
-// multiplier may be too little to keep its error off the cap in the next one.
-// Nor is it more than that one.
+// multiplier may be too little to keep its error off the cap in the next one,
+// and a single pair holds back the step of all. Nor is it more than the second.
 constexpr double kLeastProduct = 0.3;
 constexpr double kLargestProduct = 1e5;
 // After a step shorter than this, the next one only centres.
@@ -41,8 +41,7 @@ constexpr double kIdleStep = 0.1;
 constexpr double kNearGap = 10;
 constexpr double kLeastGain = 0.01;
 constexpr int kPatience = 3;
-// Mehrotra's sigma is no less, whatever the predictor leaves of the gap: with
-// 1e-3, pairs were left behind and door took 28 iterations instead of 19.
+// Mehrotra's sigma is no less, whatever the predictor leaves of the gap.
 constexpr double kSmallestSigma = 0.03;
 // mu does not fall below this share of what the gap asked for needs.
 constexpr double kLastShare = 0.5;

@@ -79,7 +79,7 @@ class BoundedPath {
   std::optional<BoundedTermination> Iterate(BoundedSummary* summary);
   int64_t NumActive() const;
 
-  const KnownRotationProblem& problem_;  // with the rows of the last state viewed
+  const KnownRotationProblem& problem_;  // rows: those of the last state viewed
   const BoundedOptions options_;
   const Context context_;
   BoundedSystem<Cap> system_;

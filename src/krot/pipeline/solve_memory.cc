@@ -102,9 +102,8 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
       std::max(memory.likely, component + PartBytes(working) +
                                   JointBytes(working, summary.norm) + sweeps);
   if (summary.method == SolveMethod::kAuto) {
-    memory.likely =
-        std::max(memory.likely,
-                 held + EstimateBoundedMemory(problem, summary.norm));
+    memory.likely = std::max(
+        memory.likely, held + EstimateBoundedMemory(problem, summary.norm));
   }
   memory.at_most = std::max(memory.at_most, memory.likely);
   return memory;
