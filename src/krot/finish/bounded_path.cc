@@ -134,7 +134,8 @@ double BoundedPath<Cap>::FindDirection() {
   return mu;
 }
 
-// Mehrotra's choice: the cube of what the predictor leaves of the gap.
+// Mehrotra's choice: the cube of what the predictor leaves of the gap if all
+// multipliers take one step: their full ones would promise too much.
 template <typename Cap>
 double BoundedPath<Cap>::AffineSigma() const {
   const double gap =

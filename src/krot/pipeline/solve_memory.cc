@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "krot/bridge/reprojection.h"
 #include "krot/conic/interior_point.h"
 #include "krot/finish/bounded_least_squares.h"
 #include "krot/joint/working_set.h"
