@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 namespace krot {
 
 // What the descent of one problem (newton_descent.h) and those of problems
@@ -15,6 +17,11 @@ inline constexpr double kZeroPixels = 1e-10;
 inline constexpr double kFirstKappa = 1e-2;
 inline constexpr double kSmallestKappa = 1e-5;
 inline constexpr double kLargestKappa = 1e9;
+// A descent that ends at a tolerance needs none far below it: steps of coarse
+// sweeps end sooner (docs/journal.md, "Res-Int, the first ten sweeps").
+inline double SmallestKappa(double tolerance) {
+  return std::max(kSmallestKappa, 0.1 * tolerance);
+}
 // What it is multiplied by after a good trial and after a failed one.
 inline constexpr double kKappaFall = 0.01;
 inline constexpr double kKappaRise = 10;

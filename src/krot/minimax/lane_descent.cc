@@ -168,17 +168,18 @@ void Stepping::Try() {
 
 // See NewtonDescent's Run.
 void Stepping::Decide() {
+  const Lanes smallest_kappa = SmallestKappa(goal_.tolerance);
   const Lanes promise = cost_ - step_.level;
   const LaneMask is_whole = share_ == 1;
   const Lanes tolerance = Select(is_whole, goal_.tolerance, kFinestTolerance);
   const LaneMask promises_nothing = ~(promise > tolerance * cost_);
   const LaneMask proposes = is_solved_ & ~is_cold_;
   const LaneMask lowers_kappa =
-      proposes & promises_nothing & (kappa_ > kSmallestKappa) & (lessons_ == 0);
+      proposes & promises_nothing & (kappa_ > smallest_kappa) & (lessons_ == 0);
   const LaneMask tries = proposes & ~lowers_kappa;
 
   const Lanes kept = (cost_ - cost_trial_) / (share_ * promise);
-  const LaneMask is_newton = is_whole & (kappa_ <= kSmallestKappa);
+  const LaneMask is_newton = is_whole & (kappa_ <= smallest_kappa);
   const Lanes left = Max(cost_trial_ - step_.level, step_.held_back);
   const LaneMask is_rounding =
       ~(kept > kSufficientShare) & (promise <= kPromiseRounding * cost_);
@@ -192,8 +193,8 @@ void Stepping::Decide() {
   lessons_ = Select(accepts, 0, lessons_);
   cost_failed_ = Select(accepts, kInfinity, cost_failed_);
   kappa_ = Select(accepts & (kept > kGoodShare),
-                  Max(kKappaFall * kappa_, kSmallestKappa), kappa_);
-  kappa_ = Select(lowers_kappa, kSmallestKappa, kappa_);
+                  Max(kKappaFall * kappa_, smallest_kappa), kappa_);
+  kappa_ = Select(lowers_kappa, smallest_kappa, kappa_);
   adopts_ = bears_ & (accepts | is_cold_);
   x_ = Select(moves, x_trial_, x_);
   cost_ = Select(moves, cost_trial_, cost_);

@@ -34,6 +34,7 @@ class Descent {
       : residuals_(*residuals),
         norm_(norm),
         goal_(goal),
+        smallest_kappa_(SmallestKappa(goal.tolerance)),
         model_(*model),
         is_member_(*is_member) {}
 
@@ -74,6 +75,7 @@ class Descent {
   ResidualSet& residuals_;
   const Norm norm_;
   const DescentGoal& goal_;
+  const double smallest_kappa_;
   LocalModel& model_;
   std::vector<char>& is_member_;
 
@@ -148,9 +150,9 @@ Descent::Proposal Descent::Propose() {
 // A promise may be small for the sake of a kappa that nothing has raised here.
 // Counts as an iteration if so.
 bool Descent::LowerKappaAtOnce() {
-  if (!(kappa_ > kSmallestKappa && lessons_ == 0)) return false;
+  if (!(kappa_ > smallest_kappa_ && lessons_ == 0)) return false;
   model_.RaiseMultipliers();
-  kappa_ = kSmallestKappa;
+  kappa_ = smallest_kappa_;
   ++iterations_;
   return true;
 }
@@ -169,7 +171,7 @@ bool Descent::EndsWith(const Proposal& proposal, const Trial& trial) const {
   if (proposal.promises_nothing) return true;
   // The pieces of polyhedral norms lack the curvature of Newton's step.
   const bool is_newton =
-      !norm_.IsPolyhedral() && kappa_ <= kSmallestKappa && proposal.share == 1;
+      !norm_.IsPolyhedral() && kappa_ <= smallest_kappa_ && proposal.share == 1;
   if (!is_newton) return false;
   // What a Newton step leaves for the next one, to first order: what the trial
   // misses of the level, and what the quadratic term held back.
@@ -190,7 +192,7 @@ void Descent::Accept(const Trial& trial) {
   model_.AdoptMultipliers();
   model_.Linearize(x_, cost_, norm_);
   if (trial.kept > kGoodShare) {
-    kappa_ = std::max(kappa_ * kKappaFall, kSmallestKappa);
+    kappa_ = std::max(kappa_ * kKappaFall, smallest_kappa_);
   }
   lessons_ = 0;
   cost_failed_ = kInfinity;

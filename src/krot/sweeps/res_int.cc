@@ -1,5 +1,6 @@
 #include "krot/sweeps/res_int.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "krot/base/check.h"
@@ -11,9 +12,19 @@
 namespace krot {
 namespace {
 
-// How far coarse sweeps take a block: see res_int.h.
-constexpr double kCoarseTolerance = 1e-3;
+// How far coarse sweeps take a block: see res_int.h. A tolerance of 1e-2
+// throughout, and alternation ends higher (docs/journal.md, "Res-Int, the first
+// ten sweeps").
+constexpr double kCoarseShareOfGain = 0.1;
+constexpr double kFinestCoarse = 1e-3;
+constexpr double kCoarsest = 1e-2;
 constexpr double kCoarseLevel = 0.5;
+
+// `gain`: by how much the last sweep lowered the cost, relative.
+DescentGoal CoarseGoal(double gain, double cost) {
+  return {std::clamp(kCoarseShareOfGain * gain, kFinestCoarse, kCoarsest),
+          kCoarseLevel * cost};
+}
 
 void CheckOptions(const ResIntOptions& options) {
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
@@ -46,14 +57,15 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   BlockSweep blocks(problem, options.fast_descent, options.norm, context);
   Momentum momentum(problem, context, *estimate, summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
+  double gain = 1;      // of the last sweep, relative; of none, as if large
   int idle_sweeps = 0;  // in a row
   for (int sweep = 1; sweep <= options.max_sweeps; ++sweep) {
     const bool is_last = sweep == options.max_sweeps;
     Estimate current =
         literal || is_last ? momentum.best() : momentum.NextStart();
-    const DescentGoal coarse_goal{kCoarseTolerance,
-                                  kCoarseLevel * momentum.best_cost()};
-    blocks.SetGoal(is_coarse && !is_last ? coarse_goal : DescentGoal{});
+    blocks.SetGoal(is_coarse && !is_last
+                       ? CoarseGoal(gain, momentum.best_cost())
+                       : DescentGoal{});
     double reached = blocks.IntersectPoints(&current);
     if (options.update_frames) reached = blocks.ResectFrames(&current);
     if (context.IsCancelled()) {
@@ -65,8 +77,8 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
     const double cost = momentum.best_cost();
     summary.sweeps.push_back({cost, timer.Seconds()});
     if (options.callback) options.callback(sweep, summary.sweeps.back());
-    const bool idle =
-        cost_before - cost <= options.sweep_tolerance * cost_before;
+    gain = (cost_before - cost) / cost_before;
+    const bool idle = gain <= options.sweep_tolerance;
     idle_sweeps = idle ? idle_sweeps + 1 : 0;
     if (is_coarse && idle_sweeps == patience) {
       is_coarse = false;

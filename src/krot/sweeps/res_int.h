@@ -15,9 +15,9 @@ namespace krot {
 // the points fixed. With `paper` settings of the descent the sweeps are the
 // paper's; with `fast` ones they have momentum (momentum.h), and are coarse
 // until they would stop: a block whose maximum is below half of the cost stays
-// where it is, any other ends with the step that promises less than 1e-3 of
-// its maximum. From then on, and in the last of `max_sweeps`, every block goes
-// to its optimum.
+// where it is, any other ends with the step that promises less than a tenth of
+// what the last sweep gained, relative, but for bounds of 1e-3 and 1e-2. From
+// then on, and in the last of `max_sweeps`, every block goes to its optimum.
 //
 // The result is a fixed point of such sweeps at best. That need not be the
 // optimum, whatever the paper says (docs/method.md).
