@@ -1,5 +1,6 @@
 // tools/benchmark/run_all.sh, on little: that every part goes through, that
-// what fails is named, and that docs/benchmarks.md takes up all that it leaves.
+// what fails is named, that docs/benchmarks.md takes up all that it leaves, and
+// that compare_runs.sh tells two such runs apart.
 
 #include <filesystem>
 #include <fstream>
@@ -98,6 +99,24 @@ class RunAll : public testing::Test {
     EXPECT_THAT(Output("summary.md"), HasSubstr("fastest rival"));
   }
 
+  // Of a run with itself, but for a sweep that took half of the time.
+  void ExpectTheComparisonOfTwoRuns() const {
+    const std::string command =
+        "cd \"$1\" && cp -r output old && jq "
+        "'.tables[].rows[].fast /= 2' output/sweep.json >old/sweep.json && "
+        "bash $2 old output >compared.md";
+    const fs::path script =
+        fs::path(KROT_RUN_ALL).parent_path() / "compare_runs.sh";
+    ASSERT_EQ(
+        RunProcess({"/bin/bash", "-c", command, "bash", folder_ / "", script})
+            .exit_code,
+        0);
+    const std::string compared = TextOf(folder_ / "compared.md");
+    EXPECT_THAT(compared, HasSubstr("| sweep | fast | 1 | 2 | 2 | synthetic"));
+    EXPECT_THAT(compared, HasSubstr("| blocks | Int fast | 1 | 1 | 1 | small"));
+    EXPECT_THAT(compared, HasSubstr("| scaling | in all | "));
+  }
+
   const ScratchFolder folder_;
 };
 
@@ -106,6 +125,7 @@ TEST_F(RunAll, GoesThroughAndLeavesWhatTheDocumentTakesUp) {
   ExpectALineForWhatIsLeftOut();
   ExpectTheTimeOfEveryPart();
   ExpectTheAnswersAtTheEnd();
+  ExpectTheComparisonOfTwoRuns();
 }
 
 }  // namespace

@@ -58,6 +58,8 @@ Proof ReadProof(const std::string& report_path, double relative_gap) {
       proof.relative_gap = (lowest - *proof.lower_bound) / lowest;
     }
     proof.is_reached = *proof.relative_gap <= relative_gap;
+  } else {
+    proof.is_reached = json.at("termination") == "zero_cost";  // needs no proof
   }
   return proof;
 }

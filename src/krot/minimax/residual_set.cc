@@ -2,17 +2,6 @@
 
 namespace krot {
 
-void RowOf(const Residual& residual, double row[kResidualRow]) {
-  for (int k = 0; k < 3; ++k) {
-    row[k] = residual.A(0, k);
-    row[4 + k] = residual.A(1, k);
-    row[8 + k] = residual.c[k];
-  }
-  row[3] = residual.b[0];
-  row[7] = residual.b[1];
-  row[11] = residual.d;
-}
-
 // A block whose lanes are idle: r = 0 / 1.
 void ResidualSet::AddBlock() {
   const size_t block = size_ / kResidualLanes;
@@ -22,12 +11,6 @@ void ResidualSet::AddBlock() {
   }
   blocks_[block] = {};
   for (double& d : blocks_[block].row[11]) d = 1;
-}
-
-void ResidualSet::Add(const Residual& residual) {
-  double row[kResidualRow];
-  RowOf(residual, row);
-  Add(row);
 }
 
 void ResidualSet::AddFrom(const ResidualSet& other, int i) {

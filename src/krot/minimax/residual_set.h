@@ -8,7 +8,16 @@
 namespace krot {
 
 // a_1, b_1, a_2, b_2, c, d.
-void RowOf(const Residual& residual, double row[kResidualRow]);
+inline void RowOf(const Residual& residual, double row[kResidualRow]) {
+  for (int k = 0; k < 3; ++k) {
+    row[k] = residual.A(0, k);
+    row[4 + k] = residual.A(1, k);
+    row[8 + k] = residual.c[k];
+  }
+  row[3] = residual.b[0];
+  row[7] = residual.b[1];
+  row[11] = residual.d;
+}
 
 // The residuals of one problem (1), stored in blocks of lanes. Refilling it
 // does not allocate once it has held as many.
@@ -22,7 +31,11 @@ class ResidualSet {
     for (int k = 0; k < kResidualRow; ++k) block.row[k][lane] = row[k];
     ++size_;
   }
-  void Add(const Residual& residual);
+  void Add(const Residual& residual) {
+    double row[kResidualRow];
+    RowOf(residual, row);
+    Add(row);
+  }
   // Number i of `other`.
   void AddFrom(const ResidualSet& other, int i);
 
