@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
-#include "krot/minimax/residual.h"
 
 namespace krot {
 namespace {
@@ -25,12 +23,6 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
   const View& view = problem.views[observation.view];
   return ViewPoint(CamFromWorld(view, estimate.translations[view.frame]),
                    observation, estimate.points[observation.point]);
-}
-
-double ResidualOf(const ViewedPoint& viewed, Norm norm) {
-  if (!(viewed.depth > 0)) return kInfinity;
-  const double residual = NormOf(viewed.v, norm) / viewed.depth;
-  return std::isfinite(residual) ? residual : kInfinity;
 }
 
 double MedianDepth(const KnownRotationProblem& problem,

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "krot/minimax/norm.h"
+#include "krot/minimax/residual.h"
 #include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"
 
@@ -29,7 +31,12 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
                       const Observation& observation, const Estimate& estimate);
 
 // r = ||v||_p / w in pixels; infinity unless w > 0 and r is finite.
-double ResidualOf(const ViewedPoint& viewed, Norm norm);
+inline double ResidualOf(const ViewedPoint& viewed, Norm norm) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  if (!(viewed.depth > 0)) return kInfinity;
+  const double residual = NormOf(viewed.v, norm) / viewed.depth;
+  return residual < kInfinity ? residual : kInfinity;
+}
 
 // Whether every observation has its point in front of the camera, w > 0: where
 // the cost is finite. A third of the work of Cost.
