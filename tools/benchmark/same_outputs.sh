@@ -24,7 +24,7 @@ trap 'rm -rf "$work"' EXIT
 without_times() {
   sed -E -e "s#$work/(before|after)#WORK#g" -e '/^Read .* s in all/d' \
     -e '/seconds|peak_memory_bytes/d' \
-    -e '/"(read|build|solve|certify|write|start|adjust|total)": [0-9.e+-]+,?$/d'
+    -e '/"(read|build|solve|certify|write|start|adjust|removal|total)": [0-9.e+-]+,?$/d'
 }
 
 # run KROT SIDE LABEL ARGUMENT... leaves output, code and files in $work/SIDE/.
