@@ -1,11 +1,14 @@
 #include "tools/benchmark/log_plot.h"
 
+#include <string>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace krot {
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -25,6 +28,18 @@ TEST(LogPlot, LeavesOutWhatHasNoLogarithm) {
   const std::string script = ToGnuplot(plot);
   EXPECT_THAT(script, HasSubstr("<< EOD\n1 1\n3 5\nEOD\n"));
   EXPECT_THAT(script, Not(HasSubstr("none")));
+}
+
+// Gnuplot has eight colours.
+TEST(LogPlot, TellsTheNinthLineFromTheFirst) {
+  LogPlot plot;
+  for (int k = 0; k < 9; ++k) {
+    plot.series.push_back({"line " + std::to_string(k), {{1, 1.0 + k}}});
+  }
+  const std::string script = ToGnuplot(plot);
+  EXPECT_THAT(script, ContainsRegex("dashtype 1 [^\n]*'line 0'"));
+  EXPECT_THAT(script, ContainsRegex("dashtype 1 [^\n]*'line 7'"));
+  EXPECT_THAT(script, ContainsRegex("dashtype 2 [^\n]*'line 8'"));
 }
 
 }  // namespace

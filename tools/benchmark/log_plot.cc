@@ -1,6 +1,7 @@
 #include "tools/benchmark/log_plot.h"
 
 #include <cmath>
+#include <cstdint>
 #include <sstream>
 
 namespace krot {
@@ -10,6 +11,10 @@ bool IsShown(const std::pair<double, double>& point) {
   return std::isfinite(point.first) && std::isfinite(point.second) &&
          point.first > 0 && point.second > 0;
 }
+
+// Of gnuplot's, which then come again: with dashes, so that no two lines look
+// the same.
+constexpr int64_t kNumColors = 8;
 
 // As a string of gnuplot's, taken literally.
 std::string Quoted(const std::string& text) {
@@ -34,12 +39,12 @@ std::string ToGnuplot(const LogPlot& plot) {
       if (IsShown(point)) points << point.first << ' ' << point.second << '\n';
     }
     if (points.str().empty()) continue;
-    const std::string block =
-        "$series" + std::to_string(&series - &plot.series[0]);
+    const int64_t index = &series - &plot.series[0];
+    const std::string block = "$series" + std::to_string(index);
     script << block << " << EOD\n" << points.str() << "EOD\n";
     lines << (lines.str().empty() ? "plot " : ", \\\n  ") << block
-          << " with linespoints linewidth 2 pointtype 7 pointsize 0.4 title "
-          << Quoted(series.name);
+          << " with linespoints linewidth 2 dashtype " << 1 + index / kNumColors
+          << " pointtype 7 pointsize 0.4 title " << Quoted(series.name);
   }
   script << lines.str() << '\n';
   return script.str();
