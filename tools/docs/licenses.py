@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Writes docs/licenses.md: the packages that an executable is linked with, or
-is compiled with, and their licences, as Debian's copyright files name them.
+is compiled with, and their licence, as Debian's copyright files name them.
 
 Usage: tools/docs/licenses.py KROT > docs/licenses.md   (on Debian)
 """
@@ -13,15 +13,15 @@ import sys
 HEAD = """# Licences
 
 KROT's own code is under the [BSD 3-Clause licence](../LICENSE), and nothing of others
-is in the repository. A binary is linked with what follows, on Debian {release}; each
-package's own file under `/usr/share/doc` has the last word. Names in parentheses are of
-parts of a package: tests, build scripts, or alternatives; those of GCC's runtime have an
-exception for what is linked with it. Debian's Ceres links GPL parts of SuiteSparse
-(CHOLMOD's supernodal code): binaries linked with it fall under the GPL.
+is in the repository. A binary is linked with these packages of Debian {release}. Named is
+the main licence; parts of a package (tests, build scripts, alternatives) may have others,
+which its own file under `/usr/share/doc` lists. The GPL of GCC's runtime has an exception
+for what is linked with it. Debian's Ceres links GPL parts of SuiteSparse (CHOLMOD's
+supernodal code): binaries linked with it fall under the GPL.
 
 Made by `tools/docs/licenses.py`.
 
-| package | version | linked | licences |
+| package | version | linked | licence |
 |---|---|---|---|
 """
 
@@ -51,11 +51,10 @@ def shared_packages(executable):
     return packages
 
 
-def licences(package):
-    """The main one, that of all files or of the first, and those of parts."""
+def licence(package):
+    """The main one: that of all files, or of the first."""
     text = pathlib.Path(f"/usr/share/doc/{package}/copyright").read_text(
         errors="replace")
-    names = []
     main = None
     for stanza in re.split(r"\n\s*\n", text):
         name = re.search(r"^License:[ \t]*(\S.*)$", stanza, re.M)
@@ -64,13 +63,10 @@ def licences(package):
             continue
         if main is None or files[1].strip() == "*":
             main = name[1].strip()
-        if name[1].strip() not in names:
-            names.append(name[1].strip())
     if main is None:
         known = re.findall(r"common-licenses/([\w.+-]*\w)", text)
         return ", ".join(sorted(set(known))) or "see its copyright file"
-    parts = [name for name in names if name != main]
-    return main + (f" ({', '.join(parts)})" if parts else "")
+    return main
 
 
 def main():
@@ -82,7 +78,7 @@ def main():
     for package, how in sorted(linked.items()):
         version = output("dpkg-query", "-W", "-f=${Version}\\n",
                          package).split()[0]
-        print(f"| {package} | {version} | {how} | {licences(package)} |")
+        print(f"| {package} | {version} | {how} | {licence(package)} |")
 
 
 if __name__ == "__main__":
