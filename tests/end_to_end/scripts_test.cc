@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/model.h"
@@ -109,6 +110,31 @@ TEST_F(Scripts, PassShellcheck) {
                     .c_str()),
             0)
       << ReadBytes(log);
+}
+
+// The proof, by a checker that shares no code with KROT.
+TEST_F(Scripts, CheckACertificateWithoutKrot) {
+  if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0) {
+    GTEST_SKIP() << "numpy is not installed";
+  }
+  const std::string solved = folder_ / "solved";
+  const fs::path certificate = folder_ / "certificate.json";
+  ASSERT_EQ(RunKrot({"solver", "--input_path", KROT_SAMPLE "/model",
+                     "--output_path", solved, "--output_type", "TXT",
+                     "--certificate_path", certificate})
+                .exit_code,
+            0);
+  const ScriptResult result =
+      RunScript("check_certificate.py", {certificate, solved});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("no estimate has all errors"));
+
+  // A bound that is higher by 1e-6 is not proved.
+  auto json = nlohmann::json::parse(ReadBytes(certificate));
+  json["lower_bound"] = (1 + 1e-6) * json["lower_bound"].get<double>();
+  WriteBytes(certificate, json.dump());
+  EXPECT_NE(RunScript("check_certificate.py", {certificate, solved}).exit_code,
+            0);
 }
 
 bool HasColmapAndJq() {
