@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Which lines and branches of the library its tests reach: builds into
-# build-coverage/, runs the tests there, prints a table for docs/reliability.md,
-# and lists what no test reached in build-coverage/unreached.txt. Branches that
+# build-coverage/, runs the tests there, prints a table for
+# docs/history/reliability.md, and lists what no test reached in build-coverage/unreached.txt. Branches that
 # only an exception takes are not counted.
 #
 # Usage: tools/measure_coverage.sh [CTEST_OPTION...]   (-L quick, -R Joint ...)

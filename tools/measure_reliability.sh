@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The recorded runs of docs/reliability.md, on the krot in build/ that
+# The recorded runs of docs/history/reliability.md, on the krot in build/ that
 # tools/run_tests.sh made: prints its tables of faults, kills and folders.
 # Half an hour, with the defaults; those of the fuzzers are tools/run_fuzzers.sh's.
 #

@@ -3,7 +3,7 @@
 # undefined behaviour sanitizers, and runs each for SECONDS of every core. What
 # was found lies in build-fuzz/findings, one file each: run the target on it.
 # Corpora stay in build-fuzz/corpus and are built upon. Prints a table for
-# docs/reliability.md. Needs Clang, which it installs (with sudo if not root).
+# docs/history/reliability.md. Needs Clang, which it installs (with sudo if not root).
 #
 # Usage: tools/run_fuzzers.sh SECONDS [TARGET...]
 set -euo pipefail

@@ -5,7 +5,7 @@ Usage: fault_test.py KROT --library FILE [--limit N] [--memory N] [--seed S]
 Of each command and each kind of fault in faults.cc the 1st, 2nd, 3rd ... call
 fails until a run passes untouched; with a limit, so many of them by chance.
 --memory is that of malloc, which a command calls tens of thousands of times.
-Prints a table for docs/reliability.md.
+Prints a table for docs/history/reliability.md.
 """
 
 import argparse

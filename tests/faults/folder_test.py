@@ -2,7 +2,7 @@
 
 Usage: folder_test.py KROT [--rounds N] [--seed S]
 A small tmpfs needs root; without, the full disk is left to fault_test.py.
-Prints a table for docs/reliability.md.
+Prints a table for docs/history/reliability.md.
 """
 
 import argparse

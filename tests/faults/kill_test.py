@@ -4,7 +4,7 @@ Usage: kill_test.py KROT [--kills N] [--interrupts N] [--seed S]
 SIGKILL leaves the old output or the new one, to the byte, and a run after it
 succeeds. SIGINT and SIGTERM end every command soon, without a trace, and with
 --write_on_interrupt 1 with a valid model that is no worse than the input.
-Prints a table for docs/reliability.md.
+Prints a table for docs/history/reliability.md.
 """
 
 import argparse

@@ -5,9 +5,9 @@ Usage: mutate_checker.py BUILD [--count N] [--skip N] [--seed S] [--jobs N]
 BUILD is a build folder with proof_test (Ninja). Each mutant is one operator,
 bound or constant of the checker's sources that becomes another; it is compiled,
 linked into proof_test and run. Prints the mutants that no test notices, with
-their line, and a summary for docs/reliability.md. Those that change nothing, or
-nothing that can be told, stand in equivalent_mutants.txt with the reason. The
-exit code is 0 if no other went unnoticed, and all of that list are mutants.
+their line, and a summary for docs/history/reliability.md. Those that change
+nothing, or nothing that can be told, stand in equivalent_mutants.txt with the
+reason. The exit code is 0 if no other went unnoticed, and all of that list are mutants.
 """
 
 import argparse

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Puts what run_all.sh printed into docs/benchmarks.md, and its plots into
-# docs/images. A table stands there between the lines
+# Puts what run_all.sh printed into docs/benchmarks.md and
+# docs/history/benchmarks.md, and its plots into docs/images. A table stands
+# there between the lines
 #
 #   <!-- begin NAME --> and <!-- end NAME -->
 #
@@ -12,11 +13,11 @@
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 output=${1:?"usage: refresh_docs.sh OUTPUT"}
-document=$root/docs/benchmarks.md
 refreshed=$(mktemp)
 trap 'rm -f "$refreshed"' EXIT
 
-awk -v output="$output" '
+for document in "$root"/docs/{,history/}benchmarks.md; do
+  awk -v output="$output" '
   /^<!-- begin [a-z_]+ -->$/ {
     print
     file = output "/" $3 ".md"
@@ -35,7 +36,8 @@ awk -v output="$output" '
   /^<!-- end [a-z_]+ -->$/ { is_replaced = 0 }
   !is_replaced { print }
 ' "$document" >"$refreshed"
-cat "$refreshed" >"$document"
+  cat "$refreshed" >"$document"
+done
 for name in triangulation triangulation_inf known_rotation scaling; do
   if [[ -s $output/$name.gp ]]; then
     gnuplot "$output/$name.gp" >"$root/docs/images/benchmark_$name.svg"

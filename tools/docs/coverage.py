@@ -1,8 +1,8 @@
 """Sums gcovr's report up by folders of the library.
 
 Usage: coverage.py COVERAGE_JSON UNREACHED
-Prints a table for docs/reliability.md; UNREACHED gets one line for each line of
-code that no test reached, and for each that did not go all of its ways.
+Prints a table for docs/history/reliability.md; UNREACHED gets one line for each
+line of code that no test reached, and for each that did not go all of its ways.
 """
 
 import collections

@@ -1,4 +1,4 @@
-# Draws one of the figures of docs/method.md as SVG: awk -v figure=NAME, NAME
+# Draws one of the figures of docs/method as SVG: awk -v figure=NAME, NAME
 # being sweep, matrix or working_set. All show the same small problem: five
 # frames, eight points, and the observations below.
 

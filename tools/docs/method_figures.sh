@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the figures of docs/method.md, docs/images/method_*.svg. Needs awk.
+# Makes the figures of docs/method, docs/images/method_*.svg. Needs awk.
 #
 # Usage: tools/docs/method_figures.sh
 set -euo pipefail

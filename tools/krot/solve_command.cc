@@ -52,8 +52,8 @@ std::string MemoryWords(const SolveSummary& summary) {
               : std::string());
 }
 
-// Peaks have been as far below what was announced as this (docs/method.md,
-// "Memory").
+// Peaks have been as far below what was announced as this (docs/method/
+// joint_solver.md, "Memory").
 constexpr double kMostAnnounced = 1.3;
 
 // What surely does not fit is not begun.

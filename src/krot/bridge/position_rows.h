@@ -24,7 +24,7 @@ namespace krot {
 // has ||v|| / w <= level in the cone with its apex at g + p that touches the
 // ellipsoid, so everywhere in it. Where the cones of several p touch it at C
 // they are the ellipsoid to first order there, as the rows of observations are
-// their lenses (docs/method.md, "Positions within a radius").
+// their lenses (docs/method/positions.md, "Positions within a radius").
 //
 // That a point X is in one is seen from a fixed frame, by views that are
 // shifted likewise: X + p - g takes the place of g + p - C.

@@ -42,7 +42,7 @@ Eigen::Matrix2d ProjectionJacobian(int model_id, const double* params,
                                    const Eigen::Vector2d& u);
 
 // An observation undistorted onto the plane z = 1, with what the residual in
-// pixels needs (docs/method.md).
+// pixels needs (docs/method/problem.md, "From pixels to rays").
 struct UndistortedObservation {
   Eigen::Vector2d u;  // |ProjectRay(u) - pixel| <= 1e-8 px
   Eigen::Matrix2d J;  // d pixel / d u at u, det J > 0

@@ -11,7 +11,8 @@ namespace krot {
 // solve each, without a factor. One aims at a step that is longer by kLonger,
 // where it brings the pairs' products within these shares of the target mu. One
 // that does not gain kWorthwhile of kLonger is the last [Colombo, Gondzio
-// 2008]. Two took a fifth of the joint iterations away (docs/journal.md).
+// 2008]. Two took a fifth of the joint iterations away
+// (docs/history/journal.md).
 struct CentralityCorrectors {
   static constexpr int kLargestNumber = 2;
   static constexpr double kLonger = 0.3;

@@ -17,8 +17,8 @@ constexpr double kNeighbourhood = 1e-3;
 // beyond, neither the gauge nor the linearised top = g w holds.
 constexpr double kMaxDepthGrowth = 3;
 // After a step shorter than this, the next one only centres, so far. Scaling
-// or leaving out the corrector instead took more iterations (docs/method.md,
-// "What did not help").
+// or leaving out the corrector instead took more iterations
+// (docs/history/journal.md, "The interior point, variants without effect").
 constexpr double kShortStep = 0.1;
 constexpr double kCentring = 0.8;
 // Mehrotra's sigma is no less, whatever the predictor leaves of the gap.

@@ -11,7 +11,7 @@ using Eigen::Matrix3f;
 using Eigen::VectorXf;
 
 // Blocks kept of a column, by those that A has below the diagonal there. More
-// take more time than they save in iterations (docs/scale.md).
+// take more time than they save in iterations (docs/history/scale.md).
 constexpr double kKept = 0.5;
 // Shifts: the first, its growth, and where it is given up.
 constexpr float kFirstShift = 1e-5F;

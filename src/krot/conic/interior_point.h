@@ -65,7 +65,7 @@ struct InteriorPointSummary {
 //
 //   min gamma   subject to   (gamma w_i, v_i) in the cone ||v||_p <= gamma w
 //
-// in (x, gamma) at once (docs/method.md, "The joint solver"). The problem
+// in (x, gamma) at once (docs/method/joint_solver.md). The problem
 // must be connected and all depths of `*estimate` positive (throws
 // std::invalid_argument otherwise); it is left at the best iterate, never
 // worse than the start. `multipliers` are those of the last iterate.

@@ -16,8 +16,8 @@ namespace krot {
 //   min 1/2 sum rho(|e_i|^2)   subject to   ||e_i||_p <= cap,  e_i = v_i / w_i,
 //
 // over all frames and points at once, by a primal-dual interior point method
-// (docs/method.md, "The finish"). Not convex, but for the constraints: what is
-// found is a local minimum.
+// (docs/method/joint_solver.md, "The finish"). Not convex, but for the
+// constraints: what is found is a local minimum.
 
 // An iterate; every one of them is below the cap.
 struct BoundedIterate {

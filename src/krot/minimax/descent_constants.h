@@ -12,13 +12,14 @@ inline constexpr double kZeroPixels = 1e-10;
 
 // kappa. A small one makes steps Newton's, a large one safe; the first and the
 // smallest are those with the fewest steps on random triangulations, of 1e-3,
-// 1e-2, 3e-2 and of 1e-6, 1e-5 (docs/benchmarks.md, "One triangulation").
+// 1e-2, 3e-2 and of 1e-6, 1e-5 (docs/history/journal.md, "One triangulation").
 // Rounding in the model is about 1e-16 / kappa.
 inline constexpr double kFirstKappa = 1e-2;
 inline constexpr double kSmallestKappa = 1e-5;
 inline constexpr double kLargestKappa = 1e9;
 // A descent that ends at a tolerance needs none far below it: steps of coarse
-// sweeps end sooner (docs/journal.md, "Res-Int, the first ten sweeps").
+// sweeps end sooner (docs/history/journal.md, "Res-Int, the first ten
+// sweeps").
 inline double SmallestKappa(double tolerance) {
   return std::max(kSmallestKappa, 0.1 * tolerance);
 }
@@ -31,8 +32,8 @@ inline constexpr double kKappaRise = 10;
 inline constexpr double kSufficientShare = 0.1;
 inline constexpr double kGoodShare = 0.5;
 // Promises below this, relative, are rounding if the trial does not keep them:
-// at two cameras they were tried again and again (docs/benchmarks.md, "One
-// triangulation", step 4).
+// at two cameras they were tried again and again (docs/history/journal.md,
+// "One triangulation", step 4).
 inline constexpr double kPromiseRounding = 1e-10;
 // The least tolerance of a descent (DescentGoal).
 inline constexpr double kFinestTolerance = 1e-11;
@@ -58,7 +59,8 @@ inline constexpr double kLargestFall = 1 - kSmallestDepthShare;
 inline constexpr double kPivotRounding = 1e-14;
 // G serves as long as (what has changed since, relative)^2 is below this. Kept
 // wherever kappa is small, it missed optima at infinity; cold points take 2 %
-// longer for this (docs/benchmarks.md, "Res-Int, the first ten sweeps").
+// longer for this (docs/history/journal.md, "Res-Int, the first ten
+// sweeps").
 inline constexpr double kMetricReach = 1e-2;
 // Up to this growth of depths the minimiser is not far away.
 inline constexpr double kNearby = 1e3;

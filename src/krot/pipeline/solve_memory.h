@@ -10,8 +10,8 @@
 namespace krot {
 
 // The largest resident set, in bytes, of a process that holds `model` and runs
-// SolveModel on it. How near that comes is measured in docs/method.md, "The
-// schedule of auto".
+// SolveModel on it. How near that comes is measured in
+// docs/method/joint_solver.md, "Memory".
 struct SolveMemory {
   // If the joint solver gets by with what it looks at first.
   int64_t likely = 0;

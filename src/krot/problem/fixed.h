@@ -11,7 +11,7 @@ namespace krot {
 // What does not move: frames and points of which the problem has a position. It
 // takes the place of the gauge: as soon as anything is fixed, translations are
 // no longer free, and as soon as two positions are, or a baseline, scale is not
-// (docs/method.md, "What is fixed").
+// (docs/method/positions.md, "What is fixed").
 
 // Whether there is any.
 bool HasFixed(const KnownRotationProblem& problem);

@@ -15,7 +15,7 @@ namespace krot {
 //   (w_i; v_i) = E_i x_cam,   x_cam = R_sr (R_rw s_k + t_f) + t_sr.
 //
 // w is the depth; the ratio is the reprojection error in pixels, linearised
-// where the row E was taken (docs/method.md).
+// where the row E was taken (docs/method/problem.md).
 
 // One image: how its camera sits in its frame.
 struct View {

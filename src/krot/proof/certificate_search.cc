@@ -20,7 +20,8 @@ constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
 constexpr int kMaxDrops = 20;
 // What frames can spare: less makes a larger certificate, more may need too
 // large changes of what is left. Misfits are not dropped there: with some the
-// rest proves next to nothing, and iterations are cheaper (docs/scale.md).
+// rest proves next to nothing, and iterations are cheaper (docs/history/
+// scale.md).
 constexpr double kSparedShares[] = {1e-2, 0};
 // Of the sub-problems: far below any gap that is asked for, as what is left of
 // it is missing from the bound.

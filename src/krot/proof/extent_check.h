@@ -23,8 +23,8 @@ namespace krot {
 //   (2)  sum_i y_i'b_i + bound sum_i lambda_i d_i = kappa,
 //
 // then 0 <= sum_i (y_i'v_i + bound lambda_i w_i) = kappa - g'z. Where anything
-// is fixed, extents are finite; what is fixed takes any force (docs/method.md,
-// "What the data allow").
+// is fixed, extents are finite; what is fixed takes any force
+// (docs/method/outliers.md, "What the data allow").
 struct ExtentCertificate {
   double bound = 0;  // pixels
   std::vector<Pull> pulls;

@@ -13,9 +13,9 @@ namespace krot {
 // are fixed, with the world's origin O moved to one of these positions: the
 // centre of the first view of the first fixed frame, or else the first fixed
 // point. Forces that balance wherever something moves have the same sum of
-// constants from every origin (docs/method.md, "What is fixed"), and from this
-// one they vanish where all that is fixed coincides. The frame at the origin
-// counts like one that moves.
+// constants from every origin (docs/method/positions.md, "What is fixed"), and
+// from this one they vanish where all that is fixed coincides. The frame at the
+// origin counts like one that moves.
 class FixedConstants {
  public:
   using Real = long double;

@@ -13,8 +13,8 @@ namespace krot {
 namespace {
 
 // How far coarse sweeps take a block: see res_int.h. A tolerance of 1e-2
-// throughout, and alternation ends higher (docs/journal.md, "Res-Int, the first
-// ten sweeps").
+// throughout, and alternation ends higher (docs/history/journal.md, "Res-Int,
+// the first ten sweeps").
 constexpr double kCoarseShareOfGain = 0.1;
 constexpr double kFinestCoarse = 1e-3;
 constexpr double kCoarsest = 1e-2;

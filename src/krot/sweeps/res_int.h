@@ -20,7 +20,8 @@ namespace krot {
 // then on, and in the last of `max_sweeps`, every block goes to its optimum.
 //
 // The result is a fixed point of such sweeps at best. That need not be the
-// optimum, whatever the paper says (docs/method.md).
+// optimum, whatever the paper says (docs/method/problem.md, "How alternation
+// gets stuck").
 
 struct Sweep {
   double cost = 0;     // pixels, the best after the sweep, to rounding

@@ -26,8 +26,9 @@ struct PositionBox {
 
 // Finds them by working sets: an end that is proved on some of the observations
 // is one for all, and it is reached where the other points fit in, too
-// (docs/method.md, "What the data allow"). Ends agree to `tolerance` of the way
-// from the centre, unless lenses take more. `target` has any direction.
+// (docs/method/outliers.md, "What the data allow"). Ends agree to `tolerance`
+// of the way from the centre, unless lenses take more. `target` has any
+// direction.
 PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
                     double tolerance, const Context& context);
 
