@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "krot/adjust/ceres_log.h"
+#include "krot/base/checkpoint.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
 #include "krot/options/option_error.h"
