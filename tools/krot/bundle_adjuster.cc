@@ -17,7 +17,7 @@
 namespace krot {
 namespace {
 
-std::string IterationLine(const BundleAdjustmentIteration& iteration) {
+Progress ProgressOf(const BundleAdjustmentIteration& iteration) {
   std::string line = "iteration " + std::to_string(iteration.iteration) + ": ";
   if (iteration.is_successful) {
     line += "cost " + FormatNumber(iteration.cost, 3) + " px^2";
@@ -28,8 +28,9 @@ std::string IterationLine(const BundleAdjustmentIteration& iteration) {
   if (iteration.barrier) {
     line += ", barrier " + Scientific(*iteration.barrier);
   }
-  return line + ", trust region " + Scientific(iteration.radius) + ", " +
-         FormatNumber(iteration.seconds, 2) + " s";
+  line += ", " + FormatNumber(iteration.seconds, 2) + " s, trust region " +
+          Scientific(iteration.radius);
+  return {"adjustment", line, std::nullopt};
 }
 
 // The adjustment with its progress on stderr. Throws CommandError where there
@@ -38,12 +39,13 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
                          Context context, const LogOptions& log) {
   options.adjustment.callback =
       [&log](const BundleAdjustmentIteration& iteration) {
-        LogLine(log, 1, IterationLine(iteration));
+        ShowProgress(log, ProgressOf(iteration));
       };
+  BeginPhase(log, "preparing the adjustment");
   SolveProgress progress(log, SolveProgress::GoalsOf(options.start));
   progress.Follow(&options.start, &context);
   AdjustModelResult result = AdjustModel(model, options, context);
-  progress.Finish();
+  EndProgress();
   const AdjustModelSummary& summary = result.summary;
   switch (summary.adjustment.termination) {
     case BundleAdjustmentTermination::kNothingToAdjust:
@@ -78,7 +80,7 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   DeferInterrupts();
   report.summary = std::move(result.summary);
 
-  LogLine(common.log, 2, "writing " + paths.output_path);
+  BeginPhase(common.log, "writing " + paths.output_path);
   const Timer write_timer;
   WriteModel(result.model, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();

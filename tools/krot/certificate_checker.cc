@@ -33,9 +33,19 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
 }
 
 Model ReadSubject(const CheckerOptions& options) {
-  return ReadValidModel(options.input_path, options.on_contradiction,
-                        options.common.log)
-      .model;
+  Model model = ReadValidModel(options.input_path, options.on_contradiction,
+                               options.common.log)
+                    .model;
+  BeginPhase(options.common.log, "checking the proof");
+  return model;
+}
+
+void WriteReport(const CheckerOptions& options,
+                 const std::optional<CertificateVerdict>& certificate,
+                 const std::optional<ConflictVerdict>& conflicts) {
+  if (options.report_path.empty()) return;
+  WriteFileAtomically(options.report_path,
+                      CheckJson(certificate, conflicts, KROT_VERSION));
 }
 
 template <typename Verdict>

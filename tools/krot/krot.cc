@@ -163,6 +163,7 @@ int RunCommand(const std::vector<std::string>& arguments) {
 // One line on stderr, whatever the message holds.
 int Fail(const std::string& who, std::string message, int exit_code) {
   std::replace(message.begin(), message.end(), '\n', ' ');
+  EndProgress();
   LogLine({}, 0, who + ": " + message);
   return exit_code;
 }

@@ -142,6 +142,7 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   DeferInterrupts();
   if (!options.error_colors_path.empty()) {
     WriteColoredCopy(options, path, model);
+  BeginPhase(options.common.log, "measuring its errors");
   }
   if (!options.report_path.empty()) {
     WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));

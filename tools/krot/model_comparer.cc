@@ -208,6 +208,7 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   const auto [model2, contradictions2] = ReadValidModel(
       options.input_path2, options.on_contradiction, options.common.log);
 
+  BeginPhase(options.common.log, "comparing the models");
   ComparisonReport report;
   report.contradictions1 = contradictions1;
   report.contradictions2 = contradictions2;

@@ -157,6 +157,7 @@ ValidModel ReadValidModel(const std::string& path,
                           const LogOptions& log) {
   LogInput(path);
   ValidModel read;
+  BeginPhase(log, "reading " + path);
   read.model = ReadModel(path, DetectModelFormat(path));
   read.contradictions = FindContradictions(read.model);
   const bool follows_images = on_contradiction == "follow_images";

@@ -94,7 +94,7 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model) {
                 " to remove; solving what is left");
   };
   OutlierFilterResult result = FilterOutliers(model, options, context);
-  progress.Finish();
+  EndProgress();
   return result;
 }
 
@@ -130,13 +130,13 @@ void WriteViews(const OutlierCommand& command,
                 const Model& result) {
   const LogOptions& log = command.common.log;
   if (!command.suspects_path.empty()) {
-    LogLine(log, 2, "writing " + command.suspects_path);
+    BeginPhase(log, "writing " + command.suspects_path);
     Model colored = input;
     ColorSuspects(summary, &colored);
     WriteModel(colored, command.suspects_path, write_options);
   }
   if (!command.overlay_path.empty()) {
-    LogLine(log, 2, "writing " + command.overlay_path);
+    BeginPhase(log, "writing " + command.overlay_path);
     WriteModel(OverlayModels(input, result, command.context.num_threads),
                command.overlay_path, write_options);
   }
@@ -146,7 +146,7 @@ void WriteSideFiles(const OutlierCommand& command,
                     const OutlierReport& report) {
   const LogOptions& log = command.common.log;
   const auto write = [&](const std::string& path, const std::string& text) {
-    LogLine(log, 2, "writing " + path);
+    BeginPhase(log, "writing " + path);
     WriteFileAtomically(path, text);
   };
   if (!command.conflicts_path.empty() && report.summary.conflicts) {
@@ -175,7 +175,7 @@ int Run(const OutlierCommand& command) {
                        "nothing to solve: no track keeps two observations");
   }
 
-  LogLine(log, 2, "writing " + paths.output_path);
+  BeginPhase(log, "writing " + paths.output_path);
   const Timer write_timer;
   WriteModel(result.model, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();

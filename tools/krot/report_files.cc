@@ -17,11 +17,11 @@ void WriteReports(const std::string& report_path, const std::string& html_path,
                   const Model& after, int num_threads, const LogOptions& log,
                   const std::string& crops_json) {
   if (!report_path.empty()) {
-    LogLine(log, 2, "writing " + report_path);
+    BeginPhase(log, "writing " + report_path);
     WriteFileAtomically(report_path, report_json);
   }
   if (!html_path.empty()) {
-    LogLine(log, 2, "writing " + html_path);
+    BeginPhase(log, "writing " + html_path);
     WriteFileAtomically(html_path, HtmlPage(report_json, before, after,
                                             num_threads, crops_json));
   }

@@ -93,8 +93,9 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
     LogLine(log, 1, ProblemWords(summary) + "; " + MemoryWords(summary));
     CheckMemory(summary);
   };
+  BeginPhase(log, "building the problem");
   TolerantSolveResult result = SolveTolerantly(model, options, context);
-  progress.Finish();
+  EndProgress();
   report->summary = std::move(result.summary);
   report->outliers = std::move(result.outliers);
   return std::move(result.model);
@@ -102,7 +103,7 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
 
 void WriteConflicts(const SolveCommand& command, const SolveReport& report) {
   if (command.conflicts_path.empty() || !report.outliers->conflicts) return;
-  LogLine(command.common.log, 2, "writing " + command.conflicts_path);
+  BeginPhase(command.common.log, "writing " + command.conflicts_path);
   WriteFileAtomically(command.conflicts_path,
                       ConflictJson(*report.outliers->conflicts));
 }
@@ -110,7 +111,7 @@ void WriteConflicts(const SolveCommand& command, const SolveReport& report) {
 void WriteCertificate(const SolveCommand& command, const std::string& path,
                       const std::optional<CertificateFile>& certificate) {
   if (!certificate || path.empty()) return;
-  LogLine(command.common.log, 2, "writing " + path);
+  BeginPhase(command.common.log, "writing " + path);
   WriteFileAtomically(path, CertificateJson(*certificate));
 }
 
@@ -256,7 +257,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, solved);
   }
-  LogLine(log, 2, "writing " + paths.output_path);
+  BeginPhase(log, "writing " + paths.output_path);
   const Timer write_timer;
   WriteModel(solved, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();

@@ -8,17 +8,10 @@
 
 namespace krot {
 
-// Tells the user on stderr that a solve is alive: what every sweep and every
-// joint iteration and every one of the finish has reached.
+// Tells the user on stderr that a solve is alive: what its sweeps, its joint
+// iterations and those of the finish have reached (ShowProgress).
 class SolveProgress {
  public:
-  enum class Style {
-    kBar,   // one line with a bar that rewrites itself
-    kLines  // one line per sweep or iteration
-  };
-  // kBar where stderr is a terminal.
-  static Style StyleOfStderr();
-
   // What fills the bar of a stage, except for the way to a start, whose end is
   // not known: the gain of a sweep falling to the
   // tolerance or the sweeps' number rising to the maximum; the gap of the
@@ -31,9 +24,9 @@ class SolveProgress {
   };
   static Goals GoalsOf(const SolveModelOptions& options);
 
-  SolveProgress(const LogOptions& log, const Goals& goals,
-                Style style = StyleOfStderr());
-  ~SolveProgress() { Finish(); }
+  SolveProgress(const LogOptions& log, const Goals& goals)
+      : log_(log), goals_(goals) {}
+  ~SolveProgress() { EndProgress(); }
   SolveProgress(const SolveProgress&) = delete;
   SolveProgress& operator=(const SolveProgress&) = delete;
 
@@ -41,32 +34,19 @@ class SolveProgress {
   // reference to this.
   void Follow(SolveModelOptions* options, Context* context);
 
-  void Update(int sweep, const Sweep& state);
-  void Update(int iteration, const JointIteration& state);  // or to a start
-  void Update(const BoundedIterate& state);                 // of the finish
-
-  // A sentence on a line of its own.
-  void Note(const std::string& sentence);
-
-  // Ends the line of the bar.
-  void Finish();
+  // What each callback tells.
+  Progress Describe(int sweep, const Sweep& state);
+  Progress Describe(int iteration,
+                    const JointIteration& state);  // or to a start
+  Progress Describe(const BoundedIterate& state);  // of the finish
 
  private:
-  enum class Stage { kNone, kSweeps, kStart, kIterations, kFinish };
-
-  // Begins a new line and an empty bar if `stage` is new.
-  void Enter(Stage stage);
-  void Show(double fraction, const std::string& words);
   double SweepFraction(int sweep, double cost);
   double IterationFraction(const JointIteration& state) const;
 
   LogOptions log_;
   Goals goals_;
-  Style style_;
-  Stage stage_ = Stage::kNone;
-  bool line_is_open_ = false;
   std::optional<double> last_cost_;  // of a sweep
-  double fraction_ = 0;              // of the bar; never falls within a stage
 };
 
 }  // namespace krot

@@ -13,6 +13,7 @@
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
+#include "tools/krot/solve_progress.h"
 
 namespace krot {
 namespace {
@@ -72,12 +73,19 @@ ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
   const auto num_boxes =
       static_cast<int64_t>(options.images.size() + options.points.size());
   options.on_box = [&](int64_t num_done) {
-    LogLine(
-        log, 2,
-        "box " + std::to_string(num_done) + " of " + std::to_string(num_boxes));
+    ShowProgress(
+        log,
+        {"boxes",
+         "box " + std::to_string(num_done) + " of " + std::to_string(num_boxes),
+         static_cast<double>(num_done) / static_cast<double>(num_boxes)});
   };
   LogLine(log, 1, "looking for " + Counted(6 * num_boxes, "end"));
-  ToleranceResult result = AnalyzeTolerances(model, options, command.context);
+  BeginPhase(log, "looking for an estimate within the bound");
+  Context context = command.context;
+  SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
+  progress.Follow(&options.solve, &context);
+  ToleranceResult result = AnalyzeTolerances(model, options, context);
+  EndProgress();
   switch (result.summary.termination) {
     case ToleranceTermination::kNothingToSolve:
       throw CommandError(kExitNothingToSolve,
@@ -107,7 +115,7 @@ int Run(const ToleranceCommand& command) {
   report.pixel_error_after = Summarize(PixelErrors(result.model, num_threads));
   RecordEnd(total_timer, num_threads, &report.run);
   if (!command.csv_path.empty()) {
-    LogLine(log, 2, "writing " + command.csv_path);
+    BeginPhase(log, "writing " + command.csv_path);
     WriteFileAtomically(command.csv_path, ToleranceCsv(report.summary));
   }
   WriteReports(paths.report_path, paths.html_path, ToleranceJson(report), model,

@@ -173,6 +173,7 @@ ToleranceResult AnalyzeInFrame(const Model& model,
     summary.gauge_images.push_back(
         result.model.images[built.image_of[*view]].name);
   }
+  if (options.on_box) options.on_box(0);
   const Estimate centre = built.start;
   const ToleranceProblem shared(result.model, &built, centre, gauge,
                                 options.solve.norm, options.max_error, context);

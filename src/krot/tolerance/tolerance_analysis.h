@@ -31,8 +31,9 @@ struct ToleranceOptions {
   // Of the problem, and of the solve that finds estimates within the bound
   // where the model is not one.
   SolveModelOptions solve;
-  // Called after every box with how many there are by now; may be empty, must
-  // be safe to call from several threads.
+  // Called once there is an estimate within the bound, then after every box,
+  // with how many boxes there are by now; may be empty, must be safe to call
+  // from several threads.
   std::function<void(int64_t num_boxes)> on_box;
 };
 
