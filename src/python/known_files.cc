@@ -1,7 +1,7 @@
 #include "python/known_files.h"
 
+#include "krot/analysis/rotation_input.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/rotations_file.h"
 
 namespace krot {
 namespace {
@@ -33,7 +33,7 @@ std::shared_ptr<const Model> KnownFiles::WithRotations(
     const std::shared_ptr<Model>& model) const {
   if (rotations_path_.empty()) return model;
   auto turned = std::make_shared<Model>(*model);
-  ReplaceRotations(ReadFileBytes(rotations_path_), turned.get());
+  TakeRotations(ReadFileBytes(rotations_path_), turned.get());
   return turned;
 }
 

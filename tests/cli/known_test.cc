@@ -1,10 +1,13 @@
 #include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
 #include "krot/geometry/rigid_transform.h"
@@ -90,6 +93,126 @@ TEST_F(Known, RotationsOfSomeImagesLeaveTheOthersTheirsAndAreCounted) {
   EXPECT_THAT(result.err, HasSubstr("; 1 image without one"));
   EXPECT_EQ(Report("output")["rotations"]["num_kept_images"], 1);
   EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "plain")));
+}
+
+// Every image's rotation as somebody else has it.
+template <typename Change>
+std::string ChangedRotationLines(Model model, const Change& change) {
+  for (Image& image : model.images) {
+    image.cam_from_world.quaternion_wxyz =
+        change(NormalizedQuaternion(image.cam_from_world.quaternion_wxyz));
+  }
+  return RotationLines(model);
+}
+
+QuaternionWxyz Inverted(const Eigen::Quaterniond& q) {
+  return ToWxyz(q.conjugate());
+}
+
+TEST_F(Known, RotationsInAnotherConventionAreRefusedBeforeTheWork) {
+  for (const int sensors_per_rig : {1, 2}) {
+    const Model model = SmallRigModel(sensors_per_rig);
+    Save(model, folder_ / std::to_string(sensors_per_rig));
+    std::ofstream(folder_ / "rotations.txt")
+        << ChangedRotationLines(model, &Inverted);
+    for (const std::vector<std::string>& command :
+         {std::vector<std::string>{"solver", "--output_path",
+                                   folder_ / "output"},
+          {"outlier_filter", "--output_path", folder_ / "output",
+           "--OutlierFilter.max_error", "3"},
+          {"tolerance_analyzer", "--ToleranceAnalyzer.max_error", "3"}}) {
+      std::vector<std::string> arguments = command;
+      arguments.insert(
+          arguments.end(),
+          {"--input_path", folder_ / std::to_string(sensors_per_rig),
+           "--rotations_path", folder_ / "rotations.txt"});
+      const KrotResult result = RunKrot(arguments);
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err,
+                  IsOneSentence("krot " + command[0],
+                                "are written a -b -c -d: they are world from "
+                                "camera, the inverse"));
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "output"));
+  }
+}
+
+// What the errors cannot decide is not refused.
+TEST_F(Known, RotationsInAnotherConventionAreAWarningWithoutPositions) {
+  Model model = SmallLegacyModel();
+  std::ofstream(folder_ / "rotations.txt")
+      << ChangedRotationLines(model, [](const Eigen::Quaterniond& q) {
+           return QuaternionWxyz{q.x(), q.y(), q.z(), q.w()};
+         });
+  model = WithoutTranslations(model);
+  Save(model, folder_ / "input");
+  const KrotResult result =
+      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
+  EXPECT_NE(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("warning: "));
+  EXPECT_THAT(result.err,
+              HasSubstr("are written d a b c: they are QX QY QZ QW"));
+}
+
+TEST_F(Known, RotationsInAnotherWorldFrameGiveTheSameModel) {
+  const Model model = SmallRigModel(2);
+  Save(model, folder_ / "input");
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(0.3, -0.5, 0.7, 0.2).normalized();
+  std::ofstream(folder_ / "rotations.txt") << ChangedRotationLines(
+      model, [&](const Eigen::Quaterniond& q) { return ToWxyz(q * turn); });
+  ASSERT_EQ(Solve("input", "plain").exit_code, 0);
+  const KrotResult result =
+      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("the list is in another world frame"));
+  EXPECT_NEAR(Report("output")["rotations"]["frame_turn_deg"],
+              Eigen::AngleAxisd(turn).angle() * 180 / M_PI, 1e-6);
+  EXPECT_LT(Report("output")["rotations"]["turn_deg"]["max"], 1e-6);
+  EXPECT_NEAR(Report("output")["cost_final"], Report("plain")["cost_final"],
+              1e-6);
+  const Model plain = Load(folder_ / "plain");
+  const Model output = Load(folder_ / "output");
+  for (size_t f = 0; f < plain.frames.size(); ++f) {
+    EXPECT_LT((Center(plain.frames[f].rig_from_world.Transform()) -
+               Center(output.frames[f].rig_from_world.Transform()))
+                  .norm(),
+              1e-3);
+  }
+}
+
+TEST_F(Known, RotationsThatAreInexactTellByHowMuchTheyTurn) {
+  const Model model = SmallLegacyModel();
+  Save(model, folder_ / "input");
+  const Eigen::Quaterniond error(
+      Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitX()));
+  int n = 0;
+  std::ofstream(folder_ / "rotations.txt")
+      << ChangedRotationLines(model, [&](const Eigen::Quaterniond& q) {
+           return ToWxyz((n++ % 2 == 0 ? error : error.conjugate()) * q);
+         });
+  const KrotResult result =
+      Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
+  EXPECT_THAT(result.err, HasSubstr("turned by 0.57 degrees in the median and "
+                                    "0.57 at most"));
+  EXPECT_THAT(result.err, ::testing::Not(HasSubstr("warning")));
+}
+
+TEST_F(Known, PosesWithTheirHalvesExchangedAreWarnedOf) {
+  Model model = SmallLegacyModel();
+  for (Image& image : model.images) {
+    const QuaternionWxyz q = image.cam_from_world.quaternion_wxyz;
+    const Eigen::Vector3d t = 3 * image.cam_from_world.translation;
+    image.cam_from_world = {{t[0], t[1], t[2], q[0]}, {q[1], q[2], q[3]}};
+  }
+  Save(model, folder_ / "input");
+  const KrotResult result =
+      RunKrot({"model_analyzer", "--path", folder_ / "input"});
+  EXPECT_EQ(result.exit_code, 0);
+  const std::string count = std::to_string(model.images.size());
+  EXPECT_THAT(result.err, HasSubstr("the quaternions of " + count + " of " +
+                                    count + " images are far from unit"));
+  EXPECT_THAT(result.err, HasSubstr("TX TY TZ and QW QX QY QZ exchanged"));
 }
 
 TEST_F(Known, RotationsThatCannotBeReadEndInOneSentence) {

@@ -160,6 +160,27 @@ TEST_F(Rigs, StayToTheBitThroughEveryCommand) {
   }
 }
 
+TEST_F(Rigs, WhoseImagesStandElsewhereAreWarnedOf) {
+  Model model = SynthesizeScene(ThreeSensors()).model;
+  Save(model, folder_ / "sound");
+  const Eigen::Quaterniond turn(
+      Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()));
+  for (size_t n = 0; n < 5; ++n) {
+    Pose& pose = model.images[n].cam_from_world;
+    pose.quaternion_wxyz =
+        ToWxyz(turn * NormalizedQuaternion(pose.quaternion_wxyz));
+  }
+  Save(model, folder_ / "stale");
+  EXPECT_EQ(RunKrot({"model_analyzer", "--path", folder_ / "sound"}).err, "");
+  const KrotResult result =
+      RunKrot({"model_analyzer", "--path", folder_ / "stale"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, ::testing::HasSubstr(
+                              "the poses of 5 of 24 images are not those that "
+                              "rigs and frames give them, rotations are off by "
+                              "11.46 degrees in the median and 11.46 at most"));
+}
+
 TEST_F(Rigs, OfAnImuHaveTheOptimumOfTheSameRigOfACamera) {
   const Model model = SynthesizeScene(ThreeSensors()).model;
   Model imu = model;

@@ -134,7 +134,7 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   }
   const std::string path = ModelPath(options, parser);
   CheckAnalyzerPaths(options, path, parser);
-  const auto [model, contradictions] =
+  const auto [model, contradictions, poses] =
       ReadValidModel(path, options.on_contradiction, options.common.log);
   const std::string certificate = CertificateText(options, model);
   ModelReport report = AnalyzeModel(model, options.num_worst);
@@ -146,6 +146,7 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   }
   if (!options.report_path.empty()) {
     WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));
+  report.poses = poses;
   }
   PrintTable(options.common.log,
              ModelTable(report, options.num_worst) + certificate);

@@ -203,9 +203,9 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   CheckComparerPaths(options, parser);
-  const auto [model1, contradictions1] = ReadValidModel(
+  const auto [model1, contradictions1, poses1] = ReadValidModel(
       options.input_path1, options.on_contradiction, options.common.log);
-  const auto [model2, contradictions2] = ReadValidModel(
+  const auto [model2, contradictions2, poses2] = ReadValidModel(
       options.input_path2, options.on_contradiction, options.common.log);
 
   BeginPhase(options.common.log, "comparing the models");

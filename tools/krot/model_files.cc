@@ -10,6 +10,7 @@
 #include "krot/model/file_bytes.h"
 #include "krot/model/model_error.h"
 #include "krot/model/validate.h"
+#include "krot/report/pose_words.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/run_log.h"
@@ -156,13 +157,17 @@ ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log) {
   LogInput(path);
-  ValidModel read;
   BeginPhase(log, "reading " + path);
+  ValidModel read;
   read.model = ReadModel(path, DetectModelFormat(path));
   read.contradictions = FindContradictions(read.model);
   const bool follows_images = on_contradiction == "follow_images";
   if (follows_images) FollowImages(&read.model);
   ValidateModel(read.model);
+  read.poses = CheckPoses(read.model);
+  for (const std::string& sentence : PoseSentences(read.poses)) {
+    LogLine(log, 1, "warning: " + path + ": " + sentence);
+  }
   if (!read.contradictions.Any()) return read;
   if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
   if (!SetsAnything(read.model)) return read;
@@ -180,15 +185,12 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log,
   ValidModel read =
       ReadValidModel(paths.input_path, paths.on_contradiction, log);
   run->contradictions = read.contradictions;
+  run->poses = read.poses;
   if (!paths.rotations_path.empty()) {
     LogInput(paths.rotations_path);
     run->rotations =
-        ReplaceRotations(ReadFileBytes(paths.rotations_path), &read.model);
-    LogLine(log, 1,
-            paths.rotations_path + ": the rotations of " +
-                Counted(run->rotations->num_frames, "frame") + "; " +
-                Counted(run->rotations->num_kept_images, "image") +
-                " without one, as the model has them");
+        TakeRotations(ReadFileBytes(paths.rotations_path), &read.model);
+    LogLine(log, 1, RotationsSentence(paths.rotations_path, *run->rotations));
   }
   run->seconds_read = timer.Seconds();
   return std::move(read.model);

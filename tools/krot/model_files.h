@@ -7,6 +7,7 @@
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 #include "krot/model/model_io.h"
+#include "krot/model/pose_checks.h"
 #include "krot/model/positions_file.h"
 #include "krot/report/run_record.h"
 #include "tools/krot/log.h"
@@ -67,10 +68,11 @@ void AddOnContradiction(std::string* on_contradiction, OptionParser* parser);
 struct ValidModel {
   Model model;
   Contradictions contradictions;  // that the files hold
+  PoseChecks poses;
 };
 
-// Reads and validates, and tells of contradictions on stderr. Throws
-// ModelError.
+// Reads and validates, and tells on stderr of contradictions and of what is odd
+// about the poses. Throws ModelError.
 ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log);

@@ -1,6 +1,8 @@
 #include "krot/model/rotations_file.h"
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/model/image_names.h"
 #include "krot/model/model_error.h"
+#include "krot/model/pose_checks.h"
 #include "krot/model/text_reader.h"
 
 namespace krot {
@@ -51,6 +54,13 @@ int32_t ReadImage(const ImageNames& names, TextReader* reader) {
   return names.Find(name, *reader);
 }
 
+// A line of the file.
+struct ListedRotation {
+  int32_t image = 0;  // index in Model::images
+  QuaternionWxyz cam_from_world;
+  size_t line = 0;
+};
+
 // What the lines so far say of a frame.
 struct NamedFrame {
   size_t line = 0;  // the first that does; 0: none
@@ -67,16 +77,30 @@ class Replacement {
         line_of_image_(model->images.size(), 0) {}
 
   void Read(const FileBytes& file);
-  ReplacedRotations Apply();
+  ReplacedRotations Apply(const std::string& path);
 
  private:
   void Add(int32_t image, const QuaternionWxyz& cam_from_world,
            const TextReader& reader);
+  // Of the listed images.
+  std::vector<Eigen::Quaterniond> OwnRotations() const;
+  // False where all frames have the same: a model without rotations, probably.
+  bool HasRotations() const;
+  // Which convention the lines are in, and which world frame, by comparison
+  // with the model's own rotations.
+  void Judge(ReplacedRotations* replaced);
+  void NameFrames(const ReplacedRotations& replaced, const std::string& path);
+  void CountTurns(const std::vector<Eigen::Quaterniond>& before,
+                  ReplacedRotations* replaced) const;
+  // The listed rotation of the rig, bit by bit where nothing turns it.
+  QuaternionWxyz RigFromWorld(const ListedRotation& listed) const;
   // False if the frame has this rotation already.
   bool Turn(const QuaternionWxyz& rig_from_world, Pose* frame) const;
 
   Model& model_;
   const std::vector<ImageGeometry> geometries_;
+  std::vector<ListedRotation> listed_;
+  std::optional<Eigen::Quaterniond> list_from_own_world_;  // none: the same
   std::vector<NamedFrame> named_;
   std::vector<size_t> line_of_image_;  // 0: none
 };
@@ -98,27 +122,96 @@ void Replacement::Add(int32_t image, const QuaternionWxyz& cam_from_world,
                     std::to_string(line_of_image_[image]) + " names it");
   }
   line_of_image_[image] = reader.line_number();
-  const ImageGeometry& geometry = geometries_[image];
-  const bool is_reference = geometry.sensor < 0;
-  const QuaternionWxyz rig_from_world =
-      is_reference
-          ? cam_from_world
-          : ToWxyz(
-                Eigen::Quaterniond(geometry.cam_from_rig.rotation).conjugate() *
-                NormalizedQuaternion(cam_from_world));
-  NamedFrame& frame = named_[geometry.frame];
-  if (frame.line == 0) {
-    frame = {reader.line_number(), rig_from_world};
-    return;
+  listed_.push_back({image, cam_from_world, reader.line_number()});
+}
+
+std::vector<Eigen::Quaterniond> Replacement::OwnRotations() const {
+  std::vector<Eigen::Quaterniond> rotations;
+  for (const ListedRotation& listed : listed_) {
+    rotations.emplace_back(geometries_[listed.image].cam_from_world.rotation);
   }
-  const double angle =
-      NormalizedQuaternion(frame.rig_from_world)
-          .angularDistance(NormalizedQuaternion(rig_from_world));
-  if (angle <= kSameRotation) return;
-  reader.Fail("a rotation " + std::to_string(angle) +
-                  " rad off the one that line " + std::to_string(frame.line) +
-                  " gives to the same frame",
-              "the same, or one line of a frame");
+  return rotations;
+}
+
+bool Replacement::HasRotations() const {
+  return std::any_of(
+      listed_.begin(), listed_.end(), [&](const ListedRotation& listed) {
+        return !geometries_[listed.image].rig_from_world.rotation.isApprox(
+            geometries_[listed_.front().image].rig_from_world.rotation,
+            kSameRotation);
+      });
+}
+
+void Replacement::Judge(ReplacedRotations* replaced) {
+  replaced->is_comparable = HasRotations();
+  if (!replaced->is_comparable) return;
+  std::vector<QuaternionWxyz> listed;
+  for (const ListedRotation& one : listed_) {
+    listed.push_back(one.cam_from_world);
+  }
+  const RotationAgreement agreement = CompareRotations(OwnRotations(), listed);
+  replaced->mistake = agreement.mistake;
+  if (!agreement.own_world_from_list || replaced->num_kept_images > 0) return;
+  list_from_own_world_ = agreement.own_world_from_list->conjugate();
+  replaced->frame_turn_deg =
+      AngleDeg(*agreement.own_world_from_list, Eigen::Quaterniond::Identity());
+}
+
+QuaternionWxyz Replacement::RigFromWorld(const ListedRotation& listed) const {
+  const ImageGeometry& geometry = geometries_[listed.image];
+  const bool is_reference = geometry.sensor < 0;
+  if (is_reference && !list_from_own_world_) return listed.cam_from_world;
+  Eigen::Quaterniond rotation = NormalizedQuaternion(listed.cam_from_world);
+  if (!is_reference) {
+    rotation = Eigen::Quaterniond(geometry.cam_from_rig.rotation).conjugate() *
+               rotation;
+  }
+  if (list_from_own_world_) rotation = rotation * *list_from_own_world_;
+  return ToWxyz(rotation);
+}
+
+void Replacement::NameFrames(const ReplacedRotations& replaced,
+                             const std::string& path) {
+  for (const ListedRotation& listed : listed_) {
+    const QuaternionWxyz rig_from_world = RigFromWorld(listed);
+    NamedFrame& frame = named_[geometries_[listed.image].frame];
+    if (frame.line == 0) {
+      frame = {listed.line, rig_from_world};
+      continue;
+    }
+    const double angle =
+        NormalizedQuaternion(frame.rig_from_world)
+            .angularDistance(NormalizedQuaternion(rig_from_world));
+    if (angle <= kSameRotation) continue;
+    if (!replaced.mistake.empty()) {
+      throw ModelError(path + ": " + replaced.mistake);
+    }
+    throw ModelError(path + ":" + std::to_string(listed.line) +
+                     ": found a rotation " + std::to_string(angle) +
+                     " rad off the one that line " +
+                     std::to_string(frame.line) +
+                     " gives to the same frame, expected the same, or one line "
+                     "of a frame");
+  }
+}
+
+void Replacement::CountTurns(const std::vector<Eigen::Quaterniond>& before,
+                             ReplacedRotations* replaced) const {
+  if (before.empty()) return;
+  std::vector<double> turns_deg;
+  for (size_t n = 0; n < before.size(); ++n) {
+    const int32_t image = listed_[n].image;
+    const ImageGeometry& geometry = geometries_[image];
+    const Eigen::Quaterniond after(
+        geometry.cam_from_rig.rotation *
+        model_.frames[geometry.frame].rig_from_world.Rotation());
+    turns_deg.push_back(AngleDeg(before[n], after));
+    if (turns_deg.back() > replaced->largest_turn_deg) {
+      replaced->largest_turn_deg = turns_deg.back();
+      replaced->largest_turn_image = model_.images[image].name;
+    }
+  }
+  replaced->median_turn_deg = Median(turns_deg);
 }
 
 bool Replacement::Turn(const QuaternionWxyz& rig_from_world,
@@ -134,27 +227,36 @@ bool Replacement::Turn(const QuaternionWxyz& rig_from_world,
   return true;
 }
 
-ReplacedRotations Replacement::Apply() {
+ReplacedRotations Replacement::Apply(const std::string& path) {
   ReplacedRotations replaced;
+  std::vector<char> is_named(named_.size(), 0);
+  for (const ListedRotation& listed : listed_) {
+    is_named[geometries_[listed.image].frame] = 1;
+  }
+  replaced.num_frames = std::count(is_named.begin(), is_named.end(), 1);
+  for (const ImageGeometry& geometry : geometries_) {
+    if (geometry.frame < 0 || is_named[geometry.frame] == 0) {
+      ++replaced.num_kept_images;
+    }
+  }
+  const std::vector<Eigen::Quaterniond> before = OwnRotations();
+  Judge(&replaced);
+  NameFrames(replaced, path);
   std::vector<char> is_turned(named_.size(), 0);
   for (size_t f = 0; f < named_.size(); ++f) {
-    if (named_[f].line == 0) continue;
-    ++replaced.num_frames;
+    if (is_named[f] == 0) continue;
     is_turned[f] =
         Turn(named_[f].rig_from_world, &model_.frames[f].rig_from_world);
   }
   for (size_t n = 0; n < model_.images.size(); ++n) {
     const ImageGeometry& geometry = geometries_[n];
-    if (geometry.frame < 0 || named_[geometry.frame].line == 0) {
-      ++replaced.num_kept_images;
-    } else if (is_turned[geometry.frame]) {
-      const Pose& frame = model_.frames[geometry.frame].rig_from_world;
-      model_.images[n].cam_from_world =
-          geometry.sensor < 0
-              ? frame
-              : ToPose(geometry.cam_from_rig * frame.Transform());
-    }
+    if (geometry.frame < 0 || is_turned[geometry.frame] == 0) continue;
+    const Pose& frame = model_.frames[geometry.frame].rig_from_world;
+    model_.images[n].cam_from_world =
+        geometry.sensor < 0 ? frame
+                            : ToPose(geometry.cam_from_rig * frame.Transform());
   }
+  CountTurns(before, &replaced);
   return replaced;
 }
 
@@ -163,7 +265,7 @@ ReplacedRotations Replacement::Apply() {
 ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model) {
   Replacement replacement(model);
   replacement.Read(file);
-  const ReplacedRotations replaced = replacement.Apply();
+  const ReplacedRotations replaced = replacement.Apply(file.path);
   if (replaced.num_frames == 0) {
     throw ModelError(file.path +
                      ": found no rotation, expected one on a line each");

@@ -1,16 +1,29 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "krot/model/file_bytes.h"
 #include "krot/model/model.h"
 
 namespace krot {
 
-// How far a file of rotations reached.
+// What a file of rotations did to a model.
 struct ReplacedRotations {
   int64_t num_frames = 0;       // that it names
   int64_t num_kept_images = 0;  // of frames that it does not name
+  // Whether the model's frames have rotations of their own, not all the same.
+  bool is_comparable = false;
+  // By how much the images that it names turn, degrees.
+  double median_turn_deg = 0;
+  double largest_turn_deg = 0;
+  std::string largest_turn_image;
+  // The file's world frame is turned against the model's by so much, which was
+  // taken off.
+  double frame_turn_deg = 0;
+  // Why the file is probably written in another convention, with the cure; ""
+  // if it is not.
+  std::string mistake;
 };
 
 // Replaces the rotations of the frames that a text file names (gyroscopes,
@@ -21,6 +34,12 @@ struct ReplacedRotations {
 // images of a frame are named, they have to agree to 1e-5 rad, and the first
 // decides. Frames keep their place, -R' t; those without a line, or with the
 // rotation that they have, keep their bits.
+//
+// A file that names all frames, and whose rotations agree with the model's own
+// much better after a rotation of the world, is of another world frame: its
+// rotations are turned into the model's. One that agrees much better still
+// with its numbers in another order, or inverted, is a mistake, probably: they
+// are taken as they stand, and `mistake` says so.
 //
 // Requires a valid model, and leaves one. Throws ModelError, with the line, for
 // what is no such line, for an image that the model does not have or has twice,

@@ -196,6 +196,7 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
       {"num_parameters", adjustment.num_parameters},
       {"left_out", LeftOutJson(LeftOutBy(adjustment))},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"poses", PosesJson(report.run.poses)},
       {"cost_initial", adjustment.cost_initial},
       {"cost_final", adjustment.cost_final},
       {"num_iterations", adjustment.num_iterations},

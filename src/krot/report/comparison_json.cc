@@ -60,15 +60,6 @@ Json WorstPointsJson(const std::vector<PointDifference>& points) {
   return json;
 }
 
-Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
-  if (!verdict) return Json();
-  return {{"lower_bound", verdict->lower_bound},
-          {"cost", NumberOrNull(verdict->cost)},
-          {"relative_gap", NumberOrNull(verdict->relative_gap)},
-          {"is_linearised", verdict->is_linearised},
-          {"num_support", verdict->support.size()}};
-}
-
 }  // namespace
 
 std::string AlignmentName(AlignmentKind kind) {

@@ -67,6 +67,7 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
       {"command", "model_analyzer"},
       {"colmap", ColmapJson(report.colmap)},
       {"contradictions", ContradictionsJson(report.contradictions)},
+      {"poses", PosesJson(report.poses)},
       {"pixel_error", CountedErrorJson(report.pixel_error)},
       {"cameras", CamerasJson(report.cameras)},
       {"images", ImageErrorsJson(report.images)},

@@ -10,13 +10,15 @@
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/model.h"
+#include "krot/model/pose_checks.h"
 
 namespace krot {
 
 // What a model's errors, tracks and depths look like: `krot model_analyzer`.
 struct ModelReport {
   ColmapStatistics colmap;
-  Contradictions contradictions;     // of the model as its files have it
+  Contradictions contradictions;  // of the model as its files have it
+  PoseChecks poses;
   PixelErrorStatistics pixel_error;  // true errors of all observations
   std::vector<ImageErrors> images;
   std::vector<CameraErrors> cameras;

@@ -213,6 +213,7 @@ std::string OutlierJson(const OutlierReport& report) {
       {"num_irreducible",
        summary.conflicts ? Json(summary.num_irreducible) : Json()},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},

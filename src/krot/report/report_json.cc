@@ -37,10 +37,39 @@ Json ContradictionsJson(const Contradictions& contradictions) {
           {"points2D", contradictions.num_points2D}};
 }
 
-Json RotationsJson(const std::optional<ReplacedRotations>& rotations) {
+Json PosesJson(const PoseChecks& poses) {
+  return {
+      {"num_far_quaternions", poses.num_far_quaternions},
+      {"is_exchanged", poses.is_exchanged},
+      {"num_stale_images", poses.num_stale},
+      {"stale_turn_deg",
+       {{"median", poses.median_turn_deg}, {"max", poses.largest_turn_deg}}}};
+}
+
+Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
+  if (!verdict) return Json();
+  return {{"lower_bound", verdict->lower_bound},
+          {"cost", NumberOrNull(verdict->cost)},
+          {"relative_gap", NumberOrNull(verdict->relative_gap)},
+          {"is_linearised", verdict->is_linearised},
+          {"num_support", verdict->support.size()},
+          {"num_fixed_frames", verdict->num_fixed_images},
+          {"num_fixed_points", verdict->num_fixed_points},
+          {"num_positions", verdict->positions.size()}};
+}
+
+Json RotationsJson(const std::optional<RotationInput>& rotations) {
   if (!rotations) return Json();
-  return {{"num_frames", rotations->num_frames},
-          {"num_kept_images", rotations->num_kept_images}};
+  const ReplacedRotations& replaced = rotations->replaced;
+  return {{"num_frames", replaced.num_frames},
+          {"num_kept_images", replaced.num_kept_images},
+          {"turn_deg",
+           {{"median", replaced.median_turn_deg},
+            {"max", replaced.largest_turn_deg}}},
+          {"frame_turn_deg", replaced.frame_turn_deg},
+          {"median_error_px",
+           {{"before", NumberOrNull(rotations->median_error_before)},
+            {"after", NumberOrNull(rotations->median_error_after)}}}};
 }
 
 std::string ReportText(const Json& json) {

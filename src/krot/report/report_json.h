@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/analysis/rotation_input.h"
+#include "krot/bridge/certificate_verdict.h"
 #include "krot/model/contradictions.h"
-#include "krot/model/rotations_file.h"
+#include "krot/model/pose_checks.h"
 #include "krot/report/problem_words.h"
 
 namespace krot {
@@ -32,8 +34,14 @@ Json LeftOutJson(const LeftOutCounts& left_out);
 // How often tracks and images contradict each other.
 Json ContradictionsJson(const Contradictions& contradictions);
 
+// What is odd about the poses.
+Json PosesJson(const PoseChecks& poses);
+
+// Null where there was no certificate.
+Json VerdictJson(const std::optional<CertificateVerdict>& verdict);
+
 // Null unless a file gave the rotations.
-Json RotationsJson(const std::optional<ReplacedRotations>& rotations);
+Json RotationsJson(const std::optional<RotationInput>& rotations);
 
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.

@@ -4,9 +4,10 @@
 #include <optional>
 #include <string>
 
+#include "krot/analysis/rotation_input.h"
 #include "krot/base/timer.h"
 #include "krot/model/contradictions.h"
-#include "krot/model/rotations_file.h"
+#include "krot/model/pose_checks.h"
 
 namespace krot {
 
@@ -14,8 +15,9 @@ namespace krot {
 struct RunRecord {
   std::string version;            // KROT's
   Contradictions contradictions;  // of the input
+  PoseChecks poses;               // likewise
   // Where the input's rotations were not its own.
-  std::optional<ReplacedRotations> rotations;
+  std::optional<RotationInput> rotations;
   double seconds_read = 0;  // wall clock
   double seconds_write = 0;
   double seconds_total = 0;

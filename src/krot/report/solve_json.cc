@@ -195,6 +195,7 @@ std::string SolveJson(const SolveReport& report) {
         {"support_point3D_ids", SameImageInSupport(summary)}}},
       {"outliers", OutliersJson(report.outliers)},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},
       {"fixed",
        {{"num_frames", summary.num_fixed_frames},
@@ -230,6 +231,8 @@ std::string SolveJson(const SolveReport& report) {
         {"write", report.run.seconds_write},
         {"total", report.run.seconds_total}}},
       {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"announced_memory_bytes",
+       {{"likely", summary.likely_bytes}, {"most", summary.largest_bytes}}},
       {"threads", report.run.threads},
       {"seed", report.run.seed},
   };

@@ -208,6 +208,7 @@ std::string ToleranceCsv(const ToleranceSummary& summary) {
       if (low.proved) csv << *low.proved;
       csv << ',' << low.reached << ',' << high.reached << ',';
       if (high.proved) csv << *high.proved;
+      {"poses", PosesJson(report.run.poses)},
       csv << '\n';
     }
   }

@@ -1,0 +1,74 @@
+#include "krot/analysis/rotation_input.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+// A model speaks against rotations if half of its observations fit with its
+// own, to this share of the image's larger side.
+constexpr double kFits = 0.01;
+// A wrong convention multiplies errors by far more than this.
+constexpr double kFarSmaller = 5;
+
+std::optional<double> MedianError(const Model& model, int num_threads) {
+  std::vector<double> errors = PixelErrors(model, num_threads);
+  if (errors.empty()) return std::nullopt;
+  for (double& error : errors) {
+    if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
+  }
+  const auto middle =
+      errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return std::isfinite(*middle) ? std::optional<double>(*middle) : std::nullopt;
+}
+
+double LargestSide(const Model& model) {
+  uint64_t side = 0;
+  for (const Camera& camera : model.cameras) {
+    side = std::max({side, camera.width, camera.height});
+  }
+  return static_cast<double>(side);
+}
+
+std::string Pixels(const std::optional<double>& error) {
+  std::ostringstream text;
+  if (error) text << std::fixed << std::setprecision(2) << *error << " px";
+  return error ? text.str() : "infinite, behind the cameras";
+}
+
+}  // namespace
+
+RotationInput TakeRotations(const FileBytes& file, Model* model,
+                            int num_threads) {
+  RotationInput input;
+  input.median_error_before = MedianError(*model, num_threads);
+  input.replaced = ReplaceRotations(file, model);
+  input.median_error_after = MedianError(*model, num_threads);
+  const bool model_fits =
+      input.median_error_before &&
+      *input.median_error_before <= kFits * LargestSide(*model);
+  if (input.replaced.mistake.empty() || !model_fits) return input;
+  const bool is_far_worse =
+      !input.median_error_after ||
+      kFarSmaller * *input.median_error_before < *input.median_error_after;
+  if (is_far_worse) {
+    throw ModelError(file.path + ": " + input.replaced.mistake +
+                     "; the median error is " +
+                     Pixels(input.median_error_before) +
+                     " with the model's own, with these " +
+                     Pixels(input.median_error_after));
+  }
+  return input;
+}
+
+}  // namespace krot
