@@ -1,11 +1,14 @@
 #include <algorithm>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/model/trivial_rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
@@ -362,6 +365,59 @@ TEST_F(Commands, ModelAnalyzerTakesAModelWithoutPoints) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, ::testing::HasSubstr("Points: 0\n"));
 }
+// However many cameras there are, the terminal gets the worst; a file gets all.
+TEST_F(Commands, ModelAnalyzerListsTheWorstOfManyCameras) {
+  SceneOptions options = SmallScene();
+  options.has_rigs = false;
+  options.num_frames = 30;
+  Model model = SynthesizeScene(options).model;
+  const Camera camera = model.cameras.front();
+  model.cameras.clear();
+  for (Image& image : model.images) {
+    image.camera_id = image.id + 100;
+    model.cameras.push_back(camera);
+    model.cameras.back().id = image.camera_id;
+  }
+  UseTrivialRigs(&model);
+  Save(model, folder_ / "input");
+  const KrotResult result =
+      RunKrot({"model_analyzer", "--path", folder_ / "input", "--report_path",
+               folder_ / "report.json", "--csv_path", folder_ / "errors.csv"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const size_t begin = result.out.find("By camera, pixels; the 10 of 30 with");
+  const size_t end = result.out.find("\nBy image");
+  ASSERT_NE(begin, std::string::npos) << result.out;
+  const std::string cameras = result.out.substr(begin, end - begin);
+  EXPECT_EQ(std::count(cameras.begin(), cameras.end(), '\n'), 2 + 10);
+
+  std::istringstream csv(ReadBytes(folder_ / "errors.csv"));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line,
+            "image_id,image_name,camera_id,num_images,num_observations,"
+            "num_not_finite,max_px,p99_px,mean_px,rms_px");
+  const Json report = Report();
+  for (const Json& expected : report["cameras"]) {
+    ASSERT_TRUE(std::getline(csv, line));
+    const std::string id = std::to_string(expected["camera_id"].get<int>());
+    EXPECT_THAT(line, ::testing::StartsWith(",," + id + ",1,"));
+    EXPECT_NEAR(std::stod(line.substr(line.rfind(',') + 1)),
+                expected["pixel_error"]["rms"], 1e-8);
+    const bool is_listed = cameras.find("\n  " + id + ",") != std::string::npos;
+    const auto num_worse = std::count_if(
+        report["cameras"].begin(), report["cameras"].end(),
+        [&](const Json& other) {
+          return other["pixel_error"]["max"] > expected["pixel_error"]["max"];
+        });
+    EXPECT_EQ(is_listed, num_worse < 10);
+  }
+  for (const Json& expected : report["images"]) {
+    ASSERT_TRUE(std::getline(csv, line));
+    EXPECT_THAT(line, ::testing::HasSubstr(expected["image_name"]));
+  }
+  EXPECT_FALSE(std::getline(csv, line));
+}
+
 
 TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
   const std::vector<std::string> arguments = {"model_synthesizer",

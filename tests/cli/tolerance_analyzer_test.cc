@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -84,6 +86,34 @@ TEST_F(ToleranceAnalyzer, TellsTheSameInTableReportCsvAndPage) {
   }
   EXPECT_FALSE(std::getline(csv, line));
   EXPECT_THAT(ReadBytes(folder_ / "p.html"), HasSubstr("boxes-section"));
+}
+
+TEST_F(ToleranceAnalyzer, ListsTheWidestOfManyBoxes) {
+  const KrotResult result = Analyze({"--num_worst", "2"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("the 2 widest of 6, --csv_path has all"));
+  const auto width = [](const Json& box) {
+    double largest = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      if (box["low"]["proved"][axis].is_null() ||
+          box["high"]["proved"][axis].is_null()) {
+        return std::numeric_limits<double>::infinity();
+      }
+      largest = std::max(largest, box["high"]["proved"][axis].get<double>() -
+                                      box["low"]["proved"][axis].get<double>());
+    }
+    return largest;
+  };
+  const Json boxes = Report()["boxes"];
+  for (const Json& box : boxes) {
+    const std::string name = box["image_name"];
+    const auto num_wider = std::count_if(
+        boxes.begin(), boxes.end(),
+        [&](const Json& other) { return width(other) > width(box); });
+    EXPECT_EQ(result.out.find("\n  " + name) != std::string::npos,
+              num_wider < 2)
+        << result.out;
+  }
 }
 
 // Of each model an end lies between what is proved and what is reached.

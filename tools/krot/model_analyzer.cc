@@ -21,6 +21,7 @@ struct AnalyzerOptions {
   std::string path;
   std::string input_path;
   std::string report_path;
+  std::string csv_path;
   std::string certificate_path;
   std::string error_colors_path;
   double error_colors_top = 4;
@@ -36,9 +37,13 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
   parser->AddPath("input_path", &options->input_path, false, "a folder",
                   "Another name for --path");
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
-                     "How many of the worst images and observations to list");
+                     "How many of the worst cameras, images and observations "
+                     "to list");
   parser->AddOutputFile("report_path", &options->report_path,
                         "Where the report goes, as JSON");
+  parser->AddOutputFile("csv_path", &options->csv_path,
+                        "Where the errors of all cameras and images go, as "
+                        "CSV");
   parser->AddPath("certificate_path", &options->certificate_path, false,
                   "a file",
                   "A certificate of this model: show what it proves, and the "
@@ -84,6 +89,7 @@ void CheckAnalyzerPaths(const AnalyzerOptions& options,
                         const std::string& input_path,
                         const OptionParser& parser) {
   CheckSidePath("report_path", options.report_path, options.error_colors_path);
+  CheckSidePath("csv_path", options.csv_path, options.error_colors_path);
   if (!options.error_colors_path.empty()) {
     if (IsSamePath(input_path, options.error_colors_path)) {
       throw OptionError("--error_colors_path = " + options.error_colors_path +
@@ -136,17 +142,20 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   CheckAnalyzerPaths(options, path, parser);
   const auto [model, contradictions, poses] =
       ReadValidModel(path, options.on_contradiction, options.common.log);
+  BeginPhase(options.common.log, "measuring its errors");
   const std::string certificate = CertificateText(options, model);
   ModelReport report = AnalyzeModel(model, options.num_worst);
   report.contradictions = contradictions;
+  report.poses = poses;
   DeferInterrupts();
   if (!options.error_colors_path.empty()) {
     WriteColoredCopy(options, path, model);
-  BeginPhase(options.common.log, "measuring its errors");
   }
   if (!options.report_path.empty()) {
     WriteFileAtomically(options.report_path, ModelJson(report, KROT_VERSION));
-  report.poses = poses;
+  }
+  if (!options.csv_path.empty()) {
+    WriteFileAtomically(options.csv_path, ModelCsv(report));
   }
   PrintTable(options.common.log,
              ModelTable(report, options.num_worst) + certificate);

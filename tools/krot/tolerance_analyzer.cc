@@ -21,6 +21,7 @@ namespace {
 struct ToleranceCommand {
   ModelPaths paths;  // without an output
   std::string csv_path;
+  int num_worst = 10;
   Context context;
   ToleranceArguments arguments;
   CommonOptions common;
@@ -37,6 +38,8 @@ void AddCommandOptions(ToleranceCommand* command, OptionParser* parser) {
                         "Where the report goes, as JSON");
   parser->AddOutputFile("csv_path", &command->csv_path,
                         "Where the boxes go, as CSV");
+  parser->AddInteger("num_worst", &command->num_worst, AtLeast(0),
+                     "How many boxes to list at most, the widest");
   AddHtmlPath(&paths->html_path, parser);
   AddOnContradiction(&paths->on_contradiction, parser);
   AddCommonOptions(
@@ -120,7 +123,7 @@ int Run(const ToleranceCommand& command) {
   }
   WriteReports(paths.report_path, paths.html_path, ToleranceJson(report), model,
                result.model, num_threads, log);
-  PrintTable(log, ToleranceTable(report));
+  PrintTable(log, ToleranceTable(report, command.num_worst));
   return kExitDone;
 }
 

@@ -82,7 +82,8 @@ std::vector<ImageErrors> ErrorsByImage(const Model& model,
   std::vector<ImageErrors> by_image;
   for (size_t n = 0; n < groups.size(); ++n) {
     by_image.push_back(
-        {model.images[n].id, model.images[n].name, Summarize(groups[n])});
+        {model.images[n].id, model.images[n].name, model.images[n].camera_id,
+         Summarize(groups[n])});
   }
   return by_image;
 }

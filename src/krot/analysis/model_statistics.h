@@ -33,6 +33,7 @@ ColmapStatistics ComputeColmapStatistics(const Model& model);
 struct ImageErrors {
   ImageId image_id = 0;
   std::string image_name;
+  CameraId camera_id = 0;
   PixelErrorStatistics errors;
 };
 struct CameraErrors {

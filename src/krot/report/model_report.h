@@ -35,9 +35,12 @@ struct ModelReport {
 ModelReport AnalyzeModel(const Model& model, int num_worst,
                          int num_threads = -1);
 
-// For the terminal: COLMAP's figures under COLMAP's names, then KROT's. The
-// images are the `max_images` with the largest errors.
-std::string ModelTable(const ModelReport& report, int max_images);
+// For the terminal: COLMAP's figures under COLMAP's names, then KROT's. Cameras
+// and images are the `max_rows` with the largest errors.
+std::string ModelTable(const ModelReport& report, int max_rows);
+
+// One line per camera, then per image, behind a line of names (docs/cli.md).
+std::string ModelCsv(const ModelReport& report);
 
 // The same as JSON, with all images; the keys are listed in docs/cli.md.
 std::string ModelJson(const ModelReport& report, const std::string& version);

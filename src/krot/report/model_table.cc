@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "krot/report/csv_text.h"
 #include "krot/report/error_rows.h"
 #include "krot/report/model_report.h"
 #include "krot/report/text_table.h"
@@ -40,33 +41,47 @@ std::string OverallErrors(const ModelReport& report) {
   return text;
 }
 
-std::string CameraErrorTable(const std::vector<CameraErrors>& cameras) {
+// "By image, pixels; the 10 of 96 with the largest errors"; keeps those alone.
+template <typename Errors>
+std::string KeepWorst(const std::string& name, size_t max_rows,
+                      std::vector<Errors>* all) {
+  const size_t total = all->size();
+  std::stable_sort(all->begin(), all->end(),
+                   [](const Errors& a, const Errors& b) {
+                     return a.errors.max > b.errors.max;
+                   });
+  all->resize(std::min(total, max_rows));
+  return "\nBy " + name + ", pixels" +
+         (all->size() < total
+              ? "; the " + std::to_string(all->size()) + " of " +
+                    std::to_string(total) + " with the largest errors"
+              : std::string()) +
+         "\n";
+}
+
+std::string CameraErrorTable(std::vector<CameraErrors> cameras,
+                             size_t max_cameras) {
+  const std::string head = KeepWorst("camera", max_cameras, &cameras);
   TextTable table;
   AddErrorHead("camera", &table);
   for (const CameraErrors& camera : cameras) {
     AddErrorRow(std::to_string(camera.camera_id) + ", " +
-                    std::to_string(camera.num_images) + " images",
+                    Counted(camera.num_images, "image"),
                 camera.errors, &table);
   }
-  return "\nBy camera, pixels\n" + table.ToString();
+  return head + table.ToString();
 }
 
 std::string ImageErrorTable(std::vector<ImageErrors> images,
                             size_t max_images) {
-  const std::string total = std::to_string(images.size());
-  std::stable_sort(images.begin(), images.end(),
-                   [](const ImageErrors& a, const ImageErrors& b) {
-                     return a.errors.max > b.errors.max;
-                   });
-  images.resize(std::min(images.size(), max_images));
+  const std::string head = KeepWorst("image", max_images, &images);
   TextTable table;
   AddErrorHead("image", &table);
   for (const ImageErrors& image : images) {
     AddErrorRow(std::to_string(image.image_id) + " " + image.image_name,
                 image.errors, &table);
   }
-  return "\nBy image, pixels; the " + std::to_string(images.size()) + " of " +
-         total + " with the largest errors\n" + table.ToString();
+  return head + table.ToString();
 }
 
 std::string WorstTable(const std::vector<WorstObservation>& worst) {
@@ -123,11 +138,38 @@ std::string GeometryTable(const ModelReport& report) {
 
 }  // namespace
 
-std::string ModelTable(const ModelReport& report, int max_images) {
+std::string ModelTable(const ModelReport& report, int max_rows) {
+  const auto num_rows = static_cast<size_t>(max_rows);
   return ColmapFigures(report.colmap) + OverallErrors(report) +
-         CameraErrorTable(report.cameras) +
-         ImageErrorTable(report.images, static_cast<size_t>(max_images)) +
-         WorstTable(report.worst) + TrackTable(report) + GeometryTable(report);
+         CameraErrorTable(report.cameras, num_rows) +
+         ImageErrorTable(report.images, num_rows) + WorstTable(report.worst) +
+         TrackTable(report) + GeometryTable(report);
+}
+
+std::string ModelCsv(const ModelReport& report) {
+  std::ostringstream csv;
+  csv.precision(9);
+  csv << "image_id,image_name,camera_id,num_images,num_observations,"
+         "num_not_finite,max_px,p99_px,mean_px,rms_px\n";
+  const auto add = [&](const PixelErrorStatistics& errors) {
+    csv << errors.count << ',' << errors.not_finite;
+    for (const double value :
+         {errors.max, errors.p99, errors.mean, errors.rms}) {
+      csv << ',';
+      if (errors.count > 0) csv << value;
+    }
+    csv << '\n';
+  };
+  for (const CameraErrors& camera : report.cameras) {
+    csv << ",," << camera.camera_id << ',' << camera.num_images << ',';
+    add(camera.errors);
+  }
+  for (const ImageErrors& image : report.images) {
+    csv << image.image_id << ',' << CsvText(image.image_name) << ','
+        << image.camera_id << ",1,";
+    add(image.errors);
+  }
+  return csv.str();
 }
 
 }  // namespace krot

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <vector>
 
@@ -33,6 +34,32 @@ int DecimalsFor(const std::vector<ToleranceBox>& boxes) {
 
 std::string EndText(const BoxEnd& end, int decimals) {
   return end.proved ? FormatNumber(*end.proved, decimals) : "-";
+}
+
+// The length of the longest side; infinite where an end is not proved.
+double Width(const ToleranceBox& box) {
+  double width = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const BoxEnd& low = box.box.low[axis];
+    const BoxEnd& high = box.box.high[axis];
+    if (!low.proved || !high.proved) {
+      return std::numeric_limits<double>::infinity();
+    }
+    width = std::max(width, *high.proved - *low.proved);
+  }
+  return width;
+}
+
+// In their order, or the widest of more than `max_rows`.
+std::vector<ToleranceBox> Listed(std::vector<ToleranceBox> boxes,
+                                 size_t max_rows) {
+  if (boxes.size() <= max_rows) return boxes;
+  std::stable_sort(boxes.begin(), boxes.end(),
+                   [](const ToleranceBox& a, const ToleranceBox& b) {
+                     return Width(a) > Width(b);
+                   });
+  boxes.resize(max_rows);
+  return boxes;
 }
 
 // How far beyond what was reached the worst proved end is, relative to the way
@@ -116,16 +143,23 @@ Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
 
 }  // namespace
 
-std::string ToleranceTable(const ToleranceReport& report) {
+std::string ToleranceTable(const ToleranceReport& report, int max_rows) {
   const ToleranceSummary& summary = report.summary;
-  const int decimals = DecimalsFor(summary.boxes);
+  const std::vector<ToleranceBox> listed =
+      Listed(summary.boxes, static_cast<size_t>(max_rows));
+  const int decimals = DecimalsFor(listed);
   std::string text =
       "What all estimates within " + FormatNumber(summary.max_error, 4) +
       " px have in common; rotations and intrinsics as given.\n" +
-      GaugeSentence(summary) + "\nNo such estimate lies outside (proved)\n";
+      GaugeSentence(summary) + "\nNo such estimate lies outside (proved)" +
+      (listed.size() < summary.boxes.size()
+           ? "; the " + std::to_string(listed.size()) + " widest of " +
+                 std::to_string(summary.boxes.size()) + ", --csv_path has all"
+           : std::string()) +
+      "\n";
   TextTable table;
   table.AddRow({"", "x from", "to", "y from", "to", "z from", "to"});
-  for (const ToleranceBox& box : summary.boxes) {
+  for (const ToleranceBox& box : listed) {
     std::vector<std::string> row = {
         box.is_image ? box.name : "point " + std::to_string(box.id)};
     for (int axis = 0; axis < 3; ++axis) {
@@ -174,6 +208,7 @@ std::string ToleranceJson(const ToleranceReport& report) {
       {"num_far_points", summary.num_far_points},
       {"num_programmes", summary.num_programmes},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},
       {"pixel_error",
        {{"before", ErrorJson(report.pixel_error_before)},
@@ -208,7 +243,6 @@ std::string ToleranceCsv(const ToleranceSummary& summary) {
       if (low.proved) csv << *low.proved;
       csv << ',' << low.reached << ',' << high.reached << ',';
       if (high.proved) csv << *high.proved;
-      {"poses", PosesJson(report.run.poses)},
       csv << '\n';
     }
   }

@@ -16,8 +16,9 @@ struct ToleranceReport {
   PixelErrorStatistics pixel_error_after;   // of the model around which
 };
 
-// For the terminal: what holds place and scale, and the proved boxes.
-std::string ToleranceTable(const ToleranceReport& report);
+// For the terminal: what holds place and scale, and the proved boxes; of more
+// than `max_rows` those that are not bounded, then the widest.
+std::string ToleranceTable(const ToleranceReport& report, int max_rows);
 
 // report.json; the keys are listed in docs/cli.md. An end without a proof is
 // null.
