@@ -61,10 +61,11 @@ export function showBounds(profile, onTake) {
 }
 
 // What it says in one sentence, and whether something is wrong.
-function conclude({ code, text = '', failure, last }, verdict) {
+function conclude({ code, files, failure, last }, verdict) {
   if (failure) return { sentence: `${failure}; ${last}`, isWrong: true };
   if (code !== 0) return { sentence: last, isWrong: true };
-  return { sentence: verdict(text), isWrong: false };
+  const report = JSON.parse(textOf(files, 'report.json'));
+  return { sentence: verdict(report), isWrong: false };
 }
 
 // `result` as Runner.run gives it, of a task with that verdict.

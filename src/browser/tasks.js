@@ -1,12 +1,27 @@
-// What the page can do, as commands of krot: `model` are files below model/, and
-// `verdict` makes one sentence of what is printed.
+// What the page can do, as commands of krot: `model` are files below model/. Each
+// writes report.json, of which `verdict` makes one sentence.
+
+import { counted, lowerBound, pixels } from '../krot/report/page/format.js';
+import { verdict } from '../krot/report/page/verdict.js';
 
 const kReports = ['report.json', 'page.html'];
 const kPaths = ['--report_path', 'report.json', '--html_path', 'page.html'];
 const kModels = ['--input_path', 'model', '--output_path', 'result'];
 
-function sentenceAt(pattern) {
-  return (text) => text.match(pattern)[0].replace(/\s+/g, ' ');
+function checkVerdict({ certificate, conflicts }) {
+  if (conflicts) {
+    return 'The conflicts hold: whatever the translations and points, at least ' +
+      `${counted(conflicts.num_conflicts, 'observation')} must go for all ` +
+      `others to be within ${pixels(conflicts.max_error)} px.`;
+  }
+  const { lower_bound: bound, cost } = certificate;
+  const given = certificate.num_fixed_frames + certificate.num_fixed_points +
+    certificate.num_positions > 0 ? 'with what it takes as known, ' : '';
+  return `The certificate holds: ${given}whatever the translations and ` +
+    `points, the largest error is at least ${lowerBound(bound)} px` +
+    (certificate.is_linearised ? ', linearised at the observations; ' : '; ') +
+    (cost === null ? 'this model has observations behind their cameras.' :
+      `this model has ${pixels(cost)} px.`);
 }
 
 export function analyze(model) {
@@ -20,7 +35,7 @@ export function analyze(model) {
 export function solve(model) {
   return {
     title: 'Lowering the largest error',
-    verdict: sentenceAt(/^Maximum .*$/m),
+    verdict,
     files: model,
     args: ['solver', ...kModels, ...kPaths,
       '--certificate_path', 'certificate.json'],
@@ -36,7 +51,7 @@ export function filter(model, bound) {
     ['--OutlierFilter.max_error', String(bound)];
   return {
     title: 'Looking for wrong observations',
-    verdict: sentenceAt(/^removed .*$/m),
+    verdict,
     files: model,
     args: ['outlier_filter', ...kModels, ...kPaths, ...chosen,
       '--conflicts_path', 'conflicts.json', '--outliers_path', 'outliers.csv'],
@@ -48,17 +63,19 @@ export function filter(model, bound) {
 export function check(model, certificate) {
   return {
     title: 'Checking the proof',
-    verdict: sentenceAt(/^The .*?\.$/ms),
+    verdict: checkVerdict,
     files: [...model, { path: 'proof/certificate.json', bytes: certificate }],
     args: ['certificate_checker', '--input_path', 'model',
-      '--certificate_path', 'proof/certificate.json'],
+      '--certificate_path', 'proof/certificate.json',
+      '--report_path', 'report.json'],
+    outputs: ['report.json'],
   };
 }
 
 export function compare(model, other) {
   return {
     title: 'Comparing the models',
-    verdict: () => 'How the two differ stands in the report.',
+    verdict,
     files: [...model, ...other],
     args: ['model_comparer', '--input_path1', 'model', '--input_path2', 'other',
       ...kPaths],

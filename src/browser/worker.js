@@ -15,12 +15,15 @@ function collect(FS, path) {
 }
 
 self.onmessage = async ({ data: { wasm, files, args, outputs } }) => {
-  const printed = [];
+  const printed = [];  // warnings among it
   try {
     const krot = await createKrot({
       wasmBinary: wasm,
       print: (line) => printed.push(line),
-      printErr: (line) => self.postMessage({ line }),
+      printErr: (line) => {
+        printed.push(line);
+        self.postMessage({ line });
+      },
     });
     for (const file of files) write(krot.FS, file);
     const code = krot.callMain(args);

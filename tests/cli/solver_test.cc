@@ -195,8 +195,15 @@ TEST_F(Commands, SolverWritesACertificateThatCheckerAndAnalyzerAccept) {
   for (const char* model : {"input", "output"}) {
     const KrotResult check =
         RunKrot({"certificate_checker", "--input_path", folder_ / model,
-                 "--certificate_path", certificate, "--num_worst", "1"});
+                 "--certificate_path", certificate, "--num_worst", "1",
+                 "--report_path", folder_ / "check.json"});
     EXPECT_EQ(check.exit_code, 0) << check.err;
+    const Json report = Json::parse(ReadBytes(folder_ / "check.json"));
+    EXPECT_EQ(report["command"], "certificate_checker");
+    EXPECT_GT(report["certificate"]["lower_bound"], 0);
+    EXPECT_LE(report["certificate"]["lower_bound"],
+              report["certificate"]["cost"]);
+    EXPECT_TRUE(report["conflicts"].is_null());
     EXPECT_THAT(check.out, ::testing::HasSubstr("worst first; the first 1\n"));
   }
   const KrotResult analysis =
@@ -358,13 +365,6 @@ TEST_F(Commands, ModelAnalyzerListsTheWorstObservations) {
             result.out);
 }
 
-TEST_F(Commands, ModelAnalyzerTakesAModelWithoutPoints) {
-  Save(WithShortTracks(SmallLegacyModel(), 0), folder_ / "input");
-  const KrotResult result =
-      RunKrot({"model_analyzer", "--path", folder_ / "input"});
-  EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.out, ::testing::HasSubstr("Points: 0\n"));
-}
 // However many cameras there are, the terminal gets the worst; a file gets all.
 TEST_F(Commands, ModelAnalyzerListsTheWorstOfManyCameras) {
   SceneOptions options = SmallScene();
@@ -418,6 +418,13 @@ TEST_F(Commands, ModelAnalyzerListsTheWorstOfManyCameras) {
   EXPECT_FALSE(std::getline(csv, line));
 }
 
+TEST_F(Commands, ModelAnalyzerTakesAModelWithoutPoints) {
+  Save(WithShortTracks(SmallLegacyModel(), 0), folder_ / "input");
+  const KrotResult result =
+      RunKrot({"model_analyzer", "--path", folder_ / "input"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("Points: 0\n"));
+}
 
 TEST_F(Commands, ModelSynthesizerMakesWhatItsOptionsSay) {
   const std::vector<std::string> arguments = {"model_synthesizer",

@@ -13,9 +13,6 @@ models=$(realpath "$2")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# In MB: "241.7 MB", "1.2 GB".
-megabytes() { awk '{ print $2 == "GB" ? 1000 * $1 : $2 == "KB" ? $1 / 1000 : $1 }'; }
-
 cat <<'TABLE'
 | model | start | announced | at most | peak | announced / peak |
 |---|---|---:|---:|---:|---:|
@@ -24,18 +21,14 @@ for model in "$models"/*/; do
   for init in model feasible; do
     "$krot" solver --input_path "$model" --output_path "$work/output" \
       --overwrite 1 --Solver.init "$init" --report_path "$work/report.json" \
-      >/dev/null 2>"$work/log" || continue
-    announced=$(sed -n 's/.*; about \([0-9.]* .B\) will be needed.*/\1/p' \
-      "$work/log" | megabytes)
-    at_most=$(sed -n 's/.* at most \([0-9.]* .B\) if the joint.*/\1/p' \
-      "$work/log" | megabytes)
-    [[ -n $announced ]] || continue
-    jq -r --arg name "$(basename "$model")" --arg init "$init" \
-      --arg announced "$announced" --arg at_most "${at_most:--}" '
-      (.peak_memory_bytes / 1e6) as $peak
-      | "| \($name) | \($init) | \($announced) | \($at_most)"
-        + " | \($peak * 10 | round / 10)"
-        + " | \(($announced | tonumber) / $peak * 100 | round / 100) |"' \
+      --log_level 0 >/dev/null 2>&1 || continue
+    jq -r --arg name "$(basename "$model")" --arg init "$init" '
+      def megabytes: . / 1e5 | round / 10;
+      .announced_memory_bytes as {$likely, $most}
+      | "| \($name) | \($init) | \($likely | megabytes)"
+        + " | \(if $most > $likely then $most | megabytes else "-" end)"
+        + " | \(.peak_memory_bytes | megabytes)"
+        + " | \($likely / .peak_memory_bytes * 100 | round / 100) |"' \
       "$work/report.json"
   done
 done

@@ -29,15 +29,14 @@ for observations in "$@"; do
   "$krot" solver --input_path "$work/street" --output_path "$work/solved" \
     --overwrite 1 --report_path "$work/report.json" --Solver.num_threads 2 \
     --Solver.relative_gap "$gap" >"$work/log" 2>&1
-  announced=$(sed -nE 's/.* about ([0-9.]+) (.)B will.* most ([0-9.]+) (.)B .*/\1 \2 \3 \4/p' \
-    "$work/log" | awk '{ print $1 * ($2 == "G" ? 1000 : 1),
-                               $3 * ($4 == "G" ? 1000 : 1) }')
-  lowest_rms=$(sed -nE 's/.*alone left ([0-9.]+) px\./\1/p' "$work/log")
-  jq -r --arg lowest "$lowest_rms" --arg announced "$announced" '
+  jq -r '
     (.seconds.solve - .finish.seconds) as $before
     | [.num_observations, .num_frames, $before,
        .finish.seconds, .finish.seconds / $before, .finish.num_iterations,
-       $lowest, .pixel_error.after.rms, $announced, .peak_memory_bytes / 1e6]
+       (2 * .finish.cost_initial / .num_observations | sqrt),
+       .pixel_error.after.rms,
+       (.announced_memory_bytes | .likely, .most | . / 1e6),
+       .peak_memory_bytes / 1e6]
     | map(tostring) | join(" ")' "$work/report.json" | awk '{
       printf "| %d | %d | %.1f | %.1f | %.2f | %d | %.4f | %.4f | %.0f | %.0f | %.0f |\n",
              $1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11 }'

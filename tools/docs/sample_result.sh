@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Makes docs/images/sample_result.svg: how many observations of the bundled
 # sample have an error above x pixels, before and after `krot solver`. Solves
-# the sample with build/krot, or with the executable in KROT. Needs awk and
-# gnuplot.
+# the sample with build/krot, or with the executable in KROT. Needs awk, jq
+# and gnuplot.
 #
 # Usage: tools/docs/sample_result.sh
 set -euo pipefail
@@ -17,12 +17,11 @@ trap 'rm -rf "$work"' EXIT
 errors() {
   "$krot" model_analyzer --path "$1" --num_worst 1000000 \
     --report_path "$work/report.json" --log_level 0 >/dev/null
-  awk -F': ' '/"error_px":/ {
+  jq '.worst[].error_px' "$work/report.json" | awk '{
     if (++rank < next_rank) next
     next_rank = rank * 1.03
-    sub(/,$/, "", $2)
-    print rank, $2
-  }' "$work/report.json"
+    print rank, $1
+  }'
 }
 
 "$krot" solver --input_path "$root/tools/sample/model" \

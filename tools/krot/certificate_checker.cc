@@ -1,10 +1,13 @@
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_verdict.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/outlier_report.h"
+#include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
@@ -16,6 +19,7 @@ struct CheckerOptions {
   std::string input_path;
   std::string certificate_path;
   std::string on_contradiction = "follow_tracks";
+  std::string report_path;
   int num_worst = 10;
   CommonOptions common;
 };
@@ -25,6 +29,8 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
                   "The COLMAP model that the certificate speaks of");
   parser->AddPath("certificate_path", &options->certificate_path, true,
                   "a file", "The certificate, or conflicts, as JSON");
+  parser->AddOutputFile("report_path", &options->report_path,
+                        "Where the report goes, as JSON");
   AddOnContradiction(&options->on_contradiction, parser);
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many observations of the support to list");
@@ -59,6 +65,7 @@ int CheckCertificate(const CheckerOptions& options, const std::string& json) {
   const CertificateVerdict verdict =
       VerifyCertificateFile(ReadSubject(options), file);
   RequireAccepted(verdict);
+  WriteReport(options, verdict, std::nullopt);
   PrintTable(options.common.log, CertificateTable(verdict, options.num_worst));
   return kExitDone;
 }
@@ -68,6 +75,7 @@ int CheckConflicts(const CheckerOptions& options, const std::string& json) {
   const ConflictVerdict verdict =
       VerifyConflictFile(ReadSubject(options), file);
   RequireAccepted(verdict);
+  WriteReport(options, std::nullopt, verdict);
   PrintTable(options.common.log, ConflictTable(verdict));
   return kExitDone;
 }
@@ -86,6 +94,7 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
     PrintTable(options.common.log, parser.Help());
     return kExitDone;
   }
+  CheckSidePath("report_path", options.report_path);
   const std::string json = ReadCertificateText(options.certificate_path);
   return HoldsConflicts(json) ? CheckConflicts(options, json)
                               : CheckCertificate(options, json);

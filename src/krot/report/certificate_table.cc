@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -82,11 +83,27 @@ std::string CertificateTable(const CertificateVerdict& verdict,
                                      ? Scientific(*verdict.relative_gap)
                                      : "-"});
   return "The certificate holds: whatever the translations and points, the "
-         "largest error is at least\nthe lower bound, in pixels.\n" +
+         "largest\nerror is at least the lower bound, in pixels.\n" +
          FixedSentence(verdict) + PositionsSentence(verdict) +
          LinearisedSentence(verdict) + bounds.ToString() +
          SupportTable(verdict.support, max_observations) +
          PositionsTable(verdict.positions, max_observations);
+}
+
+std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
+                      const std::optional<ConflictVerdict>& conflicts,
+                      const std::string& version) {
+  Json of_conflicts;
+  if (conflicts) {
+    of_conflicts = {{"max_error", conflicts->max_error},
+                    {"num_conflicts", conflicts->num_conflicts},
+                    {"num_observations", conflicts->num_observations}};
+  }
+  const Json json = {{"version", version},
+                     {"command", "certificate_checker"},
+                     {"certificate", VerdictJson(certificate)},
+                     {"conflicts", of_conflicts}};
+  return ReportText(json);
 }
 
 }  // namespace krot

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/bridge/conflict_verdict.h"
 
 namespace krot {
 
@@ -19,5 +21,10 @@ std::string SupportTable(const std::vector<SupportObservation>& support,
 // own cost and gap, and the `max_observations` worst of the support.
 std::string CertificateTable(const CertificateVerdict& verdict,
                              int max_observations);
+
+// report.json of certificate_checker for what it accepted: one of the two.
+std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
+                      const std::optional<ConflictVerdict>& conflicts,
+                      const std::string& version);
 
 }  // namespace krot

@@ -63,6 +63,10 @@ export function verdict(report) {
     return 'No better estimate was found: the model is the one that was read.' +
       polishSentence(report);
   }
+  if (report.termination === 'zero_cost') {
+    return 'Every error is zero up to rounding; nothing is left to lower.' +
+      polishSentence(report);
+  }
   const sentence = `The largest error ${movement(before.max, after.max, 2)}`;
   return sentence + (report.certified ? proof(report) :
     '; whether it can be lower was not proved.') + polishSentence(report);
