@@ -140,7 +140,7 @@ TEST_F(BundleAdjuster, TellsOfTheSolveThatItsCapRefersTo) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const size_t sweep = result.err.find("\nsweep 1: cost ");
   const size_t joint = result.err.find("\niteration 1: cost ");
-  const size_t adjustment = result.err.find("trust region ");
+  const size_t adjustment = result.err.find("barrier ");
   EXPECT_LT(sweep, joint);
   EXPECT_LT(joint, adjustment);
   EXPECT_LT(adjustment, result.err.size());

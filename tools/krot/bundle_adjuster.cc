@@ -24,12 +24,15 @@ Progress ProgressOf(const BundleAdjustmentIteration& iteration) {
   } else {
     line += "step rejected";
   }
-  if (iteration.cap) line += ", cap " + FormatNumber(*iteration.cap, 4) + " px";
+  if (iteration.cap) {
+    line += ", cap " + FormatNumber(*iteration.cap, 4) + " px";
+  } else {
+    line += ", trust region " + Scientific(iteration.radius);
+  }
   if (iteration.barrier) {
     line += ", barrier " + Scientific(*iteration.barrier);
   }
-  line += ", " + FormatNumber(iteration.seconds, 2) + " s, trust region " +
-          Scientific(iteration.radius);
+  line += ", " + FormatNumber(iteration.seconds, 2) + " s";
   return {"adjustment", line, std::nullopt};
 }
 

@@ -16,7 +16,7 @@ namespace krot {
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
 // The upper one of the middle, of at least one value.
-double Median(std::vector<double> values);
+double MedianAngle(std::vector<double> values);
 
 // What is odd about the poses of a model that can be read all the same.
 struct PoseChecks {

@@ -211,7 +211,7 @@ void Replacement::CountTurns(const std::vector<Eigen::Quaterniond>& before,
       replaced->largest_turn_image = model_.images[image].name;
     }
   }
-  replaced->median_turn_deg = Median(turns_deg);
+  replaced->median_turn_deg = MedianAngle(turns_deg);
 }
 
 bool Replacement::Turn(const QuaternionWxyz& rig_from_world,
