@@ -76,7 +76,7 @@ void Follow(const Progress& progress, SolveModelOptions* options) {
 
 Outcome RunSolve(const ConstModelPointer& model, TolerantSolveOptions options,
                  Context context, const Progress& progress,
-                 const std::string& command) {
+                 const std::string& command, const RunRecord& run) {
   const Timer timer;
   Follow(progress, &options.solve);
   options.solve.describe_certificate = true;
@@ -86,6 +86,7 @@ Outcome RunSolve(const ConstModelPointer& model, TolerantSolveOptions options,
     result = SolveTolerantly(*model, options, context);
   });
   SolveReport report;
+  report.run = run;
   RecordEnd(timer, context.num_threads, &report.run);
   report.command = command;
   report.method = MethodName(result.summary.method);
@@ -111,10 +112,11 @@ Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
   known.AddPositionsTo(&table);
   AssignKeywords(keywords, &table);
   ResolveSolverOptions(table, &options.solve);
-  const ConstModelPointer input = known.WithRotations(model);
+  RunRecord run;
+  const ConstModelPointer input = known.WithRotations(model, &run);
   options.solve.problem.fixed = known.Fixed(*input);
   options.solve.problem.positions = known.Positions(*input);
-  return RunSolve(input, options, context, progress, "solver");
+  return RunSolve(input, options, context, progress, "solver", run);
 }
 
 Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
@@ -126,7 +128,7 @@ Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
   AssignKeywords(keywords, &table);
   CheckSolveOptions(options.solve, table);
   options.solve = PointsOnly(options.solve);
-  return RunSolve(model, options, context, progress, "point_triangulator");
+  return RunSolve(model, options, context, progress, "point_triangulator", {});
 }
 
 Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
@@ -139,14 +141,14 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
   KnownFiles known;
   known.AddRotationsTo(&table);
   AssignKeywords(keywords, &table);
-  const ConstModelPointer input = known.WithRotations(model);
+  OutlierReport report;
+  const ConstModelPointer input = known.WithRotations(model, &report.run);
   Follow(progress, &options.solve);
   OutlierFilterResult result;
   RunInterruptibly([&](const CancelFlag& cancel) {
     context.cancel = &cancel;
     result = FilterOutliers(*input, options, context);
   });
-  OutlierReport report;
   RecordEnd(timer, context.num_threads, &report.run);
   report.summary = std::move(result.summary);
   Outcome outcome{std::make_shared<Model>(std::move(result.model)),
@@ -188,12 +190,12 @@ Outcome ToleranceCommand(const ModelPointer& model, const Progress& progress,
   known.AddRotationsTo(&table);
   known.AddFixedTo(&table);
   AssignKeywords(keywords, &table);
-  const ConstModelPointer input = known.WithRotations(model);
+  ToleranceReport report;
+  const ConstModelPointer input = known.WithRotations(model, &report.run);
   ToleranceOptions options = ResolveToleranceOptions(arguments, *input);
   options.solve.problem.fixed = known.Fixed(*input);
   Follow(progress, &options.solve);
   ToleranceResult result;
-  ToleranceReport report;
   RunInterruptibly([&](const CancelFlag& cancel) {
     context.cancel = &cancel;
     result = AnalyzeTolerances(*input, options, context);

@@ -30,10 +30,11 @@ void KnownFiles::AddPositionsTo(OptionTable* table) {
 }
 
 std::shared_ptr<const Model> KnownFiles::WithRotations(
-    const std::shared_ptr<Model>& model) const {
+    const std::shared_ptr<Model>& model, RunRecord* run) const {
+  run->poses = CheckPoses(*model);
   if (rotations_path_.empty()) return model;
   auto turned = std::make_shared<Model>(*model);
-  TakeRotations(ReadFileBytes(rotations_path_), turned.get());
+  run->rotations = TakeRotations(ReadFileBytes(rotations_path_), turned.get());
   return turned;
 }
 

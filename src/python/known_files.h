@@ -8,6 +8,7 @@
 #include "krot/model/model.h"
 #include "krot/model/positions_file.h"
 #include "krot/options/option_table.h"
+#include "krot/report/run_record.h"
 
 namespace krot {
 
@@ -19,9 +20,10 @@ class KnownFiles {
   void AddFixedTo(OptionTable* table);
   void AddPositionsTo(OptionTable* table);
 
-  // The model, or a copy with the file's rotations.
+  // The model, or a copy with the file's rotations; records what they did, and
+  // what is odd about the poses.
   std::shared_ptr<const Model> WithRotations(
-      const std::shared_ptr<Model>& model) const;
+      const std::shared_ptr<Model>& model, RunRecord* run) const;
   FixedParts Fixed(const Model& model) const;
   std::vector<KnownPosition> Positions(const Model& model) const;
 

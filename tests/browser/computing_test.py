@@ -33,6 +33,16 @@ class Computing(KrotPage):
             "document.querySelector('#report').contentDocument?.title ?? "
             "'KROT: (another origin)'), 500))"))
 
+    def test_solves_a_model_without_errors(self):
+        scene = self.root / "exact"
+        krot("model_synthesizer", "--output_path", scene,
+             "--Scene.num_frames", 6, "--Scene.num_points", 60)
+        self.give(scene)
+        self.assertRegex(self.submit("#solve"),
+                         "^(Every error is zero up to rounding|The largest "
+                         "error stayed at 0.00 px)")
+        self.assertFalse(self.is_wrong("#sentence"))
+
     def test_reads_a_zip_and_writes_text_for_text(self):
         self.give(zipped(self.root / "scene", self.root / "scene.zip"),
                   "#choose-files")

@@ -99,6 +99,7 @@ int Run(const std::vector<std::string>& arguments, MpiRanks* ranks) {
 [[noreturn]] void Fail(std::string message, int exit_code, MpiRanks* ranks) {
   constexpr auto kPrecedence = std::chrono::seconds(1);
   if (!ranks->IsFirst()) std::this_thread::sleep_for(kPrecedence);
+  EndProgress();
   std::replace(message.begin(), message.end(), '\n', ' ');
   std::cerr << "krot_mpi: " +
                    (ranks->IsFirst()

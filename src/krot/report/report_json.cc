@@ -61,15 +61,17 @@ Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
 Json RotationsJson(const std::optional<RotationInput>& rotations) {
   if (!rotations) return Json();
   const ReplacedRotations& replaced = rotations->replaced;
-  return {{"num_frames", replaced.num_frames},
-          {"num_kept_images", replaced.num_kept_images},
-          {"turn_deg",
-           {{"median", replaced.median_turn_deg},
-            {"max", replaced.largest_turn_deg}}},
-          {"frame_turn_deg", replaced.frame_turn_deg},
-          {"median_error_px",
-           {{"before", NumberOrNull(rotations->median_error_before)},
-            {"after", NumberOrNull(rotations->median_error_after)}}}};
+  return {
+      {"num_frames", replaced.num_frames},
+      {"num_kept_images", replaced.num_kept_images},
+      {"turn_deg",
+       {{"median", replaced.median_turn_deg},
+        {"max", replaced.largest_turn_deg}}},
+      {"frame_turn_deg", replaced.frame_turn_deg},
+      {"median_error_px",
+       {{"before", NumberOrNull(rotations->median_error_before)},
+        {"after", NumberOrNull(rotations->median_error_after)}}},
+      {"mistake", replaced.mistake.empty() ? Json() : Json(replaced.mistake)}};
 }
 
 std::string ReportText(const Json& json) {
