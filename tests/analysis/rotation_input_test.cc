@@ -24,10 +24,11 @@ Model Scene() {
   return SynthesizeScene(options).model;
 }
 
-FileBytes InverseRotations(const Model& model) {
+FileBytes InverseRotations(const Model& model, size_t num_images = 8) {
   std::ostringstream lines;
   lines.precision(17);
-  for (const Image& image : model.images) {
+  for (size_t n = 0; n < num_images; ++n) {
+    const Image& image = model.images[n];
     const QuaternionWxyz& q = image.cam_from_world.quaternion_wxyz;
     lines << image.name << " " << q[0] << " " << -q[1] << " " << -q[2] << " "
           << -q[3] << "\n";
@@ -43,6 +44,14 @@ TEST(TakeRotations, RefusesInverseOnesThatTheErrorsSpeakAgainst) {
       ::testing::AllOf(HasSubstr("r.txt: found rotations that are "),
                        HasSubstr("the median error is 0."),
                        HasSubstr(" with the model's own, with these ")));
+}
+
+// Most observations are of images that it does not name.
+TEST(TakeRotations, RefusesInverseOnesOfAFewImages) {
+  Model model = Scene();
+  const FileBytes file = InverseRotations(model, 3);
+  EXPECT_THAT(ModelErrorOf([&] { TakeRotations(file, &model); }),
+              HasSubstr("r.txt: found rotations that are "));
 }
 
 // The list is right, and the model's own rotations are the inverse ones.

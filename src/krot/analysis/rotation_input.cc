@@ -6,6 +6,7 @@
 #include <limits>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "krot/analysis/pixel_errors.h"
@@ -20,8 +21,7 @@ constexpr double kFits = 0.01;
 // A wrong convention multiplies errors by far more than this.
 constexpr double kFarSmaller = 5;
 
-std::optional<double> MedianError(const Model& model, int num_threads) {
-  std::vector<double> errors = PixelErrors(model, num_threads);
+std::optional<double> Median(std::vector<double> errors) {
   if (errors.empty()) return std::nullopt;
   for (double& error : errors) {
     if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
@@ -30,6 +30,21 @@ std::optional<double> MedianError(const Model& model, int num_threads) {
       errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
   std::nth_element(errors.begin(), middle, errors.end());
   return std::isfinite(*middle) ? std::optional<double>(*middle) : std::nullopt;
+}
+
+// Leaves those that differ, if any do: those of the images that were turned.
+void KeepChanged(std::vector<double>* before, std::vector<double>* after) {
+  size_t num_kept = 0;
+  for (size_t n = 0; n < before->size(); ++n) {
+    const double was = (*before)[n];
+    const double is = (*after)[n];
+    if (was == is || (std::isnan(was) && std::isnan(is))) continue;
+    (*before)[num_kept] = was;
+    (*after)[num_kept++] = is;
+  }
+  if (num_kept == 0) return;
+  before->resize(num_kept);
+  after->resize(num_kept);
 }
 
 double LargestSide(const Model& model) {
@@ -51,9 +66,12 @@ std::string Pixels(const std::optional<double>& error) {
 RotationInput TakeRotations(const FileBytes& file, Model* model,
                             int num_threads) {
   RotationInput input;
-  input.median_error_before = MedianError(*model, num_threads);
+  std::vector<double> before = PixelErrors(*model, num_threads);
   input.replaced = ReplaceRotations(file, model);
-  input.median_error_after = MedianError(*model, num_threads);
+  std::vector<double> after = PixelErrors(*model, num_threads);
+  KeepChanged(&before, &after);
+  input.median_error_before = Median(std::move(before));
+  input.median_error_after = Median(std::move(after));
   const bool model_fits =
       input.median_error_before &&
       *input.median_error_before <= kFits * LargestSide(*model);

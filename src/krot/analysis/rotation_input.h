@@ -12,8 +12,9 @@ namespace krot {
 // its errors while cameras and points stay where they are.
 struct RotationInput {
   ReplacedRotations replaced;
-  // The median of all pixel errors, those without a finite one at the upper
-  // end; none where it is one of these.
+  // The median pixel error of the observations of images that turn, those
+  // without a finite one at the upper end; none where it is one of these. Of
+  // all observations where none turns.
   std::optional<double> median_error_before;
   std::optional<double> median_error_after;
 };
