@@ -323,6 +323,44 @@ TEST_F(Scripts, TakeBundleAdjustmentInTheLargeToColmapWithItsErrors) {
   }
 }
 
+// As Notepad saves it: with a byte order mark and CR LF.
+std::string OfWindows(const std::string& text) {
+  std::string bytes = "\xef\xbb\xbf";
+  for (const char c : text) bytes += c == '\n' ? "\r\n" : std::string(1, c);
+  return bytes;
+}
+
+TEST_F(Scripts, TakeTextsOfWindows) {
+  const std::string text = MakeBalProblem(2, 3).text;
+  WriteBytes(folder_ / "unix.txt", text);
+  WriteBytes(folder_ / "windows.txt", OfWindows(text));
+  for (const char* name : {"unix", "windows"}) {
+    const ScriptResult result =
+        RunScript("bal_to_colmap.sh",
+                  {"--input_path", folder_ / (std::string(name) + ".txt"),
+                   "--output_path", folder_ / name});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+  EXPECT_THAT(Load(folder_ / "windows"), IsModel(Load(folder_ / "unix")));
+}
+
+TEST_F(Scripts, SayOfPackedFilesWhatUnpacksThem) {
+  for (const auto& [bytes, program] :
+       std::vector<std::pair<std::string, std::string>>{
+           {"BZh91AY&SY", "bunzip2"},
+           {"\x1f\x8b\x08", "gunzip"},
+           {"\xfd"
+            "7zXZ",
+            "unxz"},
+           {"PK\x03\x04", "unzip"}}) {
+    WriteBytes(folder_ / "problem.txt.packed", bytes);
+    ExpectRefused("bal_to_colmap.sh",
+                  {"--input_path", folder_ / "problem.txt.packed",
+                   "--output_path", folder_ / "output"},
+                  "is packed; unpack it with " + program);
+  }
+}
+
 TEST_F(Scripts, RefuseWhatIsNoProblemOfBundleAdjustmentInTheLarge) {
   const std::string text = MakeBalProblem(2, 3).text;
   int i = 0;
@@ -387,11 +425,27 @@ TEST_F(Scripts, TakeGeodeticCoordinatesToALocalFrame) {
               1e-5);
 
   ExpectRefused("geodetic_to_positions.sh", arguments, "exists");
+  // The same with a header, commas, blanks in names, and without radii.
+  WriteBytes(
+      folder_ / "gps.csv",
+      OfWindows("name,lat,lon,height\n"
+                "my a.jpg,48.1,16.2,200\nmy b.jpg\t48.102\t16.197\t231.5\n"));
+  const ScriptResult table =
+      RunScript("geodetic_to_positions.sh",
+                {"--origin", "48.1 16.2 200", "--input_path",
+                 folder_ / "gps.csv", "--output_path", folder_ / "table.txt"});
+  ASSERT_EQ(table.exit_code, 0) << table.err;
+  std::ostringstream expected;
+  expected << std::fixed << std::setprecision(6)
+           << "my a.jpg 0.000000 0.000000 0.000000\nmy b.jpg " << enu[0] << ' '
+           << enu[1] << ' ' << enu[2] << '\n';
+  EXPECT_EQ(ReadBytes(folder_ / "table.txt"), expected.str());
   int i = 0;
   for (const auto& [file, part] :
        std::vector<std::pair<std::string, std::string>>{
            {"a.jpg 98.1 16.2 200 5\n", "not in [-90d, 90d]"},
-           {"a.jpg 48.1 16.2 200\n", "expected NAME LATITUDE"},
+           {"a.jpg 48.1 16.2\n", "expected NAME LATITUDE"},
+           {"a.jpg 48,1 16,2 200 5\n", "expected decimal points"},
            {"# nothing\n", "found no position"}}) {
     const fs::path path = folder_ / ("gps" + std::to_string(++i) + ".txt");
     WriteBytes(path, file);

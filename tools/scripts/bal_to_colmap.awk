@@ -9,8 +9,11 @@ function fail(what) {
 
 BEGIN { at = 0 }
 
-# The file is one list of numbers, however its lines are broken.
+# The file is one list of numbers, however its lines are broken; a byte order
+# mark and carriage returns are none.
+NR == 1 { sub(/^\357\273\277/, "") }
 {
+  gsub(/\r/, " ")
   for (i = 1; i <= NF; ++i) {
     if ($i !~ /^[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?$/) {
       fail("'" $i "' is no number")

@@ -19,6 +19,7 @@ parse_options "input_path output_path" "$@"
 require_options input_path output_path
 file=${option[input_path]}
 [[ -f $file ]] || die "--input_path $file is not a file"
+require_text "$file"
 
 model=${option[output_path]}
 for name in cameras images points3D; do

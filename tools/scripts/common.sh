@@ -66,6 +66,20 @@ require_model() {
     die "--$1 $folder holds no COLMAP model (no images.bin, no images.txt)"
 }
 
+# require_text FILE ends the script if it is packed, or UTF-16.
+require_text() {
+  local is
+  case $(head -c 3 "$1" | od -An -tx1 | tr -d ' \n') in
+    425a68) is="packed; unpack it with bunzip2" ;;
+    1f8b*) is="packed; unpack it with gunzip" ;;
+    fd377a) is="packed; unpack it with unxz" ;;
+    504b*) is="packed; unpack it with unzip" ;;
+    fffe* | feff*) is="UTF-16; save it as UTF-8" ;;
+    *) return 0 ;;
+  esac
+  die "$1 is $is"
+}
+
 # find_krot sets krot: the executable named by KROT, or the one that was built
 # here, or the installed one.
 find_krot() {

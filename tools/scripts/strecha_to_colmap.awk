@@ -61,6 +61,7 @@ function write_camera(    name, R, q, i, j, t) {
 }
 
 FNR == 1 && NR > 1 { write_camera() }
-FNR == 1 { file = FILENAME; num_values = 0 }
+FNR == 1 { file = FILENAME; num_values = 0; sub(/^\357\273\277/, "") }
+{ gsub(/\r/, " ") }
 { for (field = 1; field <= NF; ++field) value[++num_values] = $field }
 END { if (!has_failed) write_camera() }
