@@ -43,6 +43,15 @@ TEST(WriteFile, MayLieInAFolderThatWillExist) {
                WriteError);
 }
 
+TEST(WriteFile, IsTriedWithoutATrace) {
+  TempFolder folder;
+  EXPECT_FALSE(TryToCreateIn(folder.path()));
+  EXPECT_TRUE(FileNames(folder.path()).empty());
+  // Where root may do everything, and can do nothing.
+  EXPECT_TRUE(TryToCreateIn("/proc"));
+  EXPECT_THROW(CheckFileWritable("/proc/report.json"), WriteError);
+}
+
 TEST(WriteFile, DoesNotReplaceFoldersAndDevices) {
   TempFolder folder;
   EXPECT_THROW(CheckFileWritable(folder.path()), WriteError);

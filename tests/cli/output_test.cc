@@ -55,6 +55,24 @@ TEST_F(Output, ThatCannotBeWrittenIsRefusedBeforeTheSolve) {
   ExpectNotWritten(report(folder_ / "missing/r.json"), names, "no folder");
   ExpectNotWritten(report(folder_.path()), names, "is a folder");
   ExpectNotWritten(report("/dev/null"), names, "not a regular file");
+  // Nothing can be created there, not even by root.
+  ExpectNotWritten(Solve("/proc/output"), names,
+                   "/proc: cannot be written to: ");
+  ExpectNotWritten(report("/proc/r.json"), names, "/proc is not writable: ");
+}
+
+// Splatting programs read it and not points3D.bin.
+TEST_F(Output, NamesAPlyThatIsOfAnotherModel) {
+  EXPECT_THAT(Solve(folder_ / "output").err,
+              ::testing::Not(::testing::HasSubstr("points3D.ply")));
+  const fs::path ply = folder_ / "output/points3D.ply";
+  WriteBytes(ply, "ply of the model before");
+  const KrotResult result = Solve(folder_ / "output", {"--overwrite", "1"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err,
+              ::testing::HasSubstr("warning: " + ply.string() +
+                                   " is older than the model beside it"));
+  EXPECT_EQ(ReadBytes(ply), "ply of the model before");
 }
 
 TEST_F(Output, ReplacesAModelOnlyIfTold) {

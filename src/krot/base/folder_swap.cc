@@ -71,6 +71,10 @@ void CheckFolderIsWritable(const fs::path& folder) {
     throw WriteError(folder.string() +
                      ": cannot be written to: " + Reason(errno));
   }
+  if (const std::error_code error = TryToCreateIn(folder)) {
+    throw WriteError(folder.string() +
+                     ": cannot be written to: " + error.message());
+  }
 }
 
 // A new folder beside `target`, with the permissions that mkdir gives.

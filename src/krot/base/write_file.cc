@@ -1,6 +1,7 @@
 #include "krot/base/write_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -59,6 +60,20 @@ std::optional<Failure> TryToWrite(const fs::path& file,
 
 }  // namespace
 
+std::error_code TryToCreateIn(const fs::path& folder) {
+#ifdef O_TMPFILE
+  // A file without a name, where the file system has such.
+  const FileDescriptor unnamed(
+      ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, mode_t{0600}));
+  if (unnamed.is_open()) return {};
+#endif
+  const fs::path named = folder / (".krot-" + std::to_string(getpid()));
+  const bool is_there =
+      ::mkdir(named.c_str(), mode_t{0700}) == 0 || errno == EEXIST;
+  if (is_there && ::rmdir(named.c_str()) == 0) return {};
+  return {errno, std::generic_category()};
+}
+
 void CheckFileWritable(const fs::path& file, const fs::path& folder_to_come) {
   const fs::path folder = ParentFolder(file);
   std::error_code ignored;
@@ -75,9 +90,9 @@ void CheckFileWritable(const fs::path& file, const fs::path& folder_to_come) {
     throw WriteError(file.string() + " cannot be written: there is no folder " +
                      folder.string());
   }
-  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+  if (const std::error_code error = TryToCreateIn(folder)) {
     throw WriteError(file.string() + " cannot be written: folder " +
-                     folder.string() + " is not writable");
+                     folder.string() + " is not writable: " + error.message());
   }
 }
 

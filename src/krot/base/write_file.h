@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 namespace krot {
 
@@ -13,6 +14,11 @@ class WriteError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
+
+// Why nothing can be created in `folder`; no error if something can. It is
+// tried, since permissions tell root nothing of /proc or of a read-only disk;
+// nothing stays.
+std::error_code TryToCreateIn(const std::filesystem::path& folder);
 
 // Throws WriteError if WriteFileAtomically would fail for want of a folder
 // (unless that is `folder_to_come`, which will exist by then), of permission,

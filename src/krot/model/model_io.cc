@@ -45,6 +45,8 @@ const ModelPart kParts[] = {
      FormatPoints3DBinary, FormatPoints3DText},
 };
 constexpr const char* kProjectFile = "project.ini";
+// What splatting programs make of points3D.bin and read in its place.
+constexpr const char* kPointsOfOthers = "points3D.ply";
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
@@ -203,6 +205,13 @@ void WriteModel(const Model& model, const fs::path& folder,
     }
     swap.Commit(IsModelFile);
   });
+  std::error_code ignored;
+  const fs::path points = folder / kPointsOfOthers;
+  if (!options.on_note || !fs::exists(points, ignored)) return;
+  options.on_note(points.string() +
+                  " is older than the model beside it, and splatting programs "
+                  "read it instead of points3D: remove it, if it was made of "
+                  "the old one");
 }
 
 std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model) {

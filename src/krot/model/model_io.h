@@ -32,7 +32,8 @@ struct WriteModelOptions {
   bool overwrite = false;
   // project.ini is copied from this folder, if there is one.
   std::filesystem::path copy_project_from;  // empty: nothing is copied
-  // As FolderSwap's note: what is left behind, and why; may be empty.
+  // As FolderSwap's note: what is left behind, and why; also if it is a
+  // points3D.ply, which does not belong to this model. May be empty.
   std::function<void(const std::string&)> on_note = {};
 };
 
