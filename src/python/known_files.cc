@@ -1,10 +1,19 @@
 #include "python/known_files.h"
 
+#include <pybind11/pybind11.h>
+
 #include "krot/analysis/rotation_input.h"
 #include "krot/model/file_bytes.h"
 
 namespace krot {
 namespace {
+
+// What a list holds that the model does not have, as a Python warning.
+void Warn(const std::string& sentence) {
+  if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) {
+    throw pybind11::error_already_set();
+  }
+}
 
 void AddFile(const std::string& name, std::string* path, OptionTable* table) {
   table->Add({name, "", "a file", "", false, [path](const std::string& text) {
@@ -27,6 +36,12 @@ void KnownFiles::AddFixedTo(OptionTable* table) {
 void KnownFiles::AddPositionsTo(OptionTable* table) {
   AddFile("positions_path", &positions_path_, table);
   AddFile("point_positions_path", &point_positions_path_, table);
+  table->Add({"Problem.position_radius", "", "a number > 0", "", false,
+              [this](const std::string& text) {
+                position_radius_.emplace();
+                return ParseReal(text, &*position_radius_) &&
+                       *position_radius_ > 0;
+              }});
 }
 
 std::shared_ptr<const Model> KnownFiles::WithRotations(
@@ -34,17 +49,19 @@ std::shared_ptr<const Model> KnownFiles::WithRotations(
   run->poses = CheckPoses(*model);
   if (rotations_path_.empty()) return model;
   auto turned = std::make_shared<Model>(*model);
-  run->rotations = TakeRotations(ReadFileBytes(rotations_path_), turned.get());
+  run->rotations =
+      TakeRotations(ReadFileBytes(rotations_path_), turned.get(), -1, &Warn);
   return turned;
 }
 
 FixedParts KnownFiles::Fixed(const Model& model) const {
   FixedParts fixed;
   if (!fixed_images_path_.empty()) {
-    fixed.frames = FixedFrames(ReadFileBytes(fixed_images_path_), model);
+    fixed.frames = FixedFrames(ReadFileBytes(fixed_images_path_), model, &Warn);
   }
   if (!fixed_points_path_.empty()) {
-    fixed.points3D = FixedPoints3D(ReadFileBytes(fixed_points_path_), model);
+    fixed.points3D =
+        FixedPoints3D(ReadFileBytes(fixed_points_path_), model, &Warn);
   }
   return fixed;
 }
@@ -52,11 +69,12 @@ FixedParts KnownFiles::Fixed(const Model& model) const {
 std::vector<KnownPosition> KnownFiles::Positions(const Model& model) const {
   std::vector<KnownPosition> positions;
   if (!positions_path_.empty()) {
-    positions = ReadPositions(ReadFileBytes(positions_path_), model);
+    positions = ReadPositions(ReadFileBytes(positions_path_), model,
+                              {position_radius_, &Warn});
   }
   if (!point_positions_path_.empty()) {
-    const std::vector<KnownPosition> of_points =
-        ReadPointPositions(ReadFileBytes(point_positions_path_), model);
+    const std::vector<KnownPosition> of_points = ReadPointPositions(
+        ReadFileBytes(point_positions_path_), model, {position_radius_, &Warn});
     positions.insert(positions.end(), of_points.begin(), of_points.end());
   }
   return positions;

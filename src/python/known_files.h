@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,7 @@ class KnownFiles {
   std::string fixed_points_path_;
   std::string positions_path_;
   std::string point_positions_path_;
+  std::optional<double> position_radius_;
 };
 
 }  // namespace krot

@@ -222,7 +222,9 @@ TEST_F(Known, RotationsThatCannotBeReadEndInOneSentence) {
       Solve("input", "output", {"--rotations_path", folder_ / "rotations.txt"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, IsOneSentence("krot solver",
-                                        "rotations.txt:1: found \"nobody.jpg"));
+                                        "rotations.txt: found no image of the "
+                                        "model in its 1 line, the first has "
+                                        "image \"nobody.jpg\""));
   EXPECT_EQ(Solve("input", "output", {"--rotations_path", folder_ / "none"})
                 .exit_code,
             2);

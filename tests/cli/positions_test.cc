@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -88,6 +90,32 @@ TEST_F(KnownPositions, OfPointsAndWithAxesAreKeptAndProved) {
   EXPECT_EQ(Check("output", "output").exit_code, 0);
 }
 
+// As other programs write them, of photos that were not all registered.
+TEST_F(KnownPositions, OfOtherProgramsAreTheSame) {
+  WritePositions(1e-3, 5e-3);
+  ASSERT_EQ(Solve("input", "expected", Options()).exit_code, 0);
+  std::istringstream lines(ReadBytes(folder_ / "positions.txt"));
+  std::string text =
+      "\xef\xbb\xbfphoto,x,y,z\r\nE:\\photos\\lost.jpg,1,2,3\r\n";
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    line.resize(line.find_last_of(' '));  // the radius
+    std::replace(line.begin(), line.end(), ' ', ',');
+    text += "E:\\photos\\" + line + "\r\n";
+  }
+  WriteBytes(folder_ / "positions.txt", text);
+  const KrotResult result =
+      Solve("input", "output", Options({"--Problem.position_radius", "1e-3"}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("warning: "));
+  EXPECT_THAT(result.err, HasSubstr("skipped 1 of " +
+                                    std::to_string(model_.images.size() + 1) +
+                                    " lines, whose image the model does not "
+                                    "have; the first has image "
+                                    "\"E:\\photos\\lost.jpg\""));
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "expected")));
+}
+
 TEST_F(KnownPositions, AreInflatedByTheSmallestFactorThatIsEnough) {
   WritePositions(1e-3, 5e-3);
   const KrotResult as_given = Solve("input", "given", Options());
@@ -132,7 +160,8 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
   };
   for (const auto& [text, part] :
        std::vector<std::pair<std::string, std::string>>{
-           {"nobody.jpg 1 2 3 4\n", "positions.txt:1: found \"nobody.jpg\""},
+           {"nobody.jpg 1 2 3 4\n",
+            "found no image of the model in its 1 line"},
            {"# a\n" + name + " 1 2 3 0\n", "positions.txt:2: found \"0\""},
            {name + " 1 2 3 -1\n", "a radius above zero"},
            {name + " 1 2 3 1 1 0\n", "a radius above zero"},
@@ -141,9 +170,10 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
            {name + " 1 2 x 1\n", "found \"x\""},
            {name + " 1 2 inf 1\n", "found \"inf\""},
            {"1 2 3 4\n", "found no name"},
-           {name + "\n", "X, Y, Z, RADIUS"},
+           {name + "\n", "X Y Z RADIUS"},
+           {name + " 1 2 3\n", "--Problem.position_radius"},
            {name + " 1 2 3 4\n" + name + " 1 2 3 4\n", "line 1 names it"},
-           {"\n", "found no position"}}) {
+           {"\n", "found no line"}}) {
     SCOPED_TRACE(text);
     const KrotResult result = solve(text);
     EXPECT_EQ(result.exit_code, 2);
@@ -151,11 +181,12 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
   }
   for (const auto& [text, part] :
        std::vector<std::pair<std::string, std::string>>{
-           {"99999 1 2 3 4\n", "the id of a 3D point of the model"},
-           {"a 1 2 3 4\n", "the id of a 3D point"},
-           {"1 1 2 3\n", "found 3 numbers behind the id"},
+           {"99999 1 2 3 4\n", "found no 3D point of the model"},
+           {"a 1 2 3 4\n", "the first has 3D point a"},
+           {"1 1 2 3\n", "found no RADIUS behind X Y Z"},
+           {"1 1 2 3 4 5\n", "found 5 numbers behind 3D point 1"},
            {"1 1 2 3 4\n1 1 2 3 4\n", "line 1 names it"},
-           {"", "found no position"}}) {
+           {"", "found no line"}}) {
     SCOPED_TRACE(text);
     std::ofstream(folder_ / "points.txt") << text;
     const KrotResult result = Solve(
@@ -167,6 +198,11 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
       Solve("input", "output", {"--Problem.inflate_positions", "1"});
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_THAT(none.err, HasSubstr("--Problem.inflate_positions has no effect"));
+  const KrotResult no_list =
+      Solve("input", "output", {"--Problem.position_radius", "1"});
+  EXPECT_EQ(no_list.exit_code, 1);
+  EXPECT_THAT(no_list.err,
+              HasSubstr("--Problem.position_radius has no effect"));
   WritePositions(1, 0);
   for (const std::vector<std::string>& options :
        std::vector<std::vector<std::string>>{{"--Solver.max_error", "3"},

@@ -145,10 +145,10 @@ TEST_F(WhatIsFixed, ThatCannotBeMeantAreRefused) {
   const KrotResult image = solve("--fixed_images_path", "# a\nnobody.jpg\n");
   EXPECT_EQ(image.exit_code, 2);
   EXPECT_THAT(image.err,
-              IsOneSentence("krot solver", "list.txt:2: found \"nobody.jpg\""));
+              IsOneSentence("krot solver", "the first has image \"nobody.jpg"));
   const KrotResult point = solve("--fixed_points_path", "99999999\n");
   EXPECT_EQ(point.exit_code, 2);
-  EXPECT_THAT(point.err, HasSubstr("the id of a 3D point of the model"));
+  EXPECT_THAT(point.err, HasSubstr("found no 3D point of the model"));
   EXPECT_EQ(solve("--fixed_points_path", "\n").exit_code, 2);
   Save(WithoutTranslations(model), folder_ / "input");
   EXPECT_THAT(solve("--fixed_images_path", model.images[1].name).err,

@@ -168,11 +168,14 @@ std::vector<WrongModel> InconsistentModels() {
       {"NotANumberInACamera", kText,
        [](const fs::path& f) { SetFields(f / "cameras.txt", 4, {"nan"}); }, 2,
        "nan"},
-      {"QuaternionOfLengthZero", kText,
+      {"FocalLengthOfZero", kText,
+       [](const fs::path& f) { SetFields(f / "cameras.txt", 4, {"0"}); }, 2,
+       "found 0 for f of SIMPLE_RADIAL"},
+      {"CameraIdThatStandsForNone", kText,
        [](const fs::path& f) {
-         SetFields(f / "images.txt", 1, {"0", "0", "0", "0"});
+         SetFields(f / "cameras.txt", 0, {"4294967295"});
        },
-       2, "quaternion"},
+       2, "found id 4294967295, which in COLMAP stands for none"},
   };
 }
 
@@ -224,6 +227,55 @@ TEST_P(SolverOnWrongModel, SaysSoInOneSentenceAndWritesNothing) {
               IsOneSentence("krot solver", GetParam().part_of_sentence));
   EXPECT_EQ(result.out, "");
   EXPECT_EQ(FileNames(folder.path()), before);
+}
+
+// Poses alone, and points without tracks.
+TEST(ModelsWithoutObservations, GetOneSentenceFromEveryCommand) {
+  TempFolder folder;
+  Model poses = WithShortTracks(SmallLegacyModel(), 0);
+  Save(poses, folder / "poses");
+  for (const Point3D& point : SmallLegacyModel().points3D) {
+    poses.points3D.push_back({point.id, point.xyz, point.color, -1, 0, 0});
+  }
+  Save(poses, folder / "points");
+  const std::string sentence =
+      "the model has no observations (2D points that see 3D points); colmap "
+      "point_triangulator makes them from its poses and a database of matches";
+  for (const char* name : {"poses", "points"}) {
+    for (const std::vector<std::string>& command :
+         std::vector<std::vector<std::string>>{
+             {"solver"},
+             {"point_triangulator"},
+             {"bundle_adjuster"},
+             {"outlier_filter", "--OutlierFilter.max_error", "4"},
+             {"tolerance_analyzer", "--ToleranceAnalyzer.max_error", "4"}}) {
+      std::vector<std::string> words = command;
+      words.insert(words.end(), {"--input_path", folder / name});
+      if (command[0] != "tolerance_analyzer") {
+        words.insert(words.end(), {"--output_path", folder / "output"});
+      }
+      const KrotResult result = RunKrot(words);
+      EXPECT_EQ(result.exit_code, 3) << command[0];
+      EXPECT_EQ(result.err, "krot " + command[0] +
+                                ": nothing to solve: " + sentence + "\n");
+    }
+    const KrotResult shown =
+        RunKrot({"model_analyzer", "--path", folder / name});
+    EXPECT_EQ(shown.exit_code, 0);
+    EXPECT_EQ(shown.err, "warning: " + sentence + "\n");
+  }
+}
+
+// Dummy tracks, of which COLMAP's images know nothing.
+TEST(ModelsWhoseTracksNameNo2DPoints, AreShownByTheAnalyzer) {
+  TempFolder folder;
+  Model model = SmallLegacyModel();
+  for (Image& image : model.images) image.points2D.clear();
+  Save(model, folder / "input");
+  const KrotResult shown =
+      RunKrot({"model_analyzer", "--path", folder / "input"});
+  EXPECT_EQ(shown.exit_code, 0) << shown.err;
+  EXPECT_THAT(shown.out, ::testing::HasSubstr("Points: 60"));
 }
 
 std::string Name(const ::testing::TestParamInfo<WrongModel>& test) {

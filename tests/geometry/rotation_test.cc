@@ -71,5 +71,17 @@ TEST(NearestRotation, IsNoneWhereThereAreMany) {
   EXPECT_FALSE(NearestRotation(-Matrix3d::Identity()));
 }
 
+TEST(RotationOf, WhatCannotBeNormalisedIsNotANumber) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const QuaternionWxyz& none :
+       {QuaternionWxyz{0, 0, 0, 0}, QuaternionWxyz{1e-200, 0, 0, 0},
+        QuaternionWxyz{0, 1e200, 0, 0}, QuaternionWxyz{1, 0, kInfinity, 0},
+        QuaternionWxyz{1, 0, 0, std::nan("")}}) {
+    EXPECT_FALSE(HasRotation(none));
+    EXPECT_TRUE(RotationOf(none).array().isNaN().all());
+  }
+  EXPECT_TRUE(HasRotation({0, 0, -3, 0}));
+}
+
 }  // namespace
 }  // namespace krot

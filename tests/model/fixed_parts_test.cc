@@ -35,7 +35,26 @@ TEST(FixedParts, ArePointsById) {
               ElementsAre(1, 0, 1));
 }
 
-TEST(FixedParts, ThatAreNotThereAreRefusedWithTheirLine) {
+TEST(FixedParts, ThatAreNotThereAreSkippedAndCounted) {
+  std::string notes;
+  const FileNote note = [&](const std::string& text) { notes += text + "\n"; };
+  EXPECT_THAT(FixedFrames({"f.txt", "d.jpg\nC:\\photos\\c.jpg\n8\n9"},
+                          TinyRigModel(), note),
+              ElementsAre(1, 0, 0));
+  EXPECT_EQ(notes,
+            "f.txt: skipped 2 of 4 lines, whose image the model does not have; "
+            "the first has image \"d.jpg\"\n"
+            "f.txt: paths are taken for the names that they end with, "
+            "\"C:\\photos\\c.jpg\" for \"c.jpg\", for one\n");
+  notes.clear();
+  EXPECT_THAT(FixedPoints3D({"f.txt", "12.0\n7\n"}, TinyModel(), note),
+              ElementsAre(0, 0, 1));
+  EXPECT_EQ(notes,
+            "f.txt: skipped 1 of 2 lines, whose 3D point the model does not "
+            "have; the first has 3D point 7\n");
+}
+
+TEST(FixedParts, OfWhichNoneIsThereAreRefused) {
   Model model = TinyModel();
   const auto images = [&](const std::string& text) {
     return ModelErrorOf([&] { FixedFrames({"f.txt", text}, model); });
@@ -43,12 +62,14 @@ TEST(FixedParts, ThatAreNotThereAreRefusedWithTheirLine) {
   const auto points = [&](const std::string& text) {
     return ModelErrorOf([&] { FixedPoints3D({"f.txt", text}, model); });
   };
-  EXPECT_THAT(images("c.jpg\nd.jpg"), HasSubstr("f.txt:2: found \"d.jpg\""));
-  EXPECT_THAT(images("8"), HasSubstr("f.txt:1: found \"8\""));
+  EXPECT_EQ(images("8\nd.jpg"),
+            "f.txt: found no image of the model in its 2 lines, the first has "
+            "image \"8\"; expected those of the model, such as image "
+            "\"left/a b.jpg\"");
   EXPECT_THAT(images("empty.png"), HasSubstr("which stands nowhere"));
   EXPECT_THAT(images("#"), HasSubstr("f.txt: found no line"));
-  EXPECT_THAT(points("7"), HasSubstr("f.txt:1: found \"7\""));
-  EXPECT_THAT(points("12 1"), HasSubstr("f.txt:1: found \"12 1\""));
+  EXPECT_THAT(points("7"), HasSubstr("the first has 3D point 7; expected"));
+  EXPECT_THAT(points("12 1"), HasSubstr("the first has 3D point 12 1"));
   EXPECT_THAT(points(""), HasSubstr("f.txt: found no line"));
   model.images[1].name = "c.jpg";
   EXPECT_THAT(images("c.jpg"), HasSubstr("which several images"));

@@ -87,20 +87,32 @@ TEST(RotationsFile, OfTheModelsOwnRotationsChangesNoBit) {
 }
 
 TEST(RotationsFile, ThatCannotBeMeantIsRefusedWithItsLine) {
-  EXPECT_THAT(ErrorOf("# a\nd.jpg 1 0 0 0\n"),
-              HasSubstr("r.txt:2: found \"d.jpg\", expected the name of an "
-                        "image of the model"));
   EXPECT_THAT(ErrorOf("c.jpg 1 0 0 0\nempty.png 1 0 0 0\nc.jpg 1 0 0 0\n"),
-              HasSubstr("r.txt:3: found \"c.jpg\" again, expected each image "
+              HasSubstr("r.txt:3: found image \"c.jpg\" again, expected each "
                         "once; line 1 names it"));
   EXPECT_THAT(ErrorOf("c.jpg 0 0 0 0"),
-              HasSubstr("r.txt:1: found a quaternion of length 0"));
+              HasSubstr("r.txt:1: found a quaternion of zeros"));
+  EXPECT_THAT(ErrorOf("c.jpg 1 0 0 0 1 2 3"),
+              HasSubstr("r.txt: found no image of the model in its 1 line, the "
+                        "first has image \"c.jpg 1 0 0\""));
   EXPECT_THAT(ErrorOf("c.jpg 1 0 nan 0"), HasSubstr("found \"nan\""));
   EXPECT_THAT(ErrorOf("c.jpg 1 0 inf 0"), HasSubstr("found \"inf\""));
   EXPECT_THAT(ErrorOf("c.jpg 1 0 0"), HasSubstr("found \"c.jpg\""));
   EXPECT_THAT(ErrorOf("1 0 0 0"), HasSubstr("found no name"));
   EXPECT_THAT(ErrorOf("0 0 0"), HasSubstr("found the end of the line"));
-  EXPECT_THAT(ErrorOf("# nothing\n"), HasSubstr("r.txt: found no rotation"));
+  EXPECT_THAT(ErrorOf("# nothing\n"), HasSubstr("r.txt: found no line"));
+}
+
+TEST(RotationsFile, GivesAFrameWithoutARotationOneAndNoPlace) {
+  Model model = TinyModel();
+  model.images[2].cam_from_world = {{0, 0, 0, 0}, {0, 0, 0}};
+  UseTrivialRigs(&model);
+  ReplaceRotations({"r.txt", Line("c.jpg", kTurn)}, &model);
+  const ImageGeometry image = ImageGeometries(model)[2];
+  EXPECT_FALSE(image.has_pose);
+  EXPECT_LT((image.cam_from_world.rotation - kTurn.toRotationMatrix()).norm(),
+            1e-15);
+  EXPECT_FALSE(image.cam_from_world.translation.allFinite());
 }
 
 TEST(RotationsFile, ThatContradictsItselfWithinAFrameIsRefused) {

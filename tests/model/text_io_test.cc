@@ -84,6 +84,103 @@ TEST(TextIo, SkipsCommentsBlankLinesAndCarriageReturns) {
   EXPECT_EQ(model.cameras[0].params, (std::vector<double>{1, 2, 3, 4}));
 }
 
+TEST(TextIo, SkipsAByteOrderMarkInEveryFile) {
+  const Model model = TinyRigModel();
+  const std::string mark = "\xef\xbb\xbf";
+  Model read;
+  read.stores_rigs = true;
+  ParseCamerasText({"c", mark + FormatCamerasText(model)}, &read);
+  ParseRigsText({"r", mark + FormatRigsText(model)}, &read);
+  ParseFramesText({"f", mark + FormatFramesText(model)}, &read);
+  ParseImagesText({"i", mark + FormatImagesText(model)}, &read);
+  ParsePoints3DText({"p", mark + FormatPoints3DText(model)}, &read);
+  EXPECT_THAT(read, IsModel(model));
+  // Without a comment in front, too.
+  ParseCamerasText({"c", mark + "7 SIMPLE_PINHOLE 4 3 5 2 1.5"}, &read);
+  EXPECT_EQ(read.cameras.at(0).id, 7);
+}
+
+TEST(TextIo, SaysThatUtf16IsToBecomeUtf8) {
+  for (const char* mark : {"\xff\xfe", "\xfe\xff"}) {
+    EXPECT_EQ(ErrorOf(ParseCamerasText, std::string(mark) + "#"),
+              "f.txt: found UTF-16, expected UTF-8; save it as UTF-8 text");
+  }
+}
+
+TEST(TextIo, ReadsIntegersThatAreWrittenAsRealNumbers) {
+  Model model;
+  ParseCamerasText({"f.txt", "7.0 PINHOLE 1000.0 7.5e+02 1 2 3 4\n"}, &model);
+  EXPECT_EQ(model.cameras.at(0).id, 7);
+  EXPECT_EQ(model.cameras[0].width, 1000);
+  EXPECT_EQ(model.cameras[0].height, 750);
+  ParseRigsText({"f.txt", "1.0 2.0 CAMERA 7.0 CAMERA 8.0 0.0\n"}, &model);
+  EXPECT_EQ(model.rigs.at(0).sensors.at(0).sensor_id.id, 8);
+  ParseFramesText({"f.txt", "1.0 1 1 0 0 0 0 0 0 1.0 CAMERA 7 9.0\n"}, &model);
+  EXPECT_EQ(model.frames.at(0).data.at(0).data_id, 9);
+  ParseImagesText({"f.txt", "9.0 1 0 0 0 0 0 0 7.0 a.jpg\n1 2 -1.0 3 4 5.0\n"},
+                  &model);
+  EXPECT_EQ(model.images.at(0).points2D.at(0).point3D_id, kInvalidPoint3DId);
+  EXPECT_EQ(model.images[0].points2D.at(1).point3D_id, 5);
+  ParsePoints3DText({"f.txt", "5.0 0 0 0 176.0 248.0 1.2e1 0.5 9.0 1.0\n"},
+                    &model);
+  EXPECT_EQ(model.points3D.at(0).color[0], 176);
+  EXPECT_EQ(model.points3D[0].color[2], 12);
+  EXPECT_EQ(model.track_elements.at(0).point2D_idx, 1);
+}
+
+TEST(TextIo, ReadsNoIntegerThatARealNumberDoesNotHoldExactly) {
+  for (const char* id : {"9007199254740993.0", "18446744073709551616", "1e99",
+                         "1.5", "-2.0", "nan", "inf"}) {
+    EXPECT_THAT(ErrorOf(ParsePoints3DText, std::string(id) + " 0 0 0 1 1 1 1"),
+                HasSubstr(std::string("found \"") + id +
+                          "\", expected a 3D point id, an integer from 0 to "
+                          "18446744073709551615"));
+  }
+}
+
+TEST(TextIo, TakesACommentForTheEmptySecondLineOfAnImage) {
+  // As COLMAP does, whose FAQ has this example.
+  Model model;
+  ParseImagesText({"f.txt",
+                   "1 1 0 0 0 0 0 0 1 a.png\n"
+                   "# Make sure every other line is left empty\n"
+                   "2 1 0 0 0 0 0 0 1 b.png\n"
+                   "\n"},
+                  &model);
+  ASSERT_EQ(model.images.size(), 2);
+  EXPECT_EQ(model.images[1].name, "b.png");
+  EXPECT_EQ(model.images[0].points2D.size(), 0);
+}
+
+TEST(TextIo, SaysThatAnImageHasTwoLines) {
+  const std::string cure =
+      "f.txt:3: found the line of another image, expected the 2D points of "
+      "image 1 (\"a.jpg\"): an image has two lines, of which the second may be "
+      "empty; put an empty line behind each";
+  for (const char* second :
+       {"2 0.25 0.3 0.7 -0.5 -0.1 0.1 5.1 1 b.jpg\n",
+        // All of whose numbers could be those of 2D points.
+        "2 1 0 0 0 0 0 1 1 b.jpg\n"}) {
+    EXPECT_EQ(ErrorOf(ParseImagesText,
+                      "# one line per image\n1 1 0 0 0 0 0 0 1 a.jpg\n" +
+                          std::string(second)),
+              cure);
+  }
+}
+
+TEST(TextIo, SaysThatNumbersHaveNoCommas) {
+  const std::string cure =
+      "; write numbers with a decimal point, without commas";
+  EXPECT_EQ(ErrorOf(ParseCamerasText, "1 SIMPLE_PINHOLE 4 3 800,0 2 1\n"),
+            "f.txt:1: found \"800,0\", expected a number: the parameters f, "
+            "cx, cy of SIMPLE_PINHOLE" +
+                cure);
+  EXPECT_EQ(ErrorOf(ParseCamerasText, "1, PINHOLE, 4, 3, 5, 5, 2, 1\n"),
+            "f.txt:1: found \"1,\", expected a camera id" + cure);
+  EXPECT_THAT(ErrorOf(ParseImagesText, "1 1 0 0 0 0 0 0 1 a\n576,10 311,4 1\n"),
+              HasSubstr(cure));
+}
+
 TEST(TextIo, TakesTheLineAfterAnImageForItsPointsEvenIfEmpty) {
   Model model;
   ParseImagesText({"f.txt",
@@ -110,9 +207,11 @@ TEST(TextIo, SaysWhichWordOfWhichLineIsNoNumber) {
             "f.txt:1: found \"0.1.2\", expected a number: X, Y, Z of a 3D "
             "point");
   EXPECT_EQ(ErrorOf(ParsePoints3DText, "1 0 0 0 0 256 0 1\n"),
-            "f.txt:1: found \"256\", expected 0 to 255: R, G, B of a 3D point");
+            "f.txt:1: found \"256\", expected R, G, B of a 3D point, an "
+            "integer from 0 to 255");
   EXPECT_EQ(ErrorOf(ParsePoints3DText, "1 0 0 0 0 0 0 1 5 -1\n"),
-            "f.txt:1: found \"-1\", expected the POINT2D_IDX of a track");
+            "f.txt:1: found \"-1\", expected the POINT2D_IDX of a track, an "
+            "integer from 0 to 4294967295");
   EXPECT_EQ(ErrorOf(ParseImagesText, "1 1 0 0 0 0 0 0 1 a.jpg\n1 2 -2\n"),
             "f.txt:2: found \"-2\", expected the POINT3D_ID of a 2D point, or "
             "-1");

@@ -78,12 +78,15 @@ TEST(ValidateModel, RefusesReferencesToRecordsThatDoNotExist) {
   EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[0].rig_id = 6; }),
             "frame 11: found rig id 6, expected one that exists in rigs");
   EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[0].data[1].data_id = 8; }),
-            "frame 11: found image id 8, expected one that exists in images");
+            "frame 11: found image id 8, expected one that exists in images; "
+            "take it out of frames, or remove both rigs and frames: then the "
+            "poses in images count");
   EXPECT_EQ(ErrorAfter([](Model* m) {
               m->frames[0].data[1].data_id = (uint64_t{1} << 32) + 9;
             }),
             "frame 11: found image id 4294967305, expected one that exists in "
-            "images");
+            "images; take it out of frames, or remove both rigs and frames: "
+            "then the poses in images count");
   EXPECT_EQ(ErrorAfter([](Model* m) { m->track_elements[0].image_id = 8; }),
             "3D point 5000000000: found image id 8 in its track, expected one "
             "that exists in images; --Model.on_contradiction follow_images "
@@ -105,10 +108,45 @@ TEST(ValidateModel, RefusesTracksThatAreNotConsecutive) {
             "found 4 track elements, expected the tracks' total of 5");
 }
 
-TEST(ValidateModel, RefusesPointsThatBearTheInvalidId) {
+TEST(ValidateModel, RefusesIdsThatStandForNoneInColmap) {
+  constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+  const std::string cure =
+      ": found id 4294967295, which in COLMAP stands for none, expected "
+      "another; renumber it";
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->cameras[1].id = kNone; }),
+            "cameras" + cure);
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->images[1].id = kNone; }),
+            "images" + cure);
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->rigs[1].id = kNone; }), "rigs" + cure);
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[1].id = kNone; }),
+            "frames" + cure);
   EXPECT_THAT(
       ErrorAfter([](Model* m) { m->points3D[1].id = kInvalidPoint3DId; }),
-      HasSubstr("found the id that stands for no 3D point"));
+      HasSubstr("points3D: found id 18446744073709551615, which"));
+}
+
+TEST(ValidateModel, RefusesFocalLengthsOfZeroOfCamerasWithImages) {
+  EXPECT_EQ(ErrorAfter([](Model* m) { m->cameras[0].params[0] = -0.0; }),
+            "camera 7: found 0 for f of SIMPLE_RADIAL, expected what its "
+            "photos have, in pixels");
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->cameras[0].model_id = 1;
+              m->cameras[0].params = {500, 0, 320, 240};
+            }),
+            "camera 7: found 0 for fx, fy of PINHOLE, expected what its photos "
+            "have, in pixels");
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->cameras[0].model_id = 17;
+              m->cameras[0].params = {4000, 0};
+            }),
+            "camera 7: found 0 for w, h of EQUIRECTANGULAR, expected what its "
+            "photos have, in pixels");
+  // Principal points may be anywhere; so may all of a camera without images.
+  EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->cameras[0].params[1] = 0;
+              m->cameras[1].params[0] = 0;
+            }),
+            "");
 }
 
 TEST(ValidateModel, RefusesNamesWithAZeroByte) {
@@ -142,7 +180,8 @@ TEST(ValidateModel, RefusesFramesThatDoNotFitTheirImagesAndRigs) {
   EXPECT_EQ(
       ErrorAfter([](Model* m) { m->rigs[0].sensors[0].sensor_from_rig = {}; }),
       "image 9 (\"c.jpg\"): found its camera 7 without a pose in rig 5, "
-      "expected one");
+      "expected one; calibrate the rig, or remove both rigs and frames: then "
+      "the poses in images count");
   EXPECT_EQ(ErrorAfter([](Model* m) { m->frames[1].data[0].data_id = 9; }),
             "image 9 (\"c.jpg\"): found in frame 11 and again in frame 10, "
             "expected once");
@@ -159,18 +198,18 @@ TEST(ValidateModel, RefusesNumbersThatAreNotFinite) {
                 HasSubstr("camera 3: found the parameter"));
     EXPECT_THAT(ErrorAfter([&](Model* m) { m->points3D[2].xyz[1] = bad; }),
                 HasSubstr("3D point 12: found a coordinate"));
-    EXPECT_THAT(ErrorAfter([&](Model* m) { m->images[0].points2D[1].x = bad; }),
-                HasSubstr("found the x of a 2D point"));
-    EXPECT_THAT(ErrorAfter([&](Model* m) { m->images[0].points2D[1].y = bad; }),
-                HasSubstr("found the y of a 2D point"));
-    EXPECT_THAT(ErrorAfter([&](Model* m) {
-                  m->images[2].cam_from_world.quaternion_wxyz[2] = bad;
+    for (double Point2D::*coordinate : {&Point2D::x, &Point2D::y}) {
+      EXPECT_THAT(
+          ErrorAfter(
+              [&](Model* m) { m->images[2].points2D[1].*coordinate = bad; }),
+          HasSubstr("found 2D point 1 of image 9 (\"c.jpg\") in its track, a "
+                    "coordinate of which is "));
+      // In no track.
+      EXPECT_EQ(ErrorAfter([&](Model* m) {
+                  m->images[0].points2D[1].*coordinate = bad;
                 }),
-                HasSubstr("image 9 (\"c.jpg\"): found a quaternion's"));
-    EXPECT_THAT(ErrorAfter([&](Model* m) {
-                  m->frames[2].rig_from_world.quaternion_wxyz[0] = bad;
-                }),
-                HasSubstr("frame 12: found a quaternion's"));
+                "");
+    }
     EXPECT_THAT(ErrorAfter([&](Model* m) {
                   m->rigs[0].sensors[0].sensor_from_rig->translation[0] = bad;
                 }),
@@ -178,8 +217,12 @@ TEST(ValidateModel, RefusesNumbersThatAreNotFinite) {
   }
 }
 
-TEST(ValidateModel, AcceptsAbsentTranslationsAndAnyStoredError) {
+TEST(ValidateModel, AcceptsAbsentPosesAndAnyStoredError) {
   EXPECT_EQ(ErrorAfter([](Model* m) {
+              m->images[2].cam_from_world.quaternion_wxyz = {0, 0, 0, 0};
+              m->images[1].cam_from_world.quaternion_wxyz[2] = kNaN;
+              m->frames[0].rig_from_world.quaternion_wxyz = {0, 0, 0, 0};
+              m->frames[2].rig_from_world.quaternion_wxyz[0] = kInfinity;
               m->images[0].cam_from_world.translation.setConstant(kNaN);
               m->frames[0].rig_from_world.translation.setConstant(kInfinity);
               m->points3D[0].error = kNaN;
@@ -187,21 +230,13 @@ TEST(ValidateModel, AcceptsAbsentTranslationsAndAnyStoredError) {
             "");
 }
 
-TEST(ValidateModel, RefusesQuaternionsThatCannotBeNormalised) {
-  for (const double bad : {0.0, 1e-200, 1e200}) {
-    EXPECT_THAT(ErrorAfter([&](Model* m) {
-                  m->images[2].cam_from_world.quaternion_wxyz = {bad, 0, 0, 0};
-                }),
-                HasSubstr("image 9 (\"c.jpg\"): found a quaternion of length"));
-    EXPECT_THAT(ErrorAfter([&](Model* m) {
-                  m->frames[0].rig_from_world.quaternion_wxyz = {0, 0, 0, bad};
-                }),
-                HasSubstr("frame 11: found a quaternion of length"));
+TEST(ValidateModel, RefusesSensorsWhoseRotationCannotBeNormalised) {
+  for (const double bad : {0.0, 1e-200, 1e200, kNaN, kInfinity}) {
     EXPECT_THAT(ErrorAfter([&](Model* m) {
                   m->rigs[0].sensors[0].sensor_from_rig->quaternion_wxyz = {
                       0, 0, bad, 0};
                 }),
-                HasSubstr("rig 5: found a quaternion of length"));
+                HasSubstr("rig 5: found the quaternion 0 0 "));
   }
 }
 

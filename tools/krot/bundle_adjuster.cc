@@ -75,7 +75,7 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
 
   const Model model = ReadInput(paths, common.log, &report.run);
 
-  options.adjustment.fixed = ReadFixedParts(paths, model);
+  options.adjustment.fixed = ReadFixedParts(paths, model, common.log);
   Context context{num_threads};
   if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
   AdjustModelResult result =

@@ -5,8 +5,10 @@
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/model/model_error.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
+#include "krot/report/problem_words.h"
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
@@ -114,6 +116,17 @@ void WriteColoredCopy(const AnalyzerOptions& options,
              CopyOptions(options, input_path));
 }
 
+// A model whose tracks cannot be followed is shown by what its images say.
+ValidModel ReadToShow(const std::string& path, const AnalyzerOptions& options,
+                      const OptionParser& parser) {
+  try {
+    return ReadValidModel(path, options.on_contradiction, options.common.log);
+  } catch (const ModelError&) {
+    if (parser.IsGiven("Model.on_contradiction")) throw;
+  }
+  return ReadValidModel(path, "follow_images", options.common.log);
+}
+
 // What the certificate says of the model; "" if none is given.
 std::string CertificateText(const AnalyzerOptions& options,
                             const Model& model) {
@@ -140,8 +153,10 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   }
   const std::string path = ModelPath(options, parser);
   CheckAnalyzerPaths(options, path, parser);
-  const auto [model, contradictions, poses] =
-      ReadValidModel(path, options.on_contradiction, options.common.log);
+  const auto [model, contradictions, poses] = ReadToShow(path, options, parser);
+  if (model.track_elements.empty()) {
+    LogLine(options.common.log, 1, std::string("warning: ") + kNoObservations);
+  }
   BeginPhase(options.common.log, "measuring its errors");
   const std::string certificate = CertificateText(options, model);
   ModelReport report = AnalyzeModel(model, options.num_worst);

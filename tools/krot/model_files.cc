@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "krot/model/model_error.h"
 #include "krot/model/validate.h"
 #include "krot/report/pose_words.h"
+#include "krot/report/problem_words.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/run_log.h"
@@ -42,6 +44,33 @@ std::string ContradictionWords(const Contradictions& contradictions) {
          " of 2D points that do not name the 3D point, and " +
          Counted(contradictions.num_points2D, "2D point") +
          " of 3D points whose track does not name the 2D point";
+}
+
+// What is written as it was read and takes no part; "" if there is nothing.
+std::string KeptWords(const Model& model) {
+  int64_t num_images = 0;
+  for (const Frame& frame : model.frames) {
+    if (HasRotation(frame.rig_from_world.quaternion_wxyz)) continue;
+    num_images += static_cast<int64_t>(frame.data.size());
+  }
+  int64_t num_points2D = 0;
+  for (const Image& image : model.images) {
+    num_points2D += std::count_if(
+        image.points2D.begin(), image.points2D.end(), [](const Point2D& point) {
+          return !std::isfinite(point.x) || !std::isfinite(point.y);
+        });
+  }
+  std::string words;
+  if (num_images > 0) {
+    words =
+        Counted(num_images, "image") + " without a rotation, so without a pose";
+  }
+  if (num_points2D > 0) {
+    words += (words.empty() ? "" : " and ") +
+             Counted(num_points2D, "2D point") +
+             " in no track whose coordinates are not finite";
+  }
+  return words.empty() ? words : words + ": kept as read, and left out";
 }
 
 // COLMAP's files are not for reports.
@@ -99,6 +128,14 @@ void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
                   "a file",
                   "Where 3D points are known to be: per line an id and X Y Z "
                   "RADIUS");
+  parser->Add({"Problem.position_radius",
+               "The radius of known positions whose lines have none",
+               "a number > 0, in the model's unit", "every line has its own",
+               false, [paths](const std::string& text) {
+                 paths->position_radius.emplace();
+                 return ParseReal(text, &*paths->position_radius) &&
+                        *paths->position_radius > 0;
+               }});
 }
 
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
@@ -168,6 +205,8 @@ ValidModel ReadValidModel(const std::string& path,
   for (const std::string& sentence : PoseSentences(read.poses)) {
     LogLine(log, 1, "warning: " + path + ": " + sentence);
   }
+  const std::string kept = KeptWords(read.model);
+  if (!kept.empty()) LogLine(log, 1, path + ": " + kept);
   if (!read.contradictions.Any()) return read;
   if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
   if (!SetsAnything(read.model)) return read;
@@ -185,42 +224,51 @@ Model ReadInput(const ModelPaths& paths, const LogOptions& log,
   ValidModel read =
       ReadValidModel(paths.input_path, paths.on_contradiction, log);
   run->contradictions = read.contradictions;
+  if (read.model.track_elements.empty()) {
+    throw CommandError(kExitNothingToSolve,
+                       std::string("nothing to solve: ") + kNoObservations);
+  }
   run->poses = read.poses;
   if (!paths.rotations_path.empty()) {
     LogInput(paths.rotations_path);
-    run->rotations =
-        TakeRotations(ReadFileBytes(paths.rotations_path), &read.model);
+    run->rotations = TakeRotations(ReadFileBytes(paths.rotations_path),
+                                   &read.model, -1, WarnOn(log));
     LogLine(log, 1, RotationsSentence(paths.rotations_path, *run->rotations));
   }
   run->seconds_read = timer.Seconds();
   return std::move(read.model);
 }
 
-FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model) {
+FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
+                          const LogOptions& log) {
   FixedParts fixed;
   if (!paths.fixed_images_path.empty()) {
     LogInput(paths.fixed_images_path);
-    fixed.frames = FixedFrames(ReadFileBytes(paths.fixed_images_path), model);
+    fixed.frames =
+        FixedFrames(ReadFileBytes(paths.fixed_images_path), model, WarnOn(log));
   }
   if (!paths.fixed_points_path.empty()) {
     LogInput(paths.fixed_points_path);
-    fixed.points3D =
-        FixedPoints3D(ReadFileBytes(paths.fixed_points_path), model);
+    fixed.points3D = FixedPoints3D(ReadFileBytes(paths.fixed_points_path),
+                                   model, WarnOn(log));
   }
   return fixed;
 }
 
 std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
-                                              const Model& model) {
+                                              const Model& model,
+                                              const LogOptions& log) {
+  const PositionsOptions options{paths.position_radius, WarnOn(log)};
   std::vector<KnownPosition> positions;
   if (!paths.positions_path.empty()) {
     LogInput(paths.positions_path);
-    positions = ReadPositions(ReadFileBytes(paths.positions_path), model);
+    positions =
+        ReadPositions(ReadFileBytes(paths.positions_path), model, options);
   }
   if (!paths.point_positions_path.empty()) {
     LogInput(paths.point_positions_path);
-    const std::vector<KnownPosition> of_points =
-        ReadPointPositions(ReadFileBytes(paths.point_positions_path), model);
+    const std::vector<KnownPosition> of_points = ReadPointPositions(
+        ReadFileBytes(paths.point_positions_path), model, options);
     positions.insert(positions.end(), of_points.begin(), of_points.end());
   }
   return positions;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@ struct ModelPaths {
   std::string fixed_points_path;  // "": all move
   std::string positions_path;     // "": none is known
   std::string point_positions_path;
+  std::optional<double> position_radius;  // of lines without one
   std::string report_path;
   std::string html_path;
   bool write_on_interrupt = false;
@@ -79,12 +81,14 @@ ValidModel ReadValidModel(const std::string& path,
 
 // The model to work on: read and validated, with the rotations of
 // paths.rotations_path, if there is one; fills in what `run` says of the
-// input. Throws ModelError.
+// input. Throws ModelError, and CommandError for a model without observations.
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run);
 
 // What paths.fixed_*_path name of the model. Throws ModelError.
-FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model);
+FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
+                          const LogOptions& log);
 std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
-                                              const Model& model);
+                                              const Model& model,
+                                              const LogOptions& log);
 
 }  // namespace krot

@@ -74,8 +74,9 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
             Checkpoint* checkpoint, SolveReport* report) {
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
-  options.solve.problem.fixed = ReadFixedParts(command.paths, model);
-  options.solve.problem.positions = ReadKnownPositions(command.paths, model);
+  options.solve.problem.fixed = ReadFixedParts(command.paths, model, log);
+  options.solve.problem.positions =
+      ReadKnownPositions(command.paths, model, log);
   options.solve.checkpoint = checkpoint;
   Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
@@ -208,6 +209,27 @@ void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   }
 }
 
+// One wrong observation can set the maximum, for which all others pay. On
+// models without such the mean error rises by up to a half after a finish.
+void PointToOutlierFilter(const LogOptions& log, const SolveReport& report) {
+  constexpr double kMuch = 2;
+  const PixelErrorStatistics& before = report.summary.pixel_error_before;
+  const PixelErrorStatistics& after = report.summary.pixel_error_after;
+  if (report.outliers || !report.summary.finish ||
+      before.count != after.count ||
+      report.summary.termination == SolveTermination::kZeroCost ||
+      !(after.mean > kMuch * before.mean)) {
+    return;
+  }
+  LogLine(log, 0,
+          "warning: the mean error has risen from " +
+              FormatNumber(before.mean, 4) + " to " +
+              FormatNumber(after.mean, 4) +
+              " px: a few errors, far larger than the others, fell at the "
+              "others' cost; if those observations are wrong, krot "
+              "outlier_filter removes them");
+}
+
 void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
   const std::vector<std::string> names = ImageNamesWithWhiteSpace(model);
   if (names.empty()) return;
@@ -270,6 +292,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (context.IsCancelled()) ThrowInterrupted(paths);
   RemoveCheckpoint(command.checkpoint, log);
   WarnOfMissedGap(command, report.summary);
+  PointToOutlierFilter(log, report);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;
   return is_copy ? kExitGivenBack : kExitDone;
 }

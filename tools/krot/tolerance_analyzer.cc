@@ -72,7 +72,7 @@ void CheckPairs(const OptionParser& parser) {
 ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
   const LogOptions& log = command.common.log;
   ToleranceOptions options = ResolveToleranceOptions(command.arguments, model);
-  options.solve.problem.fixed = ReadFixedParts(command.paths, model);
+  options.solve.problem.fixed = ReadFixedParts(command.paths, model, log);
   const auto num_boxes =
       static_cast<int64_t>(options.images.size() + options.points.size());
   options.on_box = [&](int64_t num_done) {

@@ -1,6 +1,7 @@
 #include "krot/adjust/adjustment_blocks.h"
 
 #include <cmath>
+#include <cstring>
 #include <string>
 
 #include "krot/camera/camera_model.h"
@@ -147,6 +148,15 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
   return blocks;
 }
 
+namespace {
+
+// To the bit: a NaN stays, too.
+bool IsSame(const PoseBlock& a, const PoseBlock& b) {
+  return std::memcmp(a.data(), b.data(), sizeof(PoseBlock)) == 0;
+}
+
+}  // namespace
+
 Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
                   const AdjustmentBlocks& after) {
   Model result = model;
@@ -166,7 +176,7 @@ Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
     }
   }
   for (size_t f = 0; f < after.frames.size(); ++f) {
-    if (after.frames[f] == before.frames[f]) continue;
+    if (IsSame(after.frames[f], before.frames[f])) continue;
     result.frames[f].rig_from_world = ToPose(after.frames[f]);
   }
 
@@ -177,8 +187,8 @@ Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
     if (f < 0) continue;
     const int32_t sensor = SensorBlock(images[n], sensor_offsets);
     const bool stays =
-        after.frames[f] == before.frames[f] &&
-        (sensor < 0 || after.sensors[sensor] == before.sensors[sensor]);
+        IsSame(after.frames[f], before.frames[f]) &&
+        (sensor < 0 || IsSame(after.sensors[sensor], before.sensors[sensor]));
     if (stays) continue;
     Pose& pose = result.images[n].cam_from_world;
     pose =

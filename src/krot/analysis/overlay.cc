@@ -113,6 +113,7 @@ void Renumber(const IdOffsets& offsets, Model* model) {
 void FollowFrames(Model* model) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
   for (size_t n = 0; n < model->images.size(); ++n) {
+    if (!geometries[n].rig_from_world.rotation.allFinite()) continue;
     model->images[n].cam_from_world = ToPose(geometries[n].cam_from_world);
   }
 }

@@ -64,10 +64,10 @@ std::string Pixels(const std::optional<double>& error) {
 }  // namespace
 
 RotationInput TakeRotations(const FileBytes& file, Model* model,
-                            int num_threads) {
+                            int num_threads, const FileNote& note) {
   RotationInput input;
   std::vector<double> before = PixelErrors(*model, num_threads);
-  input.replaced = ReplaceRotations(file, model);
+  input.replaced = ReplaceRotations(file, model, note);
   std::vector<double> after = PixelErrors(*model, num_threads);
   KeepChanged(&before, &after);
   input.median_error_before = Median(std::move(before));

@@ -19,11 +19,12 @@ struct RotationInput {
   std::optional<double> median_error_after;
 };
 
-// ReplaceRotations. Throws ModelError where the file is a mistake of
-// convention, probably (ReplacedRotations::mistake), and the model's errors say
-// so, too: with its own rotations the median is small, at most 1 % of the
-// largest image's larger side, and far smaller. O(observations).
+// ReplaceRotations, which tells `note` what it skips. Throws ModelError where
+// the file is a mistake of convention, probably (ReplacedRotations::mistake),
+// and the model's errors say so, too: with its own rotations the median is
+// small, at most 1 % of the largest image's larger side, and far smaller.
+// O(observations).
 RotationInput TakeRotations(const FileBytes& file, Model* model,
-                            int num_threads = -1);
+                            int num_threads = -1, const FileNote& note = {});
 
 }  // namespace krot

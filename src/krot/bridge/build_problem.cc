@@ -268,8 +268,9 @@ void Compact(const std::vector<PointOutcome>& outcomes, BuiltProblem* built) {
 // An image has a pose if its rotation and its place in the rig are known.
 void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
   for (ImageGeometry& image : *geometries) {
-    image.has_pose =
-        image.frame >= 0 && image.cam_from_rig.translation.allFinite();
+    image.has_pose = image.frame >= 0 &&
+                     image.cam_from_rig.translation.allFinite() &&
+                     image.rig_from_world.rotation.allFinite();
   }
 }
 

@@ -30,7 +30,16 @@ QuaternionWxyz ToWxyz(const Quaterniond& q) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
 
+bool HasRotation(const QuaternionWxyz& wxyz) {
+  const double squared_norm =
+      Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).squaredNorm();
+  return squared_norm > 0 && std::isfinite(squared_norm);
+}
+
 Matrix3d RotationOf(const QuaternionWxyz& wxyz) {
+  if (!HasRotation(wxyz)) {
+    return Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
   return NormalizedQuaternion(wxyz).toRotationMatrix();
 }
 

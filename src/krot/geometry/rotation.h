@@ -18,7 +18,11 @@ Eigen::Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz);
 // The coefficients, as they are.
 QuaternionWxyz ToWxyz(const Eigen::Quaterniond& q);
 
-// The rotation of the normalised quaternion.
+// Whether it can be normalised: it is finite and not zero. Images that are not
+// registered are written with such as cannot.
+bool HasRotation(const QuaternionWxyz& wxyz);
+
+// The rotation of the normalised quaternion; NaN if it has none.
 Eigen::Matrix3d RotationOf(const QuaternionWxyz& wxyz);
 
 // The rotation nearest to M in the Frobenius norm: U diag(1, 1, det U V') V'

@@ -2,76 +2,39 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 
-#include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/image_names.h"
-#include "krot/model/model_error.h"
-#include "krot/model/text_reader.h"
+#include "krot/model/name_list.h"
 
 namespace krot {
-namespace {
 
-// Hands every line of the file to `mark`, as text.
-template <typename Mark>
-void MarkLines(const FileBytes& file, const char* expected, const Mark& mark) {
-  TextReader reader(file);
-  bool is_empty = true;
-  while (reader.NextRecord()) {
-    is_empty = false;
-    mark(reader.Rest(), reader);
-  }
-  if (is_empty) {
-    throw ModelError(file.path + ": found no line, expected " + expected);
-  }
-}
-
-}  // namespace
-
-std::vector<char> FixedFrames(const FileBytes& file, const Model& model) {
+std::vector<char> FixedFrames(const FileBytes& file, const Model& model,
+                              const FileNote& note) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
-  const ImageNames names(model);
-  const IdIndex<ImageId> ids(model.images);
+  ListReader list(file, model, ListReader::Of::kImagesOrIds);
   std::vector<char> is_fixed(model.frames.size(), 0);
-  MarkLines(
-      file, "the name or the id of an image on each",
-      [&](std::string_view text, const TextReader& reader) {
-        std::optional<int32_t> image;
-        if (names.Has(text)) {
-          image = names.Find(text, reader);
-        } else if (const auto id = TextReader::ParseNumber<ImageId>(text)) {
-          image = ids.Find(*id);
-        }
-        if (!image) {
-          reader.Fail("\"" + std::string(text) + "\"",
-                      "the name or the id of an image of the model");
-        }
-        const int32_t frame = geometries[*image].frame;
-        if (!model.frames[frame].rig_from_world.translation.allFinite()) {
-          reader.Fail("\"" + std::string(text) +
-                          "\", which stands nowhere in the model",
-                      "an image with a finite translation");
-        }
-        is_fixed[frame] = 1;
-      });
+  while (list.Next()) {
+    const std::optional<int32_t> image = list.TakeName();
+    if (!image) continue;
+    if (!geometries[*image].has_pose) {
+      list.reader().Fail("\"" + model.images[*image].name +
+                             "\", which stands nowhere in the model",
+                         "an image with a pose");
+    }
+    is_fixed[geometries[*image].frame] = 1;
+  }
+  list.Finish(note);
   return is_fixed;
 }
 
-std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model) {
-  const IdIndex<Point3DId> ids(model.points3D);
+std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model,
+                                const FileNote& note) {
+  ListReader list(file, model, ListReader::Of::kPoints3D);
   std::vector<char> is_fixed(model.points3D.size(), 0);
-  MarkLines(file, "the id of a 3D point on each",
-            [&](std::string_view text, const TextReader& reader) {
-              const auto id = TextReader::ParseNumber<Point3DId>(text);
-              const std::optional<int32_t> point =
-                  id ? ids.Find(*id) : std::nullopt;
-              if (!point) {
-                reader.Fail("\"" + std::string(text) + "\"",
-                            "the id of a 3D point of the model");
-              }
-              is_fixed[*point] = 1;
-            });
+  while (list.Next()) {
+    if (const auto point = list.TakeName()) is_fixed[*point] = 1;
+  }
+  list.Finish(note);
   return is_fixed;
 }
 

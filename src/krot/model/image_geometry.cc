@@ -20,7 +20,8 @@ void Place(const Pose& rig_from_world, const Pose& cam_from_rig,
   image->rig_from_world = rig_from_world.Transform();
   image->cam_from_rig = cam_from_rig.Transform();
   image->cam_from_world = image->cam_from_rig * image->rig_from_world;
-  image->has_pose = image->cam_from_world.translation.allFinite();
+  image->has_pose = image->cam_from_world.translation.allFinite() &&
+                    image->rig_from_world.rotation.allFinite();
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ struct ImageGeometry {
   int32_t frame = -1;
   int32_t rig = -1;     // index in Model::rigs; -1 if frame is
   int32_t sensor = -1;  // index in Rig::sensors; -1: the reference sensor
-  // False if frame is -1 or any translation below is not finite.
+  // False if frame is -1 or anything below is not finite.
   bool has_pose = false;
   RigidTransform rig_from_world;
   RigidTransform cam_from_rig;

@@ -49,7 +49,10 @@ std::vector<Vector3d> Centres(const Model& model,
   for (size_t f = 0; f < model.frames.size(); ++f) {
     const RigidTransform rig_from_world =
         model.frames[f].rig_from_world.Transform();
-    if (!rig_from_world.translation.allFinite()) continue;
+    if (!rig_from_world.translation.allFinite() ||
+        !rig_from_world.rotation.allFinite()) {
+      continue;
+    }
     if (!is_wanted.empty() && !is_wanted[f]) continue;
     centres.push_back(Center(rig_from_world));
   }
@@ -83,8 +86,9 @@ std::vector<Vector3d> Positions(const Model& model, const FixedParts& fixed,
   return positions;
 }
 
-// t + R `shift`, rounded once.
+// t + R `shift`, rounded once; without a rotation there is nothing to shift.
 void Shift(const Vector3d& shift, Pose* pose) {
+  if (!HasRotation(pose->quaternion_wxyz)) return;
   pose->translation = (pose->translation.cast<Real>() +
                        pose->Rotation().cast<Real>() * shift.cast<Real>())
                           .cast<double>();

@@ -1,63 +1,41 @@
 #include "krot/model/positions_file.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
-#include <optional>
+#include <limits>
 #include <string>
-#include <string_view>
+#include <utility>
 
-#include "krot/model/id_index.h"
-#include "krot/model/image_names.h"
+#include "krot/base/number_text.h"
+#include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
-#include "krot/model/text_reader.h"
+#include "krot/model/name_list.h"
 
 namespace krot {
 namespace {
 
 using Eigen::Vector3d;
 
-// Numbers of a line: a ball's, an ellipsoid's, and one's that is turned.
-constexpr size_t kOfBall = 4;
-constexpr size_t kOfAxes = 6;
-constexpr size_t kOfTurnedAxes = 10;
-constexpr char kExpectedNumber[] =
-    "a finite number: X, Y, Z, RADIUS of a position";
+// Numbers of a line: an ellipsoid's that is turned, one's along the axes, a
+// ball's, and a ball's without its radius.
+const std::vector<size_t> kCounts = {10, 6, 4, 3};
+constexpr char kExpected[] =
+    "X Y Z RADIUS, or X Y Z and three semi-axes, or these and QW QX QY QZ";
 // Of two semi-axes.
 constexpr double kLargestRatio = 1e4;
 
-double ParseFinite(std::string_view word, const TextReader& reader) {
-  const auto value = TextReader::ParseNumber<double>(word);
-  if (!value || !std::isfinite(*value)) {
-    reader.Fail("\"" + std::string(word) + "\"", kExpectedNumber);
+Ellipsoid RegionOf(const std::vector<double>& v,
+                   const std::optional<double>& radius,
+                   const TextReader& reader) {
+  if (v.size() == 3 && !radius) {
+    reader.Fail("no RADIUS behind X Y Z",
+                std::string(kExpected) +
+                    "; --Problem.position_radius gives one to all such lines");
   }
-  return *value;
-}
-
-// The last `count` words of the line, which the line then lacks.
-std::vector<double> TakeLast(size_t count, TextReader* reader) {
-  std::vector<double> numbers(count);
-  for (size_t k = count; k-- > 0;) {
-    numbers[k] = ParseFinite(reader->LastWord(kExpectedNumber), *reader);
-  }
-  return numbers;
-}
-
-// Whether the line is a name of the model and so many words.
-bool HasNumbers(size_t count, const ImageNames& names, TextReader reader) {
-  for (size_t k = 0; k < count; ++k) {
-    if (reader.AtEnd()) return false;
-    const auto value =
-        TextReader::ParseNumber<double>(reader.LastWord(kExpectedNumber));
-    if (!value) return false;
-  }
-  return names.Has(reader.Rest());
-}
-
-Ellipsoid RegionOf(const std::vector<double>& v, const TextReader& reader) {
-  Ellipsoid region = Ball({v[0], v[1], v[2]}, v[3]);
-  if (v.size() >= kOfAxes) region.semi_axes = {v[3], v[4], v[5]};
-  if (v.size() == kOfTurnedAxes) {
-    region.world_from_axes = {v[6], v[7], v[8], v[9]};
-  }
+  Ellipsoid region = Ball({v[0], v[1], v[2]}, v.size() == 3 ? *radius : v[3]);
+  if (v.size() >= 6) region.semi_axes = {v[3], v[4], v[5]};
+  if (v.size() == 10) region.world_from_axes = {v[6], v[7], v[8], v[9]};
   if (!(region.semi_axes.minCoeff() > 0)) {
     std::string found = "\"";
     AppendNumber(region.semi_axes.minCoeff(), &found);
@@ -71,22 +49,78 @@ Ellipsoid RegionOf(const std::vector<double>& v, const TextReader& reader) {
   return region;
 }
 
-// Notes the line that names `index`; fails if another does already.
-void NoteLine(int32_t index, const std::string& name, const TextReader& reader,
-              std::vector<size_t>* line_of) {
-  size_t& line = (*line_of)[index];
-  if (line > 0) {
-    reader.Fail(name + " again",
-                "each once; line " + std::to_string(line) + " names it");
-  }
-  line = reader.line_number();
+// Between the quartiles of a coordinate, which few strays do not move.
+double Spread(std::vector<Vector3d> positions, int axis) {
+  if (positions.empty()) return 0;
+  std::sort(positions.begin(), positions.end(),
+            [axis](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+  const size_t count = positions.size();
+  return positions[3 * count / 4][axis] - positions[count / 4][axis];
 }
 
-void RequireAny(const std::vector<KnownPosition>& positions,
-                const FileBytes& file) {
-  if (!positions.empty()) return;
-  throw ModelError(file.path +
-                   ": found no position, expected one on a line each");
+// Whether x and y are degrees on the earth: in their range, nowhere near zero
+// for how near they are to each other, and that next to nothing beside the
+// spread that the model gives the same things or, if it gives none, beside
+// their heights'. A degree is 111 km: metres would be 10^5 times as far apart.
+bool AreDegrees(const std::vector<Vector3d>& positions,
+                const std::vector<Vector3d>& in_model) {
+  constexpr double kNextToNothing = 0.01;
+  Vector3d farthest = Vector3d::Zero();
+  for (const Vector3d& x : positions)
+    farthest = farthest.cwiseMax(x.cwiseAbs());
+  const double larger = std::max(farthest.x(), farthest.y());
+  if (larger > 180 || std::min(farthest.x(), farthest.y()) > 90) return false;
+  const double spread = std::max(Spread(positions, 0), Spread(positions, 1));
+  double other = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    other = std::max(other, Spread(in_model, axis));
+  }
+  if (other == 0) other = Spread(positions, 2);
+  return spread > 0 && spread < kNextToNothing * std::min(larger, other);
+}
+
+bool NamesDegrees(std::string header) {
+  for (char& c : header) {
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return header.find("lat") != std::string::npos &&
+         (header.find("lon") != std::string::npos ||
+          header.find("lng") != std::string::npos);
+}
+
+// Reads the list; `in_model` are the positions that the model has itself, NaN
+// for none.
+std::vector<KnownPosition> ReadList(const FileBytes& file, const Model& model,
+                                    KnownPosition::Of of,
+                                    const std::vector<Vector3d>& in_model,
+                                    const PositionsOptions& options) {
+  ListReader list(file, model,
+                  of == KnownPosition::Of::kImage ? ListReader::Of::kImages
+                                                  : ListReader::Of::kPoints3D);
+  std::vector<std::pair<ListReader::Line, TextReader>> lines;
+  std::vector<Vector3d> listed;
+  std::vector<Vector3d> own;
+  while (list.Next()) {
+    const auto line = list.Take(kCounts, kExpected);
+    if (!line) continue;
+    lines.emplace_back(*line, list.reader());
+    listed.emplace_back(line->numbers.data());
+    if (in_model[line->index].allFinite()) own.push_back(in_model[line->index]);
+  }
+  if (NamesDegrees(list.header()) || AreDegrees(listed, own)) {
+    throw ModelError(
+        file.path +
+        ": found latitudes and longitudes, expected X Y Z in the model's frame "
+        "and unit; tools/scripts/geodetic_to_positions.sh makes these of them, "
+        "for a model that colmap model_aligner has brought into that frame");
+  }
+  list.Finish(options.on_note);
+  std::vector<KnownPosition> positions;
+  for (const auto& [line, reader] : lines) {
+    positions.push_back(
+        {of, line.index, RegionOf(line.numbers, options.radius, reader)});
+  }
+  return positions;
 }
 
 }  // namespace
@@ -101,57 +135,24 @@ bool IsFit(const Ellipsoid& region) {
 }
 
 std::vector<KnownPosition> ReadPositions(const FileBytes& file,
-                                         const Model& model) {
-  const ImageNames names(model);
-  std::vector<KnownPosition> positions;
-  std::vector<size_t> line_of_image(model.images.size(), 0);
-  TextReader reader(file);
-  while (reader.NextRecord()) {
-    size_t count = kOfBall;  // unless more of them leave a name
-    for (const size_t more : {kOfAxes, kOfTurnedAxes}) {
-      if (HasNumbers(more, names, reader)) count = more;
-    }
-    const std::vector<double> numbers = TakeLast(count, &reader);
-    const std::string_view name = reader.Rest();
-    if (name.empty()) {
-      reader.Fail("no name", "an image's name in front of X Y Z RADIUS");
-    }
-    const int32_t image = names.Find(name, reader);
-    NoteLine(image, "\"" + std::string(name) + "\"", reader, &line_of_image);
-    positions.push_back(
-        {KnownPosition::Of::kImage, image, RegionOf(numbers, reader)});
+                                         const Model& model,
+                                         const PositionsOptions& options) {
+  std::vector<Vector3d> centres;
+  for (const ImageGeometry& image : ImageGeometries(model)) {
+    centres.push_back(
+        image.has_pose
+            ? Center(image.cam_from_world)
+            : Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
   }
-  RequireAny(positions, file);
-  return positions;
+  return ReadList(file, model, KnownPosition::Of::kImage, centres, options);
 }
 
 std::vector<KnownPosition> ReadPointPositions(const FileBytes& file,
-                                              const Model& model) {
-  const IdIndex<Point3DId> index(model.points3D);
-  std::vector<KnownPosition> positions;
-  std::vector<size_t> line_of_point(model.points3D.size(), 0);
-  TextReader reader(file);
-  while (reader.NextRecord()) {
-    const auto id = reader.Number<Point3DId>("the id of a 3D point");
-    const std::string name = "3D point " + std::to_string(id);
-    const std::optional<int32_t> point = index.Find(id);
-    if (!point) reader.Fail(name, "the id of a 3D point of the model");
-    NoteLine(*point, name, reader, &line_of_point);
-    std::vector<double> numbers;
-    while (!reader.AtEnd()) {
-      numbers.push_back(ParseFinite(reader.Word(kExpectedNumber), reader));
-    }
-    if (numbers.size() != kOfBall && numbers.size() != kOfAxes &&
-        numbers.size() != kOfTurnedAxes) {
-      reader.Fail(std::to_string(numbers.size()) + " numbers behind the id",
-                  "X Y Z RADIUS, or X Y Z and three semi-axes, or these and QW "
-                  "QX QY QZ");
-    }
-    positions.push_back(
-        {KnownPosition::Of::kPoint3D, *point, RegionOf(numbers, reader)});
-  }
-  RequireAny(positions, file);
-  return positions;
+                                              const Model& model,
+                                              const PositionsOptions& options) {
+  std::vector<Vector3d> points;
+  for (const Point3D& point : model.points3D) points.push_back(point.xyz);
+  return ReadList(file, model, KnownPosition::Of::kPoint3D, points, options);
 }
 
 }  // namespace krot

@@ -10,10 +10,9 @@
 #include <Eigen/Geometry>
 
 #include "krot/model/image_geometry.h"
-#include "krot/model/image_names.h"
 #include "krot/model/model_error.h"
+#include "krot/model/name_list.h"
 #include "krot/model/pose_checks.h"
-#include "krot/model/text_reader.h"
 
 namespace krot {
 namespace {
@@ -21,44 +20,12 @@ namespace {
 // What rounding to six digits makes of one rotation, twice, radians.
 constexpr double kSameRotation = 1e-5;
 
-std::string Quoted(std::string_view text) {
-  return "\"" + std::string(text) + "\"";
-}
-
-// Takes the last four words of the line.
-QuaternionWxyz ReadQuaternion(TextReader* reader) {
-  constexpr char kExpected[] = "a finite number: QW, QX, QY, QZ of a rotation";
-  QuaternionWxyz wxyz;
-  double squared_norm = 0;
-  for (int k = 3; k >= 0; --k) {
-    const std::string_view word = reader->LastWord(kExpected);
-    const auto value = TextReader::ParseNumber<double>(word);
-    if (!value || !std::isfinite(*value)) reader->Fail(Quoted(word), kExpected);
-    wxyz[k] = *value;
-    squared_norm += *value * *value;
-  }
-  if (!(squared_norm > 0) || !std::isfinite(squared_norm)) {
-    reader->Fail(
-        "a quaternion of length " + std::to_string(std::sqrt(squared_norm)),
-        "one that can be normalised");
-  }
-  return wxyz;
-}
-
-// Takes the rest of the line.
-int32_t ReadImage(const ImageNames& names, TextReader* reader) {
-  const std::string_view name = reader->Rest();
-  if (name.empty()) {
-    reader->Fail("no name", "an image's name in front of QW QX QY QZ");
-  }
-  return names.Find(name, *reader);
-}
-
 // A line of the file.
 struct ListedRotation {
   int32_t image = 0;  // index in Model::images
   QuaternionWxyz cam_from_world;
   size_t line = 0;
+  bool is_new = false;  // the model has no rotation of this image
 };
 
 // What the lines so far say of a frame.
@@ -73,16 +40,15 @@ class Replacement {
   explicit Replacement(Model* model)
       : model_(*model),
         geometries_(ImageGeometries(*model)),
-        named_(model->frames.size()),
-        line_of_image_(model->images.size(), 0) {}
+        named_(model->frames.size()) {}
 
-  void Read(const FileBytes& file);
+  void Read(const FileBytes& file, const FileNote& note);
   ReplacedRotations Apply(const std::string& path);
 
  private:
   void Add(int32_t image, const QuaternionWxyz& cam_from_world,
            const TextReader& reader);
-  // Of the listed images.
+  // The model's own, of the listed images that have one.
   std::vector<Eigen::Quaterniond> OwnRotations() const;
   // False where all frames have the same: a model without rotations, probably.
   bool HasRotations() const;
@@ -102,44 +68,51 @@ class Replacement {
   std::vector<ListedRotation> listed_;
   std::optional<Eigen::Quaterniond> list_from_own_world_;  // none: the same
   std::vector<NamedFrame> named_;
-  std::vector<size_t> line_of_image_;  // 0: none
 };
 
-void Replacement::Read(const FileBytes& file) {
-  const ImageNames names(model_);
-  TextReader reader(file);
-  while (reader.NextRecord()) {
-    const QuaternionWxyz cam_from_world = ReadQuaternion(&reader);
-    Add(ReadImage(names, &reader), cam_from_world, reader);
+void Replacement::Read(const FileBytes& file, const FileNote& note) {
+  ListReader list(file, model_, ListReader::Of::kImages);
+  while (list.Next()) {
+    const auto line = list.Take({4}, "QW QX QY QZ of a rotation");
+    if (!line) continue;
+    const std::vector<double>& q = line->numbers;
+    const QuaternionWxyz cam_from_world = {q[0], q[1], q[2], q[3]};
+    if (!HasRotation(cam_from_world)) {
+      list.reader().Fail("a quaternion of zeros, or too long to be squared",
+                         "one that can be normalised");
+    }
+    Add(line->index, cam_from_world, list.reader());
   }
+  list.Finish(note);
 }
 
 void Replacement::Add(int32_t image, const QuaternionWxyz& cam_from_world,
                       const TextReader& reader) {
-  if (line_of_image_[image] > 0) {
-    reader.Fail(Quoted(model_.images[image].name) + " again",
-                "each image once; line " +
-                    std::to_string(line_of_image_[image]) + " names it");
-  }
-  line_of_image_[image] = reader.line_number();
-  listed_.push_back({image, cam_from_world, reader.line_number()});
+  const Pose& frame = model_.frames[geometries_[image].frame].rig_from_world;
+  listed_.push_back({image, cam_from_world, reader.line_number(),
+                     !HasRotation(frame.quaternion_wxyz)});
 }
 
 std::vector<Eigen::Quaterniond> Replacement::OwnRotations() const {
   std::vector<Eigen::Quaterniond> rotations;
   for (const ListedRotation& listed : listed_) {
+    if (listed.is_new) continue;
     rotations.emplace_back(geometries_[listed.image].cam_from_world.rotation);
   }
   return rotations;
 }
 
 bool Replacement::HasRotations() const {
-  return std::any_of(
-      listed_.begin(), listed_.end(), [&](const ListedRotation& listed) {
-        return !geometries_[listed.image].rig_from_world.rotation.isApprox(
-            geometries_[listed_.front().image].rig_from_world.rotation,
-            kSameRotation);
-      });
+  const ListedRotation* first = nullptr;
+  for (const ListedRotation& listed : listed_) {
+    if (listed.is_new) continue;
+    if (first == nullptr) first = &listed;
+    if (!geometries_[listed.image].rig_from_world.rotation.isApprox(
+            geometries_[first->image].rig_from_world.rotation, kSameRotation)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 void Replacement::Judge(ReplacedRotations* replaced) {
@@ -147,7 +120,7 @@ void Replacement::Judge(ReplacedRotations* replaced) {
   if (!replaced->is_comparable) return;
   std::vector<QuaternionWxyz> listed;
   for (const ListedRotation& one : listed_) {
-    listed.push_back(one.cam_from_world);
+    if (!one.is_new) listed.push_back(one.cam_from_world);
   }
   const RotationAgreement agreement = CompareRotations(OwnRotations(), listed);
   replaced->mistake = agreement.mistake;
@@ -199,13 +172,15 @@ void Replacement::CountTurns(const std::vector<Eigen::Quaterniond>& before,
                              ReplacedRotations* replaced) const {
   if (before.empty()) return;
   std::vector<double> turns_deg;
-  for (size_t n = 0; n < before.size(); ++n) {
-    const int32_t image = listed_[n].image;
+  auto own = before.begin();
+  for (const ListedRotation& listed : listed_) {
+    if (listed.is_new) continue;
+    const int32_t image = listed.image;
     const ImageGeometry& geometry = geometries_[image];
     const Eigen::Quaterniond after(
         geometry.cam_from_rig.rotation *
         model_.frames[geometry.frame].rig_from_world.Rotation());
-    turns_deg.push_back(AngleDeg(before[n], after));
+    turns_deg.push_back(AngleDeg(*own++, after));
     if (turns_deg.back() > replaced->largest_turn_deg) {
       replaced->largest_turn_deg = turns_deg.back();
       replaced->largest_turn_image = model_.images[image].name;
@@ -262,15 +237,11 @@ ReplacedRotations Replacement::Apply(const std::string& path) {
 
 }  // namespace
 
-ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model) {
+ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model,
+                                   const FileNote& note) {
   Replacement replacement(model);
-  replacement.Read(file);
-  const ReplacedRotations replaced = replacement.Apply(file.path);
-  if (replaced.num_frames == 0) {
-    throw ModelError(file.path +
-                     ": found no rotation, expected one on a line each");
-  }
-  return replaced;
+  replacement.Read(file, note);
+  return replacement.Apply(file.path);
 }
 
 }  // namespace krot

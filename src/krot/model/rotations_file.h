@@ -40,11 +40,14 @@ struct ReplacedRotations {
 // rotations are turned into the model's. One that agrees much better still
 // with its numbers in another order, or inverted, is a mistake, probably: they
 // are taken as they stand, and `mistake` says so.
+// A frame that had no rotation gets one, and has no translation. Images that
+// the model does not have are skipped, and `note` told.
 //
 // Requires a valid model, and leaves one. Throws ModelError, with the line, for
-// what is no such line, for an image that the model does not have or has twice,
-// or that the file names twice, and for a file without lines; the model is to
-// be thrown away then. O(file + images).
-ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model);
+// what is no such line, for a name that two images bear or that the file has
+// twice, and for a file that names no image of the model; the model is to be
+// thrown away then. O(file + images).
+ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model,
+                                   const FileNote& note = {});
 
 }  // namespace krot

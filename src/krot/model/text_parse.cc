@@ -62,13 +62,12 @@ Rig ReadRig(TextReader* reader) {
   for (uint32_t i = 1; i < num_sensors; ++i) {
     RigSensor sensor;
     sensor.sensor_id = ReadSensorId(reader);
-    const std::string_view has_pose =
-        reader->Word("0 or 1: whether a sensor has a pose");
-    if (has_pose != "0" && has_pose != "1") {
-      reader->Fail("\"" + std::string(has_pose) + "\"",
-                   "0 or 1: whether a sensor has a pose");
+    constexpr char kHasPose[] = "0 or 1: whether a sensor has a pose";
+    const auto has_pose = reader->Number<uint8_t>(kHasPose);
+    if (has_pose > 1) {
+      reader->Fail("\"" + std::to_string(has_pose) + "\"", kHasPose);
     }
-    if (has_pose == "1") sensor.sensor_from_rig = ReadPose(reader);
+    if (has_pose == 1) sensor.sensor_from_rig = ReadPose(reader);
     rig.sensors.push_back(sensor);
   }
   reader->ExpectEndOfLine("the sensors of a rig");
@@ -96,7 +95,7 @@ Point2D ReadPoint2D(TextReader* reader) {
   point.x = reader->Number<double>("a number: X of a 2D point");
   point.y = reader->Number<double>("a number: Y of a 2D point");
   const std::string_view id = reader->Word("the POINT3D_ID of a 2D point");
-  if (id == "-1") return point;
+  if (TextReader::ParseNumber<int8_t>(id) == -1) return point;
   const auto value = TextReader::ParseNumber<uint64_t>(id);
   if (!value) {
     reader->Fail("\"" + std::string(id) + "\"",
@@ -106,8 +105,36 @@ Point2D ReadPoint2D(TextReader* reader) {
   return point;
 }
 
-// The image's own line, then the line of its 2D points, which may be empty
-// or, at the end of the file, absent. `points2D` is scratch memory.
+// Whether the line is one of an image's own: IMAGE_ID POSE CAMERA_ID NAME.
+bool IsImage(TextReader reader) {
+  try {
+    reader.Number<uint32_t>("");
+    ReadPose(&reader);
+    reader.Number<uint32_t>("");
+    return !reader.AtEnd() && !TextReader::ParseNumber<double>(reader.Word(""));
+  } catch (const ModelError&) {
+    return false;
+  }
+}
+
+void ReadPoints2D(const Image& image, TextReader* reader,
+                  std::vector<Point2D>* points2D) {
+  const TextReader line = *reader;
+  try {
+    while (!reader->AtEnd()) points2D->push_back(ReadPoint2D(reader));
+  } catch (const ModelError&) {
+    if (!IsImage(line)) throw;
+    line.Fail("the line of another image",
+              "the 2D points of image " + std::to_string(image.id) + " (\"" +
+                  image.name +
+                  "\"): an image has two lines, of which the second may be "
+                  "empty; put an empty line behind each");
+  }
+}
+
+// The image's own line, then the line of its 2D points, which may be empty, a
+// comment, which counts as empty, or, at the end of the file, absent, all as in
+// COLMAP. `points2D` is scratch memory.
 Image ReadImage(TextReader* reader, std::vector<Point2D>* points2D) {
   Image image;
   image.id = reader->Number<uint32_t>("an image id");
@@ -115,8 +142,8 @@ Image ReadImage(TextReader* reader, std::vector<Point2D>* points2D) {
   image.camera_id = reader->Number<uint32_t>("a camera id");
   image.name = reader->Rest();
   points2D->clear();
-  if (reader->NextLine()) {
-    while (!reader->AtEnd()) points2D->push_back(ReadPoint2D(reader));
+  if (reader->NextLine() && !reader->IsComment()) {
+    ReadPoints2D(image, reader, points2D);
   }
   image.points2D = *points2D;
   return image;
@@ -130,7 +157,7 @@ Point3D ReadPoint3D(TextReader* reader,
     point.xyz[i] = reader->Number<double>("a number: X, Y, Z of a 3D point");
   }
   for (uint8_t& channel : point.color) {
-    channel = reader->Number<uint8_t>("0 to 255: R, G, B of a 3D point");
+    channel = reader->Number<uint8_t>("R, G, B of a 3D point");
   }
   point.error = reader->Number<double>("a number: ERROR of a 3D point");
   point.track_begin = track_elements->size();

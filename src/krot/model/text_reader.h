@@ -1,9 +1,12 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "krot/base/number_text.h"
@@ -12,15 +15,29 @@
 
 namespace krot {
 
+// The text without the byte order mark that editors of Windows put in front.
+// Throws ModelError for UTF-16, which PowerShell writes.
+inline std::string_view WithoutByteOrderMark(const FileBytes& file) {
+  std::string_view text = file.bytes;
+  const std::string_view mark = text.substr(0, 2);
+  if (mark == "\xff\xfe" || mark == "\xfe\xff") {
+    throw ModelError(file.path +
+                     ": found UTF-16, expected UTF-8; save it as UTF-8 text");
+  }
+  if (text.substr(0, 3) == "\xef\xbb\xbf") text.remove_prefix(3);
+  return text;
+}
+
 // Walks over the lines of a text file in memory and over the words of the
 // current line. Words are separated by spaces and tabs; a line may end with
-// CR LF. Errors are ModelErrors that name the file, the line, the word found
-// and, from `what`, what was expected ("the x of a 2D point").
+// CR LF; a byte order mark is skipped. Errors are ModelErrors that name the
+// file, the line, the word found and, from `what`, what was expected ("the x of
+// a 2D point").
 class TextReader {
  public:
   // Keeps a reference to `file`.
   explicit TextReader(const FileBytes& file)
-      : file_(file), remaining_(file.bytes) {}
+      : file_(file), remaining_(WithoutByteOrderMark(file)) {}
 
   // Moves to the next line; false at the end of the file.
   bool NextLine() {
@@ -37,10 +54,13 @@ class TextReader {
   // Moves to the next line that holds a record: neither blank nor a comment.
   bool NextRecord() {
     while (NextLine()) {
-      if (!AtEnd() && line_.front() != '#') return true;
+      if (!AtEnd() && !IsComment()) return true;
     }
     return false;
   }
+
+  // Whether this line is a comment.
+  bool IsComment() const { return !AtEnd() && line_.front() == '#'; }
 
   // Whether no word is left on this line.
   bool AtEnd() const { return line_.empty(); }
@@ -55,33 +75,38 @@ class TextReader {
     return word;
   }
 
-  // The last word of the line, which the line then lacks.
-  std::string_view LastWord(const char* what) {
-    TrimEnd();
-    if (AtEnd()) Fail("the end of the line", what);
-    size_t length = 0;
-    while (length < line_.size() &&
-           !IsBlank(line_[line_.size() - 1 - length])) {
-      ++length;
-    }
-    const std::string_view word = line_.substr(line_.size() - length);
-    line_.remove_suffix(length);
-    return word;
-  }
-
   // The next word as a number; exact for what std::to_chars or 17 digits
   // wrote. Throws if it is none or out of range of T.
   template <typename T>
   T Number(const char* what) {
     const std::string_view word = Word(what);
     const std::optional<T> value = ParseNumber<T>(word);
-    if (!value) Fail("\"" + std::string(word) + "\"", what);
+    if (!value) FailAtNumber<T>(word, what);
     return *value;
+  }
+
+  // As Number does for a word that is none.
+  template <typename T>
+  [[noreturn]] void FailAtNumber(std::string_view word,
+                                 const std::string& what) const {
+    const bool has_comma = word.find(',') != std::string_view::npos;
+    std::string range;
+    if constexpr (std::is_integral_v<T>) {
+      using Limits = std::numeric_limits<T>;
+      if (ParseNumber<double>(word)) {
+        range = ", an integer from " + std::to_string(Limits::min()) + " to " +
+                std::to_string(Limits::max());
+      }
+    }
+    Fail("\"" + std::string(word) + "\"",
+         what + range +
+             (has_comma ? "; write numbers with a decimal point, without commas"
+                        : ""));
   }
 
   // The rest of the line without the blanks at its ends.
   std::string_view Rest() {
-    TrimEnd();
+    while (!line_.empty() && IsBlank(line_.back())) line_.remove_suffix(1);
     return std::exchange(line_, {});
   }
 
@@ -107,15 +132,29 @@ class TextReader {
     if (word.size() > 1 && word[0] == '+' && word[1] != '-') {
       word.remove_prefix(1);
     }
-    return krot::ParseNumber<T>(word);
+    const std::optional<T> value = krot::ParseNumber<T>(word);
+    if constexpr (std::is_integral_v<T>) {
+      if (!value) return ParseWhole<T>(word);
+    }
+    return value;
   }
 
  private:
-  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
-
-  void TrimEnd() {
-    while (!line_.empty() && IsBlank(line_.back())) line_.remove_suffix(1);
+  // The integer that stands there as a real number, "1000.0", if a double holds
+  // it exactly.
+  template <typename T>
+  static std::optional<T> ParseWhole(std::string_view word) {
+    constexpr double kExact = 9007199254740992.0;  // 2^53
+    const std::optional<double> real = krot::ParseNumber<double>(word);
+    if (!real || std::trunc(*real) != *real || std::abs(*real) >= kExact ||
+        *real < static_cast<double>(std::numeric_limits<T>::min()) ||
+        *real > static_cast<double>(std::numeric_limits<T>::max())) {
+      return std::nullopt;
+    }
+    return static_cast<T>(*real);
   }
+
+  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
   void SkipBlanks() {
     size_t count = 0;

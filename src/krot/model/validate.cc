@@ -1,5 +1,7 @@
 #include "krot/model/validate.h"
 
+#include <limits>
+#include <optional>
 #include <string>
 
 #include "krot/camera/camera_model.h"
@@ -9,10 +11,16 @@ namespace krot {
 namespace {
 
 template <typename Id>
-void CheckUnique(const IdIndex<Id>& index, const char* records) {
-  if (!index.duplicate()) return;
-  Fail(records, ": found id ", *index.duplicate(),
-       " twice, expected unique ids");
+void CheckIds(const IdIndex<Id>& index, const char* records) {
+  if (index.duplicate()) {
+    Fail(records, ": found id ", *index.duplicate(),
+         " twice, expected unique ids");
+  }
+  constexpr Id kInvalid = std::numeric_limits<Id>::max();
+  if (index.Find(kInvalid)) {
+    Fail(records, ": found id ", kInvalid,
+         ", which in COLMAP stands for none, expected another; renumber it");
+  }
 }
 
 void CheckCamera(const Camera& camera) {
@@ -31,28 +39,32 @@ void CheckCamera(const Camera& camera) {
   }
 }
 
-void CheckImage(const Image& image, const IdIndex<CameraId>& cameras) {
-  const auto owner = [&] { return Describe(image); };
+// With a focal length of zero, or a panorama without a side, all rays have one
+// pixel.
+void CheckFocalLength(const Camera& camera) {
+  const CameraModelInfo& info = *FindCameraModel(camera.model_id);
+  const bool has_two = info.param_names.substr(0, 2) == "fx" ||
+                       info.param_names.substr(0, 1) == "w";
+  if (camera.params[0] != 0 && (!has_two || camera.params[1] != 0)) return;
+  Fail("camera ", camera.id, ": found 0 for ",
+       info.param_names.substr(0, info.param_names.find(", c")), " of ",
+       info.name, ", expected what its photos have, in pixels");
+}
+
+void CheckImage(const Image& image, const IndexedModel& model) {
   if (image.name.find('\0') != std::string::npos) {
     Fail("image ", image.id, ": found a zero byte in its name, expected none");
   }
-  if (!cameras.Find(image.camera_id)) {
-    Fail(owner(), ": found camera id ", image.camera_id,
+  const std::optional<int32_t> camera = model.cameras.Find(image.camera_id);
+  if (!camera) {
+    Fail(Describe(image), ": found camera id ", image.camera_id,
          ", expected one that exists in cameras");
   }
-  CheckRotation(image.cam_from_world, owner);
-  for (const Point2D& point : image.points2D) {
-    CheckFinite(point.x, owner, "the x of a 2D point");
-    CheckFinite(point.y, owner, "the y of a 2D point");
-  }
+  CheckFocalLength(model.records.cameras[*camera]);
 }
 
 void CheckPoint3D(const Point3D& point) {
   const auto owner = [&] { return "3D point " + std::to_string(point.id); };
-  if (point.id == kInvalidPoint3DId) {
-    Fail(owner(),
-         ": found the id that stands for no 3D point, expected another");
-  }
   for (const double value : point.xyz) {
     CheckFinite(value, owner, "a coordinate");
   }
@@ -76,13 +88,13 @@ void CheckTracksAreConsecutive(const Model& model) {
 
 void ValidateModel(const Model& model) {
   const IndexedModel indexed(model);
-  CheckUnique(indexed.cameras, "cameras");
-  CheckUnique(indexed.images, "images");
-  CheckUnique(indexed.rigs, "rigs");
-  CheckUnique(indexed.frames, "frames");
-  CheckUnique(indexed.points3D, "points3D");
+  CheckIds(indexed.cameras, "cameras");
+  CheckIds(indexed.images, "images");
+  CheckIds(indexed.rigs, "rigs");
+  CheckIds(indexed.frames, "frames");
+  CheckIds(indexed.points3D, "points3D");
   for (const Camera& camera : model.cameras) CheckCamera(camera);
-  for (const Image& image : model.images) CheckImage(image, indexed.cameras);
+  for (const Image& image : model.images) CheckImage(image, indexed);
   ValidateRigsAndFrames(indexed);
   for (const Point3D& point : model.points3D) CheckPoint3D(point);
   CheckTracksAreConsecutive(model);

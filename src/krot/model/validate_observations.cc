@@ -1,3 +1,4 @@
+#include <cmath>
 #include <optional>
 
 #include "krot/model/validate_parts.h"
@@ -22,6 +23,13 @@ void CheckTrackElement(const IndexedModel& model, const Point3D& point,
     Fail("3D point ", point.id, ": found 2D point ", element.point2D_idx,
          " of ", Describe(image), " in its track, but that image has only ",
          image.points2D.size(), " 2D points", kHowToReadTheRest);
+  }
+  const Point2D& pixel = image.points2D[element.point2D_idx];
+  for (const double value : {pixel.x, pixel.y}) {
+    if (std::isfinite(value)) continue;
+    Fail("3D point ", point.id, ": found 2D point ", element.point2D_idx,
+         " of ", Describe(image), " in its track, a coordinate of which is ",
+         value, ", expected a finite number");
   }
 }
 

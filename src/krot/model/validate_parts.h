@@ -56,16 +56,4 @@ void CheckFinite(double value, const Owner& owner, const char* quantity) {
   Fail(owner(), ": found ", quantity, " ", value, ", expected a finite number");
 }
 
-template <typename Owner>
-void CheckRotation(const Pose& pose, const Owner& owner) {
-  double squared_norm = 0;
-  for (const double value : pose.quaternion_wxyz) {
-    CheckFinite(value, owner, "a quaternion's coefficient");
-    squared_norm += value * value;
-  }
-  if (squared_norm > 0 && std::isfinite(squared_norm)) return;
-  Fail(owner(), ": found a quaternion of length ", std::sqrt(squared_norm),
-       ", expected one that can be normalised");
-}
-
 }  // namespace krot

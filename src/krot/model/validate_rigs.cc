@@ -10,6 +10,10 @@
 namespace krot {
 namespace {
 
+// Ends a sentence about rigs and frames that are not worth a repair.
+constexpr const char* kUsePosesOfImages =
+    "remove both rigs and frames: then the poses in images count";
+
 std::string Describe(const SensorId& sensor_id) {
   const auto name = SensorTypeName(sensor_id.type);
   return (name ? std::string(*name)
@@ -51,7 +55,14 @@ void CheckRig(const Rig& rig, const IdIndex<CameraId>& cameras) {
   for (const RigSensor& sensor : rig.sensors) {
     sensor_ids.push_back(sensor.sensor_id);
     if (!sensor.sensor_from_rig) continue;
-    CheckRotation(*sensor.sensor_from_rig, owner);
+    const Pose& pose = *sensor.sensor_from_rig;
+    if (!HasRotation(pose.quaternion_wxyz)) {
+      Fail(owner(), ": found the quaternion ", pose.quaternion_wxyz[0], " ",
+           pose.quaternion_wxyz[1], " ", pose.quaternion_wxyz[2], " ",
+           pose.quaternion_wxyz[3],
+           " of a sensor, expected one that can be "
+           "normalised");
+    }
     for (const double value : sensor.sensor_from_rig->translation) {
       CheckFinite(value, owner, "a sensor's translation");
     }
@@ -75,7 +86,8 @@ int32_t ResolveImage(const IndexedModel& model, const Frame& frame,
   }
   if (!position) {
     Fail("frame ", frame.id, ": found image id ", data.data_id,
-         ", expected one that exists in images");
+         ", expected one that exists in images; take it out of frames, or ",
+         kUsePosesOfImages);
   }
   const Image& image = model.records.images[*position];
   if (image.camera_id != data.sensor_id.id) {
@@ -94,7 +106,8 @@ void CheckCameraHasPose(const Rig& rig, const Image& image) {
   }
   if (!place->sensor_from_rig) {
     Fail(Describe(image), ": found its camera ", image.camera_id,
-         " without a pose in rig ", rig.id, ", expected one");
+         " without a pose in rig ", rig.id,
+         ", expected one; calibrate the rig, or ", kUsePosesOfImages);
   }
 }
 
@@ -106,8 +119,6 @@ void CheckFrame(const IndexedModel& model, const Frame& frame,
     Fail("frame ", frame.id, ": found rig id ", frame.rig_id,
          ", expected one that exists in rigs");
   }
-  CheckRotation(frame.rig_from_world,
-                [&] { return "frame " + std::to_string(frame.id); });
   for (const FrameData& data : frame.data) {
     if (data.sensor_id.type == kSensorTypeImu) continue;
     const int32_t position = ResolveImage(model, frame, data);

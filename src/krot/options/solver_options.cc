@@ -102,8 +102,10 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   }
   if (!table.IsGiven("positions_path") &&
       !table.IsGiven("point_positions_path")) {
-    table.Refuse("Problem.inflate_positions",
-                 "without --positions_path or --point_positions_path");
+    for (const char* name :
+         {"Problem.inflate_positions", "Problem.position_radius"}) {
+      table.Refuse(name, "without --positions_path or --point_positions_path");
+    }
   }
   if (!options.inflate_positions_to) {
     table.Refuse("factor_certificate_path",

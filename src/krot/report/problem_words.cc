@@ -19,8 +19,7 @@ std::string NothingToDoSentence(const std::string& what,
   bool has_observations = false;
   for (const auto& [reason, count] : left_out) has_observations |= count > 0;
   return "nothing to " + what + ": " +
-         (has_observations ? LeftOutWords(left_out)
-                           : "the model has no observations");
+         (has_observations ? LeftOutWords(left_out) : kNoObservations);
 }
 
 }  // namespace krot

@@ -9,6 +9,11 @@
 
 namespace krot {
 
+// What a model of poses alone lacks, and where it comes from.
+inline constexpr char kNoObservations[] =
+    "the model has no observations (2D points that see 3D points); colmap "
+    "point_triangulator makes them from its poses and a database of matches";
+
 // Observations left out, by reason.
 using LeftOutCounts = std::vector<std::pair<std::string, int64_t>>;
 

@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "krot/model/trivial_rigs.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+// Models that are not as COLMAP's mapper writes them, and that COLMAP reads.
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+using Words = std::vector<std::string>;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+class OddModels : public ::testing::Test {
+ protected:
+  // Runs the command on "input" into "output".
+  KrotResult Run(Words words) const {
+    words.insert(words.end(), {"--input_path", folder_ / "input"});
+    if (words[0] != "tolerance_analyzer" && words[0] != "model_analyzer") {
+      words.insert(words.end(),
+                   {"--output_path", folder_ / "output", "--overwrite", "1"});
+    }
+    return RunKrot(words);
+  }
+
+  TempFolder folder_;
+  const std::vector<Words> kCommands = {
+      {"solver"},
+      {"point_triangulator"},
+      {"bundle_adjuster", "--BundleAdjustmentCeres.num_threads", "1"},
+      {"outlier_filter", "--OutlierFilter.max_error", "40"},
+      {"tolerance_analyzer", "--ToleranceAnalyzer.max_error", "40",
+       "--ToleranceAnalyzer.images", "1"},
+      {"model_analyzer"}};
+};
+
+// A 2D point that no 3D point claims, first in the image: the indices of the
+// others grow.
+Model With2DPointsThatAreNaN(Model model) {
+  for (Image& image : model.images) {
+    image.points2D.insert(image.points2D.begin(),
+                          {kNaN, kNaN, kInvalidPoint3DId});
+  }
+  for (TrackElement& element : model.track_elements) ++element.point2D_idx;
+  return model;
+}
+
+// As COLMAP's image_undistorter writes them.
+TEST_F(OddModels, With2DPointsThatAreNaNGiveTheResultsOfThoseWithout) {
+  const Model model = SmallLegacyModel();
+  for (const ModelFormat format : {ModelFormat::kBinary, ModelFormat::kText}) {
+    for (const Words& command : kCommands) {
+      SCOPED_TRACE(command[0]);
+      Save(model, folder_ / "input", format);
+      const KrotResult plain = Run(command);
+      ASSERT_EQ(plain.exit_code, 0) << plain.err;
+      const bool writes = std::filesystem::exists(folder_ / "output");
+      const Model expected =
+          writes ? With2DPointsThatAreNaN(Load(folder_ / "output")) : Model();
+      Save(With2DPointsThatAreNaN(model), folder_ / "input", format);
+      const KrotResult result = Run(command);
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_THAT(result.err,
+                  HasSubstr(": 6 2D points in no track whose coordinates are "
+                            "not finite: kept as read, and left out"));
+      if (writes) {
+        EXPECT_THAT(Load(folder_ / "output"), IsModel(expected));
+      }
+      std::filesystem::remove_all(folder_ / "output");
+    }
+  }
+}
+
+// One more image, which is written with a placeholder for a pose.
+Model WithUnregisteredImage(Model model, const Pose& pose) {
+  Image image;
+  image.id = 1000;
+  image.camera_id = model.cameras[0].id;
+  image.name = "unregistered.jpg";
+  image.cam_from_world = pose;
+  image.points2D = {{10, 20, kInvalidPoint3DId}};
+  model.images.push_back(image);
+  model.frames.push_back({1000,
+                          model.rigs[0].id,
+                          pose,
+                          {{{kSensorTypeCamera, image.camera_id}, image.id}}});
+  return model;
+}
+
+TEST_F(OddModels, WithAnImageOfNoPoseGiveTheResultsOfThoseWithout) {
+  for (const Pose& pose :
+       {Pose{{0, 0, 0, 0}, {0, 0, 0}}, Pose{{0, 0, 0, 0}, {1, 2, 3}},
+        Pose{{2, 0, 0, 1}, {kNaN, kNaN, kNaN}},
+        Pose{{kNaN, kNaN, kNaN, kNaN}, {kNaN, kNaN, kNaN}}}) {
+    for (const Model& model : {SmallLegacyModel(), SmallRigModel(2)}) {
+      for (const Words& command : kCommands) {
+        SCOPED_TRACE(command[0]);
+        Save(model, folder_ / "input");
+        const KrotResult plain = Run(command);
+        ASSERT_EQ(plain.exit_code, 0) << plain.err;
+        const bool writes = std::filesystem::exists(folder_ / "output");
+        const Model expected =
+            writes ? WithUnregisteredImage(Load(folder_ / "output"), pose)
+                   : Model();
+        Save(WithUnregisteredImage(model, pose), folder_ / "input");
+        const KrotResult result = Run(command);
+        ASSERT_EQ(result.exit_code, 0) << result.err;
+        EXPECT_EQ(result.err.find(": 1 image without a rotation, so without a "
+                                  "pose: kept as read") != std::string::npos,
+                  !HasRotation(pose.quaternion_wxyz))
+            << result.err;
+        if (writes) {
+          EXPECT_THAT(Load(folder_ / "output"), IsModel(expected));
+        }
+        std::filesystem::remove_all(folder_ / "output");
+      }
+    }
+  }
+}
+
+// Its observations cannot be used; from nothing but rotations, neither.
+TEST_F(OddModels, WithObservationsInAnImageOfNoRotationLeaveThemOut) {
+  Model model = SmallLegacyModel();
+  model.images[0].cam_from_world.quaternion_wxyz = {0, 0, 0, 0};
+  UseTrivialRigs(&model);
+  Save(model, folder_ / "input");
+  const auto num_observations =
+      std::count_if(model.track_elements.begin(), model.track_elements.end(),
+                    [&](const TrackElement& element) {
+                      return element.image_id == model.images[0].id;
+                    });
+  for (const char* init : {"model", "feasible"}) {
+    const KrotResult result = Run({"solver", "--Solver.init", init});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out,
+                HasSubstr("no_pose " + std::to_string(num_observations)));
+    EXPECT_EQ(Load(folder_ / "output").images[0].cam_from_world.quaternion_wxyz,
+              (QuaternionWxyz{0, 0, 0, 0}));
+  }
+}
+
+// 5,000 km from the origin, where models are solved in a frame of their own.
+TEST_F(OddModels, FarAwayKeepAnImageOfNoRotation) {
+  const Pose zeros{{0, 0, 0, 0}, {0, 0, 0}};
+  Save(WithUnregisteredImage(FarAway(SmallLegacyModel(), {4e6, 3e6, 0}), zeros),
+       folder_ / "input");
+  const KrotResult result = Run({"solver"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Model after = Load(folder_ / "output");
+  EXPECT_EQ(after.images.back().cam_from_world.translation,
+            Eigen::Vector3d::Zero());
+}
+
+// All pay for it: the cure is another command.
+TEST_F(OddModels, WithAWrongObservationPointToTheOutlierFilter) {
+  Model model = SmallLegacyModel();
+  Save(model, folder_ / "input");
+  const KrotResult sound = Run({"solver"});
+  EXPECT_EQ(sound.exit_code, 0);
+  EXPECT_THAT(sound.err, ::testing::Not(HasSubstr("outlier_filter")));
+  const TrackElement& element = model.track_elements[5];
+  const auto image =
+      std::find_if(model.images.begin(), model.images.end(),
+                   [&](const Image& i) { return i.id == element.image_id; });
+  image->points2D[element.point2D_idx].x += 300;
+  Save(model, folder_ / "input");
+  const KrotResult result = Run({"solver"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, HasSubstr("warning: the mean error has risen from "));
+  EXPECT_THAT(result.err, HasSubstr("krot outlier_filter removes them"));
+  // Where they are removed there is nothing to say.
+  const KrotResult filtered = Run({"solver", "--Solver.max_error", "4"});
+  EXPECT_THAT(filtered.err, ::testing::Not(HasSubstr("mean error has risen")));
+}
+
+}  // namespace
+}  // namespace krot
