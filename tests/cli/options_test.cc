@@ -354,10 +354,99 @@ TEST_F(Options, InAProjectFileAreChecked) {
   ExpectRefused("solver", arguments, file);
 }
 
+TEST_F(Options, InAProjectFileMayComeFromWindows) {
+  WriteBytes(folder_ / "project.ini",
+             "\xef\xbb\xbf; of a colleague\r\noutput_type=txt ; not PLY\r\n"
+             "# sweeps\r\n[ResInt]\r\n  ; few\r\nmax_sweeps=1\r\n"
+             "[Solver]\r\nmethod=RES_INT\r\n");
+  const KrotResult result = Solve({"--project_path", folder_ / "project.ini"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("after 1 sweep"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.txt"));
+  WriteBytes(folder_ / "utf16.ini", std::string("\xff\xfe[\0S\0", 6));
+  ExpectRefused("solver",
+                Paths() + Words{"--project_path", folder_ / "utf16.ini"},
+                "utf16.ini: found UTF-16, expected UTF-8");
+}
+
+TEST_F(Options, OfColmapsAdjusterAreTakenWhereTheyChangeNothing) {
+  const Words without_effect = {"use_gpu",
+                                "0",
+                                "gpu_index",
+                                "-1",
+                                "min_num_images_gpu_solver",
+                                "50",
+                                "min_num_residuals_for_cpu_multi_threading",
+                                "50000",
+                                "max_num_images_direct_dense_gpu_solver",
+                                "200",
+                                "max_num_images_direct_sparse_gpu_solver",
+                                "4000"};
+  const Words adjust =
+      Words{"bundle_adjuster", "--BundleAdjustmentCeres.num_threads", "1"} +
+      Paths();
+  const KrotResult plain = RunKrot(adjust);
+  ASSERT_EQ(plain.exit_code, 0) << plain.err;
+  const Model expected = Load(folder_ / "output");
+  const std::string help = RunKrot({"bundle_adjuster", "-h"}).out;
+  for (const std::string group :
+       {"--BundleAdjustmentCeres.", "--BundleAdjustment."}) {
+    Words all = {"--BundleAdjustment.backend",
+                 "ceres",
+                 "--overwrite",
+                 "1",
+                 group + "max_num_images_direct_dense_cpu_solver",
+                 "50"};
+    for (size_t n = 0; n < without_effect.size(); n += 2) {
+      all = all + Words{group + without_effect[n], without_effect[n + 1]};
+      EXPECT_THAT(help,
+                  ::testing::HasSubstr(group.substr(2) + without_effect[n]));
+    }
+    const KrotResult result = RunKrot(adjust + all);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(Load(folder_ / "output"), IsModel(expected));
+    ExpectRefused("bundle_adjuster", Paths() + Words{group + "use_gpu", "1"},
+                  group + "use_gpu = 1, must be 0: KROT adjusts on the CPU");
+  }
+  ExpectRefused("bundle_adjuster",
+                Paths() + Words{"--BundleAdjustment.backend", "CASPAR"},
+                "must be CERES: KROT adjusts with no other solver");
+}
+
+TEST_F(Options, OfColmapsEarlyDaysAreAnsweredWithTodays) {
+  ExpectRefused("solver",
+                {"--import_path", folder_ / "input", "--export_path", "a"},
+                "did you mean --input_path?");
+  ExpectRefused("bundle_adjuster",
+                {"--input_path", folder_ / "input", "--export_path", "a"},
+                "did you mean --output_path?");
+}
+
+TEST_F(Options, ThatAreWordsMayBeInAnyCase) {
+  for (const char* type : {"bin", "Bin", "BIN"}) {
+    EXPECT_EQ(Solve({"--output_type", type, "--overwrite", "1"}).exit_code, 0);
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "output/cameras.bin"));
+  }
+  const KrotResult loss =
+      RunKrot(Words{"bundle_adjuster", "--overwrite", "1",
+                    "--BundleAdjustmentCeres.loss_function_type", "cauchy"} +
+              Paths());
+  EXPECT_EQ(loss.exit_code, 0) << loss.err;
+}
+
+// In COLMAP's order, which its FAQ has for known poses, and in any other.
 TEST_F(Options, ForNewPointsAreRefusedByThePointTriangulator) {
-  ExpectRefused("point_triangulator",
-                Paths() + Words{"--database_path", "database.db"},
-                "only re-estimates the points that the model has");
+  const std::string sentence =
+      "--database_path and --image_path: this command only re-estimates the "
+      "points that the model has; run colmap point_triangulator with the same "
+      "options, and this one on its output, without these two";
+  const Words database = {"--database_path", "database.db"};
+  const Words images = {"--image_path", "images"};
+  for (const Words& words :
+       {database + images + Paths(), images + database + Paths(),
+        Paths() + database, Paths() + images}) {
+    ExpectRefused("point_triangulator", words, sentence);
+  }
 }
 
 }  // namespace

@@ -4,9 +4,13 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 
 #include <boost/program_options.hpp>
 
+#include "krot/model/model_error.h"
+#include "krot/model/text_reader.h"
 #include "krot/options/option_error.h"
 
 namespace krot {
@@ -33,6 +37,22 @@ OptionAssignment ToAssignment(const po::option& option) {
     throw OptionError("--" + option.string_key + " has no value");
   }
   return {option.string_key, text, "--" + option.string_key};
+}
+
+// The file as Boost reads it: without a byte order mark, and without comments
+// behind a semicolon that begins a line or follows a blank.
+std::string IniText(const std::string& path, std::istream* stream) {
+  const FileBytes file{path, {std::istreambuf_iterator<char>(*stream), {}}};
+  std::istringstream lines{std::string(WithoutByteOrderMark(file))};
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    for (size_t i = 0; i < line.size(); ++i) {
+      if (line[i] != ';') continue;
+      if (i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t') line.resize(i);
+    }
+    text += line + '\n';
+  }
+  return text;
 }
 
 }  // namespace
@@ -73,8 +93,9 @@ std::vector<OptionAssignment> ReadProjectFile(
   const po::options_description description = Describe(options);
   std::vector<OptionAssignment> assignments;
   try {
+    std::istringstream text(IniText(path, &stream));
     const po::parsed_options parsed =
-        po::parse_config_file(stream, description, true);
+        po::parse_config_file(text, description, true);
     for (const po::option& option : parsed.options) {
       assignments.push_back({option.string_key,
                              option.value.empty() ? "" : option.value.front(),
@@ -82,6 +103,8 @@ std::vector<OptionAssignment> ReadProjectFile(
     }
   } catch (const po::error& error) {
     throw OptionError(path + ": " + error.what());
+  } catch (const ModelError& error) {
+    throw OptionError(error.what());
   }
   return assignments;
 }

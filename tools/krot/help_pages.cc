@@ -82,6 +82,7 @@ std::string ManPage(const OptionTable& table) {
   }
   page += "[options]\n.SH OPTIONS\n";
   for (const Option& option : table.options()) {
+    if (option.is_without_effect) continue;
     page += ".TP\n.BI \\-\\-" + Roff(option.name) + " \" VALUE\"\n" +
             Roff(option.description) + ".\n.br\nValue: " + Roff(option.range) +
             ".";
@@ -122,6 +123,7 @@ std::string ManPage(const std::vector<CommandSummary>& commands,
 std::string BashCompletion(const OptionTable& table) {
   std::string names, values;
   for (const Option& option : table.options()) {
+    if (option.is_without_effect) continue;
     names += " --" + option.name;
     if (option.choices.empty()) continue;
     values += "        --" + option.name + ") words='" +
@@ -161,6 +163,7 @@ std::string BashTail() {
 std::string ZshCompletion(const OptionTable& table) {
   std::string specs;
   for (const Option& option : table.options()) {
+    if (option.is_without_effect) continue;
     const std::string first =
         option.description.substr(0, option.description.find_first_of(":;"));
     specs += " \\\n        '--" + option.name + "[" +

@@ -10,15 +10,18 @@ namespace {
 
 // COLMAP's command of this name makes new points from matches.
 void RefuseDatabase(OptionParser* parser) {
-  parser->Add({"database_path",
-               "Refused: this command re-estimates the points that the model "
-               "has and makes no new ones from matches",
-               "left out", "", false, [](const std::string&) -> bool {
-                 throw OptionError(
-                     "--database_path: this command only re-estimates the "
-                     "points that the model has; for new ones from matches "
-                     "use colmap point_triangulator");
-               }});
+  for (const char* name : {"database_path", "image_path"}) {
+    parser->Add({name,
+                 "Refused: this command re-estimates the points that the model "
+                 "has and makes no new ones from matches",
+                 "left out", "", false, [](const std::string&) -> bool {
+                   throw OptionError(
+                       "--database_path and --image_path: this command only "
+                       "re-estimates the points that the model has; run colmap "
+                       "point_triangulator with the same options, and this one "
+                       "on its output, without these two");
+                 }});
+  }
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "krot/options/adjustment_options.h"
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -9,10 +10,15 @@ namespace {
 constexpr char kCeres[] = "BundleAdjustmentCeres.";
 constexpr char kPlain[] = "BundleAdjustment.";
 
-// Of what COLMAP 4 and COLMAP 3.8 both know, in two groups.
+// Of what COLMAP 4 and COLMAP 3 both know, in two groups.
 const std::vector<std::string> kMoved = {
-    "max_num_iterations", "max_linear_solver_iterations", "function_tolerance",
-    "gradient_tolerance", "parameter_tolerance"};
+    "max_num_iterations",
+    "max_linear_solver_iterations",
+    "function_tolerance",
+    "gradient_tolerance",
+    "parameter_tolerance",
+    "max_num_images_direct_dense_cpu_solver",
+    "max_num_images_direct_sparse_cpu_solver"};
 
 void RefuseBoth(const OptionTable& table, const std::string& a,
                 const std::string& b) {
@@ -26,6 +32,7 @@ void AdjustmentOptions::AddTo(OptionTable* table) {
   AddRefined(table);
   AddCap(table);
   AddCeres(table);
+  AddWithoutEffect(table);
 }
 
 void AdjustmentOptions::AddRefined(OptionTable* table) {
@@ -80,7 +87,7 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
   for (const char* group : {kCeres, kPlain}) {
     const std::string prefix = group;
     const std::string suffix =
-        prefix == kPlain ? "; COLMAP 3.8's name" : std::string();
+        prefix == kPlain ? "; COLMAP 3's name" : std::string();
     table->AddInteger(prefix + kMoved[0], &options->max_num_iterations,
                       AtLeast(0),
                       "Iterations after which to stop in any case" + suffix);
@@ -98,6 +105,14 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
                    "Stop when the parameters change by less, relative to "
                    "them" +
                        suffix);
+    table->AddInteger(
+        prefix + kMoved[5], &options->max_num_images_direct_dense, AtLeast(0),
+        "Up to so many images the reduced camera system is dense" + suffix);
+    table->AddInteger(
+        prefix + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
+        "Up to so many images it is sparse; beyond them conjugate gradients "
+        "solve it" +
+            suffix);
   }
   table->AddNamed<RobustLoss>("BundleAdjustmentCeres.loss_function_type",
                               &options->loss,
@@ -110,18 +125,32 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
                  &options->loss_scale, Above(0.0, "pixels"),
                  "The error above which a loss other than TRIVIAL weighs "
                  "less");
-  table->AddInteger(
-      "BundleAdjustmentCeres.max_num_images_direct_dense_cpu_solver",
-      &options->max_num_images_direct_dense, AtLeast(0),
-      "Up to so many images the reduced camera system is dense");
-  table->AddInteger(
-      "BundleAdjustmentCeres.max_num_images_direct_sparse_cpu_solver",
-      &options->max_num_images_direct_sparse, AtLeast(0),
-      "Up to so many images it is sparse; beyond them conjugate gradients "
-      "solve it");
   table->AddThreads("BundleAdjustmentCeres.num_threads", &num_threads_,
                     "without a cap the last digits differ from run to run with "
                     "more than one");
+}
+
+// Of where COLMAP computes, which is here on the CPU, and by Ceres.
+void AdjustmentOptions::AddWithoutEffect(OptionTable* table) {
+  const auto add = [&](const std::string& name, const std::string& range,
+                       const std::function<bool(const std::string&)>& parse) {
+    table->Add({name, "", range, "", false, parse, false, {}, true});
+  };
+  add("BundleAdjustment.backend", "CERES: KROT adjusts with no other solver",
+      [](const std::string& text) { return IsSameWord(text, "CERES"); });
+  for (const std::string group : {kCeres, kPlain}) {
+    add(group + "use_gpu", "0: KROT adjusts on the CPU alone",
+        [](const std::string& text) {
+          bool use_gpu = true;
+          return ParseBool(text, &use_gpu) && !use_gpu;
+        });
+    for (const char* name : {"gpu_index", "min_num_images_gpu_solver",
+                             "min_num_residuals_for_cpu_multi_threading",
+                             "max_num_images_direct_dense_gpu_solver",
+                             "max_num_images_direct_sparse_gpu_solver"}) {
+      add(group + name, "", [](const std::string&) { return true; });
+    }
+  }
 }
 
 AdjustModelOptions AdjustmentOptions::Resolve(const OptionTable& table) const {

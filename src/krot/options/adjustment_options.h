@@ -18,6 +18,7 @@ class AdjustmentOptions {
  private:
   void AddRefined(OptionTable* table);
   void AddCeres(OptionTable* table);
+  void AddWithoutEffect(OptionTable* table);
   void AddCap(OptionTable* table);
 
   BundleAdjustmentOptions adjustment_;

@@ -68,9 +68,11 @@ void OptionTable::AddChoice(const std::string& name, std::string* value,
                             const std::string& description) {
   Add({name, description, "one of " + ChoiceText(choices), *value, false,
        [value, choices](const std::string& text) {
-         *value = text;
-         return std::find(choices.begin(), choices.end(), text) !=
-                choices.end();
+         const auto choice = std::find_if(
+             choices.begin(), choices.end(),
+             [&](const std::string& c) { return IsSameWord(c, text); });
+         if (choice != choices.end()) *value = *choice;
+         return choice != choices.end();
        },
        false, choices});
 }
@@ -135,7 +137,10 @@ const Option& OptionTable::Find(const OptionAssignment& assignment) const {
     if (option.name == assignment.name) return option;
     names.push_back(option.name);
   }
-  const std::string nearest = NearestName(assignment.name, names);
+  std::string wanted = assignment.name;
+  if (wanted == "import_path") wanted = "input_path";  // in COLMAP's old names
+  if (wanted == "export_path") wanted = "output_path";
+  const std::string nearest = NearestName(wanted, names);
   throw OptionError(assignment.source + " is no option of " + command_ +
                     (nearest.empty() ? " (" + list_ + " lists them)"
                                      : "; did you mean --" + nearest + "?"));
@@ -148,7 +153,12 @@ std::string OptionTable::Help() const {
     if (option.required) text += " --" + option.name + " VALUE";
   }
   text += " [options]\n\nOptions:\n";
+  std::string without_effect;
   for (const Option& option : options_) {
+    if (option.is_without_effect) {
+      without_effect += (without_effect.empty() ? "" : ", ") + option.name;
+      continue;
+    }
     text += "  --" + option.name + '\n';
     text += Wrap(option.description + ".", "      ");
     std::string value = "Value: " + option.range + ".";
@@ -158,7 +168,15 @@ std::string OptionTable::Help() const {
     }
     text += Wrap(value, "      ");
   }
-  return text + "  -h, --help\n      Print this text\n";
+  text += "  -h, --help\n      Print this text\n";
+  return without_effect.empty()
+             ? text
+             : text + "\n" +
+                   Wrap(
+                       "COLMAP's options that are taken where they change "
+                       "nothing here: " +
+                           without_effect,
+                       "");
 }
 
 }  // namespace krot

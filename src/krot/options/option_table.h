@@ -21,6 +21,9 @@ struct Option {
   std::function<bool(const std::string& text)> parse;
   bool repeatable = false;                // parse is called for every one
   std::vector<std::string> choices = {};  // all that it takes, if they are few
+  // One of COLMAP's that changes nothing here: parse refuses what would. Help
+  // has no more than its name.
+  bool is_without_effect = false;
 };
 
 // What one argument, one line of a project file or one keyword says.
@@ -46,10 +49,12 @@ class OptionTable {
                   const std::string& description);
   void AddReal(const std::string& name, double* value,
                const Range<double>& range, const std::string& description);
+  // In upper or lower case, as COLMAP has it.
   void AddChoice(const std::string& name, std::string* value,
                  const std::vector<std::string>& choices,
                  const std::string& description);
-  // A choice of what the names stand for; the value's own is the default.
+  // A choice of what the names stand for, in any case; the value's own is the
+  // default.
   template <typename T>
   void AddNamed(const std::string& name, T* value,
                 const std::vector<std::pair<std::string, T>>& choices,
@@ -108,7 +113,7 @@ void OptionTable::AddNamed(
   Add({name, description, "one of " + ChoiceText(names), default_text, false,
        [value, choices](const std::string& given) {
          for (const auto& [text, meaning] : choices) {
-           if (text != given) continue;
+           if (!IsSameWord(text, given)) continue;
            *value = meaning;
            return true;
          }

@@ -84,6 +84,10 @@ bool ParseBool(const std::string& text, bool* value) {
   return true;
 }
 
+bool IsSameWord(const std::string& a, const std::string& b) {
+  return LowerCase(a) == LowerCase(b);
+}
+
 Range<int> AtLeast(int min, const std::string& unit) {
   return MakeAtLeast(min, unit);
 }

@@ -33,15 +33,18 @@ Range<double> Between(double min, double max, const std::string& unit = "");
 // [min, max)
 Range<double> InHalfOpen(double min, double max, const std::string& unit = "");
 
+// But for upper and lower case.
+bool IsSameWord(const std::string& a, const std::string& b);
+
 // As help and messages print numbers: "1e-06".
 std::string NumberText(double value);
 
 // "{a, b, c}"
 std::string ChoiceText(const std::vector<std::string>& choices);
 
-// The candidate that looks most like `name`, whole or behind its group, or "" if
-// none looks like it at all: at most one edit per three characters, upper and
-// lower case being alike.
+// The candidate that looks most like `name`, whole or behind its group, or ""
+// if none looks like it at all: at most one edit per three characters, upper
+// and lower case being alike.
 std::string NearestName(const std::string& name,
                         const std::vector<std::string>& candidates);
 
