@@ -142,6 +142,30 @@ TEST_F(ToleranceAnalyzer, ShiftsItsBoxesWithTheModel) {
   }
 }
 
+TEST_F(ToleranceAnalyzer, SaysOfAModelFarAwayWhatItSaysOfItNearby) {
+  const auto sentence = [&](const Eigen::Vector3d& shift) {
+    Save(FarAway(model_, shift), folder_ / "shifted");
+    const std::string out = Analyze({}, "shifted").out;
+    const size_t begin = out.find("estimates that were met");
+    return out.substr(begin, out.find(" %", begin) - begin);
+  };
+  const std::string nearby = sentence({0, 0, 0});
+  EXPECT_THAT(nearby, HasSubstr("to within"));
+  for (const double distance : {1e4, 1e6, 1e7}) {
+    const std::string far = sentence(distance * Eigen::Vector3d(1, -2, 0.5));
+    const Json report = Report();
+    // To one per cent, as asked for, and a little that rounding decides.
+    EXPECT_LT(report["agreement"]["worst"], 0.015) << nearby << "; " << far;
+    EXPECT_EQ(report["agreement"]["num_ends"], 6 * model_.images.size());
+    const std::string still = report["gauge"]["images"][0];
+    for (const Json& box : report["boxes"]) {
+      if (box["image_name"] != still) continue;
+      EXPECT_EQ(box["low"]["proved"], box["position"]);
+      EXPECT_EQ(box["high"]["proved"], box["position"]);
+    }
+  }
+}
+
 TEST_F(ToleranceAnalyzer, RefusesWhatTheModelDoesNotHave) {
   for (const auto& [option, value] :
        std::vector<std::pair<std::string, std::string>>{

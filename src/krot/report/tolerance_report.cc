@@ -62,32 +62,6 @@ std::vector<ToleranceBox> Listed(std::vector<ToleranceBox> boxes,
   return boxes;
 }
 
-// How far beyond what was reached the worst proved end is, relative to the way
-// there from the position.
-struct Agreement {
-  int64_t num_ends = 0;
-  int64_t num_proved = 0;
-  double worst = 0;
-};
-
-Agreement Compare(const std::vector<ToleranceBox>& boxes) {
-  Agreement agreement;
-  for (const ToleranceBox& box : boxes) {
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const BoxEnd* end : {&box.box.low[axis], &box.box.high[axis]}) {
-        ++agreement.num_ends;
-        if (!end->proved) continue;
-        ++agreement.num_proved;
-        const double way = std::abs(*end->proved - box.position[axis]);
-        if (!(way > 0)) continue;
-        agreement.worst = std::max(agreement.worst,
-                                   std::abs(*end->proved - end->reached) / way);
-      }
-    }
-  }
-  return agreement;
-}
-
 const char* ToleranceTerminationName(ToleranceTermination termination) {
   switch (termination) {
     case ToleranceTermination::kNotRun:
@@ -168,7 +142,7 @@ std::string ToleranceTable(const ToleranceReport& report, int max_rows) {
     }
     table.AddRow(std::move(row));
   }
-  const Agreement agreement = Compare(summary.boxes);
+  const EndAgreement& agreement = summary.agreement;
   text += table.ToString() + "\n" + Counted(agreement.num_proved, "end") +
           " of " + std::to_string(agreement.num_ends) +
           " proved; estimates that were met reach them to within " +
@@ -214,6 +188,10 @@ std::string ToleranceJson(const ToleranceReport& report) {
        {{"before", ErrorJson(report.pixel_error_before)},
         {"after", ErrorJson(report.pixel_error_after)}}},
       {"boxes", BoxesJson(summary.boxes)},
+      {"agreement",
+       {{"num_ends", summary.agreement.num_ends},
+        {"num_proved", summary.agreement.num_proved},
+        {"worst", summary.agreement.worst}}},
       {"seconds",
        {{"read", report.run.seconds_read},
         {"analysis", summary.seconds},

@@ -134,6 +134,24 @@ void FillBoxes(const ToleranceOptions& options, const ToleranceProblem& problem,
   }
 }
 
+EndAgreement Compare(const std::vector<ToleranceBox>& boxes) {
+  EndAgreement agreement;
+  for (const ToleranceBox& box : boxes) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const BoxEnd* end : {&box.box.low[axis], &box.box.high[axis]}) {
+        ++agreement.num_ends;
+        if (!end->proved) continue;
+        ++agreement.num_proved;
+        const double way = std::abs(*end->proved - box.position[axis]);
+        if (!(way > 0)) continue;
+        agreement.worst = std::max(agreement.worst,
+                                   std::abs(*end->proved - end->reached) / way);
+      }
+    }
+  }
+  return agreement;
+}
+
 ToleranceResult AnalyzeInFrame(const Model& model,
                                const ToleranceOptions& options,
                                const Context& context) {
@@ -181,6 +199,7 @@ ToleranceResult AnalyzeInFrame(const Model& model,
   summary.num_far_points = shared.num_far_points();
   summary.boxes = EmptyBoxes(result.model, options);
   FillBoxes(options, shared, view_of, context, &summary);
+  summary.agreement = Compare(summary.boxes);
   summary.termination = context.IsCancelled()
                             ? ToleranceTermination::kInterrupted
                             : ToleranceTermination::kDone;
@@ -188,16 +207,19 @@ ToleranceResult AnalyzeInFrame(const Model& model,
   return result;
 }
 
-// Into a frame whose origin lies elsewhere; outwards.
+// Into a frame whose origin lies elsewhere; outwards, but for what cannot move.
 void Shift(const Eigen::Vector3d& by, ToleranceBox* box) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  box->position += by;
   for (int axis = 0; axis < 3; ++axis) {
+    const double at = box->position[axis];
+    box->position[axis] += by[axis];
     for (auto [end, outwards] : {std::pair(&box->box.low[axis], -kInfinity),
                                  std::pair(&box->box.high[axis], kInfinity)}) {
       end->reached += by[axis];
       if (!end->proved) continue;
-      end->proved = std::nextafter(*end->proved + by[axis], outwards);
+      const bool is_fixed = *end->proved == at;
+      *end->proved += by[axis];
+      if (!is_fixed) end->proved = std::nextafter(*end->proved, outwards);
     }
   }
 }

@@ -58,6 +58,15 @@ struct ToleranceBox {
   PositionBox box;
 };
 
+// How well the proved ends agree with the reached ones.
+struct EndAgreement {
+  int64_t num_ends = 0;
+  int64_t num_proved = 0;
+  // How far beyond what was reached the worst proved end is, relative to the
+  // way there from the position.
+  double worst = 0;
+};
+
 struct ToleranceSummary {
   ToleranceTermination termination = ToleranceTermination::kNotRun;
   double max_error = 0;  // as asked for, pixels
@@ -76,6 +85,9 @@ struct ToleranceSummary {
   int64_t num_fixed_points = 0;
   std::vector<std::string> gauge_images;  // none where options fix what holds
   std::vector<ToleranceBox> boxes;        // images, then points, as asked for
+  // In the frame in which they are found: far from the origin the last digits
+  // of coordinates are as large as a narrow box.
+  EndAgreement agreement;
   double seconds = 0;
 };
 
