@@ -74,6 +74,19 @@ TEST_F(BundleAdjuster, ReportsItsCourse) {
   }
 }
 
+TEST_F(BundleAdjuster, TakesNoMoreIterationsFarFromTheOrigin) {
+  const auto num_iterations = [&](double distance) {
+    Save(FarAway(SmallLegacyModel(), distance * Eigen::Vector3d(1, -1, 1)),
+         folder_ / "input");
+    EXPECT_EQ(Adjust({}).exit_code, 0);
+    return Report()["num_iterations"].get<int>();
+  };
+  const int nearby = num_iterations(0);
+  for (const double distance : {3e3, 3e4, 3e6}) {
+    EXPECT_LE(num_iterations(distance), nearby + 2) << distance;
+  }
+}
+
 TEST_F(BundleAdjuster, AgreesWithColmap) {
   if (!HasColmap()) GTEST_SKIP() << "no colmap";
   ASSERT_EQ(Adjust({}).exit_code, 0);

@@ -61,6 +61,12 @@ TEST(LocalFrame, PutsItsOriginAmidAModelFarAwayAndTakesTheModelAlong) {
   }
 }
 
+TEST(LocalFrame, IsAmidAModelTenExtentsAway) {
+  // The cameras are some 50 m apart.
+  EXPECT_TRUE(LocalFrame(ModelAround({0, 100, 0})).IsModels());
+  EXPECT_FALSE(LocalFrame(ModelAround({0, 1000, 0})).IsModels());
+}
+
 TEST(LocalFrame, GivesWhatStaysThereItsBitsBack) {
   Model model = ModelAround(kFarAway);
   model.points3D.push_back(model.points3D[0]);

@@ -14,8 +14,9 @@ namespace {
 using Eigen::Vector3d;
 using Real = long double;
 
-// From here on coordinates cost digits: of 16, three.
-constexpr double kFarOut = 1e3;
+// From here on coordinates cost digits, and adjustments steps: to turn a camera
+// about the origin, a hundred extents away, takes four times as many.
+constexpr double kFarOut = 10;
 
 // By coordinate; none without positions.
 std::optional<Vector3d> Median(const std::vector<Vector3d>& positions) {

@@ -11,14 +11,15 @@
 namespace krot {
 
 // Coordinates of 10^6 to 10^7 m, as in UTM or ECEF, leave few digits for the
-// scene in differences of R s and t. A local frame has its origin O amid the
-// model, at a round number: x_local = x - O is exact for points,
-// t_local = t + R O is rounded once.
+// scene in differences of R s and t, and cameras that turn about a distant
+// origin are badly conditioned unknowns. A local frame has its origin O amid
+// the model, at a round number: x_local = x - O is exact for points, t_local =
+// t + R O is rounded once.
 class LocalFrame {
  public:
   // O is near the median of what is fixed or known, or else of all finite
   // camera centres, or else of the points; zero, and all below are copies,
-  // unless that is more than 1000 times as far from the origin as half of these
+  // unless that is more than 10 times as far from the origin as half of these
   // are from it. Requires a valid model. O(images + points).
   explicit LocalFrame(const Model& model, const FixedParts& fixed = {},
                       const std::vector<KnownPosition>& known = {});
