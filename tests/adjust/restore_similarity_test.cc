@@ -1,5 +1,6 @@
 #include "krot/adjust/restore_similarity.h"
 
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -68,6 +69,25 @@ TEST(RestoreSimilarity, UndoesASimilarityOfTheWholeModel) {
     RestoreSimilarity({}, before, &after);
     ExpectNear(after, before);
   }
+}
+
+TEST(RestoreSimilarity, IsThatOfTheOthersWhereACameraRunsAway) {
+  const Matrix3d rotation =
+      Eigen::AngleAxisd(0.3, Vector3d(1, 2, -1).normalized())
+          .toRotationMatrix();
+  const AdjustmentBlocks before = MakeAdjustmentBlocks(Scene(1), 2);
+  AdjustmentBlocks after = before;
+  // Turned by half a circle, and a million times as far away.
+  PoseBlock& runaway = after.frames[2];
+  std::swap(runaway[0], runaway[1]);
+  std::swap(runaway[2], runaway[3]);
+  for (int i = 4; i < 7; ++i) runaway[i] *= 1e6;
+  Move(1.7, rotation, Vector3d(1, -2, 0.5), &after);
+  RestoreSimilarity({}, before, &after);
+  AdjustmentBlocks others = after;
+  others.frames[2] = before.frames[2];
+  ExpectNear(others, before);
+  EXPECT_GT(TranslationOf(after.frames[2]).norm(), 1e5);
 }
 
 TEST(RestoreSimilarity, LeavesTheScaleToConstantBaselines) {

@@ -171,6 +171,24 @@ TEST(AlignFrames, MakesCentroidAndRadiusEqual) {
   EXPECT_NEAR(SceneRadius(aligned), SceneRadius(poses), 1e-12);
 }
 
+TEST(AlignFrames, IsThatOfTheOthersWhereACameraRunsAway) {
+  const Similarity similarity = SomeSimilarity();
+  std::vector<PosePair> poses = MovedPoses(12, similarity);
+  for (PosePair& pose : poses) {
+    pose.distance1 = 10;
+    pose.distance2 = 10 / similarity.scale;
+  }
+  poses[4].center2 *= 1e7;
+  poses[4].distance2 *= 1e7;
+  poses[4].cam_from_world2_rotation =
+      Matrix3d(AngleAxisd(2, Vector3d::UnitZ())) *
+      poses[4].cam_from_world2_rotation;
+  ExpectNear(AlignFrames(poses).value(), similarity, 1e-12);
+  std::vector<PosePair> others = poses;
+  others.erase(others.begin() + 4);
+  EXPECT_EQ(SceneRadius(HeldPoses(poses)), SceneRadius(others));
+}
+
 SceneOptions RigScene() {
   SceneOptions options;
   options.num_frames = 5;

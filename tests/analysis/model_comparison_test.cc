@@ -154,6 +154,35 @@ TEST(CompareModels, SeesNoDifferenceBehindASimilarity) {
   EXPECT_NEAR(as_stored.rotation_deg.median, 360 / kPi, 1e-9);
 }
 
+TEST(CompareModels, SaysHowFarTheCamerasMovedAndNotTheOrigin) {
+  const Model model = SomeModel();
+  const Similarity far = {
+      1, Eigen::AngleAxisd(1e-7, Vector3d::UnitZ()).toRotationMatrix(),
+      Vector3d::Zero()};
+  const Similarity away = {1, Eigen::Matrix3d::Identity(),
+                           Vector3d(2e6, -4e6, 4e6)};
+  // A turn of 1e-7 about an origin that is 6e6 away moves everything by 0.6.
+  const Model model1 = TransformModel(model, away);
+  const Model model2 = TransformModel(TransformModel(model, far), away);
+  const ComparisonSummary summary =
+      *Compare(model1, model2, AlignmentKind::kFrame);
+  EXPECT_GT(summary.world1_from_world2.translation.norm(), 0.1);
+  EXPECT_LT(summary.moved, 1e-6);
+  EXPECT_NEAR(Compare(model, model1, AlignmentKind::kFrame)->moved, 6e6, 1e-3);
+}
+
+TEST(CompareModels, IsNotMisledByACameraThatRanAway) {
+  const Model model = SomeModel();
+  Model run = model;
+  run.images[3].cam_from_world.translation *= 1e6;
+  UseTrivialRigs(&run);
+  const ComparisonSummary summary = *Compare(model, run, AlignmentKind::kFrame);
+  EXPECT_LT(summary.center.median, 1e-12);
+  EXPECT_LT(summary.point.max, 1e-12);
+  EXPECT_GT(summary.center.max, 1e5);
+  EXPECT_LT(summary.scene_radius, 2);
+}
+
 TEST(CompareModels, ReportsThePointAndTheCameraThatMoved) {
   const Model model = SomeModel();
   Model moved = model;

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "krot/model/trivial_rigs.h"
 #include "tests/cli/krot_process.h"
@@ -180,6 +181,48 @@ TEST_F(OddModels, WithAWrongObservationPointToTheOutlierFilter) {
   // Where they are removed there is nothing to say.
   const KrotResult filtered = Run({"solver", "--Solver.max_error", "4"});
   EXPECT_THAT(filtered.err, ::testing::Not(HasSubstr("mean error has risen")));
+}
+
+// Its observations are right, only its position is not: it comes back, and does
+// not take the others along.
+TEST_F(OddModels, WithACameraFarAwayIsNamedAndTheOthersKeepTheirPlace) {
+  Model model = SmallLegacyModel();
+  for (Pose* pose :
+       {&model.images[3].cam_from_world, &model.frames[3].rig_from_world}) {
+    pose->translation *= 1e5;
+  }
+  Save(model, folder_ / "input");
+  for (Words command : {Words{"solver"}, Words{"outlier_filter"}}) {
+    SCOPED_TRACE(command[0]);
+    if (command[0] == "outlier_filter") {
+      command.insert(command.end(), {"--OutlierFilter.max_error", "3"});
+    }
+    command.insert(command.end(), {"--report_path", folder_ / "r.json"});
+    const KrotResult result = Run(command);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const nlohmann::json report =
+        nlohmann::json::parse(ReadBytes(folder_ / "r.json"));
+    const nlohmann::json& not_held = command[0] == "solver"
+                                         ? report["not_held"]
+                                         : report["solve"]["not_held"];
+    ASSERT_EQ(not_held["images"].size(), 1);
+    EXPECT_EQ(not_held["images"][0]["image_id"], model.images[3].id);
+    // The filter takes its observations, and the few that are left hold
+    // nothing.
+    EXPECT_THAT(result.out, HasSubstr(command[0] == "solver"
+                                          ? "1 image moved farther than cameras"
+                                          : "1 image is not held in place"));
+    EXPECT_THAT(result.out, HasSubstr(": " + model.images[3].name + " ("));
+    EXPECT_THAT(result.out, HasSubstr("those of the other 5 images."));
+    const Model solved = Load(folder_ / "output");
+    for (size_t n = 0; n < model.images.size(); ++n) {
+      if (n == 3) continue;
+      EXPECT_LT((solved.images[n].cam_from_world.translation -
+                 model.images[n].cam_from_world.translation)
+                    .norm(),
+                0.1);
+    }
+  }
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "krot/problem/cost.h"
@@ -166,17 +168,71 @@ TEST(RestoreGauge, ScalesIfEveryFrameSeesThroughOneCentreOffItsOrigin) {
   EXPECT_NEAR(L2Cost(scene, restored), L2Cost(scene, solved), 1e-9);
 }
 
-TEST(RestoreGauge, UsesThePointsWhereAllCentresCoincide) {
+double MedianDistance(const std::vector<Vector3d>& points,
+                      const Vector3d& from) {
+  std::vector<double> distances;
+  for (const Vector3d& x : points) distances.push_back((x - from).norm());
+  std::sort(distances.begin(), distances.end());
+  return distances[(distances.size() - 1) / 2];
+}
+
+TEST(RestoreGauge, KeepsHowFarAwayPointsAreWhereAllCentresCoincide) {
   RandomScene scene = MakeRandomScene({});
   const Vector3d centre(7, 8, -1);
   for (const View& view : scene.problem.views) {
     scene.estimate.translations[view.frame] =
         -view.cam_from_world_rotation * centre;
   }
-  Estimate restored =
+  Estimate solved =
       Moved(scene.problem, Perturbed(scene.estimate), 3, {4, 5, 6});
+  solved.points[0] *= 1e8;  // no depth is determined
+  Estimate restored = solved;
   RestoreGauge(scene.problem, scene.estimate, &restored);
-  ExpectSameCentroidAndRms(restored.points, scene.estimate.points);
+  const std::vector<Vector3d> centres = Centres(scene.problem, restored);
+  ExpectSameCentroid(centres, {centre});
+  EXPECT_NEAR(MedianDistance(restored.points, Centroid(centres)),
+              MedianDistance(scene.estimate.points, centre), 1e-12);
+}
+
+// The centres of all frames but the second.
+std::vector<Vector3d> CentresOfOthers(const RandomScene& scene,
+                                      const Estimate& estimate) {
+  std::vector<Vector3d> centres = Centres(scene.problem, estimate);
+  centres.erase(centres.begin() + 1);
+  return centres;
+}
+
+TEST(RestoreGauge, IsThatOfTheOthersWhereACameraRunsAway) {
+  const RandomScene scene = MakeRandomScene({});
+  for (const auto& [from, to] :
+       {std::pair{1.0, 1e9}, {1e5, 1e9}, {1e5, 1.0}, {40.0, 1.0}}) {
+    Estimate reference = scene.estimate;
+    Estimate solved = Perturbed(scene.estimate);
+    reference.translations[1] *= from;
+    solved.translations[1] *= to;
+    solved = Moved(scene.problem, solved, 0.5, {1, 2, 3});
+    Estimate restored = solved;
+    RestoreGauge(scene.problem, reference, &restored);
+    ExpectSameCentroidAndRms(CentresOfOthers(scene, restored),
+                             CentresOfOthers(scene, reference));
+    std::vector<char> expected(scene.problem.num_frames, 1);
+    expected[1] = 0;
+    EXPECT_EQ(FindHeldFrames(scene.problem, reference, solved), expected);
+  }
+}
+
+TEST(FindHeldFrames, LeavesOutWhatIsLooseUnlessAllAre) {
+  const RandomScene scene = MakeRandomScene({});
+  const Estimate solved = Perturbed(scene.estimate);
+  std::vector<char> is_loose(scene.problem.num_frames, 0);
+  is_loose[3] = 1;
+  std::vector<char> expected(scene.problem.num_frames, 1);
+  expected[3] = 0;
+  EXPECT_EQ(FindHeldFrames(scene.problem, scene.estimate, solved, is_loose),
+            expected);
+  EXPECT_EQ(FindHeldFrames(scene.problem, scene.estimate, solved,
+                           std::vector<char>(scene.problem.num_frames, 1)),
+            std::vector<char>(scene.problem.num_frames, 1));
 }
 
 TEST(RestoreGauge, IsNotMisledByAPointNearInfinity) {

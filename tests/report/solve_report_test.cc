@@ -242,6 +242,44 @@ TEST(SolveTable, SaysWhereAllErrorsAreZero) {
               HasSubstr("Every error is zero up to rounding (2.0e-14 px"));
 }
 
+TEST(SolveReport, NamesWhatDoesNotHoldItsPlace) {
+  SolveReport report = SomeReport();
+  report.summary.num_images = 5;
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr("place and the size")));
+  report.summary.loose.images = {{7, "a b.jpg", 4, false, 1234.5678},
+                                 {9, "c.jpg", 90, true, 6.7e4}};
+  for (Point3DId id = 11; id <= 17; ++id) {
+    report.summary.loose.points.push_back({id, 1e-3 * static_cast<double>(id)});
+  }
+  const std::string table = SolveTable(report);
+  EXPECT_THAT(
+      table,
+      HasSubstr(
+          "\n1 image is not held in place: its observations fit as well from "
+          "farther away. Check its matches. Moved no farther than needed: "
+          "a b.jpg (4 observations, moved by 1235 units).\n"
+          "1 image moved farther than cameras are from what they see: "
+          "c.jpg (90 observations, moved by 6.7e+04 units).\n"
+          "The place and the size of the model are those of the other 3 "
+          "images.\n"
+          "7 points are not determined: the rays are parallel up to noise, and "
+          "any distance fits. Moved by at most 0.017 units: point3D_id 11, 12, "
+          "13, 14, 15, ....\n"));
+  report.summary.num_images = 2;
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr("place and the size")));
+  const nlohmann::json json = nlohmann::json::parse(SolveJson(report));
+  const nlohmann::json& not_held = json["not_held"];
+  ASSERT_EQ(not_held["images"].size(), 2);
+  EXPECT_EQ(not_held["images"][0]["image_id"], 7);
+  EXPECT_EQ(not_held["images"][0]["image_name"], "a b.jpg");
+  EXPECT_EQ(not_held["images"][0]["num_observations"], 4);
+  EXPECT_EQ(not_held["images"][0]["is_determined"], false);
+  EXPECT_EQ(not_held["images"][0]["moved"], 1234.5678);
+  EXPECT_EQ(not_held["images"][1]["is_determined"], true);
+  ASSERT_EQ(not_held["points"].size(), 7);
+  EXPECT_EQ(not_held["points"][6]["point3D_id"], 17);
+}
+
 TEST(MissedGapSentence, SaysWhichLimitWasHit) {
   SolveSummary summary = CertifiedReport().summary;
   summary.termination = SolveTermination::kMaxIterations;

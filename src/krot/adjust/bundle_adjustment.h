@@ -140,9 +140,9 @@ struct BundleAdjustmentResult {
 // bits, and so do points and frames that take no part. The gauge is free during
 // the solve; after it every connected component gets back the centroid of its
 // camera centres, their RMS distance to it (unless a constant rig baseline
-// fixes the scale) and the mean of its rotations; one with anything fixed stays
-// as it is. Stored point errors are not
-// updated.
+// fixes the scale) and the mean of its rotations, runaways left out
+// (krot/geometry/consensus.h); one with anything fixed stays as it is. Stored
+// point errors are not updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a
 // cap, so is one that takes an error to it. With a cap the result has the same

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "krot/base/disjoint_sets.h"
+#include "krot/base/medians.h"
+#include "krot/geometry/consensus.h"
 #include "krot/geometry/rigid_transform.h"
 #include "krot/geometry/rotation.h"
 #include "krot/geometry/similarity.h"
@@ -106,6 +108,45 @@ Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
   return NearestRotation(sum).value_or(Matrix3d::Identity());
 }
 
+// How far away what a frame sees typically is.
+std::vector<double> TypicalDistances(
+    const AdjustmentBlocks& blocks,
+    const std::vector<AdjustmentObservation>& of) {
+  std::vector<double> distances;
+  std::vector<int32_t> frame_of;
+  for (const AdjustmentObservation& observation : of) {
+    distances.push_back((blocks.points[observation.point] -
+                         CenterOf(blocks.frames[observation.frame]))
+                            .norm());
+    frame_of.push_back(observation.frame);
+  }
+  return GroupMedians(distances, frame_of,
+                      static_cast<int32_t>(blocks.frames.size()), {});
+}
+
+// Those of a component's frames that keep their place among the others once the
+// world has turned.
+std::vector<size_t> HeldFrames(const AdjustmentBlocks& before,
+                               const AdjustmentBlocks& after,
+                               const std::vector<double>& distances_before,
+                               const std::vector<double>& distances_after,
+                               const Component& component,
+                               const Matrix3d& rotation) {
+  std::vector<CameraMove> cameras;
+  for (const size_t f : component.frames) {
+    cameras.push_back({CenterOf(before.frames[f]),
+                       rotation * CenterOf(after.frames[f]),
+                       distances_before[f], distances_after[f]});
+  }
+  const std::vector<char> keeps =
+      FindConsensus(cameras, !component.has_fixed_scale);
+  std::vector<size_t> held;
+  for (size_t n = 0; n < keeps.size(); ++n) {
+    if (keeps[n] != 0) held.push_back(component.frames[n]);
+  }
+  return held;
+}
+
 // Moves the frame's centre to `center`; turns it with the world unless
 // `keep_rotation`.
 void MoveFrame(const Vector3d& center, const Matrix3d& world_rotation,
@@ -128,13 +169,23 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        AdjustmentBlocks* after) {
   if (!options.refine_rig_from_world || !options.refine_points3D) return;
   const bool keep_rotation = options.constant_rig_from_world_rotation;
+  const std::vector<double> distances_before =
+      TypicalDistances(before, before.observations);
+  const std::vector<double> distances_after =
+      TypicalDistances(*after, before.observations);
   for (const Component& component :
        FindComponents(before, options.refine_sensor_from_rig)) {
     if (component.is_held) continue;
-    const CenterStatistics old_centers =
-        Summarize(before.frames, component.frames);
-    const CenterStatistics new_centers =
-        Summarize(after->frames, component.frames);
+    const auto rotation_of =
+        [&](const std::vector<size_t>& frames) -> Matrix3d {
+      return keep_rotation ? Matrix3d::Identity()
+                           : MeanRotation(before.frames, after->frames, frames);
+    };
+    const std::vector<size_t> held =
+        HeldFrames(before, *after, distances_before, distances_after, component,
+                   rotation_of(component.frames));
+    const CenterStatistics old_centers = Summarize(before.frames, held);
+    const CenterStatistics new_centers = Summarize(after->frames, held);
     // Of what lies around the new centroid.
     Similarity similarity;
     similarity.translation = old_centers.centroid;
@@ -142,10 +193,7 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
         new_centers.rms > 0) {
       similarity.scale = old_centers.rms / new_centers.rms;
     }
-    if (!keep_rotation) {
-      similarity.rotation =
-          MeanRotation(before.frames, after->frames, component.frames);
-    }
+    similarity.rotation = rotation_of(held);
     const auto move = [&](const Vector3d& x) -> Vector3d {
       return similarity * (x - new_centers.centroid);
     };

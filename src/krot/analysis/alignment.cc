@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "krot/base/angle.h"
+#include "krot/geometry/consensus.h"
 #include "krot/geometry/rotation.h"
 
 namespace krot {
@@ -25,6 +26,16 @@ double Radius(const Matrix3Xd& centers) {
   const Vector3d centroid = centers.rowwise().mean();
   return (centers.colwise() - centroid).norm() /
          std::sqrt(static_cast<double>(centers.cols()));
+}
+
+// The chordal mean of R1' R2.
+std::optional<Matrix3d> MeanRotation(const std::vector<PosePair>& poses) {
+  Matrix3d sum = Matrix3d::Zero();
+  for (const PosePair& pose : poses) {
+    sum += pose.cam_from_world1_rotation.transpose() *
+           pose.cam_from_world2_rotation;
+  }
+  return NearestRotation(sum);
 }
 
 bool AreEqual(const PosePair& pose) {
@@ -57,22 +68,35 @@ double AngleDeg(const Matrix3d& A, const Matrix3d& B) {
   return 2 * std::asin(std::min(1.0, sine)) * kDegreesPerRadian;
 }
 
+std::vector<PosePair> HeldPoses(const std::vector<PosePair>& poses) {
+  const std::optional<Matrix3d> rotation = MeanRotation(poses);
+  if (!rotation) return poses;
+  std::vector<CameraMove> cameras;
+  for (const PosePair& pose : poses) {
+    cameras.push_back({pose.center1, *rotation * pose.center2, pose.distance1,
+                       pose.distance2});
+  }
+  const std::vector<char> keeps =
+      FindConsensus(cameras, /*scale_is_free=*/true);
+  std::vector<PosePair> held;
+  for (size_t n = 0; n < keeps.size(); ++n) {
+    if (keeps[n] != 0) held.push_back(poses[n]);
+  }
+  return held;
+}
+
 double SceneRadius(const std::vector<PosePair>& poses) {
   return Radius(Centers(poses, &PosePair::center1));
 }
 
 std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses) {
   if (poses.empty()) return std::nullopt;
-  Matrix3d sum = Matrix3d::Zero();
-  for (const PosePair& pose : poses) {
-    sum += pose.cam_from_world1_rotation.transpose() *
-           pose.cam_from_world2_rotation;
-  }
-  const std::optional<Matrix3d> rotation = NearestRotation(sum);
+  const std::vector<PosePair> held = HeldPoses(poses);
+  const std::optional<Matrix3d> rotation = MeanRotation(held);
   if (!rotation) return std::nullopt;
 
-  const Matrix3Xd centers1 = Centers(poses, &PosePair::center1);
-  const Matrix3Xd centers2 = Centers(poses, &PosePair::center2);
+  const Matrix3Xd centers1 = Centers(held, &PosePair::center1);
+  const Matrix3Xd centers2 = Centers(held, &PosePair::center2);
   const double radius1 = Radius(centers1);
   const double radius2 = Radius(centers2);
   Similarity similarity;

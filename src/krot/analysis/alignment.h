@@ -26,19 +26,27 @@ struct PosePair {
   Eigen::Matrix3d cam_from_world2_rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d center1 = Eigen::Vector3d::Zero();
   Eigen::Vector3d center2 = Eigen::Vector3d::Zero();
+  // From the points that it sees, the median; 0 if it sees none.
+  double distance1 = 0;
+  double distance2 = 0;
 };
+
+// Those that keep their place among the others from one model to the other
+// (krot/geometry/consensus.h): a runaway says nothing about the frame that the
+// models have in common. All of them where they have none. O(images).
+std::vector<PosePair> HeldPoses(const std::vector<PosePair>& poses);
 
 // The RMS distance of the first model's camera centres from their centroid: a
 // length that differences can be compared with, and the one that KROT's gauge
-// keeps. 0 if there are none.
+// keeps if they are HeldPoses. 0 if there are none.
 double SceneRadius(const std::vector<PosePair>& poses);
 
 // The frame in which KROT keeps a model (problem/gauge.h), made the same in
-// both: the rotation is the chordal mean of those that the images name
-// (R1' R2), then the centroids of the camera centres coincide, and their RMS
-// distances from it, too. Where one of the two radii is zero the scale is 1.
-// None if there are no poses, or if the rotations point in all directions and
-// have no mean. O(images).
+// both: of HeldPoses, the rotation is the chordal mean of those that the images
+// name (R1' R2), then the centroids of the camera centres coincide, and their
+// RMS distances from it, too. Where one of the two radii is zero the scale
+// is 1. None if there are no poses, or if the rotations point in all directions
+// and have no mean. O(images).
 std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses);
 
 // The similarity that minimises the sum of squares of the distances between

@@ -6,6 +6,8 @@
 
 #include "krot/analysis/model_statistics.h"
 #include "krot/base/check.h"
+#include "krot/base/medians.h"
+#include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -25,24 +27,40 @@ ModelCounts Count(const ModelCorrespondence& correspondence) {
           static_cast<int64_t>(correspondence.observations.size())};
 }
 
-// None if either has no pose.
-std::optional<PosePair> MakePosePair(const ImageGeometry& image1,
-                                     const ImageGeometry& image2) {
-  if (!image1.has_pose || !image2.has_pose) return std::nullopt;
-  return PosePair{image1.cam_from_world.rotation,
-                  image2.cam_from_world.rotation, Center(image1.cam_from_world),
-                  Center(image2.cam_from_world)};
+// Of each image from the points that it sees; NaN without any.
+std::vector<double> TypicalDistances(const Model& model,
+                                     const std::vector<ImageGeometry>& images) {
+  const IdIndex<ImageId> index(model.images);
+  std::vector<double> distances;
+  std::vector<int32_t> image_of;
+  for (const Point3D& point : model.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const int32_t n = *index.Find(model.track_elements[e].image_id);
+      image_of.push_back(images[n].has_pose ? n : -1);
+      distances.push_back((images[n].cam_from_world * point.xyz).norm());
+    }
+  }
+  return GroupMedians(distances, image_of,
+                      static_cast<int32_t>(model.images.size()), {});
 }
 
-// One per shared image.
+// One per shared image; none if either model has no pose of it.
 std::vector<std::optional<PosePair>> PosePairs(
     const Model& model1, const Model& model2,
     const ModelCorrespondence& correspondence) {
   const std::vector<ImageGeometry> images1 = ImageGeometries(model1);
   const std::vector<ImageGeometry> images2 = ImageGeometries(model2);
+  const std::vector<double> distances1 = TypicalDistances(model1, images1);
+  const std::vector<double> distances2 = TypicalDistances(model2, images2);
   std::vector<std::optional<PosePair>> poses;
-  for (const IndexPair& pair : correspondence.images) {
-    poses.push_back(MakePosePair(images1[pair.first], images2[pair.second]));
+  for (const auto& [n1, n2] : correspondence.images) {
+    std::optional<PosePair>& pose = poses.emplace_back();
+    if (!images1[n1].has_pose || !images2[n2].has_pose) continue;
+    const RigidTransform& cam_from_world1 = images1[n1].cam_from_world;
+    const RigidTransform& cam_from_world2 = images2[n2].cam_from_world;
+    pose = PosePair{cam_from_world1.rotation, cam_from_world2.rotation,
+                    Center(cam_from_world1),  Center(cam_from_world2),
+                    distances1[n1],           distances2[n2]};
   }
   return poses;
 }
@@ -61,6 +79,16 @@ PoseDifference Difference(const PosePair& pose,
       pose.cam_from_world2_rotation * world1_from_world2.rotation.transpose();
   return {AngleDeg(pose.cam_from_world1_rotation, cam2_from_world1),
           (pose.center1 - world1_from_world2 * pose.center2).norm()};
+}
+
+// Of the centroid of the second model's centres.
+double DistanceMoved(const std::vector<PosePair>& poses,
+                     const Similarity& world1_from_world2) {
+  if (poses.empty()) return 0;
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
+  for (const PosePair& pose : poses) centroid += pose.center2;
+  centroid /= static_cast<double>(poses.size());
+  return (world1_from_world2 * centroid - centroid).norm();
 }
 
 DifferenceStatistics SummarizeDifferences(std::vector<double> values) {
@@ -158,7 +186,9 @@ std::optional<ComparisonSummary> CompareModels(
   summary.num_shared_poses = static_cast<int64_t>(known_poses.size());
   summary.alignment = options.alignment;
   summary.world1_from_world2 = *world1_from_world2;
-  summary.scene_radius = SceneRadius(known_poses);
+  const std::vector<PosePair> held_poses = HeldPoses(known_poses);
+  summary.scene_radius = SceneRadius(held_poses);
+  summary.moved = DistanceMoved(held_poses, *world1_from_world2);
 
   const std::vector<double> errors1_px =
       PixelErrors(model1, options.num_threads);

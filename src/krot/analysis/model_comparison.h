@@ -60,7 +60,10 @@ struct ComparisonSummary {
 
   AlignmentKind alignment = AlignmentKind::kNone;
   Similarity world1_from_world2;
-  double scene_radius = 0;  // SceneRadius of the shared poses
+  // Of the centroid of the second model's cameras, by the alignment: unlike its
+  // translation it does not grow with the distance from the origin.
+  double moved = 0;
+  double scene_radius = 0;  // SceneRadius of the shared poses that are held
 
   DifferenceStatistics rotation_deg;
   DifferenceStatistics center;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
@@ -136,6 +137,23 @@ void RunFinish(const Model& model, const SolveModelOptions& options,
   if (context.IsCancelled()) {
     summary->termination = SolveTermination::kInterrupted;
   }
+}
+
+double SumOfLosses(const Reprojection& reprojection,
+                   const KnownRotationProblem& problem, const ErrorLoss& loss,
+                   const Estimate& estimate, const Context& context) {
+  std::vector<double> sum = {0};
+  context.InTurn(
+      [&](std::vector<double>* of_whole) {
+        for (size_t n = 0; n < problem.observations.size(); ++n) {
+          const auto i = static_cast<int64_t>(n);
+          if (!reprojection.IsOfModel(i)) continue;
+          const double error = reprojection.Error(estimate, Norm::L2(), i);
+          (*of_whole)[0] += 0.5 * loss.Value(error * error);
+        }
+      },
+      &sum);
+  return sum[0];
 }
 
 }  // namespace krot

@@ -3,6 +3,7 @@
 #include "krot/base/context.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/bridge.h"
+#include "krot/bridge/reprojection.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {
@@ -24,5 +25,11 @@ void RunFinish(const Model& model, const SolveModelOptions& options,
                std::optional<double> lower_bound, const Context& context,
                const Timer& timer, BuiltProblem* built, Estimate* estimate,
                SolveSummary* summary);
+
+// Half the sum of the losses of the true errors, squared pixels: what the least
+// squares have lowered. O(observations).
+double SumOfLosses(const Reprojection& reprojection,
+                   const KnownRotationProblem& problem, const ErrorLoss& loss,
+                   const Estimate& estimate, const Context& context);
 
 }  // namespace krot

@@ -14,12 +14,12 @@
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
 #include "krot/pipeline/run_finish.h"
+#include "krot/pipeline/settle.h"
 #include "krot/pipeline/solve_memory.h"
 #include "krot/pipeline/start.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/fixed.h"
-#include "krot/problem/gauge.h"
 
 namespace krot {
 namespace {
@@ -228,13 +228,20 @@ SolveModelResult SolveInFrame(const Model& model,
         certificate ? std::optional(certificate->lower_bound) : std::nullopt,
         context, solve_timer, &start.built, &estimate, &summary);
   }
-  if (options.res_int.update_frames) {
-    RestoreGaugeIfHarmless(start.built.problem, start.built.start, options.norm,
-                           context, &estimate);
-  }
+  summary.loose = SettleEstimate(model, start.built,
+                                 {options.norm, options.res_int.update_frames},
+                                 context, &estimate);
   PutFixed(start.built.problem, &estimate);
   summary.largest_position_ratio = LargestPositionRatio(start.built, estimate);
   const Reprojection reprojection(model, start.built);
+  if (summary.loose.have_moved) {
+    reprojection.TakeRows(estimate, num_threads, &start.built.problem);
+    if (summary.finish) {
+      summary.finish->solve.cost_final =
+          SumOfLosses(reprojection, start.built.problem, summary.finish->loss,
+                      estimate, context);
+    }
+  }
   const auto true_cost = [&] {
     return context.Max(
         reprojection.TrueCost(estimate, options.norm, num_threads));
@@ -251,6 +258,7 @@ SolveModelResult SolveInFrame(const Model& model,
       IsWorse(before_px, PixelErrors(result.model, num_threads, options.norm),
               options.finish.max_error.value_or(0), context)) {
     summary.is_given_back = true;
+    summary.loose = {};
     summary.finish.reset();
     result.model = model;
     estimate = OwnEstimate(model, start.built);
@@ -268,6 +276,7 @@ SolveModelResult SolveInFrame(const Model& model,
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
     summary.polish = PolishModel(options.polish, options.finish.loss,
                                  options.problem.fixed, context, &result.model);
+    MeasureMoves(model, result.model, &summary.loose);
   }
   return result;
 }

@@ -16,6 +16,7 @@
 #include "krot/model/model.h"
 #include "krot/pipeline/finish.h"
 #include "krot/pipeline/polish.h"
+#include "krot/pipeline/settle.h"
 #include "krot/sweeps/res_int.h"
 
 namespace krot {
@@ -124,6 +125,9 @@ struct SolveSummary {
   // finish.max_error: the input is what is given back.
   bool is_given_back = false;
 
+  // What does not hold its place in the model written.
+  LooseParts loose;
+
   // The finish by least squares, if there was one: it gives up (cost_final -
   // finish->lowest_cost) of the maximum.
   std::optional<FinishSummary> finish;
@@ -196,12 +200,12 @@ struct SolveModelResult {
 // (mean, true pixels). Rotations, intrinsics, ids, names, tracks, colours, 2D
 // points and all orders stay; so do, per connected component, the centroid of
 // the camera centres and, unless a rig fixes it, their RMS distance to it,
-// where the model has finite ones. What options.problem.fixed marks keeps its
-// bits, and place and scale come from it. Cameras with
-// options.problem.positions come to be within their radii (to 1e-6 of them), at
-// the lowest maximum that leaves; that needs p = 2, a joint solver and no
-// polish. It may be above the input's: what is given back then is not the
-// input.
+// where the model has finite ones and but for summary.loose.images. What
+// options.problem.fixed marks keeps its bits, and place and scale come from it.
+// Cameras with options.problem.positions come to be within their radii (to 1e-6
+// of them), at the lowest maximum that leaves; that needs p = 2, a joint solver
+// and no polish. It may be above the input's: what is given back then is not
+// the input.
 //
 // Models far from the origin are solved in a local frame
 // (krot/model/local_frame.h); costs and errors are those before the

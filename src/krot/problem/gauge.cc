@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "krot/base/medians.h"
+#include "krot/geometry/consensus.h"
+#include "krot/problem/cameras.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/frame_geometry.h"
@@ -26,95 +28,56 @@ Vector3d ProjectionCentre(const FrameGeometry& frame, const Vector3d& t) {
   return frame.world_from_rig * (frame.centre_in_rig - t);
 }
 
-// Where a component's centres or points lie, and how far apart.
-struct Spread {
-  Vector3d centroid = Vector3d::Zero();
-  double rms = 0;  // distance to the centroid
-  double weight = 0;
-};
-
-// One per component; position n counts weights[n] times. The centroid is NaN
-// where nothing counts.
-std::vector<Spread> MeasureSpreads(const std::vector<Vector3d>& positions,
-                                   const std::vector<int>& weights,
-                                   const std::vector<int32_t>& component_of,
-                                   int32_t num_components,
-                                   const Context& context) {
-  std::vector<Spread> spreads(num_components);
-  context.InTurn(
-      [&](std::vector<Spread>* sums) {
-        for (size_t n = 0; n < positions.size(); ++n) {
-          if (component_of[n] < 0 || weights[n] == 0) continue;
-          Spread& sum = (*sums)[component_of[n]];
-          sum.centroid += weights[n] * positions[n];
-          sum.weight += weights[n];
-        }
-      },
-      &spreads);
-  for (Spread& spread : spreads) spread.centroid /= spread.weight;
-  context.InTurn(
-      [&](std::vector<Spread>* sums) {
-        for (size_t n = 0; n < positions.size(); ++n) {
-          if (component_of[n] < 0 || weights[n] == 0) continue;
-          Spread& sum = (*sums)[component_of[n]];
-          sum.rms += weights[n] * (positions[n] - sum.centroid).squaredNorm();
-        }
-      },
-      &spreads);
-  for (Spread& spread : spreads) {
-    spread.rms = std::sqrt(spread.rms / spread.weight);
-  }
-  return spreads;
-}
-
 // How large one component is in one estimate.
 struct Extent {
-  Spread centres;
-  Spread points;
-  // From the centroid of the centres; unlike the RMS of the points it means
-  // something when one of them lies nearly at infinity.
-  double nearest_point = std::numeric_limits<double>::infinity();
+  Vector3d centroid = Vector3d::Zero();  // of the centres; NaN without any
+  double rms = 0;                        // distance of the centres to it
+  double weight = 0;                     // how often centres count
+  double point_distance = 0;  // the median, from the centroid; NaN without any
 
   bool CentresCoincide() const {
-    const double distance = std::isfinite(nearest_point) ? nearest_point : 0;
-    return centres.rms <= kCoincident * (centres.centroid.norm() + distance);
+    const double distance = std::isfinite(point_distance) ? point_distance : 0;
+    return rms <= kCoincident * (centroid.norm() + distance);
   }
 };
 
+// One per component; frame f's centre counts num_views times.
 std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
-                                   const std::vector<int>& point_weights,
+                                   const std::vector<char>& point_counts,
                                    const Components& components,
                                    const Estimate& estimate,
                                    const Context& context) {
-  std::vector<Vector3d> centres;
-  std::vector<int> num_views;
-  for (size_t f = 0; f < frames.size(); ++f) {
-    centres.push_back(ProjectionCentre(frames[f], estimate.translations[f]));
-    num_views.push_back(frames[f].num_views);
-  }
-  const std::vector<Spread> of_centres =
-      MeasureSpreads(centres, num_views, components.of_frame, components.count,
-                     context.Alone());
-  const std::vector<Spread> of_points =
-      MeasureSpreads(estimate.points, point_weights, components.of_point,
-                     components.count, context);
-
   std::vector<Extent> extents(components.count);
-  for (int32_t c = 0; c < components.count; ++c) {
-    extents[c].centres = of_centres[c];
-    extents[c].points = of_points[c];
+  const auto for_each_centre = [&](const auto& visit) {
+    for (size_t f = 0; f < frames.size(); ++f) {
+      if (components.of_frame[f] < 0 || frames[f].num_views == 0) continue;
+      visit(ProjectionCentre(frames[f], estimate.translations[f]),
+            frames[f].num_views, &extents[components.of_frame[f]]);
+    }
+  };
+  for_each_centre([](const Vector3d& centre, int num_views, Extent* extent) {
+    extent->centroid += num_views * centre;
+    extent->weight += num_views;
+  });
+  for (Extent& extent : extents) extent.centroid /= extent.weight;
+  for_each_centre([](const Vector3d& centre, int num_views, Extent* extent) {
+    extent->rms += num_views * (centre - extent->centroid).squaredNorm();
+  });
+  for (Extent& extent : extents) {
+    extent.rms = std::sqrt(extent.rms / extent.weight);
   }
-  std::vector<double> nearest(components.count,
-                              std::numeric_limits<double>::infinity());
+  std::vector<double> distances;
   for (size_t k = 0; k < estimate.points.size(); ++k) {
     const int32_t c = components.of_point[k];
-    if (c < 0 || point_weights[k] == 0) continue;
-    nearest[c] = std::min(
-        nearest[c], (estimate.points[k] - extents[c].centres.centroid).norm());
+    distances.push_back(
+        c < 0 || point_counts[k] == 0
+            ? -1
+            : (estimate.points[k] - extents[c].centroid).norm());
   }
-  context.Reduce([](double a, double b) { return std::min(a, b); }, &nearest);
+  const std::vector<double> medians =
+      GroupMedians(distances, components.of_point, components.count, context);
   for (int32_t c = 0; c < components.count; ++c) {
-    extents[c].nearest_point = nearest[c];
+    extents[c].point_distance = medians[c];
   }
   return extents;
 }
@@ -158,60 +121,143 @@ std::vector<Hold> FindHolds(const KnownRotationProblem& problem,
   return holds;
 }
 
+// What the sizes of the two differ by: that of the centres or, where they
+// coincide, how far away the points are.
+double ScaleBetween(const Extent& reference, const Extent& estimate,
+                    double size_of_reference, double size_of_estimate) {
+  const bool use_points =
+      reference.CentresCoincide() || estimate.CentresCoincide();
+  const double scale = use_points
+                           ? reference.point_distance / estimate.point_distance
+                           : size_of_reference / size_of_estimate;
+  return std::isfinite(scale) && scale > 0 ? scale : 1;
+}
+
 // The scale alone, about what is fixed.
 Move ScaleAbout(const Vector3d& fixed, const Extent& reference,
                 const Extent& estimate) {
-  const bool use_points =
-      reference.CentresCoincide() || estimate.CentresCoincide();
   const auto distance = [&](const Extent& extent) {  // RMS
-    const Spread& spread = use_points ? extent.points : extent.centres;
-    return std::hypot(spread.rms, (spread.centroid - fixed).norm());
+    return std::hypot(extent.rms, (extent.centroid - fixed).norm());
   };
-  Move move{fixed, fixed, distance(reference) / distance(estimate)};
-  if (!std::isfinite(move.scale) || !(move.scale > 0)) move.scale = 1;
-  return move;
+  return {fixed, fixed,
+          ScaleBetween(reference, estimate, distance(reference),
+                       distance(estimate))};
 }
 
 Move MoveOnto(const Extent& reference, const Extent& estimate,
               bool scale_is_free) {
-  const bool use_points =
-      reference.CentresCoincide() || estimate.CentresCoincide();
-  const Spread& to = use_points ? reference.points : reference.centres;
-  const Spread& from = use_points ? estimate.points : estimate.centres;
-
-  if (!to.centroid.allFinite()) return {};
-  Move move{from.centroid, to.centroid, 1};
-  if (scale_is_free && from.rms > 0 && to.rms > 0) {
-    move.scale = to.rms / from.rms;
-  }
-  return move;
+  if (!reference.centroid.allFinite()) return {};
+  return {estimate.centroid, reference.centroid,
+          scale_is_free
+              ? ScaleBetween(reference, estimate, reference.rms, estimate.rms)
+              : 1};
 }
 
-}  // namespace
-
-void RestoreGauge(const KnownRotationProblem& problem,
-                  const Estimate& reference, Estimate* estimate,
-                  const Context& context) {
-  const Components components = FindComponents(problem, context);
-  std::vector<FrameGeometry> frames = DescribeFrames(problem, context);
-  for (int32_t f = 0; f < problem.num_frames; ++f) {
-    if (!reference.translations[f].allFinite()) frames[f].num_views = 0;
-  }
-  std::vector<int> point_weights;
-  for (const Vector3d& point : reference.points) {
-    point_weights.push_back(point.allFinite());
-  }
-  const std::vector<Extent> wanted =
-      MeasureExtents(frames, point_weights, components, reference, context);
-  const std::vector<Extent> found =
-      MeasureExtents(frames, point_weights, components, *estimate, context);
-
+std::vector<char> ScaleIsFree(const std::vector<FrameGeometry>& frames,
+                              const Components& components) {
   std::vector<char> scale_is_free(components.count, true);
-  for (int32_t f = 0; f < problem.num_frames; ++f) {
+  for (size_t f = 0; f < frames.size(); ++f) {
     if (frames[f].has_two_centres) {
       scale_is_free[components.of_frame[f]] = false;
     }
   }
+  return scale_is_free;
+}
+
+// How far away what a frame sees typically is: the median of its observations.
+std::vector<double> TypicalDistances(const KnownRotationProblem& problem,
+                                     const Estimate& estimate,
+                                     const Context& context) {
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem, estimate.translations);
+  std::vector<double> distances;
+  std::vector<int32_t> frame_of;
+  distances.reserve(problem.observations.size());
+  frame_of.reserve(problem.observations.size());
+  for (const Observation& o : problem.observations) {
+    const AffineMap& camera = cameras[o.view];
+    distances.push_back(
+        (camera.leftCols<3>() * estimate.points[o.point] + camera.col(3))
+            .norm());
+    frame_of.push_back(problem.views[o.view].frame);
+  }
+  return GroupMedians(distances, frame_of, problem.num_frames, context);
+}
+
+std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,
+                                 const std::vector<FrameGeometry>& frames,
+                                 const Components& components,
+                                 const Estimate& reference,
+                                 const Estimate& estimate,
+                                 const std::vector<char>& is_loose,
+                                 const Context& context) {
+  const std::vector<double> before =
+      TypicalDistances(problem, reference, context);
+  const std::vector<double> after =
+      TypicalDistances(problem, estimate, context);
+  std::vector<std::vector<int32_t>> frames_of(components.count);
+  std::vector<std::vector<CameraMove>> moves(components.count);
+  for (const bool take_loose : {false, true}) {
+    std::vector<char> is_empty;
+    for (const auto& of_component : frames_of) {
+      is_empty.push_back(of_component.empty());
+    }
+    for (int32_t f = 0; f < problem.num_frames; ++f) {
+      const int32_t c = components.of_frame[f];
+      if (c < 0 || is_empty[c] == 0) continue;
+      if (!reference.translations[f].allFinite()) continue;
+      if (!is_loose.empty() && is_loose[f] != 0 && !take_loose) continue;
+      frames_of[c].push_back(f);
+      moves[c].push_back(
+          {ProjectionCentre(frames[f], reference.translations[f]),
+           ProjectionCentre(frames[f], estimate.translations[f]), before[f],
+           after[f]});
+    }
+  }
+  const std::vector<char> scale_is_free = ScaleIsFree(frames, components);
+  std::vector<char> is_held(problem.num_frames, 0);
+  for (int32_t c = 0; c < components.count; ++c) {
+    const std::vector<char> keeps = FindConsensus(moves[c], scale_is_free[c]);
+    for (size_t n = 0; n < keeps.size(); ++n) {
+      is_held[frames_of[c][n]] = keeps[n];
+    }
+  }
+  return is_held;
+}
+
+}  // namespace
+
+std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,
+                                 const Estimate& reference,
+                                 const Estimate& estimate,
+                                 const std::vector<char>& is_loose,
+                                 const Context& context) {
+  return FindHeldFrames(problem, DescribeFrames(problem, context),
+                        FindComponents(problem, context), reference, estimate,
+                        is_loose, context);
+}
+
+void RestoreGauge(const KnownRotationProblem& problem,
+                  const Estimate& reference, Estimate* estimate,
+                  const Context& context, const std::vector<char>* held) {
+  const Components components = FindComponents(problem, context);
+  std::vector<FrameGeometry> frames = DescribeFrames(problem, context);
+  const std::vector<char> is_held =
+      held != nullptr ? *held
+                      : FindHeldFrames(problem, frames, components, reference,
+                                       *estimate, {}, context);
+  const std::vector<char> scale_is_free = ScaleIsFree(frames, components);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    if (is_held[f] == 0) frames[f].num_views = 0;
+  }
+  std::vector<char> point_counts;
+  for (const Vector3d& point : reference.points) {
+    point_counts.push_back(point.allFinite());
+  }
+  const std::vector<Extent> wanted =
+      MeasureExtents(frames, point_counts, components, reference, context);
+  const std::vector<Extent> found =
+      MeasureExtents(frames, point_counts, components, *estimate, context);
   const std::vector<Hold> holds = FindHolds(problem, frames, components);
   std::vector<Move> moves(components.count);
   for (int32_t c = 0; c < components.count; ++c) {
@@ -239,9 +285,10 @@ void RestoreGauge(const KnownRotationProblem& problem,
 
 void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
                             const Estimate& reference, Norm norm,
-                            const Context& context, Estimate* estimate) {
+                            const Context& context, Estimate* estimate,
+                            const std::vector<char>* held) {
   Estimate moved = *estimate;
-  RestoreGauge(problem, reference, &moved, context);
+  RestoreGauge(problem, reference, &moved, context, held);
   const auto cost = [&](const Estimate& x) {
     return context.Max(Cost(problem, x, norm, context.num_threads));
   };

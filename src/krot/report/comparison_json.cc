@@ -20,7 +20,8 @@ Json AlignmentJson(const ComparisonSummary& summary) {
           {"scale", similarity.scale},
           {"rotation",
            {VectorJson(R.row(0)), VectorJson(R.row(1)), VectorJson(R.row(2))}},
-          {"translation", VectorJson(similarity.translation)}};
+          {"translation", VectorJson(similarity.translation)},
+          {"moved", summary.moved}};
 }
 
 Json DifferenceJson(const DifferenceStatistics& differences) {

@@ -16,14 +16,6 @@ namespace {
 
 std::string FormatAngle(double degrees) { return FormatNumber(degrees, 6); }
 
-// Scene units may be of any size: four significant digits.
-std::string FormatLength(double value) {
-  if (!std::isfinite(value)) return "-";
-  std::ostringstream text;
-  text << std::setprecision(4) << value;
-  return text.str();
-}
-
 // Per cent of the scene's radius; "-" if it has none.
 std::string FormatShare(double length, double scene_radius) {
   return scene_radius > 0 ? FormatNumber(100 * length / scene_radius, 4) : "-";
@@ -65,7 +57,7 @@ std::string AlignmentSentence(const ComparisonSummary& summary) {
           : "after the similarity that fits the camera centres";
   return means + "\n(model 2 scaled by " + FormatNumber(similarity.scale, 8) +
          ", turned by " + FormatNumber(angle_deg, 6) + " degrees, moved by " +
-         FormatLength(similarity.translation.norm()) + ")";
+         FormatLength(summary.moved) + ")";
 }
 
 void AddDifferences(const std::string& name,

@@ -109,7 +109,8 @@ Json SolveOfRestJson(const std::optional<SolveSummary>& solve) {
           {"cost_final", solve->cost_final},
           {"certified", solve->is_certified},
           {"lower_bound", NumberOrNull(solve->lower_bound)},
-          {"relative_gap", NumberOrNull(solve->relative_gap)}};
+          {"relative_gap", NumberOrNull(solve->relative_gap)},
+          {"not_held", NotHeldJson(solve->loose)}};
 }
 
 Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
@@ -187,6 +188,9 @@ std::string OutlierTable(const OutlierReport& report) {
   text += "\nReprojection errors, pixels\n" + errors.ToString();
   if (summary.profile) text += ProfileTable(*summary.profile);
   text += SuspectTable(summary) + RotationSentence(summary) + "\n";
+  if (summary.solve) {
+    text += LooseSentences(summary.solve->loose, summary.solve->num_images);
+  }
   return text +
          RunSentence(
              report.run,

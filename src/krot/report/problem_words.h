@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/pipeline/settle.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
@@ -34,5 +35,9 @@ std::string CountsWords(const Summary& summary) {
          Counted(summary.num_points, "point") + ", " +
          Counted(summary.num_observations, "observation");
 }
+
+// What does not hold its place, and what became of that, of so many images: a
+// line for each kind, that ends in '\n'; empty where everything holds it.
+std::string LooseSentences(const LooseParts& loose, int64_t num_images);
 
 }  // namespace krot

@@ -74,6 +74,23 @@ Json RotationsJson(const std::optional<RotationInput>& rotations) {
       {"mistake", replaced.mistake.empty() ? Json() : Json(replaced.mistake)}};
 }
 
+Json NotHeldJson(const LooseParts& loose) {
+  Json images = Json::array();
+  for (const LooseImage& image : loose.images) {
+    images.push_back({{"image_id", image.image_id},
+                      {"image_name", image.image_name},
+                      {"num_observations", image.num_observations},
+                      {"is_determined", image.is_determined},
+                      {"moved", image.moved}});
+  }
+  Json points = Json::array();
+  for (const LoosePoint& point : loose.points) {
+    points.push_back(
+        {{"point3D_id", point.point3D_id}, {"moved", point.moved}});
+  }
+  return {{"images", std::move(images)}, {"points", std::move(points)}};
+}
+
 std::string ReportText(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

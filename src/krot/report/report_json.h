@@ -43,6 +43,9 @@ Json VerdictJson(const std::optional<CertificateVerdict>& verdict);
 // Null unless a file gave the rotations.
 Json RotationsJson(const std::optional<RotationInput>& rotations);
 
+// The images and points that do not hold their place.
+Json NotHeldJson(const LooseParts& loose);
+
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.
 std::string ReportText(const Json& json);

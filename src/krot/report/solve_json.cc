@@ -204,6 +204,7 @@ std::string SolveJson(const SolveReport& report) {
        {{"num_known", summary.num_positions},
         {"largest_ratio", summary.largest_position_ratio},
         {"factor", FactorJson(summary.position_factor)}}},
+      {"not_held", NotHeldJson(summary.loose)},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},
       {"lower_bound", NumberOrNull(summary.lower_bound)},

@@ -255,7 +255,8 @@ std::string SolveTable(const SolveReport& report) {
          << Counted(summary.num_components, "component")
          << " without observations in common; each is solved.\n";
   }
-  text << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
+  text << LooseSentences(summary.loose, summary.num_images)
+       << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
        << SolveEndSentence(summary) << '\n'
        << Verdict(summary) << '\n';
   if (summary.is_certified) {

@@ -51,6 +51,13 @@ std::string Scientific(double value) {
   return text.str();
 }
 
+std::string FormatLength(double value) {
+  if (!std::isfinite(value)) return "-";
+  std::ostringstream text;
+  text << std::setprecision(4) << value;
+  return text.str();
+}
+
 std::string Counted(int64_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }

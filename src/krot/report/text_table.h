@@ -26,6 +26,9 @@ std::string FormatNumber(double value, int decimals);
 // With two digits: "1.2e-05".
 std::string Scientific(double value);
 
+// A length in scene units, which may be of any size: four significant digits.
+std::string FormatLength(double value);
+
 // "1 point", "2 points".
 std::string Counted(int64_t count, const std::string& noun);
 

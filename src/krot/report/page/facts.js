@@ -53,8 +53,17 @@ function listed(entries, format) {
     .map(([name, value]) => `${name} ${format(value)}`).join(', ');
 }
 
+// How many, and the first few by name.
+function notHeld(images) {
+  if (!images?.length) return undefined;
+  const names = images.slice(0, 10).map((image) => image.image_name);
+  return `${count(images.length)}: ${names.join(', ')}${
+    images.length > names.length ? ', …' : ''}`;
+}
+
 // How the run went; a row for every figure that the report holds.
 export function factsTable(report) {
+  const loose = report.not_held ?? report.solve?.not_held;
   const facts = [
     ['Command', report.command],
     ['Method', report.method],
@@ -71,6 +80,8 @@ export function factsTable(report) {
     ['Cap on every error, px', report.max_error],
     ['Left out', report.left_out &&
       (listed(Object.entries(report.left_out), count) || 'none')],
+    ['Images that are not held', notHeld(loose?.images)],
+    ['Points that are not determined', counts(loose?.points.length)],
     ['Alignment', report.alignment?.kind],
     ['Time', report.seconds && listed(Object.entries(report.seconds), seconds)],
     ['Memory', report.peak_memory_bytes === undefined ? undefined :

@@ -1,0 +1,209 @@
+#include "krot/pipeline/settle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <Eigen/LU>
+
+#include "krot/base/medians.h"
+#include "krot/model/id_index.h"
+#include "krot/model/image_geometry.h"
+#include "krot/pipeline/settling.h"
+#include "krot/problem/cameras.h"
+
+namespace krot {
+namespace {
+
+// A sum of squared errors that is higher by up to so many variances of the
+// noise is as good: three standard deviations of whatever it depends on.
+constexpr double kAsGood = 9;
+// Errors of this size are rounding, pixels.
+constexpr double kRoundingError = 1e-9;
+// So many times as far away as anything is infinitely far.
+constexpr double kFarAway = 1e6;
+constexpr int64_t kPointsAtATime = 256;
+constexpr int64_t kObservationsAtATime = 4096;
+
+}  // namespace
+
+using Eigen::Vector3d;
+
+// The squared error of observation i; infinite if it is above the level in the
+// norm of the solve.
+double Settling::Squared(int64_t i, double level) const {
+  const double error = reprojection_.Error(estimate_, Norm::L2(), i);
+  if (level < kNoLevel &&
+      !((options_.norm.p == 2
+             ? error
+             : reprojection_.Error(estimate_, options_.norm, i)) <= level)) {
+    return kNoLevel;
+  }
+  return error * error;
+}
+
+// The noise's variance per axis: a Gaussian's median error is sqrt(2 ln 2)
+// times its deviation, and what is fitted to it takes its share.
+void Settling::Measure() {
+  level_ = context_.Max(
+      reprojection_.TrueCost(estimate_, options_.norm, context_.num_threads));
+  squared_.assign(problem_.observations.size(), -1);
+  ParallelFor(static_cast<int64_t>(squared_.size()), kObservationsAtATime,
+              context_.num_threads, [&](int64_t begin, int64_t end, int) {
+                for (int64_t i = begin; i < end; ++i) {
+                  if (!reprojection_.IsOfModel(i)) continue;
+                  squared_[i] = Squared(i, kNoLevel);
+                }
+              });
+  const auto num_errors =
+      static_cast<double>(2 * context_.Sum(built_.NumPixels()));
+  const auto num_unknowns = static_cast<double>(
+      3 * (static_cast<int64_t>(built_.frame_of.size()) +
+           context_.Sum(static_cast<int64_t>(built_.point_of.size()))));
+  const double share_left =
+      std::max(1.0, num_errors - num_unknowns) / num_errors;
+  const double noise =
+      MedianOf(squared_, context_) / (2 * std::log(2.0)) / share_left;
+  as_good_ = kAsGood * std::max(noise, kRoundingError * kRoundingError);
+}
+
+// From where cameras see points, by component; scene units.
+std::vector<double> Settling::TypicalDistances() const {
+  std::vector<double> distances;
+  std::vector<int32_t> component_of;
+  for (size_t n = 0; n < problem_.observations.size(); ++n) {
+    const auto i = static_cast<int64_t>(n);
+    const int32_t point = problem_.observations[n].point;
+    distances.push_back(reprojection_.IsOfModel(i)
+                            ? reprojection_.InCamera(estimate_, i).norm()
+                            : -1);
+    component_of.push_back(components_.of_point[point]);
+  }
+  return GroupMedians(distances, component_of, components_.count, context_);
+}
+
+bool Settling::IsAsGood(int32_t k, const Vector3d& position, double limit,
+                        double level) {
+  const Vector3d was = estimate_.points[k];
+  estimate_.points[k] = position;
+  double sum = 0;
+  for (int64_t i = problem_.point_begin[k];
+       i < problem_.point_begin[k + 1] && sum <= limit; ++i) {
+    sum += Squared(i, level);
+  }
+  estimate_.points[k] = was;
+  return sum <= limit;
+}
+
+// A point that is as good infinitely far away along its mean ray goes back to
+// where that is nearest to the input. It is loose if it is as good at the
+// typical distance, or nearer than that anyway: what is far away at least, as
+// clouds are, is determined well enough.
+void Settling::SettlePoint(int32_t k, double distance) {
+  Vector3d centre = Vector3d::Zero();  // of its cameras
+  Vector3d ray = Vector3d::Zero();     // the mean, unit length
+  double limit = as_good_;
+  const int64_t begin = problem_.point_begin[k];
+  const int64_t end = problem_.point_begin[k + 1];
+  for (int64_t i = begin; i < end; ++i) {
+    if (!reprojection_.IsOfModel(i)) return;
+    const Observation& o = problem_.observations[i];
+    const View& view = problem_.views[o.view];
+    const AffineMap camera =
+        CamFromWorld(view, estimate_.translations[view.frame]);
+    centre -= camera.leftCols<3>().transpose() * camera.col(3);
+    const Vector3d ray_in_camera = o.E.inverse().col(0);
+    ray += camera.leftCols<3>().transpose() * ray_in_camera.normalized();
+    limit += squared_[i];
+  }
+  if (begin == end || problem_.IsFixedPoint(k)) return;
+  centre /= static_cast<double>(end - begin);
+  ray.normalize();
+  const auto at = [&](double t) -> Vector3d { return centre + t * ray; };
+  const Vector3d from = estimate_.points[k];
+  const double depth = (from - centre).norm();
+  const double far = kFarAway * std::max(depth, distance);
+  if (!std::isfinite(limit) || !IsAsGood(k, at(far), limit, kNoLevel)) return;
+  is_loose_point_[k] =
+      depth <= distance || IsAsGood(k, at(distance), limit, kNoLevel);
+  const Vector3d& input = input_.points[k];
+  if (!input.allFinite()) return;
+  const double wanted = ray.dot(input - centre);
+  const Vector3d way = at(wanted > 0 ? wanted : distance) - from;
+  const double share = LargestShare(
+      [&](double s) { return IsAsGood(k, from + s * way, limit, level_); });
+  const Vector3d to = from + share * way;
+  if (!((to - input).norm() < (from - input).norm())) return;
+  estimate_.points[k] = to;
+  has_moved_point_[k] = 1;
+}
+
+void Settling::SettlePoints() {
+  const std::vector<double> distances = TypicalDistances();
+  ParallelFor(static_cast<int64_t>(built_.point_of.size()), kPointsAtATime,
+              context_.num_threads, [&](int64_t begin, int64_t end, int) {
+                for (int64_t n = begin; n < end; ++n) {
+                  const auto k = static_cast<int32_t>(n);
+                  const int32_t c = components_.of_point[k];
+                  if (c >= 0) SettlePoint(k, distances[c]);
+                }
+              });
+}
+
+LooseParts Settling::Describe() const {
+  LooseParts parts;
+  parts.have_moved = context_.Any(
+      has_moved_frame_ || std::count(has_moved_point_.begin(),
+                                     has_moved_point_.end(), char{1}) > 0);
+  std::vector<int64_t> num_observations(problem_.views.size(), 0);
+  for (const Observation& o : problem_.observations) ++num_observations[o.view];
+  context_.Reduce(std::plus<int64_t>(), &num_observations);
+  for (size_t v = 0; v < built_.image_of.size(); ++v) {
+    const int32_t f = problem_.views[v].frame;
+    const bool is_loose = is_loose_frame_[f] != 0;
+    const bool is_runaway = is_held_frame_[f] == 0 &&
+                            components_.of_frame[f] >= 0 &&
+                            input_.translations[f].allFinite();
+    if (!is_loose && !is_runaway) continue;
+    const Image& image = model_.images[built_.image_of[v]];
+    parts.images.push_back(
+        {image.id, image.name, num_observations[v], !is_loose,
+         (CentreOf(f, estimate_) - CentreOf(f, input_)).norm()});
+  }
+  for (size_t k = 0; k < built_.point_of.size(); ++k) {
+    if (is_loose_point_[k] == 0) continue;
+    parts.points.push_back({model_.points3D[built_.point_of[k]].id,
+                            (estimate_.points[k] - input_.points[k]).norm()});
+  }
+  if (context_.ranks != nullptr) {
+    parts.points = context_.ranks->Gather(parts.points);
+  }
+  return parts;
+}
+
+LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
+                          const SettleOptions& options, const Context& context,
+                          Estimate* estimate) {
+  Settling settling(model, built, options, context, estimate);
+  if (options.update_frames) settling.SettleFrames();
+  settling.SettlePoints();
+  return settling.Describe();
+}
+
+void MeasureMoves(const Model& before, const Model& after, LooseParts* loose) {
+  const std::vector<ImageGeometry> from = ImageGeometries(before);
+  const std::vector<ImageGeometry> to = ImageGeometries(after);
+  const IdIndex<ImageId> images(before.images);
+  for (LooseImage& image : loose->images) {
+    const int32_t n = *images.Find(image.image_id);
+    image.moved =
+        (Center(to[n].cam_from_world) - Center(from[n].cam_from_world)).norm();
+  }
+  const IdIndex<Point3DId> points(before.points3D);
+  for (LoosePoint& point : loose->points) {
+    const int32_t n = *points.Find(point.point3D_id);
+    point.moved = (after.points3D[n].xyz - before.points3D[n].xyz).norm();
+  }
+}
+
+}  // namespace krot
