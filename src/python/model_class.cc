@@ -12,13 +12,14 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/analysis/settle_contradictions.h"
 #include "krot/geometry/rigid_transform.h"
-#include "krot/model/contradictions.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 #include "krot/model/model_io.h"
 #include "krot/model/validate.h"
 #include "krot/options/option_error.h"
+#include "krot/report/problem_words.h"
 #include "python/bindings.h"
 #include "python/model_arrays.h"
 
@@ -31,18 +32,16 @@ std::shared_ptr<Model> Read(const std::filesystem::path& path,
                             const std::string& on_contradiction) {
   auto model = std::make_shared<Model>();
   *model = ReadModel(path, DetectModelFormat(path));
-  const Contradictions contradictions = FindContradictions(*model);
-  if (on_contradiction == "follow_images") {
-    FollowImages(model.get());
-  } else if (on_contradiction != "follow_tracks" &&
-             on_contradiction != "refuse") {
-    throw OptionError("on_contradiction = " + on_contradiction +
-                      ", must be one of {follow_tracks, follow_images, "
-                      "refuse}");
-  }
+  const Contradictions contradictions =
+      SettleContradictions(on_contradiction, model.get());
   ValidateModel(*model);
-  if (contradictions.Any() && on_contradiction == "refuse") {
-    throw ModelError(contradictions.first);
+  if (!contradictions.Any()) return model;
+  if (on_contradiction == "refuse") throw ModelError(contradictions.first);
+  RequireSettled(path.string(), contradictions);
+  const std::string sentence =
+      path.string() + ContradictionSentence(contradictions);
+  if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) {
+    throw py::error_already_set();
   }
   return model;
 }
@@ -170,7 +169,7 @@ py::tuple Observations(const Model& model) {
 void BindModel(py::module_* module) {
   py::class_<Model, std::shared_ptr<Model>>(*module, "Model")
       .def_static("read", &Read, py::arg("path"), py::kw_only(),
-                  py::arg("on_contradiction") = "follow_tracks")
+                  py::arg("on_contradiction") = "auto")
       .def_static("from_arrays", &ModelFromArrays, py::arg("observations"),
                   py::arg("image_indices"), py::arg("point_indices"),
                   py::arg("rotations"), py::arg("translations"),

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -5,7 +7,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "krot/analysis/pixel_errors.h"
 #include "krot/model/contradictions.h"
+#include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
@@ -17,6 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using Json = nlohmann::json;
 
 class OnContradiction : public ::testing::Test {
@@ -75,8 +80,8 @@ std::vector<std::string> Check(const fs::path& model,
           certificate};
 }
 
-TEST_F(OnContradiction, TheTracksAreFollowedAndBothFilesKept) {
-  const KrotResult result = RunKrot(Solve("output"));
+TEST_F(OnContradiction, TheTracksAreFollowedAndBothFilesKeptWhereAsked) {
+  const KrotResult result = RunKrot(With(Solve("output"), "follow_tracks"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, HasSubstr("contradicts itself: 2 track elements"));
   EXPECT_THAT(result.err, HasSubstr("the tracks are followed"));
@@ -87,9 +92,158 @@ TEST_F(OnContradiction, TheTracksAreFollowedAndBothFilesKept) {
   EXPECT_EQ(contradictions["track_elements"], 2);
   EXPECT_EQ(contradictions["points2D"], 1 + num_images());
   EXPECT_EQ(Report()["num_observations"], model_.track_elements.size());
+  EXPECT_EQ(contradictions["followed"], "tracks");
+  for (const fs::path& model : {input_, folder_ / "output"}) {
+    EXPECT_EQ(
+        RunKrot(With(Check(model, folder_ / "output.json"), "follow_tracks"))
+            .exit_code,
+        0);
+  }
+}
+
+// Of the three contradictions the tracks are right about all.
+TEST_F(OnContradiction, TheSideThatFitsIsFollowedByDefaultAndBothAgree) {
+  const KrotResult result = RunKrot(Solve("output"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("the tracks are followed"));
+  Model agreed = SmallLegacyModel();
+  for (Image& image : agreed.images) {
+    image.points2D.push_back({5, 0, kInvalidPoint3DId});
+  }
+  Ignoring ignoring;
+  ignoring.translations = ignoring.coordinates = ignoring.point_errors = true;
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(agreed, ignoring));
   for (const fs::path& model : {input_, folder_ / "output"}) {
     EXPECT_EQ(RunKrot(Check(model, folder_ / "output.json")).exit_code, 0);
   }
+}
+
+// As GTSFM exports models: every track names the first 2D point of its images.
+Model WithTracksOfFirst2DPoints(Model model) {
+  for (TrackElement& element : model.track_elements) element.point2D_idx = 0;
+  return model;
+}
+
+double LargestError(const Model& model) {
+  return Summarize(PixelErrors(model)).max;
+}
+
+TEST_F(OnContradiction, TracksThatNameWrong2DPointsAreNotFollowed) {
+  const Model right = SmallLegacyModel();
+  const Model wrong = WithTracksOfFirst2DPoints(right);
+  Save(wrong, input_);
+  const KrotResult result = RunKrot(Solve("output"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("the images are followed"));
+  const Json contradictions = Report()["contradictions"];
+  EXPECT_EQ(contradictions["followed"], "images");
+  EXPECT_NEAR(contradictions["max_px"]["tracks"].get<double>(),
+              LargestError(wrong), 1e-9);
+  EXPECT_NEAR(contradictions["max_px"]["images"].get<double>(),
+              LargestError(right), 1e-9);
+  const Model output = Load(folder_ / "output");
+  EXPECT_FALSE(FindContradictions(output).Any());
+  EXPECT_EQ(output.track_elements.size(), right.track_elements.size());
+  EXPECT_LT(LargestError(output), LargestError(right));
+}
+
+// "Initial cost : 0.5 [px]", of the images' side.
+double InitialRmsOfColmap(const fs::path& model, const TempFolder& folder) {
+  fs::create_directory(folder / "adjusted");
+  EXPECT_TRUE(RunColmap({"bundle_adjuster", "--input_path", model,
+                         "--output_path", folder / "adjusted"},
+                        folder / "colmap.log"));
+  const std::string log = ReadBytes(folder / "colmap.log");
+  return std::stod(log.substr(log.find(':', log.find("Initial cost")) + 1));
+}
+
+TEST_F(OnContradiction, ColmapsAdjustmentBeginsWithTheErrorsThatWereReported) {
+  if (!HasColmap()) GTEST_SKIP() << "COLMAP is not installed";
+  Save(WithTracksOfFirst2DPoints(SmallLegacyModel()), input_);
+  ASSERT_EQ(RunKrot(Solve("output")).exit_code, 0);
+  // COLMAP's is over both coordinates.
+  EXPECT_NEAR(InitialRmsOfColmap(folder_ / "output", folder_) * std::sqrt(2),
+              Report()["pixel_error"]["after"]["rms"].get<double>(), 1e-3);
+}
+
+TEST_F(OnContradiction, ErrorsThatFallAsAllPointsBecomeOneAreNoResult) {
+  const Model wrong = WithTracksOfFirst2DPoints(SmallLegacyModel());
+  Save(wrong, input_);
+  const KrotResult result = RunKrot(With(Solve("output"), "follow_tracks"));
+  EXPECT_EQ(result.exit_code, 8);
+  const std::string words = "all " + std::to_string(wrong.points3D.size()) +
+                            " points that two cameras see lie in one place";
+  EXPECT_THAT(result.err, HasSubstr("warning: No estimate is of use: "));
+  EXPECT_THAT(result.err, HasSubstr(words));
+  EXPECT_THAT(result.out, HasSubstr(words));
+  EXPECT_EQ(Report()["termination"], "collapsed");
+  EXPECT_EQ(Report()["collapse"]["is_in_one_place"], true);
+  Ignoring point_errors;
+  point_errors.point_errors = true;
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(wrong, point_errors));
+}
+
+TEST_F(OnContradiction, AnAdjustmentThatMakesAllPointsOneSaysSo) {
+  Save(WithTracksOfFirst2DPoints(SmallLegacyModel()), input_);
+  const KrotResult result =
+      RunKrot(With({"bundle_adjuster", "--input_path", input_, "--output_path",
+                    folder_ / "adjusted"},
+                   "follow_tracks"));
+  EXPECT_THAT(result.err, HasSubstr("warning: what was written is of no use: "
+                                    "the errors fall only where "));
+  EXPECT_THAT(result.err, HasSubstr("warning: by the images' side"));
+}
+
+// A 2D point far away that an image names rightly, and a track wrongly, too.
+TEST_F(OnContradiction, WhereTheImagesSideBecomesWorseTheModelIsGivenBack) {
+  Model model = SmallLegacyModel();
+  model.track_elements.push_back(model.track_elements.front());
+  ++model.points3D.back().track_end;
+  Save(model, input_);
+  const std::string words = "by the images' side";
+  const KrotResult by_tracks = RunKrot(With(Solve("output"), "follow_tracks"));
+  EXPECT_EQ(by_tracks.exit_code, 8);
+  EXPECT_THAT(by_tracks.err, HasSubstr("warning: No better estimate"));
+  EXPECT_THAT(by_tracks.err, HasSubstr(words));
+  EXPECT_THAT(by_tracks.out, HasSubstr(words));
+  Ignoring point_errors;
+  point_errors.point_errors = true;
+  EXPECT_THAT(Load(folder_ / "output"), IsModel(model, point_errors));
+  const KrotResult by_default = RunKrot(Solve("default"));
+  EXPECT_EQ(by_default.exit_code, 0);
+  EXPECT_THAT(by_default.err, Not(HasSubstr(words)));
+  EXPECT_LT(LargestError(Load(folder_ / "default")),
+            LargestError(SmallLegacyModel()));
+}
+
+// The images' side is one 2D point off, the tracks' two.
+TEST_F(OnContradiction, WhereNeitherSideFitsEveryCommandRefuses) {
+  Model model = SmallLegacyModel();
+  for (Image& image : model.images) {
+    std::rotate(image.points2D.begin(), image.points2D.begin() + 1,
+                image.points2D.end());
+  }
+  for (TrackElement& element : model.track_elements) {
+    element.point2D_idx = (element.point2D_idx + 1) % 10;
+  }
+  Save(model, input_);
+  const std::vector<std::vector<std::string>> commands = {
+      Solve("output"),
+      {"bundle_adjuster", "--input_path", input_, "--output_path",
+       folder_ / "output"},
+      {"model_analyzer", "--path", input_},
+      {"tolerance_analyzer", "--input_path", input_}};
+  for (const std::vector<std::string>& command : commands) {
+    const KrotResult result = RunKrot(command);
+    EXPECT_EQ(result.exit_code, 2) << command[0];
+    EXPECT_THAT(result.err,
+                IsOneSentence("krot " + command[0],
+                              "neither fits; --Model.on_contradiction"));
+    EXPECT_FALSE(fs::exists(folder_ / "output"));
+  }
+  EXPECT_EQ(RunKrot(With({"model_analyzer", "--path", input_}, "follow_images"))
+                .exit_code,
+            0);
 }
 
 TEST_F(OnContradiction, TheImagesAreFollowedWhereAskedAndAgreeAfterwards) {
@@ -153,8 +307,7 @@ TEST_F(OnContradiction, EveryOtherCommandReadsAndCounts) {
     EXPECT_EQ(contradictions["track_elements"], 2) << command[0];
     fs::remove(report_);
   }
-  // Nothing that is gone comes back as a point of the other model.
-  EXPECT_EQ(FindContradictions(Load(folder_ / "overlay")).num_points2D, 2);
+  EXPECT_FALSE(FindContradictions(Load(folder_ / "overlay")).Any());
 }
 
 TEST_F(OnContradiction, A2DPointInTwoTracksIsAnObservationOfBoth) {
@@ -163,9 +316,10 @@ TEST_F(OnContradiction, A2DPointInTwoTracksIsAnObservationOfBoth) {
   model.track_elements.push_back(model.track_elements.front());
   ++model.points3D.back().track_end;
   Save(model, folder_ / "twice");
-  const KrotResult result =
-      RunKrot({"model_comparer", "--input_path1", folder_ / "twice",
-               "--input_path2", folder_ / "twice", "--report_path", report_});
+  const KrotResult result = RunKrot(
+      With({"model_comparer", "--input_path1", folder_ / "twice",
+            "--input_path2", folder_ / "twice", "--report_path", report_},
+           "follow_tracks"));
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(Report()["num_observations"]["shared"],
             model.track_elements.size());

@@ -112,5 +112,29 @@ TEST(SameImageOption, LeavesOneOfAnImageInATrackAndNamesTracksInTheSupport) {
   EXPECT_LT(closest["cost_final"], keep["cost_final"]);
 }
 
+// Twins that were left out end above the largest error of the input.
+TEST(SameImageOption, GivesAModelWhereverTheTwinsEnd) {
+  const TempFolder folder;
+  SceneOptions options = SmallScene();
+  options.duplicate_ratio = 0.5;
+  Save(SynthesizeScene(options).ground_truth, folder / "input");
+  for (const char* command : {"solver", "point_triangulator"}) {
+    const KrotResult result =
+        RunKrot({command, "--input_path", folder / "input", "--output_path",
+                 folder / command, "--report_path", folder / command / "r.json",
+                 "--Problem.same_image", "closest"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("are taken to be wrong: left out, still "
+                                      "in the model"));
+    const Json report = Json::parse(ReadBytes(folder / command / "r.json"));
+    EXPECT_EQ(report["is_given_back"], false);
+    EXPECT_LT(report["pixel_error"]["after"]["max"],
+              report["pixel_error"]["before"]["max"]);
+    EXPECT_EQ(report["pixel_error"]["after"]["max"], report["cost_final"]);
+    EXPECT_EQ(Load(folder / command).track_elements.size(),
+              Load(folder / "input").track_elements.size());
+  }
+}
+
 }  // namespace
 }  // namespace krot

@@ -123,7 +123,8 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "threads", "seed", "rounds", "linear_cost", "linear_lower_bound",
           "linear_relative_gap", "is_given_back", "contradictions", "finish",
           "same_image", "outliers", "rotations", "fixed", "positions",
-          "support_positions", "poses", "not_held", "announced_memory_bytes"));
+          "support_positions", "poses", "not_held", "announced_memory_bytes",
+          "verdict", "collapse", "is_underdetermined"));
   EXPECT_THAT(Keys(report["finish"]),
               ::testing::UnorderedElementsAre(
                   "finish", "loss", "termination", "cap", "lowest_cost",
@@ -234,6 +235,21 @@ TEST_F(Commands, SolverWarnsOfAGapThatIsMissed) {
   EXPECT_THAT(result.err, ::testing::HasSubstr("is not written"));
   EXPECT_EQ(Report()["termination"], "max_iterations");
   EXPECT_FALSE(std::filesystem::exists(folder_ / "certificate.json"));
+}
+
+TEST_F(Commands, SolverWarnsOfErrorsOfZeroThatSayNothing) {
+  SceneOptions options = SmallScene();
+  options.num_frames = 2;
+  options.num_points = 2;
+  options.track_length = 2;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const KrotResult result = Run("solver");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, ::testing::HasSubstr(
+                              "warning: errors of zero say nothing: 4 "
+                              "observations are too few to determine 2 frames "
+                              "and 2 points"));
+  EXPECT_EQ(Report()["is_underdetermined"], true);
 }
 
 TEST_F(Commands, SolverNeedsNoTranslations) {

@@ -54,7 +54,7 @@ void Read(ByteSource source) {
     Model model = ReadParts(source);
     FindContradictions(model);
     Use(model);
-    FollowImages(&model);
+    Follow(Reading::kImages, &model);
     Use(model);
   } catch (const ModelError&) {
   }

@@ -65,7 +65,7 @@ void ExpectContradictions(const Model& model, int num_track_elements,
 // Following the images leaves their observations and no contradiction.
 void ExpectImagesCanBeFollowed(const Model& model) {
   Model followed = model;
-  FollowImages(&followed);
+  Follow(Reading::kImages, &followed);
   EXPECT_NO_THROW(ValidateModel(followed));
   EXPECT_FALSE(FindContradictions(followed).Any());
   EXPECT_EQ(OfTracks(followed), OfImages(model));
@@ -76,7 +76,7 @@ TEST(Contradictions, AreNotFoundInAModelThatAgreesWithItself) {
   for (const Model& model : {TinyModel(), TinyRigModel(), Model()}) {
     ExpectContradictions(model, 0, 0, "");
     Model followed = model;
-    FollowImages(&followed);
+    Follow(Reading::kImages, &followed);
     EXPECT_THAT(followed, IsModel(model));
   }
 }
@@ -144,9 +144,9 @@ TEST(Contradictions, WithImagesAnd2DPointsThatDoNotExistGoWithTheImages) {
   }
 }
 
-TEST(FollowImages, KeepsTheOrderOfATrackAndAppendsWhatItLacked) {
+TEST(Follow, TheImagesKeepsTheOrderOfATrackAndAppendsWhatItLacked) {
   Model model = WithElement(3, 9, 0);  // of point 12, between two that agree
-  FollowImages(&model);
+  Follow(Reading::kImages, &model);
   ASSERT_EQ(model.track_elements.size(), 5u);
   EXPECT_EQ(model.track_elements[2].image_id, 9u);
   EXPECT_EQ(model.track_elements[3].point2D_idx, 3u);
@@ -171,6 +171,40 @@ TEST(Contradictions, OfRealModelsAreCounted) {
     EXPECT_EQ(found.num_points2D, num_points2D) << name;
     ExpectImagesCanBeFollowed(model);
   }
+}
+
+// {9, 0} in the tracks of both points, named by the first: theirs.
+TEST(Follow, TheTracksLeavesA2DPointOfTwoTracksToTheOneThatItNames) {
+  Model model = WithElement(2, 9, 0);
+  Follow(Reading::kTracks, &model);
+  EXPECT_NO_THROW(ValidateModel(model));
+  EXPECT_FALSE(FindContradictions(model).Any());
+  Model expected = TinyModel();
+  std::multiset<Observation> observations = OfTracks(expected);
+  observations.erase({9, 1, 12});  // which no track names any more
+  EXPECT_EQ(OfTracks(model), observations);
+}
+
+TEST(Follow, TheTracksLeavesA2DPointOfTwoTracksToTheFirstIfItNamesNeither) {
+  Model model = WithElement(2, 9, 0);
+  model.images[2].points2D[0].point3D_id = 1;
+  Follow(Reading::kTracks, &model);
+  EXPECT_FALSE(FindContradictions(model).Any());
+  EXPECT_EQ(OfTracks(model).count({9, 0, 5000000000}), 1u);
+  EXPECT_EQ(OfTracks(model).count({9, 0, 12}), 0u);
+}
+
+TEST(Follow, BothTakesTheTracksWhere2DPointsNameNothing) {
+  Model model = TinyModel();
+  model.images[2].points2D[1].point3D_id = kInvalidPoint3DId;  // of point 12
+  model.images[0].points2D[3].point3D_id = 1;                  // likewise
+  Follow(Reading::kBoth, &model);
+  EXPECT_NO_THROW(ValidateModel(model));
+  EXPECT_FALSE(FindContradictions(model).Any());
+  EXPECT_EQ(OfTracks(model).count({9, 1, 12}), 1u);
+  EXPECT_EQ(OfTracks(model).count({4000000000, 3, 1}), 1u);
+  EXPECT_EQ(OfTracks(model).count({4000000000, 3, 12}), 0u);
+  EXPECT_EQ(OfTracks(model).size(), 5u);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/pipeline/solve_model.h"
+#include "krot/synthetic/scene.h"
 #include "tests/bridge/lens_model.h"
 #include "tests/testing/model_matchers.h"
 
@@ -69,11 +70,12 @@ Model ModelThatAnyStepSpoils() {
   return model;
 }
 
-class GivenBack : public ::testing::TestWithParam<double> {};
+class GivenBackIn : public ::testing::TestWithParam<double> {};
 
-INSTANTIATE_TEST_SUITE_P(Norms, GivenBack, ::testing::Values(1, 2, kInfinity));
+INSTANTIATE_TEST_SUITE_P(Norms, GivenBackIn,
+                         ::testing::Values(1, 2, kInfinity));
 
-TEST_P(GivenBack, IsTheInputAndAllNumbersSpeakOfIt) {
+TEST_P(GivenBackIn, IsTheInputAndAllNumbersSpeakOfIt) {
   const Model model = ModelThatAnyStepSpoils();
   SolveModelOptions options;
   options.norm = {GetParam()};
@@ -100,7 +102,7 @@ TEST_P(GivenBack, IsTheInputAndAllNumbersSpeakOfIt) {
   }
 }
 
-TEST_P(GivenBack, IsNotWhatCanBeImproved) {
+TEST_P(GivenBackIn, IsNotWhatCanBeImproved) {
   const Model model = MakeLensModel({});
   SolveModelOptions options;
   options.norm = {GetParam()};
@@ -111,6 +113,90 @@ TEST_P(GivenBack, IsNotWhatCanBeImproved) {
     return *std::max_element(errors.begin(), errors.end());
   };
   EXPECT_LT(largest(result.model), largest(model));
+}
+
+// Every image sees every point at its first 2D point.
+Model ModelThatCollapses() {
+  Model model = MakeLensModel({});
+  for (Image& image : model.images) {
+    const Point2D first = image.points2D.front();
+    for (Point2D& point : image.points2D) {
+      point.x = first.x;
+      point.y = first.y;
+    }
+  }
+  return model;
+}
+
+TEST(GivenBack, IsAModelWhoseErrorsFallOnlyWhereAllPointsBecomeOne) {
+  const Model model = ModelThatCollapses();
+  const SolveModelResult result = SolveModel(model, {});
+  EXPECT_EQ(result.summary.termination, SolveTermination::kCollapsed);
+  EXPECT_TRUE(result.summary.is_given_back);
+  EXPECT_TRUE(result.summary.collapse.is_in_one_place);
+  Ignoring stored_errors;
+  stored_errors.point_errors = true;
+  EXPECT_THAT(result.model, IsModel(model, stored_errors));
+  EXPECT_EQ(result.summary.pixel_error_after.max,
+            result.summary.pixel_error_before.max);
+}
+
+TEST(GivenBack, IsNotAModelWithoutNoiseWhoseErrorsFallToZero) {
+  SceneOptions scene;
+  scene.num_frames = 8;
+  scene.num_points = 100;
+  scene.start_translation_noise = 0.05;
+  scene.start_point_noise = 0.05;
+  const SolveSummary summary =
+      SolveModel(SynthesizeScene(scene).model, {}).summary;
+  EXPECT_GT(summary.cost_initial, 10);
+  EXPECT_EQ(summary.termination, SolveTermination::kZeroCost);
+  EXPECT_FALSE(summary.collapse.Any());
+  EXPECT_FALSE(summary.is_underdetermined);
+  EXPECT_FALSE(summary.is_given_back);
+}
+
+TEST(IsUnderdetermined, WhereObservationsAreNoMoreThanWhatTheyDetermine) {
+  // 4 numbers of a point against 6 of two frames, 3 of each point, and 4 that
+  // are free in any case.
+  for (const int num_points : {1, 2, 3}) {
+    SceneOptions scene;
+    scene.num_frames = 2;
+    scene.num_points = num_points;
+    scene.track_length = 2;
+    scene.pixel_noise = 1;
+    const SolveSummary summary =
+        SolveModel(SynthesizeScene(scene).model, {}).summary;
+    ASSERT_EQ(summary.num_observations, 2 * num_points);
+    EXPECT_EQ(summary.is_underdetermined, num_points <= 2);
+  }
+}
+
+// Of the truth, which least squares would hardly improve. Half of all
+// observations have a twin up to two pixels away.
+Model ModelOfTwins() {
+  SceneOptions scene;
+  scene.num_frames = 8;
+  scene.num_points = 100;
+  scene.pixel_noise = 0.7;
+  scene.duplicate_ratio = 0.5;
+  return SynthesizeScene(scene).ground_truth;
+}
+
+TEST(GivenBack, IsNotAModelWhoseTwinsRiseThatWereLeftOut) {
+  const Model model = ModelOfTwins();
+  SolveModelOptions options;
+  options.problem.same_image = SameImage::kClosest;
+  const SolveModelResult result = SolveModel(model, options);
+  const SolveSummary& summary = result.summary;
+  const double largest_before = Summarize(PixelErrors(model)).max;
+  const double largest_after = Summarize(PixelErrors(result.model)).max;
+  ASSERT_GT(largest_after, largest_before);  // a twin's, or this shows nothing
+  EXPECT_FALSE(summary.is_given_back);
+  EXPECT_EQ(summary.largest_twin_error, largest_after);
+  EXPECT_LT(summary.cost_final, summary.cost_initial);
+  EXPECT_EQ(summary.pixel_error_after.max, summary.cost_final);
+  EXPECT_EQ(summary.pixel_error_after.count, summary.num_observations);
 }
 
 }  // namespace

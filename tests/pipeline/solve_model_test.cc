@@ -11,6 +11,8 @@
 #include <gtest/gtest.h>
 
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/camera/projection_row.h"
+#include "krot/model/image_geometry.h"
 #include "krot/model/validate.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
@@ -51,6 +53,44 @@ TEST(SolveModel, ReportsTheCostsOfTheModelsItTakesAndGives) {
     EXPECT_NEAR(summary.cost_initial, CostOf(model), 1e-9);
     EXPECT_NEAR(summary.cost_final, CostOf(result.model), 1e-9);
     EXPECT_LT(summary.cost_final, summary.cost_initial);
+  }
+}
+
+// Two images that see a point in the centre of a camera, but for a hair.
+Model WithAPointInACamera(Model model) {
+  Point3D point;
+  point.id = 1000000;
+  point.track_begin = model.track_elements.size();
+  const RigidTransform first = ImageGeometries(model)[0].cam_from_world;
+  point.xyz =
+      Center(first) + first.rotation.transpose() * Eigen::Vector3d(0, 0, 1e-12);
+  for (size_t n = 0; n < 2; ++n) {
+    Image& image = model.images[n];
+    const Camera& camera = model.cameras[0];
+    const Eigen::Vector2d pixel =
+        ProjectPoint(camera.model_id, camera.params.data(),
+                     ImageGeometries(model)[n].cam_from_world * point.xyz)
+            .value_or(Eigen::Vector2d::Zero());
+    model.track_elements.push_back(
+        {image.id, static_cast<uint32_t>(image.points2D.size())});
+    image.points2D.push_back({pixel.x(), pixel.y(), point.id});
+  }
+  point.track_end = model.track_elements.size();
+  model.points3D.push_back(point);
+  return model;
+}
+
+TEST(SolveModel, ReportsTheMaximumOfTheModelThatItGives) {
+  const Model model = SynthesizeScene(NoisyScene()).model;
+  for (const Model& input : {model, WithAPointInACamera(model)}) {
+    for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
+      SolveModelOptions options;
+      options.norm = norm;
+      const SolveModelResult result = SolveModel(input, options);
+      const std::vector<double> errors = PixelErrors(result.model, -1, norm);
+      EXPECT_EQ(result.summary.cost_final,
+                *std::max_element(errors.begin(), errors.end()));
+    }
   }
 }
 

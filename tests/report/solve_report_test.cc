@@ -62,15 +62,16 @@ TEST(SolveTable, ShowsErrorsCountsAndWhyItEnded) {
               HasSubstr("5 observations left out (behind 2, short_track 3)"));
   EXPECT_THAT(table, HasSubstr("1 observation without a finite error"));
   EXPECT_THAT(table, HasSubstr("Stalled after 2 sweeps"));
-  EXPECT_THAT(table, HasSubstr("not proved optimal"));
+  EXPECT_THAT(table, HasSubstr("Maximum 0.1000 px over the observations in the "
+                               "optimisation, not proved optimal"));
   EXPECT_THAT(table, Not(HasSubstr("support")));
 }
 
 TEST(SolveTable, HasNoRowForACostThatIsTheMaximum) {
   SolveReport report = SomeReport();
-  report.summary.pixel_error_before.max = report.summary.cost_initial;
   report.summary.pixel_error_after.max = report.summary.cost_final;
   EXPECT_THAT(SolveTable(report), Not(HasSubstr("cost (")));
+  EXPECT_THAT(SolveTable(report), HasSubstr("Maximum 0.1000 px, not proved"));
   report.summary.norm = Norm::LInf();
   EXPECT_THAT(SolveTable(report), HasSubstr("cost (max optimised, p = inf)"));
   EXPECT_THAT(SolveTable(report), HasSubstr("Maximum 0.1000 px (p = inf), "));
@@ -83,7 +84,7 @@ SolveReport CertifiedReport() {
   summary.method = SolveMethod::kAuto;
   summary.termination = SolveTermination::kGapReached;
   summary.num_components = 2;
-  summary.cost_final = 3.10106;
+  summary.cost_final = summary.pixel_error_after.max = 3.10106;
   summary.is_certified = true;
   summary.lower_bound = 3.10105;
   summary.relative_gap = 3.2e-6;
@@ -131,15 +132,17 @@ TEST(SolveJson, HoldsBoundIterationsAndSupport) {
 
 TEST(SolveTable, GivesTheVerdictAndTheTenWorstOfTheSupport) {
   const std::string table = SolveTable(CertifiedReport());
-  EXPECT_THAT(table, HasSubstr("Maximum 3.1011 px, proved optimal to 0.0003 %: "
-                               "no translations and points bring all errors "
-                               "below 3.1010 px.\n"));
+  EXPECT_THAT(table,
+              HasSubstr("Maximum 3.1011 px, proved to be within 0.0003 % "
+                        "of the lowest: no translations and points "
+                        "bring all errors below 3.1010 px.\n"));
   EXPECT_THAT(table, HasSubstr("12 observations, worst first; the first 10"));
   EXPECT_THAT(table, HasSubstr("  79  "));
   EXPECT_THAT(table, Not(HasSubstr("  80  ")));
   EXPECT_THAT(table, HasSubstr("Ended after 1 iteration to a start, 2 joint "
                                "iterations on 3 % of the observations and 2 "
-                               "sweeps with the gap"));
+                               "sweeps: the lowest maximum is known to the gap "
+                               "asked for."));
   EXPECT_THAT(table, HasSubstr("falls into 2 components"));
 }
 
@@ -148,7 +151,7 @@ SolveReport CurvedReport() {
   SolveReport report = CertifiedReport();
   SolveSummary& summary = report.summary;
   summary.termination = SolveTermination::kStalled;
-  summary.cost_final = 4;
+  summary.cost_final = summary.pixel_error_after.max = 4;
   summary.lower_bound = 3.98;
   summary.relative_gap = 0.005;
   summary.rounds = {{3.5, 3.25, 0.5, 4.5, std::nullopt, 1},
@@ -161,7 +164,7 @@ TEST(SolveTable, SaysBothGapsWhereTheTrueOneIsTheLarger) {
       " With every error linearised at this estimate the gap is 0.0050 %";
   SolveReport report = CurvedReport();
   std::string table = SolveTable(report);
-  EXPECT_THAT(table, HasSubstr("proved optimal to 0.5000 %"));
+  EXPECT_THAT(table, HasSubstr("proved to be within 0.5000 % of the lowest"));
   EXPECT_THAT(table, HasSubstr("below 3.9800 px." + both));
   EXPECT_THAT(table, HasSubstr("Stalled after 2 rounds, 1 iteration to a "));
 
@@ -211,6 +214,79 @@ TEST(SolveReport, SaysThatTheInputWasGivenBack) {
   report.summary.polish.emplace();
   EXPECT_THAT(SolveTable(report), HasSubstr("the polish began at the model as "
                                             "it was read."));
+}
+
+TEST(SolveReport, SaysTheSameOfTheMaximumOnTheTerminalAndInTheReport) {
+  for (SolveReport report : {SomeReport(), CertifiedReport(), CurvedReport()}) {
+    for (const bool is_finished : {false, true}) {
+      if (is_finished) report.summary.finish.emplace();
+      const std::string verdict =
+          nlohmann::json::parse(SolveJson(report))["verdict"];
+      EXPECT_THAT(SolveTable(report), HasSubstr("\n" + verdict + "\n"));
+      EXPECT_EQ(verdict, VerdictSentence(report.summary));
+      const std::string gap =
+          report.summary.is_certified
+              ? "proved to be within " +
+                    GapPercent(*report.summary.relative_gap) + " of the lowest"
+              : "not proved optimal";
+      EXPECT_THAT(verdict, HasSubstr(gap));
+    }
+  }
+}
+
+TEST(SolveReport, SaysWhatFellTogether) {
+  SolveReport report = CertifiedReport();
+  report.summary.collapse.num_points = 100;
+  report.summary.collapse.in_camera = {17};
+  report.summary.collapse.at_infinity = {1, 2, 3, 4, 5, 6};
+  EXPECT_THAT(
+      SolveTable(report),
+      HasSubstr("1 point came to lie in a camera, where any observation "
+                "of it fits: point3D_id 17.\n"
+                "6 points came to lie at infinity, as their rays are "
+                "parallel: point3D_id 1, 2, 3, 4, 5, ....\n"));
+  const auto json = nlohmann::json::parse(SolveJson(report))["collapse"];
+  EXPECT_EQ(json["in_camera"], std::vector<int>{17});
+  EXPECT_EQ(json["at_infinity"].size(), 6u);
+  EXPECT_EQ(json["is_in_one_place"], false);
+
+  report.summary.collapse.num_points = 10;
+  report.summary.is_given_back = true;
+  report.summary.termination = SolveTermination::kCollapsed;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("No estimate is of use: the errors fall only where of "
+                        "10 points that two cameras see 1 lie in a camera and "
+                        "6 at infinity"));
+}
+
+TEST(SolveReport, SaysWhereErrorsOfZeroSayNothing) {
+  SolveReport report = SomeReport();
+  report.summary.cost_final = 1e-12;
+  report.summary.num_frames = 2;
+  report.summary.num_points = 1;
+  report.summary.num_observations = 2;
+  EXPECT_THAT(SolveTable(report), Not(HasSubstr("too few")));
+  report.summary.is_underdetermined = true;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("which says nothing: 2 observations are too few to "
+                        "determine 2 frames and 1 point."));
+}
+
+TEST(SolveReport, SaysWhatBecameOfTwins) {
+  SolveReport report = CertifiedReport();
+  report.summary.num_same_image_tracks = 2;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("\n2 tracks with an image more than once.\n"));
+  report.summary.left_out[static_cast<size_t>(LeftOut::kSameImage)] = 3;
+  report.summary.largest_twin_error = 7.5;
+  EXPECT_THAT(SolveTable(report),
+              HasSubstr("2 tracks with an image more than once; 3 observations "
+                        "that are not the closest of the image and track are "
+                        "taken to be wrong: left out, still in the model, and "
+                        "in no error above (the largest has 7.5000 px).\n"));
+  EXPECT_EQ(nlohmann::json::parse(
+                SolveJson(report))["same_image"]["largest_left_out"],
+            7.5);
 }
 
 TEST(SolveTable, SaysHowMuchTheJointSolverLookedAt) {
@@ -285,7 +361,7 @@ TEST(MissedGapSentence, SaysWhichLimitWasHit) {
   summary.termination = SolveTermination::kMaxIterations;
   EXPECT_EQ(MissedGapSentence(summary),
             "the gap asked for is not reached: Joint.max_iterations was hit; "
-            "the gap is 3.2e-06");
+            "the maximum is proved to be within 0.0003 % of the lowest");
   summary.termination = SolveTermination::kStalled;
   summary.relative_gap.reset();
   EXPECT_EQ(MissedGapSentence(summary),
@@ -300,7 +376,9 @@ TEST(MissedGapSentence, SaysWhichLimitWasHit) {
 TEST(NothingToSolve, SaysWhy) {
   SolveSummary summary;
   EXPECT_EQ(NothingToSolveSentence(summary),
-            "nothing to solve: the model has no observations");
+            "nothing to solve: the model has no observations "
+            "(2D points that see 3D points); colmap point_triangulator makes "
+            "them from its poses and a database of matches");
   summary.left_out = {0, 1, 0, 1000, 0};
   EXPECT_EQ(NothingToSolveSentence(summary),
             "nothing to solve: 1001 observations left out (undistortion 1, "

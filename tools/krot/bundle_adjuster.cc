@@ -91,6 +91,7 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
   WriteReports(paths.report_path, paths.html_path, AdjustmentJson(report),
                model, result.model, num_threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
+  WarnOfDegeneration(model, result.model, common.log);
   if (context.IsCancelled()) ThrowInterrupted(paths);
   return kExitDone;
 }

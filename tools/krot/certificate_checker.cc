@@ -18,7 +18,7 @@ namespace {
 struct CheckerOptions {
   std::string input_path;
   std::string certificate_path;
-  std::string on_contradiction = "follow_tracks";
+  std::string on_contradiction = "auto";
   std::string report_path;
   int num_worst = 10;
   CommonOptions common;

@@ -28,7 +28,7 @@ struct AnalyzerOptions {
   std::string error_colors_path;
   double error_colors_top = 4;
   bool overwrite = false;
-  std::string on_contradiction = "follow_tracks";
+  std::string on_contradiction = "auto";
   int num_worst = 10;
   CommonOptions common;
 };

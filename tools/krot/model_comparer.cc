@@ -40,7 +40,7 @@ struct ComparerOptions {
   std::string overlay_path;
   std::string output_type = "BIN";
   bool overwrite = false;
-  std::string on_contradiction = "follow_tracks";
+  std::string on_contradiction = "auto";
   CommonOptions common;
 };
 

@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 #include <utility>
 
+#include "krot/analysis/collapse.h"
+#include "krot/analysis/settle_contradictions.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
 #include "krot/model/file_bytes.h"
@@ -28,22 +31,6 @@ ModelFormat OutputFormat(const ModelPaths& paths) {
   if (paths.output_type == "BIN") return ModelFormat::kBinary;
   if (paths.output_type == "TXT") return ModelFormat::kText;
   return input_format;
-}
-
-// Whether a track has two elements. Of a model without there is one thing to
-// say alone: that there is nothing to solve.
-bool SetsAnything(const Model& model) {
-  return std::any_of(model.points3D.begin(), model.points3D.end(),
-                     [](const Point3D& point) {
-                       return point.track_end - point.track_begin >= 2;
-                     });
-}
-
-std::string ContradictionWords(const Contradictions& contradictions) {
-  return Counted(contradictions.num_track_elements, "track element") +
-         " of 2D points that do not name the 3D point, and " +
-         Counted(contradictions.num_points2D, "2D point") +
-         " of 3D points whose track does not name the 2D point";
 }
 
 // What is written as it was read and takes no part; "" if there is nothing.
@@ -182,12 +169,17 @@ void ThrowInterrupted(const ModelPaths& paths) {
 }
 
 void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
-  parser->AddChoice("Model.on_contradiction", on_contradiction,
-                    {"follow_tracks", "follow_images", "refuse"},
-                    "Where tracks and images name different observations: "
-                    "follow_tracks: the tracks count, and both are written as "
-                    "they are; follow_images: tracks are made anew from the "
-                    "images' 2D points; refuse: such a model is not read");
+  parser->AddChoice(
+      "Model.on_contradiction", on_contradiction,
+      {"auto", "follow_tracks", "follow_images", "refuse"},
+      "Where tracks and images name different observations: auto: the side "
+      "that "
+      "fits the model's own positions counts, and both are written so that "
+      "they "
+      "agree; follow_tracks: the tracks count, and both are written as they "
+      "are; "
+      "follow_images: tracks are made anew from the images' 2D points; refuse: "
+      "such a model is not read");
 }
 
 ValidModel ReadValidModel(const std::string& path,
@@ -197,9 +189,7 @@ ValidModel ReadValidModel(const std::string& path,
   BeginPhase(log, "reading " + path);
   ValidModel read;
   read.model = ReadModel(path, DetectModelFormat(path));
-  read.contradictions = FindContradictions(read.model);
-  const bool follows_images = on_contradiction == "follow_images";
-  if (follows_images) FollowImages(&read.model);
+  read.contradictions = SettleContradictions(on_contradiction, &read.model);
   ValidateModel(read.model);
   read.poses = CheckPoses(read.model);
   for (const std::string& sentence : PoseSentences(read.poses)) {
@@ -209,13 +199,35 @@ ValidModel ReadValidModel(const std::string& path,
   if (!kept.empty()) LogLine(log, 1, path + ": " + kept);
   if (!read.contradictions.Any()) return read;
   if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
-  if (!SetsAnything(read.model)) return read;
-  LogLine(log, 1,
-          "warning: " + path + " contradicts itself: " +
-              ContradictionWords(read.contradictions) + "; the " +
-              (follows_images ? "images" : "tracks") +
-              " are followed (--Model.on_contradiction)");
+  RequireSettled(path, read.contradictions);
+  // Of a model without there is one thing to say alone: nothing to solve.
+  if (HasTrack(read.model)) {
+    LogLine(log, 1,
+            "warning: " + path + ContradictionSentence(read.contradictions));
+  }
   return read;
+}
+
+void WarnOfDegeneration(const Model& input, const Model& written,
+                        const LogOptions& log) {
+  const Collapse collapse = FindCollapse(input, written);
+  if (collapse.IsWhole()) {
+    LogLine(log, 0,
+            "warning: what was written is of no use: " +
+                WholeCollapseWords(collapse) +
+                "; most likely the observations name the wrong 2D points");
+  } else {
+    std::istringstream lines(CollapseLines(collapse));
+    for (std::string line; std::getline(lines, line);) {
+      LogLine(log, 0, "warning: " + line);
+    }
+  }
+  if (const auto worse = WorseImagesSide(input, written)) {
+    LogLine(log, 0,
+            "warning: " + WorseImagesWords(*worse) +
+                "; --Model.on_contradiction auto writes a model that agrees "
+                "with itself");
+  }
 }
 
 Model ReadInput(const ModelPaths& paths, const LogOptions& log,

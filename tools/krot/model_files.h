@@ -22,7 +22,7 @@ struct ModelPaths {
   std::string output_path;
   std::string output_type = "auto";
   bool overwrite = false;
-  std::string on_contradiction = "follow_tracks";
+  std::string on_contradiction = "auto";
   std::string rotations_path;     // "": the model's own
   std::string fixed_images_path;  // "": all move
   std::string fixed_points_path;  // "": all move
@@ -83,6 +83,12 @@ ValidModel ReadValidModel(const std::string& path,
 // paths.rotations_path, if there is one; fills in what `run` says of the
 // input. Throws ModelError, and CommandError for a model without observations.
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run);
+
+// Of a result that is not given back: points that fit only as they have
+// degenerated, and, of a model that contradicts itself, an images' side that
+// is worse than it was.
+void WarnOfDegeneration(const Model& input, const Model& written,
+                        const LogOptions& log);
 
 // What paths.fixed_*_path name of the model. Throws ModelError.
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,

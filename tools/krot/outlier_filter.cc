@@ -191,6 +191,7 @@ int Run(const OutlierCommand& command) {
   WriteReports(paths.report_path, paths.html_path, report_json, model,
                result.model, command.context.num_threads, log, crops);
   PrintTable(log, OutlierTable(report));
+  WarnOfDegeneration(model, result.model, log);
   if (!report.summary.is_within) {
     LogLine(log, 0, "warning: not all errors are within the bound");
   }

@@ -7,6 +7,7 @@
 
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
+#include "krot/problem/cost.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/free_memory.h"
@@ -195,9 +196,26 @@ void ThrowIfNothingSoFar(const SolveReport& report) {
       "interrupted before there was an estimate, nothing was written");
 }
 
+// Of errors that fell to nothing without saying anything.
+void WarnOfEmptyFall(const LogOptions& log, const SolveSummary& summary) {
+  const bool is_zero = IsZeroUpToRounding(summary.cost_final) &&
+                       !IsZeroUpToRounding(summary.cost_initial);
+  if (summary.termination == SolveTermination::kCollapsed ||
+      summary.worse_images_side) {
+    LogLine(log, 0, "warning: " + GivenBackSentence(summary));
+  } else if (is_zero && summary.is_underdetermined) {
+    LogLine(log, 0,
+            "warning: errors of zero say nothing: " +
+                UnderdeterminedWords(summary));
+  }
+}
+
 void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   const LogOptions& log = command.common.log;
-  if (summary.method == SolveMethod::kResInt) return;
+  if (summary.method == SolveMethod::kResInt ||
+      summary.termination == SolveTermination::kCollapsed) {
+    return;
+  }
   if (summary.termination != SolveTermination::kGapReached &&
       summary.termination != SolveTermination::kZeroCost) {
     LogLine(log, 0, "warning: " + MissedGapSentence(summary));
@@ -291,6 +309,7 @@ int RunSolveCommand(const SolveCommand& command) {
   PrintTable(log, SolveTable(report));
   if (context.IsCancelled()) ThrowInterrupted(paths);
   RemoveCheckpoint(command.checkpoint, log);
+  WarnOfEmptyFall(log, report.summary);
   WarnOfMissedGap(command, report.summary);
   PointToOutlierFilter(log, report);
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/bridge/bridge.h"
 #include "krot/model/image_geometry.h"
 #include "krot/problem/known_rotation_problem.h"
 
@@ -21,5 +22,17 @@ bool HasImageTwice(const Observation* observations, int count);
 std::vector<char> ClosestOfImages(const std::vector<ImageGeometry>& images,
                                   const Observation* observations, int count,
                                   const Eigen::Vector3d& xyz);
+
+// The part that a track element has in a built problem.
+enum class Role : char {
+  kOut,   // none
+  kIn,    // it is an observation of the problem
+  kTwin,  // none, but another of its image and track is, which kClosest prefers
+};
+
+// One for each of the model's track elements, of a problem that was built with
+// `same_image`. O(observations).
+std::vector<Role> RolesOf(const Model& model, const BuiltProblem& built,
+                          SameImage same_image);
 
 }  // namespace krot

@@ -90,6 +90,56 @@ std::string DescribeUnclaimed(const Image& image, uint32_t point2D_idx,
                        ", expected one that exists in points3D");
 }
 
+// What no track confirms.
+void DropUnconfirmedNames(Model* model) {
+  Claims claims(*model);
+  for (const Point3D& point : model->points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      claims.Take(point, model->track_elements[e]);
+    }
+  }
+  claims.ForEachUnclaimed([&](size_t n, uint32_t i) {
+    model->images[n].points2D[i].point3D_id = kInvalidPoint3DId;
+  });
+}
+
+// 2D points that name none: after the first track that names them.
+void NameByTracks(Model* model) {
+  const IdIndex<ImageId> images(model->images);
+  for (const Point3D& point : model->points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model->track_elements[e];
+      const std::optional<int32_t> n = images.Find(element.image_id);
+      if (!n) continue;
+      std::vector<Point2D>& points2D = model->images[*n].points2D;
+      if (element.point2D_idx >= points2D.size()) continue;
+      Point3DId& named = points2D[element.point2D_idx].point3D_id;
+      if (named == kInvalidPoint3DId) named = point.id;
+    }
+  }
+}
+
+// Of every track the elements that are kept and, behind them, those of
+// `missing`, by point; or none, if that is empty.
+void RebuildTracks(const std::vector<char>& is_kept,
+                   const std::vector<std::vector<TrackElement>>& missing,
+                   Model* model) {
+  std::vector<TrackElement> elements;
+  for (size_t k = 0; k < model->points3D.size(); ++k) {
+    Point3D& point = model->points3D[k];
+    const size_t begin = elements.size();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (is_kept[e]) elements.push_back(model->track_elements[e]);
+    }
+    if (!missing.empty()) {
+      elements.insert(elements.end(), missing[k].begin(), missing[k].end());
+    }
+    point.track_begin = begin;
+    point.track_end = elements.size();
+  }
+  model->track_elements = std::move(elements);
+}
+
 }  // namespace
 
 Contradictions FindContradictions(const Model& model) {
@@ -120,43 +170,46 @@ Contradictions FindContradictions(const Model& model) {
   return found;
 }
 
-void FollowImages(Model* model) {
+bool HasTrack(const Model& model) {
+  return std::any_of(model.points3D.begin(), model.points3D.end(),
+                     [](const Point3D& point) {
+                       return point.track_end - point.track_begin >= 2;
+                     });
+}
+
+void Follow(Reading reading, Model* model) {
   DropUnknownPoints3D(model);
+  if (reading == Reading::kTracks) DropUnconfirmedNames(model);
+  if (reading != Reading::kImages) NameByTracks(model);
+  const IdIndex<Point3DId> points3D(model->points3D);
   Claims claims(*model);
-  std::vector<bool> is_kept(model->track_elements.size());
+  std::vector<char> is_kept;
   for (const Point3D& point : model->points3D) {
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      is_kept[e] =
-          claims.Take(point, model->track_elements[e]) == Claim::kConfirmed;
+      is_kept.push_back(claims.Take(point, model->track_elements[e]) ==
+                        Claim::kConfirmed);
     }
   }
-  const IdIndex<Point3DId> points3D(model->points3D);
-  std::vector<std::pair<int32_t, TrackElement>> missing;  // by 3D point
+  std::vector<std::vector<TrackElement>> missing(model->points3D.size());
   claims.ForEachUnclaimed([&](size_t n, uint32_t i) {
     const Image& image = model->images[n];
-    missing.emplace_back(*points3D.Find(image.points2D[i].point3D_id),
-                         TrackElement{image.id, i});
+    missing[*points3D.Find(image.points2D[i].point3D_id)].push_back(
+        {image.id, i});
   });
-  std::stable_sort(
-      missing.begin(), missing.end(),
-      [](const auto& a, const auto& b) { return a.first < b.first; });
+  RebuildTracks(is_kept, missing, model);
+}
 
-  std::vector<TrackElement> elements;
-  auto next = missing.begin();
-  for (size_t k = 0; k < model->points3D.size(); ++k) {
-    Point3D& point = model->points3D[k];
-    const size_t begin = elements.size();
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (is_kept[e]) elements.push_back(model->track_elements[e]);
-    }
-    for (; next != missing.end() && next->first == static_cast<int32_t>(k);
-         ++next) {
-      elements.push_back(next->second);
-    }
-    point.track_begin = begin;
-    point.track_end = elements.size();
+int64_t DropUnknownPoints2D(Model* model) {
+  const IdIndex<ImageId> images(model->images);
+  std::vector<char> is_kept;
+  for (const TrackElement& element : model->track_elements) {
+    const std::optional<int32_t> n = images.Find(element.image_id);
+    is_kept.push_back(n &&
+                      element.point2D_idx < model->images[*n].points2D.size());
   }
-  model->track_elements = std::move(elements);
+  const size_t count = model->track_elements.size();
+  RebuildTracks(is_kept, {}, model);
+  return static_cast<int64_t>(count - model->track_elements.size());
 }
 
 void DropUnknownPoints3D(Model* model) {

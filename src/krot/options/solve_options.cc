@@ -78,8 +78,8 @@ void AddSameImage(BuildProblemOptions* options, OptionTable* table) {
       "Problem.same_image", &options->same_image,
       {{"keep", SameImage::kKeep}, {"closest", SameImage::kClosest}},
       "Of an image's observations in the same track: keep all, or leave out "
-      "all but the one closest to the model's own point; they stay in the "
-      "model");
+      "all but the one closest to the model's own point, as wrong; they stay "
+      "in the model and count in no maximum");
 }
 
 void CheckSolveOptions(const SolveModelOptions& options,

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/collapse.h"
+#include "krot/analysis/settle_contradictions.h"
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/carry_left_out.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/bridge/same_image.h"
 #include "krot/pipeline/certify.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
@@ -28,6 +32,7 @@ namespace {
 constexpr double kGapOfAnswer = 1e-2;
 // What rounding may add to the largest error, relative.
 constexpr double kErrorRounding = 1e-9;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Of the bound of a start, the level at which it keeps positions.
 constexpr double kShareOfStart = 0.99;
 
@@ -37,6 +42,9 @@ void CheckOptions(const SolveModelOptions& options, const Context& context) {
     context.RequireAlone("what keeps positions");
   }
   if (options.polish != Polish::kNone) context.RequireAlone("a polish");
+  if (options.problem.same_image == SameImage::kClosest) {
+    context.RequireAlone("--Problem.same_image closest");
+  }
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
   CheckArgument(options.init_max_error > 0, "init_max_error",
                 options.init_max_error, "> 0");
@@ -109,6 +117,10 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
       summary->termination == SolveTermination::kGapReached ||
       summary->termination == SolveTermination::kZeroCost ||
       summary->termination == SolveTermination::kStalled;
+  if (summary->is_given_back && summary->collapse.IsWhole()) {
+    summary->termination = SolveTermination::kCollapsed;
+    return;
+  }
   if (!has_ended || summary->method == SolveMethod::kResInt) return;
   if (summary->largest_position_ratio > 1 + kKeptPosition) {
     summary->termination = SolveTermination::kUnproved;
@@ -159,6 +171,30 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
+// The largest of the track elements in this role; infinite where a point does
+// not project.
+double LargestOf(Role role, const std::vector<Role>& roles,
+                 const std::vector<double>& errors_px, const Context& context) {
+  double largest = 0;
+  for (size_t e = 0; e < roles.size(); ++e) {
+    if (roles[e] != role) continue;
+    largest = std::max(largest,
+                       std::isfinite(errors_px[e]) ? errors_px[e] : kInfinity);
+  }
+  return context.Max(largest);
+}
+
+// The errors that count: twins that were left out are wrong by assumption.
+std::vector<double> Counted(const std::vector<Role>& roles,
+                            std::vector<double> errors_px) {
+  size_t num_kept = 0;
+  for (size_t e = 0; e < roles.size(); ++e) {
+    if (roles[e] != Role::kTwin) errors_px[num_kept++] = errors_px[e];
+  }
+  errors_px.resize(num_kept);
+  return errors_px;
+}
+
 // Whether an error that was finite is now above the largest that was, and above
 // what may be; all in the norm of the solve.
 bool IsWorse(const std::vector<double>& errors_before_px,
@@ -175,6 +211,20 @@ bool IsWorse(const std::vector<double>& errors_before_px,
         std::isfinite(errors_before_px[i]) && !(errors_after_px[i] <= largest);
   }
   return context.Any(is_worse);
+}
+
+// Whether the observations are no more numbers than those that they are to
+// determine: then all errors can be zero, whatever the observations are.
+bool IsUnderdetermined(const SolveSummary& summary,
+                       const KnownRotationProblem& problem) {
+  const bool is_held = summary.num_fixed_frames + summary.num_fixed_points > 0;
+  const int64_t gauge =
+      is_held ? 0 : (HasBaseline(problem) ? 3 : 4) * summary.num_components;
+  return summary.num_positions == 0 &&
+         2 * summary.num_observations <=
+             3 * (summary.num_frames - summary.num_fixed_frames +
+                  summary.num_points - summary.num_fixed_points) -
+                 gauge;
 }
 
 }  // namespace
@@ -242,32 +292,49 @@ SolveModelResult SolveInFrame(const Model& model,
                       estimate, context);
     }
   }
-  const auto true_cost = [&] {
-    return context.Max(
-        reprojection.TrueCost(estimate, options.norm, num_threads));
-  };
-  summary.cost_final = true_cost();
+  const double level =
+      context.Max(reprojection.TrueCost(estimate, options.norm, num_threads));
   result.model = ApplyEstimate(model, start.built, estimate);
   const std::vector<double> before_px =
       PixelErrors(model, num_threads, options.norm);
   CarryLeftOutPoints(model, before_px, options.norm, start.built,
-                     options.problem.fixed, summary.cost_final, &result.model);
+                     options.problem.fixed, level, &result.model);
+  std::vector<double> after_px =
+      PixelErrors(result.model, num_threads, options.norm);
+  const std::vector<Role> roles =
+      RolesOf(model, start.built, options.problem.same_image);
+  summary.collapse = FindCollapse(model, result.model, context);
+  const double allowed = options.finish.max_error.value_or(0);
+  if (context.ranks == nullptr) {
+    const auto worse = WorseImagesSide(model, result.model, options.norm);
+    if (worse && worse->second > allowed) summary.worse_images_side = worse;
+  }
   // Where positions are known, errors that were lower without them do not
   // count.
   if (start.built.positions.empty() &&
-      IsWorse(before_px, PixelErrors(result.model, num_threads, options.norm),
-              options.finish.max_error.value_or(0), context)) {
+      (summary.collapse.IsWhole() || summary.worse_images_side ||
+       IsWorse(Counted(roles, before_px), Counted(roles, after_px), allowed,
+               context))) {
     summary.is_given_back = true;
     summary.loose = {};
     summary.finish.reset();
     result.model = model;
+    after_px = before_px;
     estimate = OwnEstimate(model, start.built);
     reprojection.TakeRows(estimate, num_threads, &start.built.problem);
-    summary.cost_final = true_cost();
   }
-  const std::vector<double> errors_px = PixelErrors(result.model, num_threads);
+  summary.cost_final = LargestOf(Role::kIn, roles, after_px, context);
+  summary.is_underdetermined = IsUnderdetermined(summary, start.built.problem);
+  const auto in_pixels = [&](const Model& m, const std::vector<double>& px) {
+    return options.norm.p == 2 ? px : PixelErrors(m, num_threads);
+  };
+  const std::vector<double> errors_px = in_pixels(result.model, after_px);
   UpdatePointErrors(errors_px, &result.model);
-  summary.pixel_error_after = Summarize(errors_px);
+  summary.pixel_error_before =
+      Summarize(Counted(roles, in_pixels(model, before_px)));
+  summary.pixel_error_after = Summarize(Counted(roles, errors_px));
+  summary.largest_twin_error =
+      LargestOf(Role::kTwin, roles, errors_px, context);
   summary.seconds_solve = solve_timer.Seconds();
 
   Certify(model, start.built, estimate, options, context, certificate,

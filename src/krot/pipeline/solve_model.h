@@ -5,8 +5,10 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "krot/analysis/collapse.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
@@ -50,6 +52,7 @@ enum class SolveTermination {
   kMaxIterations,
   kInfeasible,   // proved: no estimate below init_max_error
   kNoStart,      // no estimate below init_max_error was found
+  kCollapsed,    // most points fell together (Collapse::IsWhole)
   kInterrupted,  // the estimate is the best so far
 };
 
@@ -96,6 +99,9 @@ struct SolveSummary {
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
   int64_t num_same_image_tracks = 0;  // that hold an image more than once
+  // Of those left out as kSameImage, in the model written, pixels. They count
+  // in no error below but the points' own.
+  double largest_twin_error = 0;
 
   // The largest true error of the observations in the optimisation, pixels;
   // initial: of the start, after re-triangulation; final: of the model written
@@ -122,8 +128,19 @@ struct SolveSummary {
 
   // No estimate was found whose largest error in the p-norm, over all
   // observations that had a finite one, is not above the input's, or above
-  // finish.max_error: the input is what is given back.
+  // finish.max_error, or most points of the one that was found fell together
+  // (collapse.IsWhole()): the input is what is given back.
   bool is_given_back = false;
+  // The largest error by the images' side of a model that contradicts itself,
+  // pixels in the p-norm, before and after (WorseImagesSide), where it is worse
+  // and above finish.max_error: then the input is given back, too. Of a model
+  // that is shared by processes it is not measured.
+  std::optional<std::pair<double, double>> worse_images_side;
+  // What degenerated on the way from the input to the estimate.
+  Collapse collapse;
+  // Whether the observations are no more numbers than what they determine, so
+  // that an error of zero says nothing.
+  bool is_underdetermined = false;
 
   // What does not hold its place in the model written.
   LooseParts loose;
@@ -137,7 +154,7 @@ struct SolveSummary {
     return finish ? finish->lowest_cost : cost_final;
   }
 
-  // Over all observations of the model, those left out included.
+  // Over all observations of the model, those left out included but for twins.
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "krot/model/model_error.h"
 
 namespace krot {
 namespace {
@@ -66,6 +69,29 @@ std::string LoosePointsSentence(const std::vector<LoosePoint>& points) {
          ".\n";
 }
 
+std::string FitWords(const char* whose,
+                     const std::optional<Contradictions::Fit>& fit) {
+  if (!fit) return std::string(whose) + " side has no observations";
+  if (!std::isfinite(fit->median)) {
+    return "most of " + std::string(whose) + " observations do not project";
+  }
+  return std::string(whose) + " observations have a median error of " +
+         FormatNumber(fit->median, 4) + " px" +
+         (std::isfinite(fit->max)
+              ? " and a largest of " + FormatNumber(fit->max, 4) + " px"
+              : std::string());
+}
+
+std::string FollowedWords(const std::string& followed) {
+  if (followed == "neither") return "";
+  if (followed == "both") {
+    return ": every 2D point is taken to see the 3D point that it names or, "
+           "where it names none, the first whose track names it "
+           "(--Model.on_contradiction)";
+  }
+  return ": the " + followed + " are followed (--Model.on_contradiction)";
+}
+
 }  // namespace
 
 std::string LeftOutWords(const LeftOutCounts& left_out) {
@@ -101,6 +127,70 @@ std::string LooseSentences(const LooseParts& loose, int64_t num_images) {
                     Counted(num_images - num_loose, "image") + ".\n"
               : "") +
          LoosePointsSentence(loose.points);
+}
+
+std::string ContradictionSentence(const Contradictions& contradictions) {
+  const bool is_measured = contradictions.of_tracks || contradictions.of_images;
+  return " contradicts itself: " +
+         Counted(contradictions.num_track_elements, "track element") +
+         " of 2D points that do not name the 3D point, and " +
+         Counted(contradictions.num_points2D, "2D point") +
+         " of 3D points whose track does not name the 2D point; " +
+         (is_measured
+              ? "at the model's own positions " +
+                    FitWords("the tracks'", contradictions.of_tracks) + ", " +
+                    FitWords("the images'", contradictions.of_images)
+              : std::string("it has no positions that would show "
+                            "which is right")) +
+         FollowedWords(contradictions.followed);
+}
+
+void RequireSettled(const std::string& path,
+                    const Contradictions& contradictions) {
+  if (contradictions.followed != "neither") return;
+  throw ModelError(path + ContradictionSentence(contradictions) +
+                   ": neither fits; --Model.on_contradiction follow_tracks or "
+                   "follow_images reads it all the same");
+}
+
+std::string WorseImagesWords(const std::pair<double, double>& max_px) {
+  return "by the images' side, which COLMAP's bundle adjustment reads, the "
+         "largest error rises from " +
+         FormatNumber(max_px.first, 4) + " px to " +
+         (std::isfinite(max_px.second)
+              ? FormatNumber(max_px.second, 4) + " px"
+              : std::string("points that do not project"));
+}
+
+std::string WholeCollapseWords(const Collapse& collapse) {
+  const std::string points =
+      Counted(collapse.num_points, "point") + " that two cameras see";
+  const std::string where =
+      collapse.is_in_one_place
+          ? "all " + points + " lie in one place"
+          : "of " + points + " " + std::to_string(collapse.in_camera.size()) +
+                " lie in a camera and " +
+                std::to_string(collapse.at_infinity.size()) + " at infinity";
+  return "the errors fall only where " + where +
+         ", so that nothing is left of the scene";
+}
+
+std::string CollapseLines(const Collapse& collapse) {
+  std::string text;
+  const auto add = [&](const std::vector<Point3DId>& points,
+                       const std::string& where) {
+    if (points.empty()) return;
+    text += Counted(static_cast<int64_t>(points.size()), "point") +
+            " came to lie " + where + ": " + PointList(points) + ".\n";
+  };
+  add(collapse.in_camera, "in a camera, where any observation of it fits");
+  add(collapse.at_infinity, "at infinity, as their rays are parallel");
+  return text;
+}
+
+std::string PointList(const std::vector<Point3DId>& points) {
+  return "point3D_id " +
+         FirstFew(points, [](Point3DId id) { return std::to_string(id); });
 }
 
 }  // namespace krot

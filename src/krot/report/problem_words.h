@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/collapse.h"
+#include "krot/model/contradictions.h"
 #include "krot/pipeline/settle.h"
 #include "krot/report/text_table.h"
 
@@ -25,6 +27,29 @@ std::string LeftOutWords(const LeftOutCounts& left_out);
 // "nothing to solve: 15 observations left out (...)" for `what` = "solve".
 std::string NothingToDoSentence(const std::string& what,
                                 const LeftOutCounts& left_out);
+
+// " contradicts itself: ...", behind the model's path: how often, how both
+// sides fit the model's own positions, and what is followed.
+std::string ContradictionSentence(const Contradictions& contradictions);
+
+// Throws ModelError where the model at `path` is not to be read as neither side
+// fits.
+void RequireSettled(const std::string& path,
+                    const Contradictions& contradictions);
+
+// "by the images' side, which COLMAP's bundle adjustment reads, the largest
+// error rises from 1.0973 px to 131.9991 px": before and after, pixels.
+std::string WorseImagesWords(const std::pair<double, double>& max_px);
+
+// "the errors fall only where all 1721 points that two cameras see lie in one
+// place, so that nothing is left of the scene". Requires IsWhole().
+std::string WholeCollapseWords(const Collapse& collapse);
+
+// What came to lie in cameras and at infinity, one line each; "" if nothing.
+std::string CollapseLines(const Collapse& collapse);
+
+// "point3D_id 5, 17, 9, ...".
+std::string PointList(const std::vector<Point3DId>& points);
 
 // "2 frames, 4 images, 1 point, 8 observations", of a summary with these
 // counts.

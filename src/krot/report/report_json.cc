@@ -1,5 +1,7 @@
 #include "krot/report/report_json.h"
 
+#include <cmath>
+
 namespace krot {
 
 Json NumberOrNull(const std::optional<double>& value) {
@@ -33,8 +35,21 @@ Json LeftOutJson(const LeftOutCounts& left_out) {
 }
 
 Json ContradictionsJson(const Contradictions& contradictions) {
+  using Fit = Contradictions::Fit;
+  const auto fit = [](const std::optional<Fit>& side, double Fit::*px) {
+    return side && std::isfinite((*side).*px) ? Json((*side).*px) : Json();
+  };
   return {{"track_elements", contradictions.num_track_elements},
-          {"points2D", contradictions.num_points2D}};
+          {"points2D", contradictions.num_points2D},
+          {"followed", contradictions.followed.empty()
+                           ? Json()
+                           : Json(contradictions.followed)},
+          {"median_px",
+           {{"tracks", fit(contradictions.of_tracks, &Fit::median)},
+            {"images", fit(contradictions.of_images, &Fit::median)}}},
+          {"max_px",
+           {{"tracks", fit(contradictions.of_tracks, &Fit::max)},
+            {"images", fit(contradictions.of_images, &Fit::max)}}}};
 }
 
 Json PosesJson(const PoseChecks& poses) {

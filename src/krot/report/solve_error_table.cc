@@ -17,19 +17,12 @@ std::string PolishSentence(const SolveSummary& summary) {
          "maximum it no longer has.\n";
 }
 
-// The cost, unless it is the maximum that is there already: it is with p = 2 if
-// every observation takes part.
+// The cost, unless it is the maximum that is there already.
 void AddCost(const SolveSummary& summary, TextTable* table) {
-  if (summary.is_given_back) return;
-  const std::string before = FormatNumber(summary.cost_initial, 4);
-  const std::string after = FormatNumber(summary.cost_final, 4);
-  if (summary.norm.p == 2 &&
-      before == FormatNumber(summary.pixel_error_before.max, 4) &&
-      after == FormatNumber(summary.pixel_error_after.max, 4)) {
-    return;
-  }
+  if (summary.is_given_back || CostIsMaximum(summary)) return;
   table->AddRow({"cost (max optimised, p = " + NormName(summary.norm) + ")",
-                 before, after});
+                 FormatNumber(summary.cost_initial, 4),
+                 FormatNumber(summary.cost_final, 4)});
 }
 
 }  // namespace

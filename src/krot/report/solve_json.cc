@@ -1,3 +1,4 @@
+#include <cmath>
 #include <optional>
 
 #include "krot/report/adjustment_report.h"
@@ -29,10 +30,20 @@ const char* TerminationName(SolveTermination termination) {
       return "interrupted";
     case SolveTermination::kNothingToSolve:
       return "nothing_to_solve";
+    case SolveTermination::kCollapsed:
+      return "collapsed";
     case SolveTermination::kNotRun:
       break;
   }
   return "not_run";
+}
+
+// Of the observations that are left out as another's twins.
+std::optional<double> LargestTwin(const SolveSummary& summary) {
+  const int64_t count =
+      summary.left_out[static_cast<size_t>(LeftOut::kSameImage)];
+  if (count == 0 || !std::isfinite(summary.largest_twin_error)) return {};
+  return summary.largest_twin_error;
 }
 
 Json JointIterationsJson(const std::vector<JointIteration>& iterations) {
@@ -192,7 +203,8 @@ std::string SolveJson(const SolveReport& report) {
       {"left_out", left_out},
       {"same_image",
        {{"num_tracks", summary.num_same_image_tracks},
-        {"support_point3D_ids", SameImageInSupport(summary)}}},
+        {"support_point3D_ids", SameImageInSupport(summary)},
+        {"largest_left_out", NumberOrNull(LargestTwin(summary))}}},
       {"outliers", OutliersJson(report.outliers)},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"poses", PosesJson(report.run.poses)},
@@ -214,6 +226,12 @@ std::string SolveJson(const SolveReport& report) {
       {"linear_relative_gap", NumberOrNull(LinearRelativeGap(summary))},
       {"certified", summary.is_certified},
       {"is_given_back", summary.is_given_back},
+      {"verdict", VerdictSentence(summary)},
+      {"collapse",
+       {{"in_camera", summary.collapse.in_camera},
+        {"at_infinity", summary.collapse.at_infinity},
+        {"is_in_one_place", summary.collapse.is_in_one_place}}},
+      {"is_underdetermined", summary.is_underdetermined},
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"after", ErrorJson(summary.pixel_error_after)}}},

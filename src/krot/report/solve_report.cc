@@ -7,7 +7,6 @@
 #include "krot/report/text_table.h"
 
 namespace krot {
-
 LeftOutCounts LeftOutByReason(const SolveSummary& summary) {
   LeftOutCounts counts;
   for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
@@ -39,7 +38,7 @@ std::string MissedGapSentence(const SolveSummary& summary) {
           : "no further progress was made";
   return "the gap asked for is not reached: " + why +
          (summary.relative_gap
-              ? "; the gap is " + Scientific(*summary.relative_gap)
+              ? "; the maximum is " + GapWords(*summary.relative_gap)
           : summary.lower_bound ? "; there is no finite maximum"
                                 : "; no bound is proved");
 }
@@ -51,12 +50,45 @@ std::optional<double> LinearRelativeGap(const SolveSummary& summary) {
   return (last.linear_cost - *last.linear_lower_bound) / last.linear_cost;
 }
 
+bool CostIsMaximum(const SolveSummary& summary) {
+  return summary.norm.p == 2 &&
+         FormatNumber(summary.cost_final, 4) ==
+             FormatNumber(summary.pixel_error_after.max, 4);
+}
+
+std::string GapPercent(double relative_gap) {
+  const double percent = 100 * relative_gap;
+  return (percent < 1e-4 ? std::string("less than 0.0001")
+                         : FormatNumber(percent, 4)) +
+         " %";
+}
+
+std::string GapWords(double relative_gap) {
+  return "proved to be within " + GapPercent(relative_gap) + " of the lowest";
+}
+
+std::string UnderdeterminedWords(const SolveSummary& summary) {
+  return Counted(summary.num_observations, "observation") +
+         " are too few to determine " + Counted(summary.num_frames, "frame") +
+         " and " + Counted(summary.num_points, "point");
+}
+
 std::string GivenBackSentence(const SolveSummary& summary) {
-  return summary.polish
-             ? "No better estimate was found: the polish began at the model as "
-               "it was read."
-             : "No better estimate was found: the model is written as it was "
-               "read.";
+  const std::string what = summary.polish
+                               ? "the polish began at the model as it was read."
+                               : "the model is written as it was read.";
+  if (summary.collapse.IsWhole()) {
+    return "No estimate is of use: " + WholeCollapseWords(summary.collapse) +
+           "; " + what +
+           " Most likely the observations name the wrong 2D points.";
+  }
+  if (summary.worse_images_side) {
+    return "No better estimate was found: " +
+           WorseImagesWords(*summary.worse_images_side) + "; " + what +
+           " --Model.on_contradiction auto solves the side that fits, and "
+           "writes a model that agrees with itself.";
+  }
+  return "No better estimate was found: " + what;
 }
 
 std::string MethodName(SolveMethod method) {

@@ -36,6 +36,24 @@ std::string NothingToSolveSentence(const SolveSummary& summary);
 // The points in whose tracks an image occurs more than once, of the support.
 std::vector<Point3DId> SameImageInSupport(const SolveSummary& summary);
 
+// Whether the cost is, to the digits shown, the largest error of the model that
+// is written: it is with p = 2 if every observation takes part.
+bool CostIsMaximum(const SolveSummary& summary);
+
+// The maximum of the model that is written and what is proved of it, and what
+// is not: on the terminal, in the report and on the page.
+std::string VerdictSentence(const SolveSummary& summary);
+
+// "0.0100 %", "less than 0.0001 %".
+std::string GapPercent(double relative_gap);
+
+// "proved to be within 0.0100 % of the lowest".
+std::string GapWords(double relative_gap);
+
+// "2 observations are too few to determine 2 frames and 1 point". Requires
+// is_underdetermined.
+std::string UnderdeterminedWords(const SolveSummary& summary);
+
 // "the gap asked for is not reached after 300 iterations, as many as ...".
 std::string MissedGapSentence(const SolveSummary& summary);
 

@@ -7,6 +7,7 @@
 #include "krot/report/certificate_table.h"
 #include "krot/report/error_rows.h"
 #include "krot/report/outlier_report.h"
+#include "krot/report/problem_words.h"
 #include "krot/report/solve_error_table.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
@@ -16,16 +17,8 @@ namespace {
 
 // How many observations of the support the terminal shows.
 constexpr int kListedSupport = 10;
-constexpr size_t kListedPoints = 5;
 // From which share of the true gap on the rows' own is no other number.
 constexpr double kNoticeablySmaller = 0.5;
-
-std::string GapPercent(double relative_gap) {
-  const double percent = 100 * relative_gap;
-  return (percent < 1e-4 ? std::string("less than 0.0001")
-                         : FormatNumber(percent, 4)) +
-         " %";
-}
 
 // "no translations and points bring all errors below 3.4201 px", which has to
 // be proved.
@@ -76,31 +69,6 @@ std::string FinishSentence(const SolveSummary& summary) {
               : "; a little less might be possible.");
 }
 
-// What is proved, and what is not.
-std::string Verdict(const SolveSummary& summary) {
-  if (summary.is_given_back) {
-    return GivenBackSentence(summary) +
-           (summary.is_certified
-                ? " It is proved that " + BoundWords(summary) + "."
-                : std::string());
-  }
-  if (IsZeroUpToRounding(summary.cost_final)) {
-    return "Every error is zero up to rounding (" +
-           Scientific(summary.cost_final) + " px at most).";
-  }
-  const std::string maximum =
-      "Maximum " + FormatNumber(summary.cost_final, 4) + " px" +
-      (summary.norm.p == 2 ? "" : " (p = " + NormName(summary.norm) + ")");
-  if (!summary.is_certified) {
-    return maximum + ", not proved optimal." + FinishSentence(summary);
-  }
-  return maximum +
-         (summary.finish ? ", proved to be within " : ", proved optimal to ") +
-         GapPercent(*summary.relative_gap) +
-         (summary.finish ? " of the lowest: " : ": ") + BoundWords(summary) +
-         "." + LinearGapSentence(summary) + FinishSentence(summary);
-}
-
 // " on 3 % of the observations"; empty where the joint solver did not run.
 std::string WorkingSetWords(const SolveSummary& summary) {
   const int64_t count = summary.num_working_observations.value_or(0);
@@ -140,7 +108,8 @@ std::string SolveEndSentence(const SolveSummary& summary) {
   const std::string after = StepsWords(summary);
   switch (summary.termination) {
     case SolveTermination::kGapReached:
-      return "Ended" + after + " with the gap asked for.";
+      return "Ended" + after +
+             ": the lowest maximum is known to the gap asked for.";
     case SolveTermination::kMaxIterations:
       return "Ended" + after + ", as many iterations as were allowed.";
     case SolveTermination::kStalled:
@@ -155,6 +124,8 @@ std::string SolveEndSentence(const SolveSummary& summary) {
              "maximum is proved; a lower one may exist.";
     case SolveTermination::kZeroCost:
       return "Ended" + after + " with nothing left to lower.";
+    case SolveTermination::kCollapsed:
+      return "Ended" + after + " in a collapse of the scene.";
     case SolveTermination::kMaxSweeps:
       return "Ended" + after + ", as many as were allowed.";
     case SolveTermination::kInterrupted:
@@ -179,21 +150,33 @@ std::string SolveCountsSentence(const SolveSummary& summary) {
 }
 
 // One of an image's observations in a track is wrong, at least; where those are
-// that set the maximum.
+// that set the maximum, or what became of them.
 std::string SameImageSentence(const SolveSummary& summary) {
   if (summary.num_same_image_tracks == 0) return "";
-  std::string sentence = Counted(summary.num_same_image_tracks, "track") +
-                         " with an image more than once";
+  const std::string tracks = Counted(summary.num_same_image_tracks, "track") +
+                             " with an image more than once";
+  const int64_t num_twins =
+      summary.left_out[static_cast<size_t>(LeftOut::kSameImage)];
+  if (num_twins > 0) {
+    return tracks + "; " + Counted(num_twins, "observation") + " that " +
+           (num_twins == 1 ? "is" : "are") +
+           " not the closest of the image and track " +
+           (num_twins == 1 ? "is" : "are") +
+           " taken to be wrong: left out, still in the model, and in no error "
+           "above (" +
+           (std::isfinite(summary.largest_twin_error)
+                ? "the largest has " +
+                      FormatNumber(summary.largest_twin_error, 4) + " px"
+                : std::string("some do not project")) +
+           ").\n";
+  }
   const std::vector<Point3DId> points = SameImageInSupport(summary);
-  for (size_t n = 0; n < std::min(points.size(), kListedPoints); ++n) {
-    sentence += (n == 0 ? "; in the support: point3D_id " : ", ") +
-                std::to_string(points[n]);
-  }
-  if (points.size() > kListedPoints) sentence += ", ...";
-  if (!points.empty()) {
-    sentence += " (--Problem.same_image closest leaves one of each)";
-  }
-  return sentence + ".\n";
+  return tracks +
+         (points.empty()
+              ? std::string()
+              : "; in the support: " + PointList(points) +
+                    " (--Problem.same_image closest leaves one of each)") +
+         ".\n";
 }
 
 // How cameras and points stand to where they are known to be.
@@ -242,6 +225,35 @@ std::string BracketOf(const SolveReport& report) {
 
 }  // namespace
 
+std::string VerdictSentence(const SolveSummary& summary) {
+  if (summary.is_given_back) {
+    return GivenBackSentence(summary) +
+           (summary.is_certified
+                ? " It is proved that " + BoundWords(summary) + "."
+                : std::string());
+  }
+  if (IsZeroUpToRounding(summary.cost_final)) {
+    return "Every error is zero up to rounding (" +
+           Scientific(summary.cost_final) + " px at most)" +
+           (summary.is_underdetermined
+                ? ", which says nothing: " + UnderdeterminedWords(summary)
+                : std::string()) +
+           ".";
+  }
+  const std::string maximum =
+      "Maximum " + FormatNumber(summary.cost_final, 4) + " px" +
+      (summary.norm.p == 2 ? "" : " (p = " + NormName(summary.norm) + ")") +
+      (summary.norm.p != 2 || CostIsMaximum(summary)
+           ? ""
+           : " over the observations in the optimisation");
+  if (!summary.is_certified) {
+    return maximum + ", not proved optimal." + FinishSentence(summary);
+  }
+  return maximum + ", " + GapWords(*summary.relative_gap) + ": " +
+         BoundWords(summary) + "." + LinearGapSentence(summary) +
+         FinishSentence(summary);
+}
+
 std::string SolveTable(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   std::ostringstream text;
@@ -249,7 +261,8 @@ std::string SolveTable(const SolveReport& report) {
        << SolveErrorTable(summary) << BracketOf(report)
        << SolveCountsSentence(summary) << '\n'
        << SameImageSentence(summary)
-       << NotFiniteSentence(summary.pixel_error_after);
+       << NotFiniteSentence(summary.pixel_error_after)
+       << (summary.is_given_back ? "" : CollapseLines(summary.collapse));
   if (summary.num_components > 1) {
     text << "The problem falls into "
          << Counted(summary.num_components, "component")
@@ -258,7 +271,7 @@ std::string SolveTable(const SolveReport& report) {
   text << LooseSentences(summary.loose, summary.num_images)
        << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
        << SolveEndSentence(summary) << '\n'
-       << Verdict(summary) << '\n';
+       << VerdictSentence(summary) << '\n';
   if (summary.is_certified) {
     text << SupportTable(summary.support, kListedSupport)
          << PositionsTable(summary.support_positions, kListedSupport);

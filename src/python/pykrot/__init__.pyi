@@ -23,7 +23,7 @@ class NoSolutionError(RuntimeError):
 class Model:
     @staticmethod
     def read(path: Union[str, PathLike[str]], *,
-             on_contradiction: str = "follow_tracks") -> Model: ...
+             on_contradiction: str = "auto") -> Model: ...
     @staticmethod
     def from_arrays(observations: ArrayLike, image_indices: ArrayLike,
                     point_indices: ArrayLike, rotations: ArrayLike,

@@ -55,10 +55,8 @@ export function isMinimax(report) {
 
 // Whether that cost is, to the digits shown, the maximum over all observations.
 export function costIsLargestError(report) {
-  const errors = report.pixel_error;
   return report.norm === '2' &&
-    pixels(report.cost_initial) === pixels(errors.before.max) &&
-    pixels(report.cost_final) === pixels(errors.after.max);
+    pixels(report.cost_final) === pixels(report.pixel_error.after.max);
 }
 
 // How the two models of a report are called.

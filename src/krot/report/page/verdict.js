@@ -1,23 +1,12 @@
 import { boxesVerdict } from './boxes.js';
-import {
-  costIsLargestError, isComparison, isFilter, isMinimax, modelErrors,
-} from './data.js';
-import { count, counted, lowerBound } from './format.js';
+import { isComparison, isFilter, isMinimax, modelErrors } from './data.js';
+import { count, counted } from './format.js';
 
 function movement(before, after, decimals) {
   const from = before.toFixed(decimals);
   const to = after.toFixed(decimals);
   if (from === to) return `stayed at ${to} px`;
   return `${after < before ? 'fell' : 'rose'} from ${from} px to ${to} px`;
-}
-
-function proof(report) {
-  const bound = `no translations and points can lower it below ` +
-    `${lowerBound(report.lower_bound)} px (proved)`;
-  if (costIsLargestError(report)) return `; ${bound}.`;
-  return `. The cost, which is the largest error of the observations that ` +
-    `took part in the optimisation (p = ${report.norm}), ` +
-    `${movement(report.cost_initial, report.cost_final, 4)}; ${bound}.`;
 }
 
 // A bracket for the fewest that do.
@@ -59,17 +48,9 @@ export function verdict(report) {
   if (isFilter(report)) return filterVerdict(report);
   if (report.boxes) return boxesVerdict(report);
   if (!isMinimax(report)) return adjustmentVerdict(report, before, after);
-  if (report.is_given_back) {
-    return 'No better estimate was found: the model is the one that was read.' +
-      polishSentence(report);
-  }
-  if (report.termination === 'zero_cost') {
-    return 'Every error is zero up to rounding; nothing is left to lower.' +
-      polishSentence(report);
-  }
-  const sentence = `The largest error ${movement(before.max, after.max, 2)}`;
-  return sentence + (report.certified ? proof(report) :
-    '; whether it can be lower was not proved.') + polishSentence(report);
+  const fall = report.is_given_back ? '' :
+    `The largest error ${movement(before.max, after.max, 2)}. `;
+  return fall + report.verdict + polishSentence(report);
 }
 
 // What the verdict holds for.
