@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "krot/report/text_table.h"
 
@@ -44,6 +45,14 @@ void SolveProgress::Follow(SolveModelOptions* options, Context* context) {
   };
   context->on_note = [this](const std::string& sentence) {
     LogLine(log_, 1, sentence);
+  };
+  context->on_stage = [this](const std::string& what, int64_t done,
+                             int64_t of) {
+    if (of == 0) return BeginPhase(log_, what);
+    ShowProgress(
+        log_,
+        {what, what + ": " + std::to_string(done) + " of " + std::to_string(of),
+         static_cast<double>(done) / static_cast<double>(of)});
   };
 }
 

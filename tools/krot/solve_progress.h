@@ -30,8 +30,8 @@ class SolveProgress {
   SolveProgress(const SolveProgress&) = delete;
   SolveProgress& operator=(const SolveProgress&) = delete;
 
-  // Sets the callbacks that tell of sweeps, iterations and choices; they keep a
-  // reference to this.
+  // Sets the callbacks that tell of sweeps, iterations, stages and choices;
+  // they keep a reference to this.
   void Follow(SolveModelOptions* options, Context* context);
 
   // What each callback tells.

@@ -20,12 +20,30 @@ struct Context {
   const CancelFlag* cancel = nullptr;  // may be null
   // Takes a sentence on what was chosen, and why; may be empty.
   std::function<void(const std::string&)> on_note = {};
+  // Takes what a stage that may last does, as "looking for conflicts", and how
+  // much of it is done; of 0: not known. From any thread; may be empty.
+  std::function<void(const std::string& what, int64_t done, int64_t of)>
+      on_stage = {};
   // The processes that share the points; null: this one has them all.
   Ranks* ranks = nullptr;
 
   bool IsCancelled() const { return krot::IsCancelled(cancel); }
   void Note(const std::string& sentence) const {
     if (on_note) on_note(sentence);
+  }
+  void Stage(const std::string& what, int64_t done = 0, int64_t of = 0) const {
+    if (on_stage) on_stage(what, done, of);
+  }
+
+  // The same for a part of `whole`: stages begin with that.
+  Context Within(const std::string& whole) const {
+    Context part = *this;
+    if (!on_stage) return part;
+    part.on_stage = [whole, say = on_stage](const std::string& what,
+                                            int64_t done, int64_t of) {
+      say(whole + ": " + what, done, of);
+    };
+    return part;
   }
 
   // The same for work on this process's own share.

@@ -182,6 +182,7 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
   for (int n = 0; n < max_programmes && !context_.IsCancelled(); ++n) {
     if (best.observations.empty()) break;
     const bool is_last = num_idle == kPatience || n + 1 == max_programmes;
+    context_.Stage("choosing what to remove, programme", n + 1, max_programmes);
     if (n == 1) near_ = NearSet(built_.problem);  // the start's says little
     SolveProgramme(is_last ? kFineMu : kRoughMu);
     const size_t before = best.observations.size();
@@ -190,6 +191,7 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
     const bool is_idle = n > 0 && best.observations.size() >= before;
     num_idle = is_idle ? num_idle + 1 : 0;
   }
+  context_.Stage("taking back what fits");
   while (!context_.IsCancelled() && TakeBack(&best)) {
   }
   for (size_t i = 0; i < is_tight_.size(); ++i) {

@@ -85,6 +85,8 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   options.norm = norm;
   options.smallest_mu = kStartMu;
   for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
+    context.Stage("positions from rotations and tracks, programme", n + 1,
+                  kStartReweightings + 1);
     const ExcessSolution solution =
         MinimizeExcess(part.problem(), level, options, context, &own);
     options.weights = WeightsAgainst(solution.excess, level, kDearExcess);

@@ -209,10 +209,11 @@ std::optional<RotationSuspect> FindRotationSuspect(
   std::set_union(observations.begin(), observations.end(),
                  removal.observations.begin(), removal.observations.end(),
                  std::back_inserter(observations_and_removed));
+  const Context within = context.Within("asking whether a rotation is wrong");
   const auto solve = [&](const std::vector<int64_t>& removed,
                          const Estimate& start) {
     return SolveWithout(model, built, removed, start, bound.norm, kGapOfSuspect,
-                        context);
+                        within);
   };
   const OptimumWithout with = solve({}, built.start);
   const OptimumWithout without = solve(observations, built.start);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -126,6 +127,7 @@ class Rounds {
 void Rounds::Prove() {
   const std::optional<RowsCertificate> rows = bounds_.UseRows();
   if (!rows) return;
+  context_.Stage("proving the bound in true pixels");
   const double sufficient = bounds_.Sufficient(cost_);
   bounds_.Improve(
       positions_.Any()
@@ -164,6 +166,8 @@ bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) {
 
 // Whether another round may lower the cost.
 bool Rounds::RunOne() {
+  context_.Stage("lowering the largest error, round " +
+                 std::to_string(summary_.rounds.size() + 1));
   const KnownRotationProblem& rows = built_.problem;
   std::optional<KnownRotationProblem> bounded;
   std::vector<int64_t> observation_of;

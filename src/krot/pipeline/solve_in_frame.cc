@@ -239,6 +239,7 @@ SolveModelResult SolveInFrame(const Model& model,
   summary.norm = options.norm;
 
   const int num_threads = context.num_threads;
+  context.Stage("setting up the problem");
   const Timer build_timer;
   Start start = ChooseStart(model, options, summary.method, context);
   summary.init = start.init;
@@ -273,6 +274,7 @@ SolveModelResult SolveInFrame(const Model& model,
   }
   if (summary.method == SolveMethod::kAuto &&
       summary.termination != SolveTermination::kInterrupted) {
+    context.Stage("finding the least squares below the largest error");
     RunFinish(
         model, options,
         certificate ? std::optional(certificate->lower_bound) : std::nullopt,
@@ -337,10 +339,12 @@ SolveModelResult SolveInFrame(const Model& model,
       LargestOf(Role::kTwin, roles, errors_px, context);
   summary.seconds_solve = solve_timer.Seconds();
 
+  context.Stage("checking the proof");
   Certify(model, start.built, estimate, options, context, certificate,
           &summary);
   MeasureGap(options.joint.relative_gap, &summary);
   if (options.polish != Polish::kNone && !context.IsCancelled()) {
+    context.Stage("polishing");
     summary.polish = PolishModel(options.polish, options.finish.loss,
                                  options.problem.fixed, context, &result.model);
     MeasureMoves(model, result.model, &summary.loose);
