@@ -29,8 +29,9 @@ const Packed& PackedScene() {
     std::vector<int64_t> all(built.pixels.size());
     std::iota(all.begin(), all.end(), 0);
     std::vector<PixelCertificate> proofs;
+    Work work;
     for (const Conflict& conflict :
-         PackConflicts(result.model, built, {Norm::L2(), 2}, all, {})) {
+         PackConflicts(result.model, built, {Norm::L2(), 2}, all, {}, &work)) {
       proofs.push_back(conflict.proof);
     }
     result.file = DescribeConflicts(result.model, built, Norm::L2(), 2, proofs);

@@ -51,8 +51,9 @@ TEST(PackConflicts, AreInfeasibleAndIrreducibleByAnIndependentOracle) {
       SCOPED_TRACE(testing::Message() << "p = " << norm.p << ", " << seed);
       const SyntheticScene scene = MakeOutlierScene(seed, 0.03);
       const BuiltProblem built = BuildProblem(scene.model, {});
-      const std::vector<Conflict> conflicts =
-          PackConflicts(scene.model, built, {norm, kBound}, All(built), {});
+      Work work;
+      const std::vector<Conflict> conflicts = PackConflicts(
+          scene.model, built, {norm, kBound}, All(built), {}, &work);
       ASSERT_FALSE(conflicts.empty());
       for (const Conflict& conflict : conflicts) {
         EXPECT_TRUE(conflict.is_irreducible);
@@ -74,8 +75,9 @@ TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
     const SyntheticScene scene = MakeOutlierScene(seed, 0.05);
     const BuiltProblem built = BuildProblem(scene.model, {});
     const ErrorBound bound{Norm::L2(), kBound};
+    Work work;
     const std::vector<Conflict> conflicts =
-        PackConflicts(scene.model, built, bound, All(built), {});
+        PackConflicts(scene.model, built, bound, All(built), {}, &work);
     ASSERT_FALSE(conflicts.empty());
     std::set<int64_t> seen;
     for (const Conflict& conflict : conflicts) {
@@ -95,8 +97,47 @@ TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
 TEST(PackConflicts, AreNoneWhereEverythingFits) {
   const SyntheticScene scene = MakeOutlierScene(6, 0);
   const BuiltProblem built = BuildProblem(scene.model, {});
-  EXPECT_TRUE(PackConflicts(scene.model, built, {Norm::L2(), 4}, All(built), {})
-                  .empty());
+  Work work;
+  EXPECT_TRUE(
+      PackConflicts(scene.model, built, {Norm::L2(), 4}, All(built), {}, &work)
+          .empty());
+}
+
+// A camera that maps everything to one pixel says nothing about its points.
+TEST(Decide, EndsSoonWhereNothingCanBeDecided) {
+  Model model = MakeOutlierScene(1, 0.05).model;
+  for (Camera& camera : model.cameras) {
+    camera.params[0] = camera.params[1] = 0;
+  }
+  const BuiltProblem built = BuildProblem(model, {});
+  ASSERT_FALSE(built.pixels.empty());
+  Work work;
+  const Decision decision =
+      Decide(model, built, {Norm::L2(), kBound}, {}, &work);
+  EXPECT_FALSE(decision.is_feasible);
+  EXPECT_FALSE(decision.is_refuted);
+  EXPECT_LE(work.done, 500 * static_cast<int64_t>(built.pixels.size()));
+}
+
+TEST(PackConflicts, EndWhereTheirWorkIsUsedUp) {
+  const SyntheticScene scene = MakeOutlierScene(4, 0.05);
+  const BuiltProblem built = BuildProblem(scene.model, {});
+  const ErrorBound bound{Norm::L2(), kBound};
+  Work whole;
+  const std::vector<Conflict> all =
+      PackConflicts(scene.model, built, bound, All(built), {}, &whole);
+  ASSERT_GE(all.size(), 4u);
+  ASSERT_GT(whole.done, 0);
+  Work half;
+  half.limit = whole.done / 2;
+  const std::vector<Conflict> some =
+      PackConflicts(scene.model, built, bound, All(built), {}, &half);
+  EXPECT_TRUE(half.IsUsedUp());
+  ASSERT_FALSE(some.empty());
+  ASSERT_LT(some.size(), all.size());
+  for (size_t n = 0; n < some.size(); ++n) {
+    EXPECT_EQ(some[n].observations, all[n].observations);
+  }
 }
 
 TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {
@@ -115,8 +156,9 @@ TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {
     std::vector<int64_t> track(problem.point_begin[k + 1] -
                                problem.point_begin[k]);
     std::iota(track.begin(), track.end(), problem.point_begin[k]);
+    Work work;
     const std::optional<Conflict> conflict =
-        FindConflict(model, built, {Norm::L2(), 0.1}, track, {});
+        FindConflict(model, built, {Norm::L2(), 0.1}, track, {}, &work);
     if (!conflict) continue;
     ++num_pairs;
     ASSERT_EQ(conflict->observations.size(), 2u);

@@ -40,8 +40,9 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
     for (const int64_t i : c.removal.observations) {
       for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
         ++num_candidates;
-        EXPECT_TRUE(
-            FindConflict(c.scene.model, c.built, {Norm::L2(), kBound}, set, {}))
+        Work work;
+        EXPECT_TRUE(FindConflict(c.scene.model, c.built, {Norm::L2(), kBound},
+                                 set, {}, &work))
             << "observation " << i << ", seed " << seed;
       }
     }

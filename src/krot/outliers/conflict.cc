@@ -34,11 +34,12 @@ constexpr size_t kMaxDeletions = 60;
 class Deletion {
  public:
   Deletion(const Model& model, BuiltProblem support, const ErrorBound& bound,
-           const Context& context)
+           const Context& context, Work* work)
       : model_(model),
         built_(std::move(support)),
         bound_(bound),
         context_(context),
+        work_(work),
         kept_(built_.pixels.size()) {
     std::iota(kept_.begin(), kept_.end(), 0);
   }
@@ -55,8 +56,9 @@ class Deletion {
       for (const std::vector<int64_t>& part :
            Parts(built_, Without(kept_, {spared}))) {
         const ProblemSubset subset(built_.problem, part);
-        Decision decision = Decide(
-            model_, BuiltPart(built_, subset, built_.start), bound_, context_);
+        Decision decision =
+            Decide(model_, BuiltPart(built_, subset, built_.start), bound_,
+                   context_, work_);
         is_feasible = is_feasible && decision.is_feasible;
         if (!decision.is_refuted) continue;
         is_feasible = true;
@@ -79,6 +81,7 @@ class Deletion {
   const BuiltProblem built_;
   const ErrorBound bound_;
   const Context context_;
+  Work* const work_;
   std::vector<int64_t> kept_;  // ascending
 };
 
@@ -88,15 +91,15 @@ std::optional<Conflict> FindConflict(const Model& model,
                                      const BuiltProblem& built,
                                      const ErrorBound& bound,
                                      const std::vector<int64_t>& observations,
-                                     const Context& context) {
+                                     const Context& context, Work* work) {
   const ProblemSubset subset(built.problem, observations);
   const BuiltProblem part = BuiltPart(built, subset, built.start);
-  const Decision first = Decide(model, part, bound, context);
+  const Decision first = Decide(model, part, bound, context, work);
   if (!first.is_refuted) return std::nullopt;
 
   const ProblemSubset support(part.problem, first.support);
-  Deletion deletion(model, BuiltPart(part, support, part.start), bound,
-                    context);
+  Deletion deletion(model, BuiltPart(part, support, part.start), bound, context,
+                    work);
   Conflict conflict;
   conflict.is_irreducible = deletion.Run();
   conflict.observations = subset.InWhole(support.InWhole(deletion.kept()));
@@ -105,13 +108,13 @@ std::optional<Conflict> FindConflict(const Model& model,
 
 bool ProveConflict(const Model& model, const BuiltProblem& built,
                    const ErrorBound& bound, const Context& context,
-                   Conflict* conflict) {
+                   Conflict* conflict, Work* work) {
   const ProblemSubset subset(built.problem, conflict->observations);
   const BuiltProblem part = BuiltPart(built, subset, built.start);
-  const Decision decision = Decide(model, part, bound, context);
+  const Decision decision = Decide(model, part, bound, context, work);
   if (!decision.is_refuted) return false;
   std::optional<PixelCertificate> proof =
-      ProveRefutation(model, part, bound, decision, context);
+      ProveRefutation(model, part, bound, decision, context, work);
   if (!proof) return false;
   conflict->proof = *std::move(proof);
   conflict->proof.rows = InWhole(subset, std::move(conflict->proof.rows));
@@ -126,15 +129,16 @@ std::vector<Conflict> PackConflicts(const Model& model,
                                     const BuiltProblem& built,
                                     const ErrorBound& bound,
                                     const std::vector<int64_t>& observations,
-                                    const Context& context) {
+                                    const Context& context, Work* work) {
   std::vector<Conflict> conflicts;
   std::vector<std::vector<int64_t>> open = Parts(built, observations);
-  while (!open.empty() && !context.IsCancelled()) {
+  while (!open.empty() && !work->IsUsedUp() && !context.IsCancelled()) {
     const std::vector<int64_t> part = std::move(open.back());
     open.pop_back();
     std::optional<Conflict> conflict =
-        FindConflict(model, built, bound, part, context);
-    if (!conflict || !ProveConflict(model, built, bound, context, &*conflict)) {
+        FindConflict(model, built, bound, part, context, work);
+    if (!conflict ||
+        !ProveConflict(model, built, bound, context, &*conflict, work)) {
       continue;
     }
     for (std::vector<int64_t>& rest :

@@ -27,27 +27,28 @@ struct Conflict {
 // irreducible by deletion: as long as what is left without one is refuted, too,
 // it goes. None if they go together, or if that is not decided. It is refuted
 // as far as the linear rows tell, not proved yet. Takes as many solves of the
-// support as it has observations.
+// support as it has observations. Adds to `*work`.
 std::optional<Conflict> FindConflict(const Model& model,
                                      const BuiltProblem& built,
                                      const ErrorBound& bound,
                                      const std::vector<int64_t>& observations,
-                                     const Context& context);
+                                     const Context& context, Work* work);
 
 // Gives a conflict its proof, by which some observations may fall away; false
-// if there is none. With strong lenses most of the time of a conflict.
+// if there is none. With strong lenses most of the time of a conflict. Adds to
+// `*work`.
 bool ProveConflict(const Model& model, const BuiltProblem& built,
                    const ErrorBound& bound, const Context& context,
-                   Conflict* conflict);
+                   Conflict* conflict, Work* work);
 
 // Proved conflicts without a common observation among the given ones, as many
 // as are found: every part of them that hangs together is asked for one, which
-// is taken out, and so on with what remains. At least as many observations must
-// go.
+// is taken out, and so on with what remains, until `*work`, which it adds to,
+// is used up. At least as many observations must go.
 std::vector<Conflict> PackConflicts(const Model& model,
                                     const BuiltProblem& built,
                                     const ErrorBound& bound,
                                     const std::vector<int64_t>& observations,
-                                    const Context& context);
+                                    const Context& context, Work* work);
 
 }  // namespace krot

@@ -56,9 +56,11 @@ ProfileLevel Profiler::Solve(Removal removal) const {
 
 void Profiler::Charge(ProfileLevel* level) {
   if (level->removal.observations.size() <= options_.max_charged) {
-    profile_.conflicts = PackAgainstRemoval(
-        model_, built_, {options_.norm, level->max_error}, level->removal,
-        std::move(profile_.conflicts), context_);
+    profile_.conflicts =
+        PackAgainstRemoval(model_, built_, {options_.norm, level->max_error},
+                           level->removal, std::move(profile_.conflicts),
+                           context_)
+            .conflicts;
   }
   level->num_proved = static_cast<int64_t>(profile_.conflicts.size());
 }

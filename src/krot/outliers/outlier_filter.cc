@@ -145,8 +145,10 @@ void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
                          std::vector<Conflict> found,
                          const std::vector<uint64_t>& elements) {
   const Timer timer;
-  std::vector<Conflict> conflicts = PackAgainstRemoval(
-      model_, built, bound_, removal, std::move(found), context_);
+  ConflictPacking packing = PackAgainstRemoval(model_, built, bound_, removal,
+                                               std::move(found), context_);
+  std::vector<Conflict>& conflicts = packing.conflicts;
+  summary_.is_search_complete = packing.is_complete;
   if (context_.IsCancelled()) return;
   summary_.rotation_suspect =
       FindRotationSuspect(model_, built, bound_, conflicts, removal, context_);

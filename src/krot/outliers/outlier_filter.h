@@ -93,6 +93,9 @@ struct OutlierFilterSummary {
   int64_t num_points_removed = 0;
   // So many at least had to go, whatever is done: disjoint conflicts.
   int64_t num_proved = 0;
+  // Whether more conflicts were looked for until none was found: the search
+  // ends early where hardly anything can be decided.
+  bool is_search_complete = true;
   int64_t num_irreducible = 0;            // of the conflicts
   std::optional<ConflictFile> conflicts;  // kConflicts
   // Most removed observations first; those without are left out.

@@ -30,7 +30,7 @@ class Packing {
  public:
   Packing(const Model& model, const BuiltProblem& built,
           const ErrorBound& bound, const Removal& removal,
-          std::vector<Conflict> found, const Context& context)
+          std::vector<Conflict> found, const Context& context, int64_t work)
       : model_(model),
         built_(built),
         problem_(built.problem),
@@ -41,29 +41,39 @@ class Packing {
         is_taken_(problem_.observations.size(), 0),
         neighbourhoods_(problem_, removal.estimate),
         two_views_(problem_, removal.estimate, bound.max_error) {
+    work_.limit = work * static_cast<int64_t>(problem_.observations.size());
     small_context_ = context;
     small_context_.num_threads = 1;
     for (const int64_t i : removal.observations) is_free_[i] = 0;
     for (Conflict& conflict : found) Take(std::move(conflict));
   }
 
-  std::vector<Conflict> Run();
+  ConflictPacking Run();
 
  private:
   int32_t FrameOf(int64_t i) const {
     return problem_.views[problem_.observations[i].view].frame;
   }
   bool FitsIn(int64_t i, const std::vector<int32_t>& frames) const;
-  std::optional<Conflict> Refute(int64_t i,
-                                 const std::vector<int64_t>& near) const;
-  std::optional<Conflict> Try(int64_t i,
-                              const std::vector<int32_t>& frames) const;
-  bool Prove(Conflict* conflict) const {
-    return ProveConflict(model_, built_, bound_, small_context_, conflict);
+  std::optional<Conflict> Refute(int64_t i, const std::vector<int64_t>& near,
+                                 Work* work) const;
+  std::optional<Conflict> Try(int64_t i, const std::vector<int32_t>& frames,
+                              Work* work) const;
+  bool Prove(Conflict* conflict, Work* work) const {
+    return ProveConflict(model_, built_, bound_, small_context_, conflict,
+                         work);
+  }
+  // Asked while there is more to do.
+  bool MayGoOn() {
+    context_.Stage("conflicts of removed observations",
+                   static_cast<int64_t>(conflicts_.size()),
+                   static_cast<int64_t>(removal_.observations.size()));
+    is_complete_ = is_complete_ && !work_.IsUsedUp();
+    return is_complete_ && !context_.IsCancelled();
   }
   bool IsTaken(int64_t i) const { return is_taken_[i] != 0; }
-  std::optional<Conflict> InTwoViews(int64_t i,
-                                     const std::vector<float>& worth) const;
+  std::optional<Conflict> InTwoViews(int64_t i, const std::vector<float>& worth,
+                                     Work* work) const;
   void ChargeInTwoViews(std::vector<int64_t>* open);
   bool Charge(int64_t i, int num_others);
   void ChargeInFrames(std::vector<int64_t>* open);
@@ -78,6 +88,8 @@ class Packing {
   const Removal& removal_;
   const Context context_;
   Context small_context_;
+  Work work_;
+  bool is_complete_ = true;
   std::vector<char> is_free_;   // to make conflicts with others
   std::vector<char> is_taken_;  // by a conflict
   const Neighbourhoods neighbourhoods_;
@@ -106,21 +118,23 @@ bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
 }
 
 // A conflict among observations (ascending) that hang together with i.
-std::optional<Conflict> Packing::Refute(
-    int64_t i, const std::vector<int64_t>& near) const {
+std::optional<Conflict> Packing::Refute(int64_t i,
+                                        const std::vector<int64_t>& near,
+                                        Work* work) const {
   for (const std::vector<int64_t>& part :
        SplitIntoComponents(problem_, PruneUnconstrained(problem_, near))) {
     if (!std::binary_search(part.begin(), part.end(), i)) continue;
-    return FindConflict(model_, built_, bound_, part, small_context_);
+    return FindConflict(model_, built_, bound_, part, small_context_, work);
   }
   return std::nullopt;
 }
 
 // A conflict of observation i in its frame and others.
 std::optional<Conflict> Packing::Try(int64_t i,
-                                     const std::vector<int32_t>& frames) const {
+                                     const std::vector<int32_t>& frames,
+                                     Work* work) const {
   if (FitsIn(i, frames)) return std::nullopt;
-  return Refute(i, neighbourhoods_.Around(i, frames, is_free_));
+  return Refute(i, neighbourhoods_.Around(i, frames, is_free_), work);
 }
 
 void Packing::Take(Conflict conflict) {
@@ -131,8 +145,9 @@ void Packing::Take(Conflict conflict) {
   conflicts_.push_back(std::move(conflict));
 }
 
-std::optional<Conflict> Packing::InTwoViews(
-    int64_t i, const std::vector<float>& worth) const {
+std::optional<Conflict> Packing::InTwoViews(int64_t i,
+                                            const std::vector<float>& worth,
+                                            Work* work) const {
   std::vector<std::vector<int64_t>> sets;
   const Observation& own = problem_.observations[i];
   for (int64_t j = problem_.point_begin[own.point];
@@ -146,8 +161,8 @@ std::optional<Conflict> Packing::InTwoViews(
     sets.push_back(std::move(set));
   }
   for (const std::vector<int64_t>& set : sets) {
-    std::optional<Conflict> conflict = Refute(i, set);
-    if (conflict && Prove(&*conflict)) return conflict;
+    std::optional<Conflict> conflict = Refute(i, set, work);
+    if (conflict && Prove(&*conflict, work)) return conflict;
   }
   return std::nullopt;
 }
@@ -157,7 +172,7 @@ std::optional<Conflict> Packing::InTwoViews(
 void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
   std::vector<int64_t> queue(open->rbegin(), open->rend());
   std::vector<int64_t> left;
-  while (!queue.empty() && !context_.IsCancelled()) {
+  while (!queue.empty() && MayGoOn()) {
     std::vector<int64_t> batch;
     while (batch.size() < kBatch && !queue.empty()) {
       if (!IsTaken(queue.back())) batch.push_back(queue.back());
@@ -167,10 +182,12 @@ void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
     all.insert(all.end(), batch.begin(), batch.end());
     const std::vector<float> worth = Worths(problem_, is_free_, all);
     std::vector<std::optional<Conflict>> found(batch.size());
+    std::vector<Work> work(batch.size());
     ParallelFor(static_cast<int64_t>(batch.size()), 1, context_.num_threads,
                 [&](int64_t n, int64_t, int) {
-                  found[n] = InTwoViews(batch[n], worth);
+                  found[n] = InTwoViews(batch[n], worth, &work[n]);
                 });
+    for (const Work& own : work) work_.done += own.done;
     std::vector<int64_t> again;
     for (size_t n = 0; n < batch.size(); ++n) {
       if (!found[n]) {
@@ -185,6 +202,7 @@ void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
     }
     queue.insert(queue.end(), again.rbegin(), again.rend());
   }
+  left.insert(left.end(), queue.rbegin(), queue.rend());
   *open = std::move(left);
 }
 
@@ -193,15 +211,18 @@ bool Packing::Charge(int64_t i, int num_others) {
   const std::vector<std::vector<int32_t>> sets =
       neighbourhoods_.FrameSets(i, num_others, is_free_);
   std::vector<std::optional<Conflict>> found(sets.size());
-  ParallelFor(static_cast<int64_t>(sets.size()), 1, context_.num_threads,
-              [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n]); });
+  std::vector<Work> work(sets.size());
+  ParallelFor(
+      static_cast<int64_t>(sets.size()), 1, context_.num_threads,
+      [&](int64_t n, int64_t, int) { found[n] = Try(i, sets[n], &work[n]); });
+  for (const Work& own : work) work_.done += own.done;
   std::vector<std::pair<size_t, size_t>> smallest_first;
   for (size_t n = 0; n < found.size(); ++n) {
     if (found[n]) smallest_first.emplace_back(found[n]->observations.size(), n);
   }
   std::sort(smallest_first.begin(), smallest_first.end());
   for (const auto& [size, n] : smallest_first) {
-    if (!Prove(&*found[n])) continue;
+    if (!Prove(&*found[n], &work_)) continue;
     Take(*std::move(found[n]));
     return true;
   }
@@ -213,10 +234,12 @@ bool Packing::Charge(int64_t i, int num_others) {
 void Packing::ChargeInFrames(std::vector<int64_t>* open) {
   for (const int num_others : {2, 3}) {
     std::vector<int64_t> left;
-    for (size_t n = 0; n < open->size() && !context_.IsCancelled(); ++n) {
+    const size_t first =
+        open->size() - std::min(open->size(), kMaxForMoreFrames);
+    for (size_t n = 0; n < open->size(); ++n) {
       const int64_t i = (*open)[n];
       if (IsTaken(i)) continue;
-      const bool is_tried = n + kMaxForMoreFrames >= open->size();
+      const bool is_tried = n >= first && MayGoOn();
       if (!is_tried || !Charge(i, num_others)) left.push_back(i);
     }
     *open = std::move(left);
@@ -234,7 +257,7 @@ void Packing::Charge(std::vector<int64_t>* open) {
   open->insert(open->begin(), crowded.begin(), crowded.end());
 }
 
-std::vector<Conflict> Packing::Run() {
+ConflictPacking Packing::Run() {
   const Reprojection reprojection(model_, built_);
   std::vector<std::pair<double, int64_t>> by_error;
   for (const int64_t i : removal_.observations) {
@@ -249,7 +272,7 @@ std::vector<Conflict> Packing::Run() {
   for (const int64_t i : open) is_free_[i] = 1;
   Charge(&open);
   ChargeTight();
-  return std::move(conflicts_);
+  return {std::move(conflicts_), is_complete_};
 }
 
 void Packing::ChargeTight() {
@@ -257,13 +280,13 @@ void Packing::ChargeTight() {
   for (const int64_t i : removal_.tight) {
     if (is_free_[i]) tight.push_back(i);
   }
-  if (tight.empty() || tight.size() > kMaxTight) return;
+  if (tight.empty() || tight.size() > kMaxTight || !MayGoOn()) return;
   const ProblemSubset subset(problem_, tight);
   const BuiltProblem part = BuiltPart(built_, subset, built_.start);
   std::vector<int64_t> all(tight.size());
   std::iota(all.begin(), all.end(), 0);
   for (Conflict& conflict :
-       PackConflicts(model_, part, bound_, all, small_context_)) {
+       PackConflicts(model_, part, bound_, all, small_context_, &work_)) {
     conflict.observations = subset.InWhole(std::move(conflict.observations));
     conflict.proof.rows = InWhole(subset, std::move(conflict.proof.rows));
     Take(std::move(conflict));
@@ -272,13 +295,13 @@ void Packing::ChargeTight() {
 
 }  // namespace
 
-std::vector<Conflict> PackAgainstRemoval(const Model& model,
-                                         const BuiltProblem& built,
-                                         const ErrorBound& bound,
-                                         const Removal& removal,
-                                         std::vector<Conflict> found,
-                                         const Context& context) {
-  return Packing(model, built, bound, removal, std::move(found), context).Run();
+ConflictPacking PackAgainstRemoval(
+    const Model& model, const BuiltProblem& built, const ErrorBound& bound,
+    const Removal& removal, std::vector<Conflict> found, const Context& context,
+    int64_t work_per_observation) {
+  return Packing(model, built, bound, removal, std::move(found), context,
+                 work_per_observation)
+      .Run();
 }
 
 }  // namespace krot

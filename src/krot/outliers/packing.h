@@ -10,6 +10,15 @@
 
 namespace krot {
 
+// What is found of the conflicts that removed observations take part in.
+struct ConflictPacking {
+  std::vector<Conflict> conflicts;
+  bool is_complete = true;  // false: it ended for want of work
+};
+
+// An endoscope's model needs 1,300, and most fewer than 300.
+inline constexpr int64_t kMostWork = 1500;
+
 // Disjoint conflicts, each of which charges one of the removed observations
 // with what others it does not go together with, so that as many as possible
 // have one of their own. For each, those that barely miss the bound first, as
@@ -27,11 +36,13 @@ namespace krot {
 //
 // Those that are `found` already, without a common observation, stay, and come
 // first.
-std::vector<Conflict> PackAgainstRemoval(const Model& model,
-                                         const BuiltProblem& built,
-                                         const ErrorBound& bound,
-                                         const Removal& removal,
-                                         std::vector<Conflict> found,
-                                         const Context& context);
+//
+// Where hardly anything can be decided, as with wrong rotations, it ends with
+// the conflicts so far once it has taken `work_per_observation` (Work) for each
+// observation of the problem.
+ConflictPacking PackAgainstRemoval(
+    const Model& model, const BuiltProblem& built, const ErrorBound& bound,
+    const Removal& removal, std::vector<Conflict> found, const Context& context,
+    int64_t work_per_observation = kMostWork);
 
 }  // namespace krot

@@ -165,9 +165,12 @@ std::string BracketSentence(const OutlierFilterSummary& summary) {
       "removed " + Thousands(static_cast<int64_t>(summary.removed.size())) +
       " of " + Thousands(summary.num_observations);
   if (summary.conflicts) {
-    sentence += "; at least " + Thousands(summary.num_proved) + " must go (" +
-                Thousands(summary.num_proved) + " disjoint conflict" +
-                (summary.num_proved == 1 ? "" : "s") + ", certificate)";
+    sentence +=
+        "; at least " + Thousands(summary.num_proved) + " must go (" +
+        Thousands(summary.num_proved) + " disjoint conflict" +
+        (summary.num_proved == 1 ? "" : "s") + ", certificate" +
+        (summary.is_search_complete ? ")"
+                                    : "; the search for more ended early)");
   }
   return sentence;
 }
@@ -175,6 +178,13 @@ std::string BracketSentence(const OutlierFilterSummary& summary) {
 std::string OutlierTable(const OutlierReport& report) {
   const OutlierFilterSummary& summary = report.summary;
   std::string text = BracketSentence(summary) + "\n";
+  if (!summary.is_search_complete) {
+    text +=
+        "The search for conflicts ended early, as it took too much work: more "
+        "may have to go than is proved. Where that happens, rotations, "
+        "intrinsics or matches are often wrong altogether, or the bound is far "
+        "too low; look at these first.\n";
+  }
   if (summary.num_points_removed > 0) {
     text += Counted(summary.num_points_removed, "track") +
             " kept fewer than two and went, with " +
@@ -216,6 +226,7 @@ std::string OutlierJson(const OutlierReport& report) {
       {"num_must_go", summary.conflicts ? Json(summary.num_proved) : Json()},
       {"num_irreducible",
        summary.conflicts ? Json(summary.num_irreducible) : Json()},
+      {"is_search_complete", summary.is_search_complete},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},

@@ -166,6 +166,7 @@ Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
           {"num_points_removed", outliers->num_points_removed},
           {"num_must_go",
            outliers->conflicts ? Json(outliers->num_proved) : Json()},
+          {"is_search_complete", outliers->is_search_complete},
           {"seconds",
            {{"removal", outliers->seconds_removal},
             {"conflicts", outliers->seconds_conflicts},
