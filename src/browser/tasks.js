@@ -43,8 +43,8 @@ export function solve(model) {
   };
 }
 
-// Without a bound, the one that the error profile recommends; with it the
-// profile is not made.
+// Without a bound the model's noise chooses one, and the error profile shows
+// what others cost.
 export function filter(model, bound) {
   const chosen = bound === null ?
     ['--OutlierFilter.profile_path', 'profile.json'] :

@@ -30,19 +30,18 @@ class OutlierFilterCommand : public ::testing::Test {
 
   KrotResult Filter(std::vector<std::string> more = {},
                     const std::string& max_error = "3") const {
-    std::vector<std::string> arguments = {"outlier_filter",
-                                          "--input_path",
-                                          folder_ / "input",
-                                          "--output_path",
-                                          folder_ / "output",
-                                          "--report_path",
-                                          folder_ / "r.json",
-                                          "--OutlierFilter.max_error",
-                                          max_error,
-                                          "--overwrite",
-                                          "1"};
+    std::vector<std::string> arguments = {
+        "outlier_filter",   "--input_path",     folder_ / "input",
+        "--output_path",    folder_ / "output", "--report_path",
+        folder_ / "r.json", "--overwrite",      "1"};
+    if (!max_error.empty()) {
+      more.push_back("--OutlierFilter.max_error=" + max_error);
+    }
     arguments.insert(arguments.end(), more.begin(), more.end());
     return RunKrot(arguments);
+  }
+  KrotResult WithoutABound(std::vector<std::string> more) const {
+    return Filter(std::move(more), "");
   }
   KrotResult Check(const std::string& file) const {
     return RunKrot({"certificate_checker", "--input_path", folder_ / "input",
@@ -107,28 +106,20 @@ TEST_F(OutlierFilterCommand, ProvesNothingByTheThreshold) {
 
 TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
   const std::string profile = folder_ / "profile.json";
-  const std::vector<std::string> arguments = {"outlier_filter",
-                                              "--input_path",
-                                              folder_ / "input",
-                                              "--output_path",
-                                              folder_ / "output",
-                                              "--report_path",
-                                              folder_ / "r.json",
-                                              "--conflicts_path",
-                                              folder_ / "c.json",
-                                              "--OutlierFilter.profile_path",
-                                              profile};
-  const KrotResult result = RunKrot(arguments);
+  const KrotResult result =
+      WithoutABound({"--conflicts_path", folder_ / "c.json",
+                     "--OutlierFilter.profile_path", profile});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json json = Json::parse(ReadBytes(profile));
   const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
   EXPECT_EQ(report["profile"]["levels"], json["levels"]);
   const Json& levels = json["levels"];
-  const Json& chosen = json["elbow"].is_null()
-                           ? levels.back()
-                           : levels[json["elbow"].get<int>()];
-  const double largest = chosen["max_error"].get<double>();
-  EXPECT_DOUBLE_EQ(report["max_error"].get<double>(), 1.0005 * largest);
+  ASSERT_FALSE(json["elbow"].is_null());
+  const int elbow = json["elbow"].get<int>();
+  const Json& chosen = levels[elbow];
+  EXPECT_EQ(report["max_error"], json["noise"]["max_error"]);
+  EXPECT_LE(chosen["max_error"], report["max_error"]);
+  EXPECT_GT(levels[elbow - 1]["max_error"], report["max_error"]);
   EXPECT_EQ(report["num_removed"], chosen["num_removed"]);
   std::set<uint64_t> points;
   for (const Json& removed : report["removed"]) {
@@ -141,6 +132,89 @@ TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
   EXPECT_LE(levels.back()["max_error"].get<double>(),
             0.5 * levels[0]["max_error"].get<double>());
   EXPECT_EQ(Check("c.json").exit_code, 0);
+}
+
+// Everything above what noise explains goes; nothing else has to.
+TEST_F(OutlierFilterCommand, ChoosesItsBoundByTheNoise) {
+  const KrotResult result =
+      WithoutABound({"--conflicts_path", folder_ / "c.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_GT(report["num_must_go"], 0);
+  EXPECT_EQ(report["max_error"], report["noise"]["max_error"]);
+  EXPECT_GT(report["noise"]["lower_bound"], report["max_error"]);
+  EXPECT_TRUE(report["is_within"]);
+  EXPECT_THAT(result.out, HasSubstr("such noise is not all"));
+  EXPECT_EQ(Check("c.json").exit_code, 0);
+}
+
+TEST_F(OutlierFilterCommand, CallsNoObservationOfNoiseWrong) {
+  for (const double pixel_noise : {0.0, 1.0}) {
+    SceneOptions options = SmallScene();
+    options.pixel_noise = pixel_noise;
+    options.start_translation_noise = options.start_point_noise = 0;
+    Save(SynthesizeScene(options).model, folder_ / "input");
+    const KrotResult result =
+        WithoutABound({"--conflicts_path", folder_ / "c.json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("removed 0 of "));
+    EXPECT_THAT(result.out, HasSubstr("no elbow"));
+    const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+    EXPECT_TRUE(report["max_error"].is_null());
+    for (const char* name : {"images.bin", "points3D.bin"}) {
+      EXPECT_EQ(ReadBytes(folder_ / "output" / name),
+                ReadBytes(folder_ / "input" / name));
+    }
+    const KrotResult check = Check("c.json");
+    EXPECT_EQ(check.exit_code, 0) << check.err;
+    EXPECT_THAT(check.out, HasSubstr("at least 0 observations must go"));
+  }
+}
+
+TEST_F(OutlierFilterCommand, DoubtsMoreThanObservationsWhereAllErrorsAreLarge) {
+  for (const double pixel_noise : {1.0, 20.0}) {
+    SceneOptions options = SmallScene();
+    options.pixel_noise = pixel_noise;
+    Save(SynthesizeScene(options).model, folder_ / "input");
+    const KrotResult result = WithoutABound({});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(
+        result.out.find("rotations, intrinsics or matches may be wrong") !=
+            std::string::npos,
+        pixel_noise > 2)
+        << result.out;
+  }
+}
+
+TEST_F(OutlierFilterCommand, SaysThatThereIsNoElbowWhateverTheBound) {
+  SceneOptions options = SmallScene();
+  options.pixel_noise = 1;
+  Save(SynthesizeScene(options).model, folder_ / "input");
+  const KrotResult result =
+      Filter({"--OutlierFilter.profile_path", folder_ / "profile.json"}, "1");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("there is no elbow"));
+  EXPECT_THAT(result.out, ::testing::Not(HasSubstr("called wrong")));
+  EXPECT_TRUE(
+      Json::parse(ReadBytes(folder_ / "profile.json"))["elbow"].is_null());
+}
+
+TEST_F(OutlierFilterCommand, NeedsABoundForTheThreshold) {
+  const KrotResult result =
+      WithoutABound({"--OutlierFilter.method", "threshold"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, IsOneSentence("krot outlier_filter", "is required"));
+}
+
+TEST_F(OutlierFilterCommand, SaysWhatItDoesInEveryPhase) {
+  const KrotResult result = WithoutABound({"--log_level", "2"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* phase :
+       {"reading ", "measuring the noise", "comparing the errors with noise",
+        "choosing what to remove", "conflicts of removed observations: ",
+        "lowering the largest error", "writing "}) {
+    EXPECT_THAT(result.err, HasSubstr(phase));
+  }
 }
 
 TEST_F(OutlierFilterCommand, DrawsItsProfileDownToTheBoundThatIsGiven) {

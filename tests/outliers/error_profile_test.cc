@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/problem/components.h"
 #include "krot/problem/subset.h"
@@ -120,24 +121,80 @@ TEST(ErrorProfile, HasTheOptimaOfAnIndependentOracle) {
   }
 }
 
+NoiseLimit LimitOf(const Model& model) {
+  return FindNoiseLimit(model, BuildProblem(model, {}), Norm::L2(), {});
+}
+
+TEST(NoiseLimit, HasTheSigmaOfAnAdjustedModelWhateverTheLengthOfItsTracks) {
+  for (const double track_length : {3.0, 5.0, 8.0}) {
+    SCOPED_TRACE(track_length);
+    SceneOptions options = OutlierScene(6, 0, 400, 0.7);
+    options.num_frames = 10;
+    options.track_length = track_length;
+    const Model adjusted =
+        AdjustBundle(SynthesizeScene(options).model, {}, {}).model;
+    EXPECT_NEAR(LimitOf(adjusted).sigma, 0.7, 0.1);
+  }
+}
+
+// Nor where cameras, points or a share of the observations are far off.
+TEST(NoiseLimit, DoesNotMindOutliersOrAStartThatIsOff) {
+  for (const double start_noise : {0.0, 0.03}) {
+    for (const double outlier_ratio : {0.0, 0.1}) {
+      SCOPED_TRACE(testing::Message() << start_noise << ' ' << outlier_ratio);
+      SceneOptions options = OutlierScene(6, outlier_ratio, 150, 1);
+      options.start_translation_noise = start_noise;
+      options.start_point_noise = start_noise;
+      const NoiseLimit limit = LimitOf(SynthesizeScene(options).model);
+      EXPECT_GT(limit.sigma, 0.7);
+      EXPECT_LT(limit.sigma, 1.5);
+    }
+  }
+}
+
 TEST(ErrorProfile, BendsWherePlantedOutliersAreGone) {
-  SceneOptions options;
-  options.num_frames = 6;
-  options.num_points = 150;
-  options.track_length = 4;
-  options.camera_model_id = 1;
-  options.pixel_noise = 0.2;
-  options.outlier_ratio = 0.01;
-  options.random_seed = 6;
-  const SyntheticScene scene = SynthesizeScene(options);
-  const BuiltProblem built = BuildProblem(scene.model, {});
+  for (const double start_noise : {0.0, 0.03}) {
+    SceneOptions options = OutlierScene(6, 0.02, 150, 0.2);
+    options.start_translation_noise = start_noise;
+    options.start_point_noise = start_noise;
+    const SyntheticScene scene = SynthesizeScene(options);
+    const BuiltProblem built = BuildProblem(scene.model, {});
+    const ErrorProfile profile =
+        FindErrorProfile(scene.model, built, {Norm::L2(), {}}, {});
+    ASSERT_TRUE(profile.elbow);
+    const ProfileLevel& elbow = profile.levels[*profile.elbow];
+    EXPECT_LE(elbow.max_error, profile.noise.max_error);
+    EXPECT_GT(profile.levels[*profile.elbow - 1].max_error,
+              profile.noise.max_error);
+    // Of all but those that happen to fall near their place.
+    EXPECT_LT(elbow.max_error, 2);
+    EXPECT_LE(elbow.removal.observations.size(), scene.outliers.size());
+    EXPECT_GE(elbow.removal.observations.size(),
+              0.9 * static_cast<double>(scene.outliers.size()));
+    EXPECT_LE(profile.levels.back().max_error,
+              0.5 * profile.levels[0].max_error);
+  }
+}
+
+TEST(ErrorProfile, HasNoElbowInGaussianNoise) {
+  for (const double track_length : {2.5, 4.0, 6.0}) {
+    for (const uint64_t seed : {1u, 2u, 3u}) {
+      SceneOptions options = OutlierScene(seed, 0, 150, 1);
+      options.track_length = track_length;
+      const Model model = SynthesizeScene(options).model;
+      const ErrorProfile profile = FindErrorProfile(
+          model, BuildProblem(model, {}), {Norm::L2(), {}}, {});
+      EXPECT_FALSE(profile.elbow) << track_length << ", " << seed;
+      EXPECT_GT(profile.levels.size(), 3u);
+    }
+  }
+}
+
+TEST(ErrorProfile, HasNoElbowInRounding) {
+  const Model model = MakeOutlierScene(6, 0, 150, 0).model;
   const ErrorProfile profile =
-      FindErrorProfile(scene.model, built, {Norm::L2(), 0.4}, {});
-  ASSERT_TRUE(profile.elbow);
-  const ProfileLevel& elbow = profile.levels[*profile.elbow];
-  // Noise is within four sigma or so; outliers are above ten pixels.
-  EXPECT_LT(elbow.max_error, 2);
-  EXPECT_LE(elbow.removal.observations.size(), 2 * scene.outliers.size());
+      FindErrorProfile(model, BuildProblem(model, {}), {Norm::L2(), {}}, {});
+  EXPECT_FALSE(profile.elbow);
 }
 
 TEST(ErrorProfile, EndsWithTheFirstLevelWhereThatIsLowEnough) {

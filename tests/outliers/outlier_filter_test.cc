@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 #include <set>
+#include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -116,6 +117,68 @@ TEST(FilterOutliers, HasTheSameBitsAtOneAndTwoThreads) {
   ASSERT_EQ(a.model.points3D.size(), b.model.points3D.size());
   for (size_t k = 0; k < a.model.points3D.size(); ++k) {
     EXPECT_EQ(a.model.points3D[k].xyz, b.model.points3D[k].xyz);
+  }
+}
+
+TEST(FilterOutliers, GivesBackAModelWhoseErrorsNoiseExplains) {
+  for (const double pixel_noise : {0.0, 0.5, 2.0}) {
+    for (const bool make_profile : {false, true}) {
+      SCOPED_TRACE(testing::Message() << pixel_noise << ' ' << make_profile);
+      const Model model = MakeOutlierScene(9, 0, 150, pixel_noise).model;
+      OutlierFilterOptions options;
+      options.make_profile = make_profile;
+      const OutlierFilterResult result = FilterOutliers(model, options, {});
+      EXPECT_TRUE(result.summary.removed.empty());
+      EXPECT_EQ(result.summary.max_error, 0);
+      ASSERT_TRUE(result.summary.noise);
+      EXPECT_TRUE(result.summary.noise->ExplainsAll());
+      EXPECT_LE(result.summary.noise->lower_bound,
+                result.summary.noise->limit.max_error);
+      ASSERT_EQ(result.model.points3D.size(), model.points3D.size());
+      for (size_t k = 0; k < model.points3D.size(); ++k) {
+        EXPECT_EQ(result.model.points3D[k].xyz, model.points3D[k].xyz);
+      }
+    }
+  }
+}
+
+TEST(FilterOutliers, RemovesWithoutABoundWhatNoiseDoesNotExplain) {
+  for (const double pixel_noise : {0.0, 0.5}) {
+    const SyntheticScene scene = MakeOutlierScene(9, 0.03, 150, pixel_noise);
+    const OutlierFilterResult result =
+        FilterOutliers(scene.model, OutlierFilterOptions(), {});
+    const OutlierFilterSummary& summary = result.summary;
+    EXPECT_EQ(summary.max_error, summary.noise->limit.max_error);
+    EXPECT_GT(summary.noise->lower_bound, summary.max_error);
+    EXPECT_TRUE(summary.is_within);
+    // The planted ones suffice.
+    EXPECT_LE(summary.removed.size(), scene.outliers.size());
+    EXPECT_GE(static_cast<double>(summary.num_proved),
+              0.9 * static_cast<double>(scene.outliers.size()));
+  }
+}
+
+// Every phase says what it does, and none counts beyond its end.
+TEST(FilterOutliers, TellsOfItsStages) {
+  const SyntheticScene scene = MakeOutlierScene(3, 0.05, 100);
+  std::set<std::string> stages;
+  Context context;
+  context.on_stage = [&](const std::string& what, int64_t done, int64_t of) {
+    stages.insert(what);
+    EXPECT_LE(done, of) << what;
+  };
+  OutlierFilterOptions options;
+  options.make_profile = true;
+  FilterOutliers(scene.model, options, context);
+  for (const char* what :
+       {"measuring the noise",
+        "error profile, level 0 of about 6: lowering the largest error, round "
+        "1",
+        "choosing what to remove, programme", "taking back what fits",
+        "conflicts of removed observations",
+        "lowering the largest error, round 1",
+        "finding the least squares below the largest error"}) {
+    EXPECT_EQ(stages.count(what), 1u) << what;
   }
 }
 

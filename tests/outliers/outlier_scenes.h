@@ -6,18 +6,25 @@
 
 namespace krot {
 
-// Small scenes with pinhole cameras, half a pixel of noise and outliers.
-inline SyntheticScene MakeOutlierScene(uint64_t seed, double outlier_ratio,
-                                       int num_points = 60) {
+// Small scenes with pinhole cameras, noise and outliers.
+inline SceneOptions OutlierScene(uint64_t seed, double outlier_ratio,
+                                 int num_points, double pixel_noise) {
   SceneOptions options;
   options.num_frames = 6;
   options.num_points = num_points;
   options.track_length = 4;
   options.camera_model_id = 1;
-  options.pixel_noise = 0.5;
+  options.pixel_noise = pixel_noise;
   options.outlier_ratio = outlier_ratio;
   options.random_seed = seed;
-  return SynthesizeScene(options);
+  return options;
+}
+
+inline SyntheticScene MakeOutlierScene(uint64_t seed, double outlier_ratio,
+                                       int num_points = 60,
+                                       double pixel_noise = 0.5) {
+  return SynthesizeScene(
+      OutlierScene(seed, outlier_ratio, num_points, pixel_noise));
 }
 
 }  // namespace krot

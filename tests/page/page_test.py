@@ -536,6 +536,27 @@ class RenderedSceneTest(unittest.TestCase):
                     math.hypot(x, y), delta=4)
 
 
+class NoiseAloneTest(unittest.TestCase):
+    def test_no_observation_is_called_wrong(self):
+        for noise in (0, 1):
+            with self.subTest(noise=noise), \
+                    tempfile.TemporaryDirectory() as folder:
+                root = pathlib.Path(folder)
+                run_krot("model_synthesizer", "--output_path", root / "input",
+                         "--Scene.num_frames", 6, "--Scene.num_points", 100,
+                         "--Scene.pixel_noise", noise)
+                run_krot("outlier_filter", "--input_path", root / "input",
+                         "--output_path", root / "output",
+                         "--OutlierFilter.profile_path", root / "profile.json",
+                         "--html_path", root / "page.html")
+                with Chromium((1200, 1300)) as browser:
+                    browser.open((root / "page.html").as_uri())
+                    self.assertIn("No observation is called wrong",
+                                  browser.text("#verdict"))
+                    self.assertNotIn("elbow", browser.text("#profile"))
+                    self.assertEqual(browser.console(), [])
+
+
 class RotationSuspectTest(unittest.TestCase):
     """A scene in which one camera is turned by a degree about its own axis."""
 

@@ -57,8 +57,8 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   parser->AddOutputFile(
       "OutlierFilter.profile_path", &command->profile_path,
       "Where the error profile goes, as JSON: the largest error against the "
-      "number removed, down to max_error or half of the first; also on the "
-      "page");
+      "number removed, down to max_error or, without it, half of the first or "
+      "what noise explains; also on the page");
   AddCommonOptions(
       "Recorded in the report; this command draws no random numbers",
       &command->common, parser);
@@ -70,14 +70,14 @@ void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
       parser.Refuse(
           name, "with --OutlierFilter.method threshold, which proves nothing");
     }
+    if (!command.options.max_error) {
+      throw OptionError(
+          "--OutlierFilter.max_error is required with "
+          "--OutlierFilter.method threshold");
+    }
   }
   if (command.paths.html_path.empty()) {
     parser.Refuse("image_path", "without --html_path");
-  }
-  if (!command.options.max_error && command.profile_path.empty()) {
-    throw OptionError(
-        "--OutlierFilter.max_error is required without "
-        "--OutlierFilter.profile_path");
   }
 }
 

@@ -9,8 +9,9 @@ namespace krot {
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
   table->Add({"OutlierFilter.max_error",
-              "The bound that all errors are to be within; may be missing "
-              "with profile_path only, whose elbow it then is",
+              "The bound that all errors are to be within; without it what the "
+              "model's own noise explains, and nothing is removed where it is "
+              "not proved that some errors are above that",
               "a number > 0, pixels", "", false,
               [options](const std::string& text) {
                 double value = 0;

@@ -2,15 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/bridge/reprojection.h"
 #include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
+#include "krot/outliers/robust_start.h"
 
 namespace krot {
 namespace {
 
+// That noise alone exceeds the limit.
+constexpr double kFalseAlarm = 0.05;
+// Smaller errors are not told from rounding, pixels.
+constexpr double kLeastNoise = 1e-3;
 // Few are enough where the last level's weights are at hand.
 constexpr int kFirstProgrammes = 4;
 constexpr int kNextProgrammes = 2;
@@ -23,12 +30,14 @@ class Profiler {
         built_(built),
         options_(options),
         context_(context),
-        search_(model, built, options.norm, context) {}
+        search_(model, built, options.norm, context) {
+    profile_.noise = FindNoiseLimit(model, built, options.norm, context);
+  }
 
   ErrorProfile Run();
 
  private:
-  ProfileLevel Solve(Removal removal) const;
+  ProfileLevel Solve(Removal removal, const Context& context) const;
   void Charge(ProfileLevel* level);
   void Append(ProfileLevel level);
 
@@ -41,10 +50,10 @@ class Profiler {
 };
 
 // The optimum of what a removal leaves.
-ProfileLevel Profiler::Solve(Removal removal) const {
+ProfileLevel Profiler::Solve(Removal removal, const Context& context) const {
   OptimumWithout optimum =
       SolveWithout(model_, built_, removal.observations, removal.estimate,
-                   options_.norm, options_.relative_gap, context_);
+                   options_.norm, options_.relative_gap, context);
   ProfileLevel level;
   level.removal = std::move(removal);
   level.removal.estimate = std::move(optimum.estimate);
@@ -75,48 +84,83 @@ void Profiler::Append(ProfileLevel level) {
   levels.push_back(std::move(level));
 }
 
-std::optional<size_t> Elbow(const std::vector<ProfileLevel>& levels) {
-  if (levels.size() < 3) return std::nullopt;
-  const auto removed = [&](size_t n) {
-    return static_cast<double>(levels[n].removal.observations.size());
-  };
-  const size_t last = levels.size() - 1;
-  const auto fall = [&](size_t n) {
-    return std::log(levels[0].max_error / levels[n].max_error);
-  };
-  std::optional<size_t> elbow;
-  double largest = 0;
-  for (size_t n = 1; n < last; ++n) {
-    const double below = fall(n) / fall(last) - removed(n) / removed(last);
-    if (!(below > largest)) continue;
-    largest = below;
-    elbow = n;
+NoiseLimit LimitAt(const Reprojection& reprojection,
+                   const KnownRotationProblem& problem,
+                   const Estimate& estimate, Norm norm) {
+  std::vector<double> variances;  // of an axis, by each observation alone
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    const double rows = 2.0 * static_cast<double>(problem.point_begin[k + 1] -
+                                                  problem.point_begin[k]);
+    if (rows <= 3) continue;
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      const double error = reprojection.Error(estimate, Norm::L2(), i);
+      variances.push_back(error * error * rows / (rows - 3));
+    }
   }
-  return elbow;
+  NoiseLimit noise;
+  noise.max_error = kLeastNoise;
+  if (variances.empty()) return noise;
+  const auto count = static_cast<double>(variances.size());
+  const auto middle =
+      variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
+  std::nth_element(variances.begin(), middle, variances.end());
+  noise.sigma = std::sqrt(*middle / (2 * std::log(2.0)));
+  // ||e||_1 <= sqrt(2) ||e||_2.
+  const double factor = norm.p == 1 ? std::sqrt(2.0) : 1;
+  noise.max_error =
+      std::max(kLeastNoise, factor * noise.sigma *
+                                std::sqrt(2 * std::log(count / kFalseAlarm)));
+  return noise;
 }
 
 ErrorProfile Profiler::Run() {
   Removal nothing;
   nothing.estimate = built_.start;
-  profile_.levels.push_back(Solve(std::move(nothing)));
+  const auto at_level = [this](int n) {
+    return context_.Within("error profile, level " + std::to_string(n) +
+                           " of about " + std::to_string(options_.num_levels));
+  };
+  profile_.levels.push_back(Solve(std::move(nothing), at_level(0)));
   const double first = profile_.levels[0].max_error;
-  const double last = options_.max_error.value_or(first / 2);
+  const double noise = profile_.noise.max_error;
+  const bool has_outliers = profile_.levels[0].lower_bound > noise;
+  const double last = options_.max_error.value_or(
+      has_outliers ? std::min(noise, first / 2) : first / 2);
   for (int n = 0; !context_.IsCancelled(); ++n) {
     const double now = profile_.levels.back().max_error;
     if (!(now > last) || !std::isfinite(now)) break;
     const double steps = std::max(1, options_.num_levels - n);
-    const double bound = std::max(last, now * std::pow(last / now, 1 / steps));
+    double bound = std::max(last, now * std::pow(last / now, 1 / steps));
+    if (noise < now) bound = std::max(bound, noise);
     ProfileLevel level =
-        Solve(search_.Find(bound, n == 0 ? kFirstProgrammes : kNextProgrammes));
+        Solve(search_.Find(bound, n == 0 ? kFirstProgrammes : kNextProgrammes),
+              at_level(n + 1));
     if (context_.IsCancelled() || !(level.max_error < now)) break;
     Charge(&level);
     Append(std::move(level));
   }
-  profile_.elbow = Elbow(profile_.levels);
+  for (size_t n = 1; has_outliers && n < profile_.levels.size(); ++n) {
+    if (profile_.levels[n].max_error > noise) continue;
+    profile_.elbow = n;
+    break;
+  }
   return std::move(profile_);
 }
 
 }  // namespace
+
+NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
+                          Norm norm, const Context& context) {
+  const Reprojection reprojection(model, built);
+  const NoiseLimit own =
+      LimitAt(reprojection, built.problem, built.start, norm);
+  context.Stage("measuring the noise");
+  const Estimate robust = FindRobustStart(
+      built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
+  const NoiseLimit limit = LimitAt(reprojection, built.problem, robust, norm);
+  return limit.sigma < own.sigma ? limit : own;
+}
 
 ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
                               const ErrorProfileOptions& options,

@@ -14,11 +14,33 @@
 
 namespace krot {
 
-// How low the largest error can be without some of the observations.
+// How low the largest error can be without some of the observations, and from
+// where on that is no noise.
+
+// What Gaussian noise explains.
+struct NoiseLimit {
+  double sigma = 0;  // per axis, pixels
+  // In a model of such noise alone no error is above this with a probability of
+  // 95 %; true pixels of the norm; > 0.
+  double max_error = 0;
+};
+
+// From the median error at built.start or at FindRobustStart's, whichever has
+// less: the one is nearer to the least squares, the other does not mind a start
+// that is off. Points of least squares take up 3 of the 2 n coordinates of a
+// track of n observations, so that an error shows the share (2 n - 3) / (2 n)
+// of its variance, on average [Baarda 1968]; the median of the squares is then
+// 2 ln 2 sigma^2, whatever a few others are, and one of N is above
+// 2 ln(N / 0.05) sigma^2 with a probability of 5 % at most (Bonferroni).
+// Nothing below a thousandth of a pixel is told from rounding. Takes less than
+// a solve.
+NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
+                          Norm norm, const Context& context);
 
 struct ErrorProfileOptions {
   Norm norm;
-  // The last level's largest error, true pixels; > 0. None: half of the first.
+  // The last level's largest error, true pixels; > 0. None: half of the first
+  // or, if that is lower and the first is above it, what noise explains.
   std::optional<double> max_error;
   double relative_gap = 1e-3;  // of every level; > 0
   int num_levels = 6;          // about, below the first; >= 1
@@ -45,18 +67,19 @@ struct ErrorProfile {
   // in the first.
   std::vector<ProfileLevel> levels;
   std::vector<Conflict> conflicts;  // disjoint
-  // The level farthest below the straight line from the first to the last,
-  // numbers removed and logarithms of the largest errors each in units of what
-  // they change by [Satopaa, Albrecht, Irwin, Raghavan 2011]; none of fewer
-  // than three.
+  NoiseLimit noise;
+  // Where what is no noise ends: the first level that noise explains, if it is
+  // proved that the one of all observations is above that. None: noise explains
+  // them all, as far as is proved, or none of the levels.
   std::optional<size_t> elbow;
 };
 
 // From one optimum to the next: observations are removed for a bound below it
-// (RemovalSearch), in equal ratios down to the last, and what is left is solved
-// anew (SolveInRounds). Tracks that keep one observation hold nothing any more
-// and have no part in the errors. Cancelled, it ends with the levels so far.
-// Every level takes about as long as two solves.
+// (RemovalSearch), in equal ratios down to the last, stopping at what noise
+// explains, and what is left is solved anew (SolveInRounds). Tracks that keep
+// one observation hold nothing any more and have no part in the errors.
+// Cancelled, it ends with the levels so far. Every level takes about as long as
+// two solves.
 ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
                               const ErrorProfileOptions& options,
                               const Context& context);

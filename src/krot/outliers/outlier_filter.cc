@@ -9,8 +9,8 @@
 #include "krot/model/local_frame.h"
 #include "krot/model/remove_observations.h"
 #include "krot/outliers/element_index.h"
-#include "krot/outliers/error_profile.h"
 #include "krot/outliers/list_removed.h"
+#include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/removal_start.h"
@@ -56,8 +56,11 @@ class OutlierFilter {
   }
   void FilterByConflicts();
   void FilterByThreshold();
-  Removal RemoveFew(const BuiltProblem& built, std::vector<Conflict>* found);
-  Removal MakeProfile(const BuiltProblem& built, std::vector<Conflict>* found);
+  std::optional<Removal> RemoveFew(const BuiltProblem& built,
+                                   std::vector<Conflict>* found);
+  std::optional<Removal> MakeProfile(const BuiltProblem& built,
+                                     std::vector<Conflict>* found);
+  void MeasureNoise(const BuiltProblem& built);
   void Pack(const BuiltProblem& built, const Removal& removal,
             std::vector<Conflict> found, const std::vector<uint64_t>& elements);
   void PlaceAt(const BuiltProblem& built, const Removal& removal, Model* moved);
@@ -71,7 +74,8 @@ class OutlierFilter {
   const std::vector<double> errors_before_;  // per track element
   std::vector<char> is_removed_;
   std::vector<int64_t> conflict_of_;
-  RemovedObservations kept_;  // as of the last solve
+  RemovedObservations kept_;    // as of the last solve
+  bool is_given_back_ = false;  // the model, with nothing removed
   OutlierFilterSummary summary_;
 };
 
@@ -97,20 +101,38 @@ void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
   *moved = ApplyEstimate(model_, built, placed);
 }
 
-// Conflicts that are at hand already go to `found`.
-Removal OutlierFilter::RemoveFew(const BuiltProblem& built,
-                                 std::vector<Conflict>* found) {
+// Conflicts that are at hand already go to `found`. None if noise explains all
+// errors where it is to choose the bound, which is set otherwise.
+std::optional<Removal> OutlierFilter::RemoveFew(const BuiltProblem& built,
+                                                std::vector<Conflict>* found) {
+  if (built.pixels.empty()) return Removal{{}, built.start, {}};
   if (options_.make_profile) return MakeProfile(built, found);
+  if (bound_.max_error == 0) {
+    MeasureNoise(built);
+    if (summary_.noise->ExplainsAll()) return std::nullopt;
+    bound_.max_error = summary_.noise->limit.max_error;
+  }
   const Timer timer;
   Removal removal = FindRemoval(model_, built, bound_, context_);
   summary_.seconds_removal = timer.Seconds();
   return removal;
 }
 
-// The removal of the profile's level that is asked for; sets the bound where
-// that was not given.
-Removal OutlierFilter::MakeProfile(const BuiltProblem& built,
-                                   std::vector<Conflict>* found) {
+void OutlierFilter::MeasureNoise(const BuiltProblem& built) {
+  NoiseSummary& noise = summary_.noise.emplace();
+  noise.limit = FindNoiseLimit(model_, built, bound_.norm, context_);
+  const OptimumWithout lowest =
+      SolveWithout(model_, built, {}, built.start, bound_.norm,
+                   ErrorProfileOptions().relative_gap,
+                   context_.Within("comparing the errors with noise"));
+  noise.lowest_max_error = lowest.max_error;
+  noise.lower_bound = lowest.lower_bound;
+}
+
+// The removal of the profile's last level or, where no bound was given, of its
+// elbow.
+std::optional<Removal> OutlierFilter::MakeProfile(
+    const BuiltProblem& built, std::vector<Conflict>* found) {
   const Timer timer;
   ErrorProfileOptions options;
   options.norm = bound_.norm;
@@ -125,13 +147,13 @@ Removal OutlierFilter::MakeProfile(const BuiltProblem& built,
   }
   summary.elbow = profile.elbow;
   summary.seconds = timer.Seconds();
-  const size_t last = profile.levels.size() - 1;
-  const size_t chosen =
-      options_.max_error ? last : profile.elbow.value_or(last);
+  summary_.noise = NoiseSummary{profile.noise, profile.levels[0].max_error,
+                                profile.levels[0].lower_bound};
+  size_t chosen = profile.levels.size() - 1;
   if (!options_.max_error) {
-    // With room for the least squares, as above every lowest maximum.
-    bound_.max_error =
-        (1 + options_.solve.finish.slack) * profile.levels[chosen].max_error;
+    if (!profile.elbow) return std::nullopt;
+    chosen = *profile.elbow;
+    bound_.max_error = profile.noise.max_error;
   }
   for (Conflict& conflict : profile.conflicts) {
     if (conflict.proof.lower_bound > bound_.max_error) {
@@ -205,15 +227,23 @@ void OutlierFilter::FilterByConflicts() {
   bound_.max_error = start.max_error;
   const std::vector<uint64_t> elements = ElementsOf(model_, built);
   std::vector<Conflict> found;
-  const Removal removal = RemoveFew(built, &found);
-  for (const int64_t i : removal.observations) is_removed_[elements[i]] = 1;
+  const std::optional<Removal> removal = RemoveFew(built, &found);
   if (context_.IsCancelled()) return;
-  if (options_.find_conflicts) Pack(built, removal, std::move(found), elements);
+  if (!removal) {
+    is_given_back_ = true;
+    summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
+                                           summary_.noise->limit.max_error, {});
+    return;
+  }
+  for (const int64_t i : removal->observations) is_removed_[elements[i]] = 1;
+  if (options_.find_conflicts) {
+    Pack(built, *removal, std::move(found), elements);
+  }
   if (options_.on_removed) {
-    options_.on_removed(static_cast<int64_t>(removal.observations.size()));
+    options_.on_removed(static_cast<int64_t>(removal->observations.size()));
   }
   Model moved;
-  PlaceAt(built, removal, &moved);
+  PlaceAt(built, *removal, &moved);
   Solve(std::move(moved));
   // What took no part in all that.
   if (!RemoveAbove()) return;
@@ -254,6 +284,11 @@ OutlierFilterResult OutlierFilter::Run() {
   }
   summary_.max_error = bound_.max_error;
   if (context_.IsCancelled()) return {model_, std::move(summary_)};
+  if (is_given_back_) {
+    summary_.is_within = true;
+    summary_.pixel_error_after = summary_.pixel_error_before;
+    return {model_, std::move(summary_)};
+  }
   const std::vector<double> errors =
       PixelErrors(kept_.model, context_.num_threads);
   UpdatePointErrors(errors, &kept_.model);
@@ -290,9 +325,17 @@ OutlierFilterResult FilterOutliers(const Model& model,
                 "solve.problem.positions", "some", "none");
   CheckArgument(!options.solve.problem.fixed.Any(), "solve.problem.fixed",
                 "something", "empty: everything moves");
-  return InLocalFrame(LocalFrame(model), model, [&](const Model& local) {
-    return OutlierFilter(local, options, context).Run();
-  });
+  CheckArgument(
+      options.max_error || options.method == OutlierMethod::kConflicts,
+      "max_error", "none", "given with this method");
+  OutlierFilterResult result =
+      InLocalFrame(LocalFrame(model), model, [&](const Model& local) {
+        return OutlierFilter(local, options, context).Run();
+      });
+  const bool is_given_back =
+      result.summary.noise && result.summary.max_error == 0;
+  if (is_given_back) result.model = model;  // to the last bit
+  return result;
 }
 
 }  // namespace krot

@@ -10,6 +10,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/conflict_file.h"
 #include "krot/model/model.h"
+#include "krot/outliers/error_profile.h"
 #include "krot/outliers/rotation_suspect.h"
 #include "krot/pipeline/solve_model.h"
 
@@ -26,10 +27,11 @@ enum class OutlierMethod {
 
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
-  // The bound, true pixels; > 0. It may be missing: with a profile it is then
-  // the largest error of the profile's elbow, or of its last level, and the
-  // room that solve.finish.slack leaves above it; otherwise, from nothing, ten
-  // times the median error of the start.
+  // The bound, true pixels; > 0. Required by kThreshold. If it is missing, it
+  // is what noise explains (FindNoiseLimit), where it is proved that no
+  // estimate brings all errors below that; else nothing is removed, and the
+  // model stays as it is. From nothing, without a profile, it is ten times the
+  // median error of the start.
   std::optional<double> max_error;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // kConflicts: the proof, most of the time
@@ -78,9 +80,21 @@ struct ErrorProfileSummary {
   double seconds = 0;  // wall clock
 };
 
+// The noise of the model, and what it does not explain.
+struct NoiseSummary {
+  NoiseLimit limit;
+  // Of all observations: an estimate's, and what none is below; true pixels.
+  double lowest_max_error = 0;
+  double lower_bound = 0;  // 0 without a proof
+
+  bool ExplainsAll() const { return !(lower_bound > limit.max_error); }
+};
+
 struct OutlierFilterSummary {
   OutlierMethod method = OutlierMethod::kConflicts;
-  double max_error = 0;  // true pixels
+  // True pixels; 0: there is none, as noise explains all errors.
+  double max_error = 0;
+  std::optional<NoiseSummary> noise;  // with a profile or without a bound
   Norm norm;
   SolveInit init = SolveInit::kModel;  // that was used
 
@@ -104,7 +118,7 @@ struct OutlierFilterSummary {
 
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
-  // Whether all errors of the result are within the bound.
+  // Whether all errors of the result are within the bound, if there is one.
   bool is_within = false;
   std::optional<ErrorProfileSummary> profile;  // if asked for
   std::optional<SolveSummary> solve;  // of what is left; none if nothing is

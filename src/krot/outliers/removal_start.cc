@@ -10,8 +10,6 @@
 namespace krot {
 namespace {
 
-// From nothing, pixels: what is an error is known only afterwards.
-constexpr double kLevelOfStart = 2;
 // Of a bound that is chosen: of the median error, and in pixels.
 constexpr double kBoundPerMedian = 10;
 constexpr double kLeastBound = 1e-3;
@@ -53,7 +51,8 @@ RemovalStart FindRemovalStart(const Model& model,
     const double level = options.max_error.value_or(kLevelOfStart);
     PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
   }
-  if (!options.max_error && !options.make_profile) {
+  if (start.init == SolveInit::kFeasible && !options.max_error &&
+      !options.make_profile) {
     const double median =
         MedianError(start.built.problem, start.built.start, norm);
     start.max_error = std::max(kBoundPerMedian * median, kLeastBound);

@@ -13,7 +13,7 @@ struct RemovalStart {
   // not be positive if it is from nothing.
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
-  double max_error = 0;  // the bound: as asked for, or chosen; 0: the profile's
+  double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
 };
 
 // The model's own start or, if options.solve.init says so or the model has

@@ -6,6 +6,9 @@
 
 namespace krot {
 
+// From nothing, pixels: what is an error is known only afterwards.
+inline constexpr double kLevelOfStart = 2;
+
 // Positions from rotations and raw tracks: an estimate of all frames and points
 // from nothing, whatever outliers there are. For each connected component,
 //

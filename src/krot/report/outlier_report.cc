@@ -5,6 +5,7 @@
 #include <sstream>
 #include <vector>
 
+#include "krot/outliers/robust_start.h"
 #include "krot/report/csv_text.h"
 #include "krot/report/error_rows.h"
 #include "krot/report/report_json.h"
@@ -126,6 +127,50 @@ Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
           {"elbow", profile.elbow ? Json(*profile.elbow) : Json()}};
 }
 
+Json NoiseJson(const std::optional<NoiseSummary>& noise) {
+  if (!noise) return {};
+  return {{"sigma", noise->limit.sigma},
+          {"max_error", noise->limit.max_error},
+          {"lowest_max_error", noise->lowest_max_error},
+          {"lower_bound", NumberOrNull(noise->lower_bound)}};
+}
+
+// What noise explains, and what follows from that.
+std::string NoiseSentence(const OutlierFilterSummary& summary) {
+  if (!summary.noise) return "";
+  const NoiseSummary& noise = *summary.noise;
+  const auto pixels = [](double value) {
+    return FormatNumber(value, 4) + " px";
+  };
+  std::string text = "\nGaussian noise of " + pixels(noise.limit.sigma) +
+                     " (standard deviation per axis, from the median error) "
+                     "explains errors up to " +
+                     pixels(noise.limit.max_error) + ".\n";
+  if (!noise.ExplainsAll()) {
+    text +=
+        "Without a removal no translations and points bring all errors "
+        "below " +
+        pixels(noise.lower_bound) + " (proved): such noise is not all.\n";
+  } else if (noise.lowest_max_error <= noise.limit.max_error) {
+    text += "Translations and points bring all errors down to " +
+            pixels(noise.lowest_max_error) + ": there is no elbow.\n";
+  } else {
+    text +=
+        "It was not proved that some errors stay above that: there is no "
+        "elbow.\n";
+  }
+  if (noise.limit.sigma > kLevelOfStart) {
+    text +=
+        "Feature points rarely have that much: rotations, intrinsics or "
+        "matches may be wrong altogether; look at these first.\n";
+  }
+  if (summary.max_error > 0) return text;
+  return text +
+         "No observation is called wrong, and the model is written as it was "
+         "read. To remove observations for a bound of your own, give "
+         "--OutlierFilter.max_error.\n";
+}
+
 std::string ProfileTable(const ErrorProfileSummary& profile) {
   TextTable table;
   table.AddRow({"removed", "must go", "largest error", "proved"});
@@ -196,6 +241,7 @@ std::string OutlierTable(const OutlierReport& report) {
   AddErrorColumns({summary.pixel_error_before, summary.pixel_error_after},
                   &errors);
   text += "\nReprojection errors, pixels\n" + errors.ToString();
+  text += NoiseSentence(summary);
   if (summary.profile) text += ProfileTable(*summary.profile);
   text += SuspectTable(summary) + RotationSentence(summary) + "\n";
   if (summary.solve) {
@@ -216,7 +262,8 @@ std::string OutlierJson(const OutlierReport& report) {
       {"command", "outlier_filter"},
       {"method", OutlierMethodName(summary.method)},
       {"norm", NormName(summary.norm)},
-      {"max_error", summary.max_error},
+      {"max_error", summary.max_error > 0 ? Json(summary.max_error) : Json()},
+      {"noise", NoiseJson(summary.noise)},
       {"is_within", summary.is_within},
       {"num_observations", summary.num_observations},
       {"num_points", summary.num_points},
@@ -265,6 +312,7 @@ std::string ProfileJson(const OutlierReport& report) {
                {"norm", NormName(summary.norm)},
                {"num_observations", summary.num_observations}};
   json.update(ProfileLevelsJson(*summary.profile));
+  json["noise"] = NoiseJson(summary.noise);
   json["seconds"] = summary.profile->seconds;
   return ReportText(json);
 }

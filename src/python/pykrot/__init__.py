@@ -104,13 +104,15 @@ def triangulate(model, *, progress=None, options=None, **keywords):
     return _run(_core.triangulate, model, progress, options, keywords)
 
 
-def filter(model, max_error, *, progress=None, options=None, **keywords):
+def filter(model, max_error=None, *, progress=None, options=None, **keywords):
     """Removes few observations so that all others are within `max_error` px.
 
+    None: what the model's own noise explains, or nothing is removed.
     report["num_must_go"] says how many had to go; `certificate` proves it.
     """
-    return _run(_core.filter, model, progress, options,
-                {"max_error": max_error, **keywords})
+    if max_error is not None:
+        keywords["max_error"] = max_error
+    return _run(_core.filter, model, progress, options, keywords)
 
 
 def bundle_adjust(model, *, progress=None, options=None, **keywords):

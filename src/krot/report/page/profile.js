@@ -9,7 +9,7 @@ export function profileChart({ levels, elbow }) {
   const [high, low] = [levels[0].max_error, levels.at(-1).max_error];
   const { figure, at, add } = chart({
     caption: 'Largest error against the observations removed' +
-      (elbow === null ? '' : '; the ring is the elbow'),
+      (elbow === null ? '; there is no elbow' : '; the ring is the elbow'),
     legend: [['after', 'removed'], ['bound', 'must go, proved']],
     x: linear(0, levels.at(-1).num_removed),
     y: high > 10 * low ? logarithmic(low * 0.9, high * 1.1) :

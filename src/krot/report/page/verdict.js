@@ -1,6 +1,6 @@
 import { boxesVerdict } from './boxes.js';
 import { isComparison, isFilter, isMinimax, modelErrors } from './data.js';
-import { count, counted } from './format.js';
+import { count, counted, pixels } from './format.js';
 
 function movement(before, after, decimals) {
   const from = before.toFixed(decimals);
@@ -9,8 +9,17 @@ function movement(before, after, decimals) {
   return `${after < before ? 'fell' : 'rose'} from ${from} px to ${to} px`;
 }
 
-// A bracket for the fewest that do.
+// A bracket for the fewest that do, or why none is called wrong.
 function filterVerdict(report) {
+  if (report.max_error === null) {
+    const { sigma, max_error: explained, lowest_max_error: lowest } =
+      report.noise;
+    return 'No observation is called wrong, and the model is the one that ' +
+      `was read: noise of ${pixels(sigma)} px explains errors up to ${
+        pixels(explained)} px, and ` + (lowest <= explained ?
+        `translations and points bring all down to ${pixels(lowest)} px.` :
+        'it was not proved that some errors stay above that.');
+  }
   const removed = `Without ${count(report.num_removed)} of ${
     counted(report.num_observations, 'observation')} all others are within ${
     report.max_error.toFixed(2)} px`;
