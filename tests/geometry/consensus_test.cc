@@ -65,6 +65,18 @@ TEST(FindConsensus, IsWithoutRunawaysHoweverFarTheyRun) {
   }
 }
 
+TEST(FindConsensus, KnowsRunawaysThatSeeWhatIsFarAwayByTheOthersSpread) {
+  std::vector<CameraMove> cameras = Circle(12, 0.01);
+  for (CameraMove& camera : cameras) {
+    camera.distance_before = 900;
+    camera.distance_after = kScale * 900;
+  }
+  cameras[5].after += kScale * Vector3d(20, 0, 0);
+  std::vector<char> expected(12, 1);
+  expected[5] = 0;
+  EXPECT_EQ(FindConsensus(cameras, true), expected);
+}
+
 TEST(FindConsensus, StandsUpToAlmostAsManyRunaways) {
   std::vector<CameraMove> cameras = Circle(12, 0.01);
   for (int n = 0; n < 5; ++n) {

@@ -33,6 +33,23 @@ struct CommonMove {
   }
 };
 
+// The median distance of the cameras, before, from their median centre.
+double Spread(const std::vector<CameraMove>& cameras) {
+  Vector3d middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const CameraMove& camera : cameras) {
+      values.push_back(camera.before[axis]);
+    }
+    middle[axis] = Median(std::move(values));
+  }
+  std::vector<double> distances;
+  for (const CameraMove& camera : cameras) {
+    distances.push_back((camera.before - middle).norm());
+  }
+  return Median(std::move(distances));
+}
+
 CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
   CommonMove move;
   move.scale = scale;
@@ -90,7 +107,7 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
   }
   if (cameras.size() < 3 || 2 * scales.size() < cameras.size()) return keeps;
 
-  const double distance = Median(std::move(distances));
+  const double far = std::min(Median(std::move(distances)), Spread(cameras));
   CommonMove move =
       MedianMove(cameras, scale_is_free ? Median(std::move(scales)) : 1);
   for (int round = 0; round < kMaxRounds; ++round) {
@@ -98,8 +115,7 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
     for (const CameraMove& camera : cameras) {
       residuals.push_back(move.Residual(camera));
     }
-    const double allowed =
-        std::max(distance, kTypicalMoves * Median(residuals));
+    const double allowed = std::max(far, kTypicalMoves * Median(residuals));
     std::vector<char> now;
     for (const double residual : residuals) now.push_back(residual <= allowed);
     if (round > 0 && now == keeps) break;

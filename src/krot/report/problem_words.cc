@@ -48,7 +48,8 @@ std::string LooseImagesSentence(const std::vector<LooseImage>& images) {
 std::string RunawaysSentence(const std::vector<LooseImage>& images) {
   if (images.empty()) return "";
   return Counted(static_cast<int64_t>(images.size()), "image") +
-         " moved farther than cameras are from what they see: " +
+         " moved farther than cameras are from one another or from what they "
+         "see: " +
          FirstFew(images, &NameOf) + ".\n";
 }
 
