@@ -24,7 +24,7 @@ constexpr double kClearly = 2;
 constexpr double kPixel = 1;
 // What rounding may add to the largest error, relative.
 constexpr double kRounding = 1e-9;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kDoesNotProject = std::numeric_limits<double>::infinity();
 
 struct SideFit {
   Contradictions::Fit px;
@@ -46,7 +46,7 @@ std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
   const std::vector<double> errors_px = PixelErrors(model);
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const auto image_indices = ImageIndices(model);
-  std::vector<double> px(num_unknown, kInfinity);
+  std::vector<double> px(num_unknown, kDoesNotProject);
   std::vector<double> relative = px;
   SideFit fit;
   for (size_t e = 0; e < errors_px.size(); ++e) {
@@ -58,7 +58,7 @@ std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
         std::max({camera.width, camera.height, uint64_t{1}}));
     const bool is_finite = std::isfinite(errors_px[e]);
     fit.is_any_finite |= is_finite;
-    px.push_back(is_finite ? errors_px[e] : kInfinity);
+    px.push_back(is_finite ? errors_px[e] : kDoesNotProject);
     relative.push_back(px.back() / side);
   }
   if (px.empty()) return std::nullopt;
@@ -166,7 +166,7 @@ std::optional<std::pair<double, double>> WorseImagesSide(const Model& before,
   const PixelErrorStatistics errors_after =
       Summarize(PixelErrors(Followed(Reading::kImages, after), -1, norm));
   const double max_after = errors_after.not_finite > errors.not_finite
-                               ? kInfinity
+                               ? kDoesNotProject
                                : errors_after.max;
   if (!(max_after > errors.max * (1 + kRounding))) return std::nullopt;
   return std::pair(errors.max, max_after);
