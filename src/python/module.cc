@@ -2,7 +2,7 @@
 
 #include <pybind11/pybind11.h>
 
-#include "krot/adjust/ceres_log.h"
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
 #include "krot/options/option_error.h"

@@ -1,10 +1,10 @@
-#include "krot/adjust/error_jacobians.h"
+#include "krot/adjust/reprojection_errors.h"
 
 #include <string>
 
 #include <gtest/gtest.h>
 
-#include "krot/adjust/projected_errors.h"
+#include "krot/adjust/reprojection_errors.h"
 #include "krot/camera/camera_model.h"
 #include "tests/adjust/small_blocks.h"
 

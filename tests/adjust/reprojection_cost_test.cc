@@ -1,4 +1,4 @@
-#include "krot/adjust/reprojection_cost.h"
+#include "krot/adjust/ceres_problem.h"
 
 #include <array>
 #include <string>

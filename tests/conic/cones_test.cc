@@ -1,17 +1,45 @@
 #include "krot/conic/cones.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 #include <type_traits>
 
 #include <gtest/gtest.h>
 
-#include "tests/conic/random_cones.h"
-
 namespace krot {
 namespace {
 
 constexpr int kTrials = 2000;
+
+// Random vectors of a cone's space.
+template <typename Cone>
+class ConeGenerator {
+ public:
+  using Vector = typename Cone::Vector;
+
+  explicit ConeGenerator(unsigned seed) : generator_(seed) {}
+
+  // Each entry uniform in [-1, 1].
+  Vector Direction() {
+    Vector d;
+    for (double& entry : d) entry = uniform_(generator_);
+    return d;
+  }
+
+  // Inside the cone; the smallest eigenvalue is `margin`, the others up to 2
+  // larger, and all are multiplied by 10^decade.
+  Vector Inside(double margin, double decade) {
+    Vector x = Direction();
+    x += (margin - Cone::SmallestEigenvalue(x)) * Cone::Identity();
+    return std::pow(10, decade) * x;
+  }
+
+ private:
+  std::mt19937 generator_;
+  std::uniform_real_distribution<double> uniform_{-1, 1};
+};
 
 template <typename Cone>
 class ConeTest : public testing::Test {
@@ -32,7 +60,8 @@ class ConeTest : public testing::Test {
   }
 };
 
-using Cones = testing::Types<SecondOrderCone, FourHalfLines>;
+using Cones = testing::Types<SecondOrderCone, FourHalfLines,
+                             WithHalfLine<SecondOrderCone>>;
 TYPED_TEST_SUITE(ConeTest, Cones);
 
 TYPED_TEST(ConeTest, IdentityIsNeutralAndInside) {
@@ -178,6 +207,87 @@ TEST(SecondOrderCone, MaxStepMeetsTheBoundaryAlongANullDirection) {
   // (2 - a, a, 0): on the boundary at a = 1; a null direction has no a^2.
   EXPECT_DOUBLE_EQ(SecondOrderCone::MaxStep({2, 0, 0}, {-1, 1, 0}, 9), 1);
   EXPECT_EQ(SecondOrderCone::MaxStep({2, 0, 0}, {1, 1, 0}, 9), 9);
+}
+
+using ScaledCones = testing::Types<SecondOrderCone, FourHalfLines>;
+
+template <typename Cone>
+class NtScalingTest : public testing::Test {
+ protected:
+  using Vector = typename Cone::Vector;
+
+  // Pairs s, z whose smallest eigenvalues are `margin` of their size, and whose
+  // sizes differ by up to 12 decades.
+  template <typename Body>
+  static void ForPairs(double margin, const Body& body) {
+    ConeGenerator<Cone> random(1);
+    for (int n = 0; n < 500; ++n) {
+      const double decade = n % 7;
+      body(random.Inside(margin, decade), random.Inside(margin, -decade));
+    }
+  }
+};
+
+TYPED_TEST_SUITE(NtScalingTest, ScaledCones);
+
+TYPED_TEST(NtScalingTest, TakesZAndSToTheSamePoint) {
+  for (const double margin : {1.0, 1e-2, 1e-4, 1e-6}) {
+    this->ForPairs(margin, [&](const auto& s, const auto& z) {
+      const NtScaling<TypeParam> W(s, z);
+      const auto lambda = W.Apply(z);
+      EXPECT_GT(TypeParam::SmallestEigenvalue(lambda), 0);
+      EXPECT_LT((W.ApplyInverse(s) - lambda).norm(),
+                1e-14 / margin * lambda.norm());
+      EXPECT_NEAR(lambda.squaredNorm(), s.dot(z), 1e-14 / margin * s.dot(z));
+    });
+  }
+}
+
+TYPED_TEST(NtScalingTest, ApplyInverseUndoesApply) {
+  ConeGenerator<TypeParam> random(2);
+  for (const double margin : {1.0, 1e-2, 1e-4, 1e-6}) {
+    this->ForPairs(margin, [&](const auto& s, const auto& z) {
+      const NtScaling<TypeParam> W(s, z);
+      const auto x = random.Direction();
+      EXPECT_LT((W.ApplyInverse(W.Apply(x)) - x).norm(), 1e-14 / margin);
+      EXPECT_LT((W.Apply(W.ApplyInverse(x)) - x).norm(), 1e-14 / margin);
+    });
+  }
+}
+
+TYPED_TEST(NtScalingTest, IsSymmetricAndPositiveDefinite) {
+  ConeGenerator<TypeParam> random(3);
+  this->ForPairs(1e-3, [&](const auto& s, const auto& z) {
+    const NtScaling<TypeParam> W(s, z);
+    const auto x = random.Direction();
+    const auto y = random.Direction();
+    const double size = W.Apply(x).norm() * y.norm() + W.Apply(y).norm();
+    EXPECT_NEAR(x.dot(W.Apply(y)), y.dot(W.Apply(x)), 1e-14 * size);
+    EXPECT_GT(x.dot(W.Apply(x)), 0);
+  });
+}
+
+TYPED_TEST(NtScalingTest, TakesAPairWhereSmallestProductSays) {
+  for (const double margin : {1.0, 1e-2, 1e-4, 1e-6}) {
+    this->ForPairs(margin, [&](const auto& s, const auto& z) {
+      const double root =
+          TypeParam::SmallestEigenvalue(NtScaling<TypeParam>(s, z).Apply(z));
+      EXPECT_NEAR(TypeParam::SmallestProduct(s, z), root * root,
+                  1e-14 / margin * s.dot(z));
+    });
+  }
+}
+
+TYPED_TEST(NtScalingTest, OfACentredPairHasOneEigenvalue) {
+  // s = mu z^-1: lambda is sqrt(mu) times the identity.
+  ConeGenerator<TypeParam> random(4);
+  for (int n = 0; n < 100; ++n) {
+    const auto s = random.Inside(0.1, 0);
+    const typename TypeParam::Vector z =
+        9 * TypeParam::Divide(s, TypeParam::Identity());
+    const auto lambda = NtScaling<TypeParam>(s, z).Apply(z);
+    EXPECT_LT((lambda - 3 * TypeParam::Identity()).norm(), 1e-12);
+  }
 }
 
 }  // namespace

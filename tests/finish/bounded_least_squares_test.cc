@@ -85,9 +85,8 @@ class FirstOrder {
     std::vector<double> multiplier(active.size(), 0);
     for (int sweep = 0; sweep < 20000; ++sweep) {  // coordinate descent
       for (size_t n = 0; n < active.size(); ++n) {
-        const double next =
-            std::max(0.0, multiplier[n] -
-                              rest.dot(active[n]) / active[n].squaredNorm());
+        const double next = std::max(
+            0.0, multiplier[n] - rest.dot(active[n]) / active[n].squaredNorm());
         rest += (next - multiplier[n]) * active[n];
         multiplier[n] = next;
       }
@@ -154,7 +153,7 @@ TEST_P(BoundedLeastSquares, EndsWhereDenseAlgebraFindsTheFirstOrderConditions) {
         Estimate estimate = solved.scene.estimate;
         const BoundedSummary summary =
             MinimizeBounded(problem, options, {}, &estimate);
-        EXPECT_EQ(summary.termination, BoundedTermination::kConverged);
+        EXPECT_EQ(summary.termination, InteriorPointTermination::kConverged);
         EXPECT_LT(summary.cost_final, summary.cost_initial);
         EXPECT_LT(Cost(problem, estimate, norm(), 1), solved.cap);
         FirstOrder after(problem, estimate, options.loss, solved.cap, norm());
@@ -247,7 +246,7 @@ TEST_P(BoundedLeastSquares, SolvesComponentsAsIfEachWereAlone) {
                .cost_final;
   }
   const BoundedSummary summary = MinimizeBounded(both, options, {}, &estimate);
-  EXPECT_EQ(summary.termination, BoundedTermination::kConverged);
+  EXPECT_EQ(summary.termination, InteriorPointTermination::kConverged);
   EXPECT_NEAR(summary.cost_final, sum, 1e-5 * sum);
 }
 

@@ -1,4 +1,4 @@
-#include "krot/finish/log_product.h"
+#include "krot/finish/bounded_system.h"
 
 #include <cmath>
 

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/minimax/residual.h"
 
 namespace krot {

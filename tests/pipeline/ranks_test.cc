@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 
 #include "krot/bridge/certificate_file.h"
-#include "krot/conic/frame_pattern.h"
-#include "krot/conic/observation_loop.h"
 #include "krot/joint/working_set.h"
+#include "krot/linear/block_structure.h"
+#include "krot/linear/ordered_sums.h"
 #include "krot/model/model_share.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
@@ -188,15 +188,28 @@ TEST(Ranks, GatherInTheirOrderAndHandOnInTurn) {
   });
 }
 
-TEST(FramePattern, OfSharesIsThatOfTheWhole) {
-  const FramePattern whole = {{0, 1, 3}, {1, 2}, {2}, {3}};
-  const std::vector<FramePattern> shares = {{{0, 1}, {1}, {2}, {3}},
-                                            {{0, 3}, {1, 2}, {2}, {3}},
-                                            {{0, 1}, {1}, {2}, {3}}};
+// Which frames see each point.
+BlockStructure StructureOf(const std::vector<std::vector<int32_t>>& tracks) {
+  BlockStructure structure;
+  structure.point_begin = {0};
+  for (const std::vector<int32_t>& track : tracks) {
+    structure.frame_of.insert(structure.frame_of.end(), track.begin(),
+                              track.end());
+    structure.point_begin.push_back(
+        static_cast<int64_t>(structure.frame_of.size()));
+  }
+  structure.frame_is_fixed = {0, 0, 1, 0, 0};
+  return structure;
+}
+
+TEST(BlockPattern, OfSharesIsThatOfTheWhole) {
+  const BlockPattern whole =
+      PairsThatSharePoints(StructureOf({{0, 1, 2}, {3, 0}, {4, 1}, {1, 0, 0}}));
+  const std::vector<BlockStructure> shares = {StructureOf({{0, 1, 2}, {3, 0}}),
+                                              StructureOf({}),
+                                              StructureOf({{4, 1}, {1, 0, 0}})};
   ThreadRanks::Run(3, [&](Ranks* ranks) {
-    FramePattern pattern = shares[ranks->rank()];
-    UniteOverRanks(ranks, &pattern);
-    EXPECT_EQ(pattern, whole);
+    EXPECT_EQ(PairsThatSharePoints(shares[ranks->rank()], ranks), whole);
   });
 }
 

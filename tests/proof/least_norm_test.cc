@@ -27,8 +27,7 @@ LeastNormProblem RandomProblem(bool has_last_row) {
       LeastNormProblem::Columns columns;
       columns.point = k;
       columns.frame = n % problem.num_frames;
-      columns.point_rows = Matrix3d::NullaryExpr(random);
-      columns.frame_rows = Matrix3d::NullaryExpr(random);
+      columns.rows = Matrix3d::NullaryExpr(random);
       if (has_last_row) {
         columns.last_row = Matrix3d::NullaryExpr(random).col(0);
       }
@@ -43,10 +42,10 @@ MatrixXd Dense(const LeastNormProblem& problem) {
   MatrixXd M = MatrixXd::Zero(problem.num_rows(), 3 * problem.columns.size());
   int64_t i = 0;
   for (const LeastNormProblem::Columns& c : problem.columns) {
-    M.block<3, 3>(3 * c.point, i) = c.point_rows.transpose();
+    M.block<3, 3>(3 * c.point, i) = c.rows.transpose();
     if (c.frame > 0) {
       M.block<3, 3>(3 * (problem.num_points + c.frame - 1), i) =
-          c.frame_rows.transpose();
+          -c.rows.transpose();
     }
     if (problem.has_last_row) {
       M.block<1, 3>(M.rows() - 1, i) = c.last_row.transpose();
@@ -88,8 +87,7 @@ TEST(LeastNormSolver, IsAsAccurateAsInLongDoubleWhereMultipliersSpanDecades) {
   LeastNormProblem problem = RandomProblem(true);
   for (size_t i = 0; i < problem.columns.size(); ++i) {
     const double scale = std::pow(10, -static_cast<double>(i % 9));
-    problem.columns[i].point_rows *= scale;
-    problem.columns[i].frame_rows *= scale;
+    problem.columns[i].rows *= scale;
     problem.columns[i].last_row *= scale;
   }
   using MatrixXr = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
@@ -123,7 +121,7 @@ TEST(LeastNormSolver, RefusesEquationsThatMayHaveNoSolution) {
   LeastNormProblem repeated = RandomProblem(true);
   for (LeastNormProblem::Columns& c : repeated.columns) {
     c.last_row.setZero();
-    if (c.point == 3) c.last_row = c.point_rows.col(1);
+    if (c.point == 3) c.last_row = c.rows.col(1);
   }
   for (const int64_t max_dense_rows : {0, 1000}) {
     EXPECT_FALSE(LeastNormSolver(1, max_dense_rows).Factorize(few));

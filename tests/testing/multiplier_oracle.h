@@ -9,8 +9,8 @@
 #include <Eigen/Core>
 
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/adjust/adjustment_problem.h"
 #include "krot/adjust/bundle_adjustment.h"
+#include "krot/adjust/ceres_problem.h"
 #include "krot/model/model.h"
 
 namespace krot {

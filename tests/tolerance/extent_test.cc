@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/fixed.h"
 #include "krot/tolerance/pull_coefficients.h"
@@ -78,11 +79,22 @@ std::vector<double> Stacked(const BlockVector& blocks) {
   return stacked;
 }
 
+// The same by translations, t = -R_rw C.
+BlockVector ByTranslations(const KnownRotationProblem& problem,
+                           const Pull& pull) {
+  BlockVector coefficients = CoefficientsOf(problem, pull);
+  const auto rig_from_world = RigFromWorldRotations(problem);
+  for (size_t f = 0; f < coefficients.frames.size(); ++f) {
+    coefficients.frames[f] = -(rig_from_world[f] * coefficients.frames[f]);
+  }
+  return coefficients;
+}
+
 // What p'x has beside the coefficients times the unknowns.
 double ConstantOf(const KnownRotationProblem& problem, const Estimate& estimate,
                   const Pull& pull) {
   return Along(problem, estimate, pull) -
-         CoefficientsOf(problem, pull)
+         ByTranslations(problem, pull)
              .Dot({estimate.points, estimate.translations});
 }
 
@@ -92,12 +104,12 @@ double ExtentByLp(const TolerantScene& tolerant, Norm norm, const Pull& pull) {
   std::vector<double> e;
   double kept = 0;
   if (tolerant.scale) {
-    const BlockVector row = CoefficientsOf(problem, *tolerant.scale);
+    const BlockVector row = ByTranslations(problem, *tolerant.scale);
     e = Stacked(row);
     kept = row.Dot({estimate.points, estimate.translations});
   }
   return *LargestByLp(problem, norm, tolerant.bound,
-                      Stacked(CoefficientsOf(problem, pull)), e, kept) +
+                      Stacked(ByTranslations(problem, pull)), e, kept) +
          ConstantOf(problem, estimate, pull);
 }
 

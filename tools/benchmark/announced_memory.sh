@@ -4,8 +4,8 @@
 #
 #   announced_memory.sh KROT MODELS
 #
-# `announced`: what will be needed, and at most, where that is more; `peak`: the
-# largest resident set. Solves that end without a model are left out.
+# `announced`: what will be needed; `peak`: the largest resident set. Solves that end
+# without a model are left out.
 set -euo pipefail
 
 krot=$(realpath "$1")
@@ -14,8 +14,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 cat <<'TABLE'
-| model | start | announced | at most | peak | announced / peak |
-|---|---|---:|---:|---:|---:|
+| model | start | announced | peak | announced / peak |
+|---|---|---:|---:|---:|
 TABLE
 for model in "$models"/*/; do
   for init in model feasible; do
@@ -24,11 +24,10 @@ for model in "$models"/*/; do
       --log_level 0 >/dev/null 2>&1 || continue
     jq -r --arg name "$(basename "$model")" --arg init "$init" '
       def megabytes: . / 1e5 | round / 10;
-      .announced_memory_bytes as {$likely, $most}
-      | "| \($name) | \($init) | \($likely | megabytes)"
-        + " | \(if $most > $likely then $most | megabytes else "-" end)"
+      .announced_memory_bytes as $announced
+      | "| \($name) | \($init) | \($announced | megabytes)"
         + " | \(.peak_memory_bytes | megabytes)"
-        + " | \($likely / .peak_memory_bytes * 100 | round / 100) |"' \
+        + " | \($announced / .peak_memory_bytes * 100 | round / 100) |"' \
       "$work/report.json"
   done
 done

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <vector>
 
-#include "krot/adjust/ceres_log.h"
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/checkpoint.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"

@@ -46,11 +46,7 @@ std::string ProblemWords(const SolveSummary& summary) {
 }
 
 std::string MemoryWords(const SolveSummary& summary) {
-  return "about " + FormatBytes(summary.likely_bytes) + " will be needed" +
-         (summary.largest_bytes > summary.likely_bytes
-              ? ", at most " + FormatBytes(summary.largest_bytes) +
-                    " if the joint solver has to take in every observation"
-              : std::string());
+  return "about " + FormatBytes(summary.needed_bytes) + " will be needed";
 }
 
 // Peaks have been as far below what was announced as this (docs/method/
@@ -61,7 +57,7 @@ constexpr double kMostAnnounced = 1.3;
 void CheckMemory(const SolveSummary& summary) {
   const int64_t free = FreeMemoryBytes();
   const auto least = static_cast<int64_t>(
-      static_cast<double>(summary.likely_bytes) / kMostAnnounced);
+      static_cast<double>(summary.needed_bytes) / kMostAnnounced);
   if (BytesStillNeeded(least) <= free) return;
   throw CommandError(kExitInternal,
                      "out of memory before it began: " + MemoryWords(summary) +

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "krot/adjust/ceres_log.h"
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
 #include "krot/options/solver_options.h"

@@ -5,7 +5,7 @@
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/conic/block_structure.h"
+#include "krot/linear/block_structure.h"
 
 namespace krot {
 

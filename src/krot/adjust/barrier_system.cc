@@ -1,5 +1,6 @@
 #include "krot/adjust/barrier_system.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace krot {
@@ -11,17 +12,8 @@ using Eigen::Vector3d;
 // Poses of frame and sensor, sixteen parameters, the cap.
 constexpr int kMaxBlocks = 4 + 6 + 1;
 
-// R of H = R'R.
-UpperTriangle CholeskyFactor(const Matrix3d& H) {
-  UpperTriangle R;
-  R.r00 = std::sqrt(H(0, 0));
-  R.r01 = H(1, 0) / R.r00;
-  R.r02 = H(2, 0) / R.r00;
-  R.r11 = std::sqrt(H(1, 1) - R.r01 * R.r01);
-  R.r12 = (H(2, 1) - R.r01 * R.r02) / R.r11;
-  R.r22 = std::sqrt(H(2, 2) - R.r02 * R.r02 - R.r12 * R.r12);
-  return R;
-}
+// A point's pivots are no smaller than this share of its trace.
+constexpr double kLeastPivot = 1e-14;
 
 // Adds up the parts in order.
 void AddParts(const std::vector<std::vector<Vector3d>>& parts,
@@ -34,18 +26,52 @@ void AddParts(const std::vector<std::vector<Vector3d>>& parts,
 
 }  // namespace
 
+AdjustmentTracks::AdjustmentTracks(const ErrorJacobians& jacobians,
+                                   const AdjustmentBlocks& blocks,
+                                   int32_t num_blocks)
+    : observation_begin_(blocks.points.size() + 1, 0) {
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    ++observation_begin_[observation.point + 1];
+  }
+  for (size_t k = 0; k < blocks.points.size(); ++k) {
+    observation_begin_[k + 1] += observation_begin_[k];
+  }
+  structure_.point_begin.assign(1, 0);
+  structure_.frame_is_fixed.assign(num_blocks, 0);
+  std::vector<int32_t> seen;
+  for (size_t k = 0; k < blocks.points.size(); ++k) {
+    seen.clear();
+    for (int64_t i = begin(k); i < end(k); ++i) {
+      seen.insert(seen.end(), jacobians.blocks(i),
+                  jacobians.blocks(i) + jacobians.num_blocks(i));
+    }
+    std::sort(seen.begin(), seen.end());
+    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+    structure_.frame_of.insert(structure_.frame_of.end(), seen.begin(),
+                               seen.end());
+    structure_.point_begin.push_back(
+        static_cast<int64_t>(structure_.frame_of.size()));
+    for (int64_t i = begin(k); i < end(k); ++i) {
+      slot_begin_.push_back(static_cast<int64_t>(slots_.size()));
+      for (int n = 0; n < jacobians.num_blocks(i); ++n) {
+        slots_.push_back(static_cast<int32_t>(
+            std::lower_bound(seen.begin(), seen.end(), jacobians.blocks(i)[n]) -
+            seen.begin()));
+      }
+    }
+  }
+}
+
 BarrierSystem::BarrierSystem(const AdjustmentColumns& columns,
                              const AdjustmentBlocks& blocks, int num_threads)
     : columns_(columns),
       loop_(static_cast<int64_t>(blocks.observations.size()), num_threads),
       jacobians_(columns, blocks),
       tracks_(jacobians_, blocks, columns.num_blocks),
-      reduced_(tracks_.structure()),
-      parts_(tracks_.structure().point_begin, reduced_.num_parts()),
-      R_(blocks.points.size()),
-      part_diagonal_(reduced_.num_parts()),
-      part_gradient_(reduced_.num_parts()),
-      part_rhs_(reduced_.num_parts()) {}
+      schur_(tracks_.structure(), {num_threads}),
+      L_inverse_(blocks.points.size()),
+      part_diagonal_(schur_.reduced().num_parts()),
+      part_gradient_(schur_.reduced().num_parts()) {}
 
 void BarrierSystem::Linearize(const AdjustmentBlocks& blocks,
                               const std::vector<ProjectedError>& errors,
@@ -94,7 +120,7 @@ Eigen::Vector4d BarrierSystem::Weigh(int64_t i, const Vector3d& change,
 // Adds a point's part of the reduced system: with A by the point and F by the
 // blocks, F'F - E'H^-1 E, E = A'F, H = A'A.
 void BarrierSystem::AddPoint(int64_t k, double damping, int part) {
-  thread_local std::vector<double> G[3];  // R'^-1 E
+  thread_local std::vector<double> G[3];  // L^-1 E
   thread_local std::vector<int32_t> blocks;
   thread_local std::vector<char> is_apart;
   blocks.assign(tracks_.blocks_begin(k), tracks_.blocks_end(k));
@@ -113,7 +139,7 @@ void BarrierSystem::AddPoint(int64_t k, double damping, int part) {
       }
       for (int c = 0; c <= b; ++c) {
         const Matrix3d block = F[b].transpose() * F[c];
-        reduced_.AddBlock(part, ids[b], ids[c], block.data());
+        schur_.reduced().AddBlock(part, ids[b], ids[c], block.data());
         if (b == c) part_diagonal_[part][ids[b]] += block.diagonal();
       }
     }
@@ -121,34 +147,31 @@ void BarrierSystem::AddPoint(int64_t k, double damping, int part) {
   if (!columns_.point_moves[k]) return;
   diagonal_.points[k] = H.diagonal();
   H.diagonal() *= 1 + damping;
-  const UpperTriangle R = R_[k] = CholeskyFactor(H);
+  InvertCholesky(H, kLeastPivot * H.trace(), &L_inverse_[k]);
   for (size_t c = 0; c < G[0].size(); ++c) {
-    const Vector3d column =
-        R.SolveTransposed(Vector3d(G[0][c], G[1][c], G[2][c]));
+    const Vector3d column = L_inverse_[k] * Vector3d(G[0][c], G[1][c], G[2][c]);
     for (int r = 0; r < 3; ++r) G[r][c] = column[r];
   }
   const double* const rows[3] = {G[0].data(), G[1].data(), G[2].data()};
-  reduced_.SubtractSquare(part, blocks, is_apart, rows);
+  schur_.reduced().SubtractSquare(part, blocks, is_apart, rows);
 }
 
 bool BarrierSystem::Factorize(double radius) {
-  reduced_.SetZero();
   diagonal_.SetZero(tracks_.structure().num_points(), columns_.num_blocks);
   for (std::vector<Vector3d>& part : part_diagonal_) {
     part.assign(columns_.num_blocks, Vector3d::Zero());
   }
-  parts_.ForEach(loop_.num_threads(),
-                 [&](int64_t k, int part) { AddPoint(k, 1 / radius, part); });
+  schur_.AddPoints([&](int64_t k, int part) { AddPoint(k, 1 / radius, part); });
   AddParts(part_diagonal_, &diagonal_.frames);
   for (int32_t b = 0; b < columns_.num_blocks; ++b) {
     const Matrix3d damping = (diagonal_.frames[b] / radius).asDiagonal();
-    reduced_.AddBlock(0, b, b, damping.data());
+    schur_.reduced().AddBlock(0, b, b, damping.data());
   }
-  return reduced_.Factorize(loop_.num_threads());
+  return schur_.Factorize();
 }
 
 // The gradient g and what is left of it without the points, g_b - E'H^-1 g_k.
-void BarrierSystem::ReducePoint(int64_t k, int part) {
+void BarrierSystem::ReducePoint(int64_t k, int part, double* rhs) {
   const int64_t begin = tracks_.begin(k), end = tracks_.end(k);
   const auto by_error = [&](int64_t i) -> Vector3d {
     const Eigen::Vector2d pull = (1 + mu_ / SlackOf(i)) * (*errors_)[i].r;
@@ -160,7 +183,7 @@ void BarrierSystem::ReducePoint(int64_t k, int part) {
     for (int64_t i = begin; i < end; ++i) {
       gradient.noalias() += jacobians_.by_point(i).transpose() * by_error(i);
     }
-    step = -R_[k].Solve(R_[k].SolveTransposed(gradient));
+    step = -(L_inverse_[k].transpose() * (L_inverse_[k] * gradient));
   }
   for (int64_t i = begin; i < end; ++i) {
     const Vector3d pull = by_error(i);
@@ -170,12 +193,12 @@ void BarrierSystem::ReducePoint(int64_t k, int part) {
       const int32_t id = jacobians_.blocks(i)[b];
       const Matrix3d& D = jacobians_.by_block(i, b);
       part_gradient_[part][id].noalias() += D.transpose() * pull;
-      part_rhs_[part][id].noalias() += D.transpose() * pull_left;
+      Vector3d::Map(rhs + 3 * id).noalias() += D.transpose() * pull_left;
     }
     if (MovesCap()) {
       const double by_cap2 = -mu_ / (2 * SlackOf(i));
       part_gradient_[part][columns_.cap][0] += by_cap2;
-      part_rhs_[part][columns_.cap][0] += by_cap2 + weighed[3];
+      rhs[3 * columns_.cap] += by_cap2 + weighed[3];
     }
   }
 }
@@ -196,7 +219,7 @@ void BarrierSystem::BackSubstitute(int64_t k) {
   }
   if (!columns_.point_moves[k] || begin == end) return;
   Vector3d& step = direction_.unknowns.points[k];
-  step = -R_[k].Solve(R_[k].SolveTransposed(rest));
+  step = -(L_inverse_[k].transpose() * (L_inverse_[k] * rest));
   for (int64_t i = begin; i < end; ++i) {
     direction_.slopes[i].noalias() += jacobians_.by_point(i) * step;
   }
@@ -209,28 +232,19 @@ void BarrierSystem::Solve(double mu, double cap_weight) {
   gradient_.SetZero(num_points, num_blocks);
   direction_.unknowns.SetZero(num_points, num_blocks);
   direction_.slopes.resize(loop_.count());
-  for (auto* parts : {&part_gradient_, &part_rhs_}) {
-    for (auto& part : *parts) part.assign(num_blocks, Vector3d::Zero());
+  for (std::vector<Vector3d>& part : part_gradient_) {
+    part.assign(num_blocks, Vector3d::Zero());
   }
-  parts_.ForEach(loop_.num_threads(),
-                 [&](int64_t k, int part) { ReducePoint(k, part); });
+  std::vector<Vector3d> of_cap(num_blocks, Vector3d::Zero());
+  if (MovesCap()) of_cap[columns_.cap][0] = cap_weight / 2;
+  std::vector<Vector3d>& moves = direction_.unknowns.frames;
+  schur_.Solve(
+      [&](int64_t k, int part, double* rhs) { ReducePoint(k, part, rhs); },
+      &of_cap, SchurComplement::kTolerance, &moves);
+  for (Vector3d& move : moves) move = -move;
   AddParts(part_gradient_, &gradient_.frames);
-  std::vector<Vector3d> rhs;
-  AddParts(part_rhs_, &rhs);
-  if (MovesCap()) {
-    gradient_.frames[columns_.cap][0] += cap_weight / 2;
-    rhs[columns_.cap][0] += cap_weight / 2;
-  }
-  Eigen::Map<const Eigen::VectorXd> stacked(
-      num_blocks > 0 ? rhs[0].data() : nullptr,
-      static_cast<int64_t>(3 * num_blocks));
-  const Eigen::VectorXd solution = reduced_.Solve(stacked);
-  for (size_t b = 0; b < num_blocks; ++b) {
-    direction_.unknowns.frames[b] =
-        -solution.segment<3>(static_cast<int64_t>(3 * b));
-  }
-  parts_.ForEach(loop_.num_threads(),
-                 [&](int64_t k, int) { BackSubstitute(k); });
+  if (MovesCap()) gradient_.frames[columns_.cap] += of_cap[columns_.cap];
+  schur_.ForEachPoint([&](int64_t k) { BackSubstitute(k); });
 }
 
 double BarrierSystem::cap2_slope() const {

@@ -1,19 +1,47 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/adjustment_columns.h"
-#include "krot/adjust/adjustment_tracks.h"
-#include "krot/adjust/error_jacobians.h"
-#include "krot/adjust/projected_errors.h"
-#include "krot/conic/block_structure.h"
-#include "krot/conic/frame_system.h"
-#include "krot/conic/observation_loop.h"
-#include "krot/conic/point_parts.h"
-#include "krot/conic/thin_qr.h"
+#include "krot/adjust/reprojection_errors.h"
+#include "krot/linear/ordered_sums.h"
+#include "krot/linear/schur_complement.h"
 
 namespace krot {
+
+// The observations of every point, and the blocks of columns that they depend
+// on.
+class AdjustmentTracks {
+ public:
+  AdjustmentTracks(const ErrorJacobians& jacobians,
+                   const AdjustmentBlocks& blocks, int32_t num_blocks);
+
+  int64_t begin(int64_t k) const { return observation_begin_[k]; }
+  int64_t end(int64_t k) const { return observation_begin_[k + 1]; }
+
+  // Every block of the point once, ascending.
+  const int32_t* blocks_begin(int64_t k) const {
+    return structure_.frame_of.data() + structure_.point_begin[k];
+  }
+  const int32_t* blocks_end(int64_t k) const {
+    return structure_.frame_of.data() + structure_.point_begin[k + 1];
+  }
+  // Where among these ErrorJacobians::blocks(i) stand.
+  const int32_t* slots(int64_t i) const {
+    return slots_.data() + slot_begin_[i];
+  }
+
+  // The same for a FrameSystem, with blocks for frames.
+  const BlockStructure& structure() const { return structure_; }
+
+ private:
+  std::vector<int64_t> observation_begin_;  // num_points + 1
+  BlockStructure structure_;
+  std::vector<int64_t> slot_begin_;  // by observation
+  std::vector<int32_t> slots_;
+};
 
 // The slack of an error below the cap.
 inline double Slack(double cap2, double squared_error) {
@@ -38,9 +66,9 @@ inline double Slack(double cap2, double squared_error) {
 // is -J'J alone, J = dr: dw takes the place of the second derivatives of r,
 // without which steps along a cap of large multipliers are short.
 //
-// The points are eliminated; what is left is a FrameSystem, which has blocks of
-// three columns for "frames": those of AdjustmentColumns. The gauge is free, so
-// the diagonal is raised by its share 1 / radius.
+// The points are eliminated; the "frames" of what is left are the blocks of
+// three columns of AdjustmentColumns. The gauge is free, so the diagonal is
+// raised by its share 1 / radius.
 class BarrierSystem {
  public:
   // Keeps a reference to `columns`.
@@ -72,7 +100,7 @@ class BarrierSystem {
   double SingleGains() const;
 
   const ObservationLoop& loop() const { return loop_; }
-  FrameSystem::Kind kind() const { return reduced_.kind(); }
+  ReducedCameraSystem::Kind kind() const { return schur_.reduced().kind(); }
 
  private:
   double SlackOf(int64_t i) const {
@@ -86,7 +114,7 @@ class BarrierSystem {
                         double cap2_change) const;
 
   void AddPoint(int64_t k, double damping, int part);
-  void ReducePoint(int64_t k, int part);
+  void ReducePoint(int64_t k, int part, double* rhs);
   void BackSubstitute(int64_t k);
   bool MovesCap() const { return columns_.cap != AdjustmentColumns::kHeld; }
 
@@ -94,21 +122,18 @@ class BarrierSystem {
   const ObservationLoop loop_;
   ErrorJacobians jacobians_;
   const AdjustmentTracks tracks_;
-  FrameSystem reduced_;
-  const PointParts parts_;
+  SchurComplement schur_;
 
   const std::vector<ProjectedError>* errors_ = nullptr;
   const std::vector<double>* multipliers_ = nullptr;
   double cap2_ = 0;
   double mu_ = 0;
-  std::vector<double> pull_;      // mu / h
-  std::vector<UpperTriangle> R_;  // of points
+  std::vector<Eigen::Matrix3d> L_inverse_;  // of points, H = L L'
   BlockVector diagonal_;
   BlockVector gradient_;
   Direction direction_;
   // Of the blocks, by part of the sum.
-  std::vector<std::vector<Eigen::Vector3d>> part_diagonal_, part_gradient_,
-      part_rhs_;
+  std::vector<std::vector<Eigen::Vector3d>> part_diagonal_, part_gradient_;
 };
 
 }  // namespace krot

@@ -9,14 +9,13 @@
 #include <vector>
 
 #include <ceres/solver.h>
+#include <glog/logging.h>
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/adjustment_columns.h"
-#include "krot/adjust/adjustment_problem.h"
 #include "krot/adjust/bounded_adjustment.h"
-#include "krot/adjust/iteration_observer.h"
-#include "krot/adjust/optimality.h"
-#include "krot/adjust/projected_errors.h"
+#include "krot/adjust/ceres_problem.h"
+#include "krot/adjust/reprojection_errors.h"
 #include "krot/adjust/restore_similarity.h"
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
@@ -210,5 +209,7 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   summary.seconds = timer.Seconds();
   return result;
 }
+
+void SilenceCeres() { FLAGS_minloglevel = google::GLOG_FATAL; }
 
 }  // namespace krot

@@ -1,7 +1,6 @@
 // Where there is no Ceres: nothing can be adjusted.
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/adjust/ceres_log.h"
 #include "krot/base/check.h"
 
 namespace krot {

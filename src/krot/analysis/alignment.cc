@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/geometry/consensus.h"
 #include "krot/geometry/rotation.h"
 

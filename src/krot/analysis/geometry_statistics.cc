@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/image_geometry.h"
 

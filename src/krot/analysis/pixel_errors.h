@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/model.h"
 
 namespace krot {

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/contradictions.h"
 
 namespace krot {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/model.h"
 
 namespace krot {

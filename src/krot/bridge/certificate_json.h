@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/bridge/certificate_file.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 
 namespace krot {
 

@@ -6,7 +6,7 @@
 
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/model.h"
 #include "krot/proof/certificate_check.h"
 

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "krot/bridge/bridge.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/model.h"
 #include "krot/problem/known_rotation_problem.h"
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 
 namespace krot {
 

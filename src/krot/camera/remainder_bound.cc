@@ -13,6 +13,7 @@
 #include "krot/camera/models.h"
 #include "krot/camera/projection_row.h"
 #include "krot/camera/remainder_search.h"
+#include "krot/math/norm.h"
 
 namespace krot {
 namespace {
@@ -75,11 +76,6 @@ std::optional<Region> FindRegion(int model_id, const double* params,
   return std::nullopt;
 }
 
-double DualNorm(const Eigen::Vector2d& y, double p) {
-  if (p == 2) return y.norm();
-  return p == 1 ? y.lpNorm<Eigen::Infinity>() : y.lpNorm<1>();
-}
-
 }  // namespace
 
 std::optional<double> RemainderBound(int model_id, const double* params,
@@ -106,7 +102,7 @@ std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector2d& y, double level_px,
                                    double p, double sufficient) {
   CheckArguments(level_px, p);
-  const double length = DualNorm(y, p) * (1 + kRounding);
+  const double length = DualNorm(y, {p}) * (1 + kRounding);
   if (!(length > 0))
     return length == 0 ? std::optional<double>(0) : std::nullopt;
   if (IsPinhole(model_id)) {

@@ -35,7 +35,7 @@ Interval ClipToUnit(const Interval& a) {
   return {std::max(a.lo, -1.0), std::min(a.hi, 1.0)};
 }
 
-Interval Norm(const Interval& x, const Interval& y, double p) {
+Interval IntervalNorm(const Interval& x, const Interval& y, double p) {
   const Interval a = Absolute(x);
   const Interval b = Absolute(y);
   if (p == 1) return a + b;
@@ -77,7 +77,7 @@ Enclosure Enclose(const ErrorMap& map, const Box& box) {
 }
 
 bool IsOutside(const Enclosure& enclosure, double p) {
-  return Norm(enclosure.f[0], enclosure.f[1], p).lo > 1;
+  return IntervalNorm(enclosure.f[0], enclosure.f[1], p).lo > 1;
 }
 
 // An upper bound of |m| where |f| <= 1, from m = f - r:
@@ -86,7 +86,7 @@ bool IsOutside(const Enclosure& enclosure, double p) {
 // and s'f <= its own enclosure where that is less. NaN if nothing is known.
 double BoundLinearError(const Enclosure& enclosure, double p) {
   const Interval* r = enclosure.remainder;
-  const double direct = Norm(enclosure.m[0], enclosure.m[1], p).hi;
+  const double direct = IntervalNorm(enclosure.m[0], enclosure.m[1], p).hi;
   const Interval f[2] = {ClipToUnit(enclosure.f[0]),
                          ClipToUnit(enclosure.f[1])};
   double bound = 0;
@@ -142,7 +142,7 @@ template <typename Value>
 double Sample(const ErrorMap& map, double p, double d1, double d2,
               const Value& value) {
   constexpr int kCorrections = 6;
-  const double norm = Norm({d1, d1}, {d2, d2}, p).hi;
+  const double norm = IntervalNorm({d1, d1}, {d2, d2}, p).hi;
   const double wanted[2] = {d1 / norm, d2 / norm};
   double q[2] = {wanted[0], wanted[1]};
   for (int j = 0;; ++j) {
@@ -152,7 +152,7 @@ double Sample(const ErrorMap& map, double p, double d1, double d2,
       for (int k = 0; k < 2; ++k) q[k] += wanted[k] - f[k];
       continue;
     }
-    const double size = Norm({f[0], f[0]}, {f[1], f[1]}, p).hi;
+    const double size = IntervalNorm({f[0], f[0]}, {f[1], f[1]}, p).hi;
     return size < 1.5 && size > 0.5 ? value(at, size) : -kInfinity;
   }
 }
@@ -225,11 +225,11 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
   double sampled = 1;
   for (int i = 0; i < kDirections; ++i) {
     const double angle = i * 2 * 3.14159265358979323846 / kDirections;
-    sampled =
-        std::max(sampled, Sample(map, p, std::cos(angle), std::sin(angle),
-                                 [p](const auto& at, double size) {
-                                   return Norm(at.m[0], at.m[1], p).lo / size;
-                                 }));
+    sampled = std::max(
+        sampled, Sample(map, p, std::cos(angle), std::sin(angle),
+                        [p](const auto& at, double size) {
+                          return IntervalNorm(at.m[0], at.m[1], p).lo / size;
+                        }));
   }
   const double target =
       sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 
 namespace krot {
 
@@ -161,5 +161,111 @@ Eigen::Matrix<double, kDim, 1> FromMultiplier(Norm norm, double lambda,
   }
   return z;
 }
+
+// A cone and a half-line: of the pairs of an observation that may exceed its
+// bound by a slack.
+template <typename Cone>
+struct WithHalfLine {
+  static constexpr int kDim = Cone::kDim + 1;
+  static constexpr int kDegree = Cone::kDegree + 1;
+  using Vector = Eigen::Matrix<double, kDim, 1>;
+
+  static typename Cone::Vector Head(const Vector& x) {
+    return x.template head<Cone::kDim>();
+  }
+  static double Last(const Vector& x) { return x[Cone::kDim]; }
+  static Vector Join(const typename Cone::Vector& head, double last) {
+    Vector result;
+    result << head, last;
+    return result;
+  }
+
+  static Vector Identity() { return Join(Cone::Identity(), 1); }
+  static Vector Product(const Vector& x, const Vector& y) {
+    return Join(Cone::Product(Head(x), Head(y)), Last(x) * Last(y));
+  }
+  static Vector Divide(const Vector& x, const Vector& r) {
+    return Join(Cone::Divide(Head(x), Head(r)), Last(r) / Last(x));
+  }
+  static double SmallestEigenvalue(const Vector& x) {
+    return std::min(Cone::SmallestEigenvalue(Head(x)), Last(x));
+  }
+  static double SmallestProduct(const Vector& s, const Vector& z) {
+    return std::min(Cone::SmallestProduct(Head(s), Head(z)), Last(s) * Last(z));
+  }
+  static Vector Clamp(const Vector& x, double low, double high) {
+    return Join(Cone::Clamp(Head(x), low, high),
+                std::min(std::max(Last(x), low), high));
+  }
+  static double MaxStep(const Vector& x, const Vector& d, double limit) {
+    limit = Cone::MaxStep(Head(x), Head(d), limit);
+    return Last(d) < 0 ? std::min(limit, -Last(x) / Last(d)) : limit;
+  }
+};
+
+// The Nesterov-Todd scaling of a pair s, z inside a cone: the symmetric
+// positive definite W with  W z = W^-1 s = lambda  [Nesterov, Todd 1997;
+// Vandenberghe 2010, Sec. 4].
+template <typename Cone>
+class NtScaling;
+
+// For the second-order cone
+//
+//   W = eta [ w0  w1' ; w1  I + w1 w1' / (1 + w0) ],  w0^2 - |w1|^2 = 1.
+template <>
+class NtScaling<SecondOrderCone> {
+ public:
+  using Vector = SecondOrderCone::Vector;
+
+  NtScaling() = default;
+  NtScaling(const Vector& s, const Vector& z) {
+    const double root_s = std::sqrt(SecondOrderCone::Determinant(s));
+    const double root_z = std::sqrt(SecondOrderCone::Determinant(z));
+    const Vector s_unit = s / root_s;
+    const Vector z_unit = z / root_z;
+    const double cosh = std::sqrt((1 + s_unit.dot(z_unit)) / 2);
+    w0_ = (s_unit[0] + z_unit[0]) / (2 * cosh);
+    w1_ = (s_unit.tail<2>() - z_unit.tail<2>()) / (2 * cosh);
+    eta_ = std::sqrt(root_s / root_z);
+  }
+
+  Vector Apply(const Vector& x) const {  // W x
+    const double w1x1 = w1_.dot(x.tail<2>());
+    Vector result;
+    result[0] = eta_ * (w0_ * x[0] + w1x1);
+    result.tail<2>() = eta_ * (x.tail<2>() + (x[0] + w1x1 / (1 + w0_)) * w1_);
+    return result;
+  }
+
+  Vector ApplyInverse(const Vector& x) const {  // W^-1 x
+    const double w1x1 = w1_.dot(x.tail<2>());
+    Vector result;
+    result[0] = (w0_ * x[0] - w1x1) / eta_;
+    result.tail<2>() = (x.tail<2>() + (w1x1 / (1 + w0_) - x[0]) * w1_) / eta_;
+    return result;
+  }
+
+ private:
+  double eta_ = 1;
+  double w0_ = 1;
+  Eigen::Vector2d w1_ = Eigen::Vector2d::Zero();
+};
+
+// W = diag(sqrt(s / z)).
+template <>
+class NtScaling<FourHalfLines> {
+ public:
+  using Vector = FourHalfLines::Vector;
+
+  NtScaling() = default;
+  NtScaling(const Vector& s, const Vector& z)
+      : w_(s.cwiseQuotient(z).cwiseSqrt()) {}
+
+  Vector Apply(const Vector& x) const { return w_.cwiseProduct(x); }
+  Vector ApplyInverse(const Vector& x) const { return x.cwiseQuotient(w_); }
+
+ private:
+  Vector w_ = Vector::Ones();
+};
 
 }  // namespace krot

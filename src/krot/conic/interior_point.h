@@ -1,11 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/conic/cone_program.h"
-#include "krot/minimax/norm.h"
+#include "krot/linear/block_structure.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -33,8 +34,8 @@ struct InteriorPointOptions {
   Norm norm;                  // p = 1, 2 or infinity
   double start_margin = 0.1;  // gamma starts at (1 + margin) cost; > 0
   // MinimizeJointly: those of a similar problem's last iterate, per
-  // observation, zero where they are not known. It starts the nearer to them
-  // the smaller the margin is. They may be what it writes to in the end.
+  // observation, zero where they are not known. The smaller the margin is, the
+  // nearer to them it starts. May alias the output.
   const std::vector<Multiplier>* known_multipliers = nullptr;
   double smallest_gap = 1e-9;  // stop there, relative; > 0
   int max_iterations = 200;    // >= 1
@@ -44,11 +45,11 @@ struct InteriorPointOptions {
 
 enum class InteriorPointTermination {
   kNotRun,
-  kStopped,  // options.stop said so
-  kSmallestGap,
-  kFeasible,  // FindFeasible: every residual is below the bound
+  kConverged,  // what was asked for: a small gap, or all tolerances
+  kStopped,    // options.stop said so
+  kFeasible,   // FindFeasible: every residual is below the bound
   kMaxIterations,
-  kNoProgress,  // steps have become too short
+  kNoProgress,  // steps have become too short, or gain next to nothing
   kSingular,    // the linear system could not be factorised
   kInterrupted,
 };
@@ -89,6 +90,13 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   double unit_depth, Estimate* estimate,
                                   std::vector<Multiplier>* multipliers);
 
+// h'x, to be minimised along e'x = const. x stands for points and for the
+// frames' centres in the world, -R_rw' t_f.
+struct LinearObjective {
+  BlockVector h;
+  std::optional<BlockVector> e;  // none: nothing of the kind is kept
+};
+
 // How far estimates whose residuals are all at most `bound` > 0, pixels, reach
 // in one direction:
 //
@@ -97,19 +105,14 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
 // from `*estimate`, whose residuals must all be below the bound (throws
 // std::invalid_argument otherwise) and which becomes the one with the lowest
 // h'x that was met. The problem must be connected and something in it fixed.
-// Soon the multipliers' forces balance h but for rounding and a multiple of e,
-// and then they prove what krot/proof/extent_check.h says.
-// The gap is relative to how far it is from the start to the end that they
-// prove.
+// Soon the dual residual is h but for rounding and a multiple of e, and then
+// the multipliers prove what krot/proof/extent_check.h says. The gap is
+// relative to how far it is from the start to the end that they prove.
 InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
                                     const InteriorPointOptions& options,
                                     const Context& context, double bound,
                                     const LinearObjective& objective,
                                     Estimate* estimate,
                                     std::vector<Multiplier>* multipliers);
-
-// What MinimizeJointly will allocate beyond the problem, bytes. O(problem).
-int64_t EstimateInteriorPointMemory(const KnownRotationProblem& problem,
-                                    Norm norm);
 
 }  // namespace krot

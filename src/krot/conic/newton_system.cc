@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/LU>
 
+#include "krot/base/numbers.h"
 #include "krot/problem/fixed.h"
 
 namespace krot {
@@ -13,18 +15,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of the median depth; smaller ones count as this much.
+// Depths below this share of the median depth are small: they count as much in
+// the gauge, and may grow by any factor.
 constexpr double kSmallDepth = 0.1;
-
-double MedianDepth(const std::vector<ViewedPoint>& viewed) {
-  std::vector<double> depths;
-  depths.reserve(viewed.size());
-  for (const ViewedPoint& v : viewed) depths.push_back(v.depth);
-  const auto middle =
-      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
-}
+// No other depth grows by more than this factor in a step: far beyond, neither
+// the gauge nor the linearised top = g w holds.
+constexpr double kMaxDepthGrowth = 3;
 
 }  // namespace
 
@@ -37,8 +33,9 @@ NewtonSystem<Cone>::NewtonSystem(const KnownRotationProblem& problem,
       loop_(static_cast<int64_t>(problem.observations.size()), num_threads),
       has_free_scale_(program.IsCost() && IsScaleFree(problem)),
       structure_(AnchoredStructure(problem)),
+      rig_from_world_(RigFromWorldRotations(problem)),
       T_(ConeMap<kDim>(norm)),
-      elimination_(structure_, num_threads),
+      least_squares_(structure_, {num_threads}),
       scaling_(problem.observations.size()),
       lambda_(problem.observations.size()),
       border_(problem.observations.size()),
@@ -49,74 +46,92 @@ NewtonSystem<Cone>::NewtonSystem(const KnownRotationProblem& problem,
 }
 
 template <typename Cone>
-typename Cone::Vector NewtonSystem<Cone>::Slack(const ViewedPoint& viewed,
-                                                double scalar) const {
-  return T_ *
-         Vector3d(program_.Top(viewed.depth, scalar), viewed.v[0], viewed.v[1]);
+void NewtonSystem<Cone>::ViewAll(State* state) const {
+  state->viewed.resize(problem_.observations.size());
+  loop_.ForEach([&](int64_t i) {
+    state->viewed[i] = ViewPoint(problem_, problem_.observations[i], state->x);
+  });
 }
 
 template <typename Cone>
-bool NewtonSystem<Cone>::Factorize(const std::vector<ViewedPoint>& viewed,
-                                   double scalar,
-                                   const std::vector<Vector>& z) {
+typename Cone::Vector NewtonSystem<Cone>::Slack(const State& state,
+                                                int64_t i) const {
+  const ViewedPoint& viewed = state.viewed[i];
+  return T_ * Vector3d(program_.Top(viewed.depth, state.scalar), viewed.v[0],
+                       viewed.v[1]);
+}
+
+template <typename Cone>
+void NewtonSystem<Cone>::Move(const State& from, double step, State* to) const {
+  MoveCentres(rig_from_world_, from.x, step, direction_.dx, &to->x);
+  to->scalar = from.scalar + step * direction_.dscalar;
+  ViewAll(to);
+}
+
+template <typename Cone>
+bool NewtonSystem<Cone>::IsPlausible(const State& from, const State& to,
+                                     int64_t i) const {
+  if (!program_.IsCost()) return true;
+  const double depth = to.viewed[i].depth;
+  return to.scalar > 0 && depth > 0 &&
+         depth <=
+             kMaxDepthGrowth * std::max(from.viewed[i].depth, small_depth_);
+}
+
+template <typename Cone>
+bool NewtonSystem<Cone>::Factorize(const State& at) {
   using Rows = Eigen::Matrix<double, kDim, 3, Eigen::RowMajor>;
-  const double top_per_depth = program_.TopPerDepth(scalar);
+  const double top_per_depth = program_.TopPerDepth(at.scalar);
   loop_.ForEach([&](int64_t i) {
-    scaling_[i] = NtScaling<Cone>(Slack(viewed[i], scalar), z[i]);
-    lambda_[i] = scaling_[i].Apply(z[i]);
+    scaling_[i] = NtScaling<Cone>(Slack(at, i), at.z[i]);
+    lambda_[i] = scaling_[i].Apply(at.z[i]);
     border_[i] = scaling_[i].ApplyInverse(
-        T_.col(0) * program_.TopPerScalar(viewed[i].depth));
+        T_.col(0) * program_.TopPerScalar(at.viewed[i].depth));
     const Observation& o = problem_.observations[i];
-    const View& view = problem_.views[o.view];
     Matrix3d E = o.E;
     E.row(0) *= top_per_depth;
     Rows rows;  // of x_cam
     for (int c = 0; c < 3; ++c) {
       rows.col(c) = scaling_[i].ApplyInverse(T_ * E.col(c));
     }
-    Eigen::Map<Rows>(elimination_.point_rows(i)).noalias() =
-        rows * view.cam_from_world_rotation;
-    Eigen::Map<Rows>(elimination_.frame_rows(i)).noalias() =
-        rows * view.cam_from_rig_rotation;
+    Eigen::Map<Rows>(least_squares_.rows(i)).noalias() =
+        rows * problem_.views[o.view].cam_from_world_rotation;
   });
-  gap_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); });
-  mu_ = gap_ / static_cast<double>(loop_.count() * Cone::kDegree);
-  if (!elimination_.Factorize()) return false;
+  mu_ = loop_.Sum([&](int64_t i) { return lambda_[i].squaredNorm(); }) /
+        static_cast<double>(loop_.count() * Cone::kDegree);
+  if (!least_squares_.Factorize()) return false;
 
   // What the border needs of the factorised part.
-  BlockVector zero;
-  zero.SetZero(problem_.num_points, problem_.num_frames);
   if (program_.IsLinear()) {
-    elimination_.Solve(program_.linear->h, nullptr, &x_border_);
+    least_squares_.SolveRefined(&program_.linear->h, nullptr, &x_border_,
+                                rest_[0].data());
   } else {
-    elimination_.Solve(zero, border_[0].data(), &x_border_);
+    least_squares_.SolveRefined(nullptr, border_[0].data(), &x_border_,
+                                rest_[0].data());
   }
-  FindGauge(viewed);
-  elimination_.Solve(gauge_, nullptr, &x_gauge_);
-  elimination_.Multiply(x_border_, rest_[0].data());
   loop_.ForEach([&](int64_t i) { rest_[i] = border_[i] - rest_[i]; });
+  FindGauge(at.viewed);
+  least_squares_.SolveRefined(&gauge_, nullptr, &x_gauge_);
   return true;
 }
 
 // e = mean of c_i / w_i, w_i at least the small depth: e'dx is the mean
 // relative change of the depths. Its multiplier is as large as the gap, so that
-// with depths that fall like the gap alone its forces would not vanish.
+// with depths that fall like the gap alone the dual residual would not vanish.
 template <typename Cone>
 void NewtonSystem<Cone>::FindGauge(const std::vector<ViewedPoint>& viewed) {
-  gauge_.SetZero(problem_.num_points, problem_.num_frames);
-  if (program_.IsLinear() && program_.linear->e) gauge_ = *program_.linear->e;
-  if (!program_.IsCost()) return;
-  small_depth_ = kSmallDepth * MedianDepth(viewed);
-  for (int64_t i = 0; i < loop_.count(); ++i) {
-    const Observation& o = problem_.observations[i];
-    const View& view = problem_.views[o.view];
-    const double weight = 1 / (static_cast<double>(loop_.count()) *
-                               std::max(viewed[i].depth, small_depth_));
-    const Vector3d c = weight * o.E.row(0).transpose();
-    gauge_.points[o.point] += view.cam_from_world_rotation.transpose() * c;
-    if (structure_.frame_is_fixed[view.frame]) continue;
-    gauge_.frames[view.frame] += view.cam_from_rig_rotation.transpose() * c;
+  if (!program_.IsCost()) {
+    gauge_.SetZero(problem_.num_points, problem_.num_frames);
+    if (program_.IsLinear() && program_.linear->e) gauge_ = *program_.linear->e;
+    return;
   }
+  std::vector<double> depths;
+  for (const ViewedPoint& v : viewed) depths.push_back(v.depth);
+  small_depth_ = kSmallDepth * Median(std::move(depths));
+  gauge_ = GradientOf(problem_, structure_, [&](int64_t i) -> Vector3d {
+    const double depth = std::max(viewed[i].depth, small_depth_);
+    return {1 / (static_cast<double>(loop_.count()) * depth), 0, 0};
+  });
 }
 
 template <typename Cone>
@@ -138,9 +153,7 @@ double NewtonSystem<Cone>::ObjectiveLength() const {
 // In the linear programme 1 takes the place of dg there, as Xb = H^-1 h.
 template <typename Cone>
 void NewtonSystem<Cone>::SolveForTarget(double sigma) {
-  BlockVector zero;
-  zero.SetZero(problem_.num_points, problem_.num_frames);
-  elimination_.Solve(zero, target_[0].data(), &x_target_);
+  least_squares_.SolveRefined(nullptr, target_[0].data(), &x_target_);
   Eigen::Matrix2d M;
   Eigen::Vector2d rhs;
   M(0, 0) = loop_.Sum([&](int64_t i) { return rest_[i].squaredNorm(); });
@@ -168,7 +181,7 @@ void NewtonSystem<Cone>::SolveForTarget(double sigma) {
   d.dx.Add(-d.dscalar, x_border_);
   d.dx.Add(-solution[1], x_gauge_);
   if (program_.IsLinear()) d.dscalar = program_.linear->h.Dot(d.dx);
-  elimination_.Multiply(d.dx, d.ds[0].data());
+  least_squares_.Multiply(d.dx, d.ds[0].data());
   loop_.ForEach([&](int64_t i) {
     d.ds[i] += d.dscalar * border_[i];
     d.dz[i] = target_[i] - lambda_[i] - d.ds[i];
@@ -178,37 +191,18 @@ void NewtonSystem<Cone>::SolveForTarget(double sigma) {
 // dz = W^-2 A H^-1 (h - A'z + nu e), nu such that what is missing has no part
 // in e: it is small then, and so is what the solution costs in digits.
 template <typename Cone>
-void NewtonSystem<Cone>::SolveForBalance(const std::vector<Vector>& z) {
+void NewtonSystem<Cone>::SolveForStationarity(const std::vector<Vector>& z) {
   BlockVector missing = program_.linear->h;
-  for (int64_t i = 0; i < loop_.count(); ++i) {
-    const Observation& o = problem_.observations[i];
-    const View& view = problem_.views[o.view];
+  missing.Add(-1, GradientOf(problem_, structure_, [&](int64_t i) {
     Vector3d multiplier = ToMultiplier(z[i]);
     multiplier[0] *= program_.bound;
-    const Vector3d force = o.E.transpose() * multiplier;
-    missing.points[o.point] -= view.cam_from_world_rotation.transpose() * force;
-    missing.frames[view.frame] -=
-        view.cam_from_rig_rotation.transpose() * force;
-  }
+    return multiplier;
+  }));
   if (program_.linear->e) {
     missing.Add(-gauge_.Dot(missing) / gauge_.Dot(gauge_), gauge_);
   }
   BlockVector x;
-  elimination_.Solve(missing, nullptr, &x);
-  elimination_.Multiply(x, direction_.dz[0].data());
-}
-
-template <typename Cone>
-int64_t NewtonSystem<Cone>::MemoryBytes(const KnownRotationProblem& problem) {
-  constexpr int64_t kPerObservation =
-      sizeof(NtScaling<Cone>) + 6 * sizeof(Vector) +
-      2 * sizeof(Vector) +             // refinement
-      3 * 3 * kDim * sizeof(double) +  // A_s, A_t, Q
-      2 * sizeof(int32_t);             // structure and order
-  constexpr int64_t kPerUnknown = 10 * sizeof(Vector3d);
-  return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
-         (problem.num_points + problem.num_frames) * kPerUnknown +
-         FrameSystem(AnchoredStructure(problem)).MemoryBytes();
+  least_squares_.SolveRefined(&missing, nullptr, &x, direction_.dz[0].data());
 }
 
 template class NewtonSystem<SecondOrderCone>;

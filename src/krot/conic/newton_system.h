@@ -3,14 +3,42 @@
 #include <utility>
 #include <vector>
 
-#include "krot/conic/cone_program.h"
 #include "krot/conic/cones.h"
-#include "krot/conic/nt_scaling.h"
-#include "krot/conic/observation_loop.h"
-#include "krot/conic/point_elimination.h"
-#include "krot/minimax/norm.h"
+#include "krot/conic/interior_point.h"
+#include "krot/linear/ordered_sums.h"
+#include "krot/linear/schur_complement.h"
+#include "krot/problem/centre_unknowns.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
+
+// The programmes that the interior point solves: minimise a scalar g subject to
+// (top_i, v_i) in the cone ||v|| <= top for every observation, where
+//
+//   cost:         top = g w              g is gamma, a bound on all residuals
+//   feasibility:  top = b (w + u (g - 1))  g < 1 makes every residual < b
+//   linear:       top = b w              g = h'x
+//
+// with w the depth and u a unit of depth. The first is homogeneous in the
+// unknowns where no baseline sets a scale; the second needs no positive depth
+// to start.
+struct ConeProgram {
+  enum class Kind { kCost, kFeasibility, kLinear };
+  Kind kind = Kind::kCost;
+  double bound = 0;       // b, pixels; not of the cost programme
+  double unit_depth = 1;  // u, scene units; 0 of the linear programme
+  const LinearObjective* linear = nullptr;  // of the linear programme
+
+  bool IsCost() const { return kind == Kind::kCost; }
+  bool IsLinear() const { return kind == Kind::kLinear; }
+  double Top(double depth, double g) const {
+    return IsCost() ? g * depth : bound * (depth + unit_depth * (g - 1));
+  }
+  double TopPerDepth(double g) const { return IsCost() ? g : bound; }
+  double TopPerScalar(double depth) const {
+    return IsCost() ? depth : bound * unit_depth;
+  }
+};
 
 // The Newton system of the interior point at an iterate. With s_i = T (top_i;
 // v_i) in the cone, z_i its multiplier and W_i their scaling, a direction
@@ -20,8 +48,9 @@ namespace krot {
 //
 // a linear least squares problem, along the gauge e'dx = 0. The multipliers
 // follow: W dz = f - lambda - W^-1 ds. All that is kept per observation is
-// scaled by W, and so are A and b here. With H = A'A of PointElimination, g and
-// the gauge are a border of two rows and columns:
+// scaled by W, and so are A and b here. x stands for points and for the frames'
+// centres in the world. With H = A'A, g and the gauge are a border of two rows
+// and columns:
 //
 //   [ H     A'b    e    ] [ dx ]   [ A'f     ]
 //   [ b'A   b'b    0    ] [ dg ] = [ b'f - 1 ]
@@ -39,25 +68,42 @@ namespace krot {
 // Factorize at an iterate; then Solve for one f after another, each of which
 // may be made of lambda() and the last target() and direction(). Restore puts
 // an earlier direction back, but not its target.
-template <typename Cone>
+template <typename ConeType>
 class NewtonSystem {
  public:
-  static constexpr int kDim = Cone::kDim;
+  using Cone = ConeType;
   using Vector = typename Cone::Vector;
+  static constexpr int kNumCorrectors = 2;
+  static constexpr bool kGapAfterOwnSteps = false;
+
+  struct State {
+    Estimate x;
+    double scalar = 0;  // g
+    std::vector<ViewedPoint> viewed;
+    std::vector<Vector> z;
+    double gap = 0;  // sum s'z
+  };
 
   NewtonSystem(const KnownRotationProblem& problem, const ConeProgram& program,
                Norm norm, int num_threads);
 
-  // s = T (top; v).
-  Vector Slack(const ViewedPoint& viewed, double scalar) const;
+  // Sets viewed from x.
+  void ViewAll(State* state) const;
+  Vector Slack(const State& state, int64_t i) const;  // s = T (top; v)
   // (lambda; y) = T'z: the multipliers of the depth and of v.
   Eigen::Vector3d ToMultiplier(const Vector& z) const {
     return T_.transpose() * z;
   }
+  // Stationarity of the cost programme holds for one g, and so primal and dual
+  // steps are of one length there.
+  bool HasOneStep() const { return program_.IsCost(); }
+  // Along the direction; leaves z alone.
+  void Move(const State& from, double step, State* to) const;
+  // Whether the linearised top = g w may hold between two iterates.
+  bool IsPlausible(const State& from, const State& to, int64_t i) const;
 
   // Scales and factorises at an iterate; false if there is no factor.
-  bool Factorize(const std::vector<ViewedPoint>& viewed, double scalar,
-                 const std::vector<Vector>& z);
+  bool Factorize(const State& at);
 
   // The direction for the targets f = target(i), which may depend on the last
   // f and direction, and for the centring sigma of the depths' growth where
@@ -69,17 +115,15 @@ class NewtonSystem {
   }
 
   // Linear programme: the least change of z, in the scaling, after which the
-  // forces balance, A'z = h but for a multiple of e; as the direction's dz.
-  void SolveForBalance(const std::vector<Vector>& z);
+  // dual residual vanishes, A'z = h but for a multiple of e; as the direction's
+  // dz.
+  void SolveForStationarity(const std::vector<Vector>& z);
 
   const ObservationLoop& loop() const { return loop_; }
-  double gap() const { return gap_; }  // sum s'z = sum |lambda|^2
-  double mu() const { return mu_; }    // of each pair, on the central path
+  double mu() const { return mu_; }  // of each pair, on the central path
   // Linear programme: how much h'x may change within the ellipsoid |A dx| <= 1
   // along the gauge.
   double ObjectiveLength() const;
-  // Cost programme: depths below it are small beside the others.
-  double small_depth() const { return small_depth_; }
   const std::vector<Vector>& lambda() const { return lambda_; }
   const std::vector<Vector>& target() const { return target_; }  // the last f
 
@@ -96,9 +140,9 @@ class NewtonSystem {
     return scaling_[i].ApplyInverse(direction_.dz[i]);
   }
 
-  static int64_t MemoryBytes(const KnownRotationProblem& problem);
-
  private:
+  static constexpr int kDim = Cone::kDim;
+
   void FindGauge(const std::vector<ViewedPoint>& viewed);
   void SolveForTarget(double sigma);
 
@@ -107,9 +151,9 @@ class NewtonSystem {
   const ObservationLoop loop_;
   const bool has_free_scale_;
   const BlockStructure structure_;
+  const std::vector<Eigen::Matrix3d> rig_from_world_;
   const Eigen::Matrix<double, kDim, 3> T_;
-  PointElimination<kDim> elimination_;
-  double gap_ = 0;
+  CentredLeastSquares<kDim> least_squares_;
   double mu_ = 0;
   double small_depth_ = 0;
   std::vector<NtScaling<Cone>> scaling_;

@@ -1,11 +1,310 @@
 #include "krot/finish/bounded_least_squares.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
 #include "krot/base/check.h"
-#include "krot/finish/bounded_path.h"
+#include "krot/conic/path_following.h"
+#include "krot/finish/bounded_system.h"
 #include "krot/problem/cost.h"
 
 namespace krot {
 namespace {
+
+// The first mu, as a share of the cost by pair: the start is near the boundary,
+// and has to leave it first.
+constexpr double kStartWeight = 10;
+// The first multipliers are those of slacks of this share of the cap's at
+// least. Nearer to the boundary they would let the slack grow by no more than
+// itself in a step.
+constexpr double kStartSlack = 0.01;
+// A step goes so far of the way to the boundary: one that all but reached it
+// would leave a slack that the next direction cannot predict. One that does not
+// lower the barrier cost is shortened by the second factor, and one shorter
+// than the last is none.
+constexpr double kDamping = 0.95;
+constexpr double kBacktracking = 0.5;
+constexpr double kLeastStep = 1e-6;
+// What rounding may add to the barrier cost, relative.
+constexpr double kCostRounding = 1e-13;
+// No pair's product is less than this share of mu: what the step leaves of a
+// multiplier may be too little to keep its error off the cap in the next one,
+// and a single pair holds back the step of all. Nor is it more than the second.
+constexpr double kLeastProduct = 0.3;
+constexpr double kLargestProduct = 1e5;
+// After a step shorter than this, the next one only centres.
+constexpr double kShortStep = 0.03;
+// With a gap this near to that asked for, in such gaps, so many steps in a row
+// that are shorter than kIdleStep and gain less of the cost end it: lenses near
+// their fold follow no linear row far.
+constexpr double kIdleStep = 0.1;
+constexpr double kNearGap = 10;
+constexpr double kLeastGain = 0.01;
+constexpr int kPatience = 3;
+constexpr double kLeastSigma = 0.03;
+// mu does not fall below this share of what the gap asked for needs.
+constexpr double kLastShare = 0.5;
+// Multipliers above this count as active: an error's own weight is 1.
+constexpr double kActiveMultiplier = 1e-3;
+
+// One run along the central path: the minima of
+//
+//   1/2 sum rho - mu sum log(h_j(e) / h_j(0))
+//
+// as mu falls. A direction is a predictor's, mu = 0, and then a corrector's
+// [Mehrotra 1992]. Its longest step is shortened until the barrier cost does
+// not rise; where no step is found along the corrector's direction, one is
+// looked for along Newton's.
+//
+// Multipliers take their full steps, each by itself, but none falls far below
+// the path: whatever they are, as long as they are positive, a direction leads
+// downwards, and the barrier cost alone decides on progress.
+template <typename Cap>
+class BoundedPath {
+ public:
+  BoundedPath(const KnownRotationProblem& problem,
+              const BoundedOptions& options, const Context& context,
+              const Estimate& start);
+
+  BoundedSummary Run();
+  const Estimate& estimate() const { return now_.x; }
+
+  // FollowPath's.
+  bool Factorize() { return system_.Factorize(now_.viewed, multipliers_); }
+  bool IsThere();
+  void FindDirection(double step);
+  double TakeStep();
+  bool Recover();
+  std::optional<InteriorPointTermination> Report(int iteration, double step);
+
+ private:
+  using Vector = typename Cap::Vector;
+
+  struct State {
+    Estimate x;
+    std::vector<ViewedError> viewed;
+    double cost = 0;     // 1/2 sum rho
+    double barrier = 0;  // -sum log(h_j(e) / h_j(0))
+  };
+
+  int32_t NumViews() const {
+    return options_.num_views.value_or(
+        static_cast<int32_t>(problem_.views.size()));
+  }
+  bool TakeRows(const Estimate& x) {
+    return !options_.take_rows || context_.All(options_.take_rows(x));
+  }
+  // Whether every error is below the cap.
+  bool View(State* state);
+  double BarrierCost(const State& state, double mu) const {
+    return state.cost + mu * state.barrier;
+  }
+  double Count() const {  // of pairs
+    return static_cast<double>(system_.loop().whole_count() * Cap::kNum);
+  }
+  double MuOf(double relative_gap) const {
+    return relative_gap * now_.cost / Count();
+  }
+  double RelativeGap() const {
+    return now_.cost > 0 ? Count() * mu_ / now_.cost : 0;
+  }
+
+  // mu / h, with slacks h of no less than this share of the cap's.
+  void CentreMultipliers(double mu, double least_slack);
+  bool TryStep(double step, double highest);
+  void MoveMultipliers();
+  int64_t NumActive() const;
+
+  const KnownRotationProblem& problem_;  // rows: those of the last state viewed
+  const BoundedOptions options_;
+  const Context context_;
+  BoundedSystem<Cap> system_;
+  State now_, trial_;
+  std::vector<Vector> multipliers_;
+  double mu_ = 0;            // mean of the pairs at now_
+  double target_mu_ = 0;     // that the direction aims at
+  double gain_ = 0;          // what the last step took off the barrier cost
+  int num_idle_ = 0;         // steps in a row
+  bool is_centred_ = false;  // all pairs are, since no step was found
+  BoundedSummary summary_;
+};
+
+template <typename Cap>
+BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
+                              const BoundedOptions& options,
+                              const Context& context, const Estimate& start)
+    : problem_(problem),
+      options_(options),
+      context_(context),
+      system_(problem, Cap(options.norm, options.cap), options.loss, NumViews(),
+              context),
+      multipliers_(problem.observations.size()) {
+  now_.x = start;
+  now_.viewed.resize(problem.observations.size());
+  trial_ = now_;
+}
+
+template <typename Cap>
+bool BoundedPath<Cap>::View(State* state) {
+  if (!TakeRows(state->x)) return false;
+  struct Totals {
+    double least;  // slack
+    double cost;
+    LogProduct slacks;
+  };
+  const Totals totals = system_.loop().Reduce(
+      Totals{std::numeric_limits<double>::infinity(), 0, {}},
+      [&](int64_t i) -> Totals {
+        const ViewedPoint viewed =
+            ViewPoint(problem_, problem_.observations[i], state->x);
+        if (!(viewed.depth > 0)) return {-1, 0, {}};
+        const Eigen::Vector2d e = viewed.v / viewed.depth;
+        state->viewed[i] = {e, viewed.depth};
+        const Vector h = system_.cap().Slacks(e);
+        if (!(h.minCoeff() > 0)) return {-1, 0, {}};
+        const double loss = problem_.observations[i].view < NumViews()
+                                ? options_.loss.Value(e.squaredNorm())
+                                : 0;
+        return {h.minCoeff(), loss / 2,
+                LogProduct(system_.cap().RelativeSlack(h))};
+      },
+      [](const Totals& a, const Totals& b) {
+        return Totals{std::min(a.least, b.least), a.cost + b.cost,
+                      a.slacks.Times(b.slacks)};
+      });
+  state->cost = totals.cost;
+  state->barrier = -totals.slacks.Log();
+  return totals.least > 0 && std::isfinite(state->cost);
+}
+
+template <typename Cap>
+void BoundedPath<Cap>::CentreMultipliers(double mu, double least_slack) {
+  const Vector least =
+      least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
+  const double gap = system_.loop().Sum([&](int64_t i) {
+    const Vector h = system_.cap().Slacks(now_.viewed[i].e);
+    multipliers_[i] = mu * h.cwiseMax(least).cwiseInverse();
+    return multipliers_[i].dot(h);
+  });
+  mu_ = gap / Count();
+}
+
+// Where the gap is small enough, Newton's step is looked at.
+template <typename Cap>
+bool BoundedPath<Cap>::IsThere() {
+  summary_.duality_gap = RelativeGap();
+  if (*summary_.duality_gap > options_.gap_tolerance) return false;
+  system_.Solve(mu_);
+  summary_.stationarity = now_.cost > 0 ? system_.Slope() / (2 * now_.cost) : 0;
+  return *summary_.stationarity <= options_.stationarity_tolerance;
+}
+
+// All multipliers take one step in what a predictor is thought to leave of the
+// gap: their full ones would promise too much.
+template <typename Cap>
+void BoundedPath<Cap>::FindDirection(double step) {
+  target_mu_ = mu_;
+  if (*summary_.duality_gap <= options_.gap_tolerance) return;  // Newton's
+  if (step < kShortStep) return system_.Solve(mu_);
+  system_.Solve(0);
+  const double sigma =
+      MehrotraSigma(system_.PredictedGap() / (Count() * mu_), kLeastSigma);
+  target_mu_ = std::max(MuOf(kLastShare * options_.gap_tolerance), sigma * mu_);
+  system_.Correct(target_mu_);
+}
+
+template <typename Cap>
+bool BoundedPath<Cap>::TryStep(double step, double highest) {
+  system_.Move(now_.x, step, &trial_.x);
+  if (!View(&trial_) || !(BarrierCost(trial_, target_mu_) <= highest)) {
+    return false;
+  }
+  MoveMultipliers();
+  std::swap(now_, trial_);
+  return true;
+}
+
+template <typename Cap>
+double BoundedPath<Cap>::TakeStep() {
+  const double before = BarrierCost(now_, target_mu_);
+  const double highest =
+      before + kCostRounding * (now_.cost + target_mu_ * Count());
+  const auto search = [&] {
+    return Backtrack(system_.MaxStep(kDamping), kBacktracking, kLeastStep,
+                     [&](double step) { return TryStep(step, highest); });
+  };
+  double step = search();
+  if (step == 0) {
+    TakeRows(now_.x);
+    system_.Solve(target_mu_);
+    step = search();
+  }
+  if (step == 0) TakeRows(now_.x);
+  gain_ = before - BarrierCost(now_, target_mu_);
+  return step;
+}
+
+// To those of trial_.
+template <typename Cap>
+void BoundedPath<Cap>::MoveMultipliers() {
+  const double gap = system_.loop().Sum([&](int64_t i) {
+    Vector& l = multipliers_[i];
+    const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
+    const Vector centred = target_mu_ * h.cwiseInverse();
+    l = (l + system_.StepOf(i).dl)
+            .cwiseMax(kLeastProduct * centred)
+            .cwiseMin(kLargestProduct * centred);
+    return l.dot(h);
+  });
+  mu_ = gap / Count();
+}
+
+template <typename Cap>
+bool BoundedPath<Cap>::Recover() {
+  if (std::exchange(is_centred_, true)) return false;
+  CentreMultipliers(target_mu_, 0);
+  return true;
+}
+
+template <typename Cap>
+std::optional<InteriorPointTermination> BoundedPath<Cap>::Report(int iteration,
+                                                                 double step) {
+  is_centred_ = false;
+  if (options_.callback) {
+    options_.callback({iteration, now_.cost, RelativeGap(), step});
+  }
+  const bool is_idle =
+      step < kIdleStep &&
+      gain_ < kLeastGain * options_.gap_tolerance * now_.cost &&
+      *summary_.duality_gap <= kNearGap * options_.gap_tolerance;
+  num_idle_ = is_idle ? num_idle_ + 1 : 0;
+  if (num_idle_ == kPatience) return InteriorPointTermination::kNoProgress;
+  return std::nullopt;
+}
+
+template <typename Cap>
+int64_t BoundedPath<Cap>::NumActive() const {
+  return static_cast<int64_t>(system_.loop().Sum([&](int64_t i) {
+    return system_.cap().Share(multipliers_[i]) > kActiveMultiplier ? 1.0 : 0.0;
+  }));
+}
+
+template <typename Cap>
+BoundedSummary BoundedPath<Cap>::Run() {
+  if (!View(&now_)) {  // as only rows can make it that are not those of x
+    summary_.termination = InteriorPointTermination::kNoProgress;
+    return summary_;
+  }
+  summary_.cost_initial = now_.cost;
+  CentreMultipliers(MuOf(kStartWeight), kStartSlack);
+  summary_.termination =
+      FollowPath(context_, options_.max_iterations, this, &summary_.iterations);
+  summary_.cost_final = now_.cost;
+  summary_.num_active = NumActive();
+  return summary_;
+}
 
 template <typename Cap>
 BoundedSummary Run(const KnownRotationProblem& problem,
@@ -39,11 +338,6 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
   return options.norm.p == 2
              ? Run<DiscCap>(problem, options, context, estimate)
              : Run<PolygonCap>(problem, options, context, estimate);
-}
-
-int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm) {
-  return norm.p == 2 ? BoundedPath<DiscCap>::MemoryBytes(problem)
-                     : BoundedPath<PolygonCap>::MemoryBytes(problem);
 }
 
 }  // namespace krot

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <optional>
 
 #include "krot/base/context.h"
-#include "krot/finish/error_loss.h"
-#include "krot/minimax/norm.h"
+#include "krot/conic/interior_point.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
@@ -19,6 +20,54 @@ namespace krot {
 // (docs/method/joint_solver.md, "The finish"). Not convex, but for the
 // constraints: what is found is a local minimum.
 
+// rho of a squared error, squared pixels: rho(s) = s for small s, and less for
+// what is beyond the scale. As in Ceres.
+struct ErrorLoss {
+  enum class Kind { kTrivial, kHuber, kCauchy };
+  Kind kind = Kind::kTrivial;
+  double scale = 1;  // pixels; > 0
+
+  double Value(double s) const {
+    const double b = scale * scale;
+    switch (kind) {
+      case Kind::kTrivial:
+        break;
+      case Kind::kHuber:
+        return s <= b ? s : 2 * scale * std::sqrt(s) - b;
+      case Kind::kCauchy:
+        return b * std::log1p(s / b);
+    }
+    return s;
+  }
+
+  // rho'(s), in (0, 1].
+  double Weight(double s) const {
+    const double b = scale * scale;
+    switch (kind) {
+      case Kind::kTrivial:
+        break;
+      case Kind::kHuber:
+        return s <= b ? 1 : scale / std::sqrt(s);
+      case Kind::kCauchy:
+        return 1 / (1 + s / b);
+    }
+    return 1;
+  }
+};
+
+// As --Solver.finish_loss takes it: "trivial", "huber", "cauchy".
+inline const char* LossName(ErrorLoss::Kind kind) {
+  switch (kind) {
+    case ErrorLoss::Kind::kHuber:
+      return "huber";
+    case ErrorLoss::Kind::kCauchy:
+      return "cauchy";
+    case ErrorLoss::Kind::kTrivial:
+      break;
+  }
+  return "trivial";
+}
+
 // An iterate; every one of them is below the cap.
 struct BoundedIterate {
   int iteration = 0;
@@ -30,31 +79,22 @@ struct BoundedIterate {
 struct BoundedOptions {
   Norm norm;       // of the cap: p = 1, 2 or infinity
   double cap = 0;  // pixels; > 0
-  // The observations of views behind so many first ones have no error to be
-  // squared, but bounds alone; none: all have.
+  // Only the observations of so many first views have errors that are squared;
+  // the others are bounds alone. None: all have.
   std::optional<int32_t> num_views;
   ErrorLoss loss;
   double gap_tolerance = 1e-3;           // > 0, relative to the cost
   double stationarity_tolerance = 1e-6;  // > 0
   int max_iterations = 200;              // >= 1
   // Takes all rows of the problem itself anew where their points project at an
-  // estimate, to first order around; false if one does not project. Empty where
-  // rows do not depend on where they are taken.
+  // estimate: false if one does not project. Empty where rows do not depend on
+  // where they are taken.
   std::function<bool(const Estimate&)> take_rows;
   std::function<void(const BoundedIterate&)> callback;  // may be empty
 };
 
-enum class BoundedTermination {
-  kNotRun,
-  kConverged,  // gap and stationarity are below their tolerances
-  kMaxIterations,
-  kNoProgress,  // steps have become too short, or gain next to nothing
-  kSingular,    // the linear system could not be factorised
-  kInterrupted,
-};
-
 struct BoundedSummary {
-  BoundedTermination termination = BoundedTermination::kNotRun;
+  InteriorPointTermination termination = InteriorPointTermination::kNotRun;
   int iterations = 0;
   double cost_initial = 0;  // 1/2 sum rho, squared pixels
   double cost_final = 0;    // <= cost_initial
@@ -76,8 +116,5 @@ struct BoundedSummary {
 BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const BoundedOptions& options,
                                const Context& context, Estimate* estimate);
-
-// What MinimizeBounded will allocate, bytes. O(problem).
-int64_t EstimateBoundedMemory(const KnownRotationProblem& problem, Norm norm);
 
 }  // namespace krot

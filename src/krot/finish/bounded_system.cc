@@ -7,21 +7,11 @@
 namespace krot {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // No step is followed farther.
 constexpr double kFurthest = 2;
-
-std::vector<Matrix3d> FrameRotations(const KnownRotationProblem& problem) {
-  std::vector<Matrix3d> rotations(problem.num_frames, Matrix3d::Identity());
-  for (const View& view : problem.views) {
-    rotations[view.frame] =
-        view.cam_from_rig_rotation.transpose() * view.cam_from_world_rotation;
-  }
-  return rotations;
-}
 
 }  // namespace
 
@@ -35,8 +25,8 @@ BoundedSystem<Cap>::BoundedSystem(const KnownRotationProblem& problem,
       num_views_(num_views),
       loop_(static_cast<int64_t>(problem.observations.size()), context),
       structure_(AnchoredStructure(problem, context)),
-      frame_rotations_(FrameRotations(problem)),
-      elimination_(structure_, context),
+      rig_from_world_(RigFromWorldRotations(problem)),
+      least_squares_(structure_, context),
       root_(problem.observations.size()),
       correction_(problem.observations.size()),
       d_(problem.observations.size()) {}
@@ -81,10 +71,10 @@ bool BoundedSystem<Cap>::Factorize(const std::vector<ViewedError>& viewed,
     Eigen::Matrix<double, 3, 3, Eigen::RowMajor> B;
     B << U.a * Jx + U.b * Jy, U.c * Jy, U.depth * scale * o.E.row(0);
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-        elimination_.rows(i))
+        least_squares_.rows(i))
         .noalias() = B * problem_.views[o.view].cam_from_world_rotation;
   });
-  return elimination_.Factorize();
+  return least_squares_.Factorize();
 }
 
 // The gradient of an observation's part of the barrier problem, by its error.
@@ -107,10 +97,8 @@ void BoundedSystem<Cap>::SolveForTarget() {
     d_[i] << x, (-pull[1] - U.b * x) / U.c, 0;
   });
   // A rank may have no observation.
-  elimination_.Solve(d_.empty() ? nullptr : d_[0].data(), &dx_);
-  for (size_t f = 0; f < dx_.frames.size(); ++f) {  // t = -R_rw c
-    dx_.frames[f] = -(frame_rotations_[f] * dx_.frames[f]);
-  }
+  double* const rows = d_.empty() ? nullptr : d_[0].data();
+  least_squares_.Solve(nullptr, rows, &dx_, rows);
   loop_.ForEach([&](int64_t i) {
     Vector3d& d = d_[i];
     const Root& U = root_[i];
@@ -196,36 +184,9 @@ typename BoundedSystem<Cap>::PairStep BoundedSystem<Cap>::StepOf(
 }
 
 template <typename Cap>
-double BoundedSystem<Cap>::MaxStep(double damping) const {
-  return std::min(1.0, damping * reach_.primal);
-}
-
-template <typename Cap>
-double BoundedSystem<Cap>::MaxDualStep() const {
-  return std::min(1.0, reach_.dual);
-}
-
-template <typename Cap>
-double BoundedSystem<Cap>::GapAfter(double primal, double dual) const {
-  return reach_.gap + primal * reach_.by_primal + dual * reach_.by_dual +
-         primal * dual * reach_.by_both;
-}
-
-template <typename Cap>
 double BoundedSystem<Cap>::Slope() const {
   return loop_.Sum(
       [&](int64_t i) { return -PullOf(i).dot(d_[i].template head<2>()); });
-}
-
-template <typename Cap>
-int64_t BoundedSystem<Cap>::MemoryBytes(const KnownRotationProblem& problem) {
-  constexpr int64_t kPerObservation = sizeof(Root) + sizeof(Correction) +
-                                      sizeof(Vector3d) +  // d
-                                      sizeof(int32_t);    // structure
-  constexpr int64_t kPerUnknown = 2 * sizeof(Vector3d);
-  return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
-         (problem.num_points + problem.num_frames) * kPerUnknown +
-         CentreElimination::MemoryBytes(AnchoredStructure(problem));
 }
 
 template class BoundedSystem<DiscCap>;

@@ -1,14 +1,122 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
-#include "krot/conic/observation_loop.h"
-#include "krot/finish/centre_elimination.h"
-#include "krot/finish/error_cap.h"
-#include "krot/finish/error_loss.h"
-#include "krot/problem/known_rotation_problem.h"
+#include <Eigen/Core>
+
+#include "krot/finish/bounded_least_squares.h"
+#include "krot/linear/ordered_sums.h"
+#include "krot/linear/schur_complement.h"
+#include "krot/math/norm.h"
+#include "krot/problem/centre_unknowns.h"
 
 namespace krot {
+
+// The logarithm of a product of numbers in [1e-100, 1], with one logarithm for
+// many of them.
+class LogProduct {
+ public:
+  LogProduct() = default;
+  explicit LogProduct(double factor) : product_(factor) {}
+
+  LogProduct Times(const LogProduct& other) const {
+    LogProduct all(product_ * other.product_);
+    all.log_ = log_ + other.log_;
+    if (all.product_ < kSmallest) {
+      all.log_ += std::log(all.product_);
+      all.product_ = 1;
+    }
+    return all;
+  }
+  double Log() const { return log_ + std::log(product_); }
+
+ private:
+  static constexpr double kSmallest = 1e-100;
+
+  double product_ = 1;
+  double log_ = 0;
+};
+
+// ||e||_p <= cap as kNum conditions h_j(e) >= 0 on an error e, pixels. Each cap
+// offers, at e,
+//
+//   Slacks         h_j > 0 inside
+//   Normals        n_j = -dh_j/de, as columns
+//   kBend          -d^2 h_j / de^2 = kBend I
+//   MaxStep        the largest t <= limit with e + t d inside
+//   RelativeSlack  of slacks h_j, the product of all h_j / h_j(0)
+//   Share          of multipliers: what they weigh beside an error's own
+//                  weight, 1
+
+// p = 2: h = (cap^2 - |e|^2) / 2.
+struct DiscCap {
+  static constexpr int kNum = 1;
+  static constexpr double kBend = 1;
+  using Vector = Eigen::Matrix<double, kNum, 1>;
+
+  DiscCap(Norm, double cap_px) : cap(cap_px) {}
+
+  Vector Slacks(const Eigen::Vector2d& e) const {
+    const double norm = e.norm();
+    return Vector((cap - norm) * (cap + norm) / 2);
+  }
+  Eigen::Matrix<double, 2, kNum> Normals(const Eigen::Vector2d& e) const {
+    return e;
+  }
+  // Of |d|^2 t^2 + 2 e'd t = 2 h the positive root, without cancellation.
+  double MaxStep(const Eigen::Vector2d& e, const Eigen::Vector2d& d,
+                 double limit) const {
+    const double h2 = 2 * Slacks(e)[0];
+    const double b = e.dot(d);
+    const double root = std::sqrt(b * b + d.squaredNorm() * h2);
+    const double t = b > 0 ? h2 / (b + root) : (root - b) / d.squaredNorm();
+    return t < limit ? t : limit;
+  }
+  double RelativeSlack(const Vector& h) const { return 2 * h[0] / (cap * cap); }
+  double Share(const Vector& multiplier) const { return multiplier[0]; }
+
+  double cap;
+};
+
+// p = 1 or infinity: h_j = cap - n_j'e.
+struct PolygonCap {
+  static constexpr int kNum = 4;
+  static constexpr double kBend = 0;
+  using Vector = Eigen::Matrix<double, kNum, 1>;
+
+  PolygonCap(Norm norm, double cap_px) : cap(cap_px) {
+    if (norm.p == 1) {
+      normals << 1, 1, -1, -1, 1, -1, 1, -1;
+    } else {
+      normals << 1, -1, 0, 0, 0, 0, 1, -1;
+    }
+  }
+
+  Vector Slacks(const Eigen::Vector2d& e) const {
+    return Vector::Constant(cap) - normals.transpose() * e;
+  }
+  const Eigen::Matrix<double, 2, kNum>& Normals(const Eigen::Vector2d&) const {
+    return normals;
+  }
+  double MaxStep(const Eigen::Vector2d& e, const Eigen::Vector2d& d,
+                 double limit) const {
+    const Vector h = Slacks(e);
+    const Vector fall = normals.transpose() * d;
+    for (int j = 0; j < kNum; ++j) {
+      if (fall[j] * limit > h[j]) limit = h[j] / fall[j];
+    }
+    return limit;
+  }
+  double RelativeSlack(const Vector& h) const { return (h / cap).prod(); }
+  double Share(const Vector& multipliers) const {
+    return multipliers.maxCoeff() / cap;
+  }
+
+  double cap;
+  Eigen::Matrix<double, 2, kNum> normals;
+};
 
 // An observation's error e = v / w, pixels, and its depth w.
 struct ViewedError {
@@ -33,8 +141,7 @@ struct ViewedError {
 // right-hand side, -(rho' e + sum_j mu / h_j n_j), is minus the gradient of the
 // barrier problem: any l > 0 gives a descent direction.
 //
-// As rotations stay, dx_cam = R_sr R_rw (ds_k - dc_f) with c_f the centre of
-// frame f: the unknowns of CentreElimination.
+// The unknowns are points and frames' centres.
 template <typename Cap>
 class BoundedSystem {
  public:
@@ -57,7 +164,9 @@ class BoundedSystem {
   // direction [Mehrotra 1992].
   void Correct(double mu);
 
-  const BlockVector& dx() const { return dx_; }
+  void Move(const Estimate& from, double step, Estimate* to) const {
+    MoveCentres(rig_from_world_, from, step, dx_, to);
+  }
   // Where the last direction leads the slacks and multipliers of observation i.
   struct PairStep {
     Vector h, dh, dl;
@@ -65,18 +174,22 @@ class BoundedSystem {
   PairStep StepOf(int64_t i) const;
   // The longest step <= 1 along dx that keeps all errors below the cap where
   // rows stay, times `damping`, which is >= 1 / 2.
-  double MaxStep(double damping) const;
-  // The longest step <= 1 along all dl that keeps all multipliers positive.
-  double MaxDualStep() const;
-  // sum h'l after such steps, to second order.
-  double GapAfter(double primal, double dual) const;
+  double MaxStep(double damping) const {
+    return std::min(1.0, damping * reach_.primal);
+  }
+  // sum h'l, to second order, after the longest steps <= 1 along dx and along
+  // all dl that keep all errors below the cap and all multipliers positive.
+  double PredictedGap() const {
+    const double primal = std::min(1.0, reach_.primal);
+    const double dual = std::min(1.0, reach_.dual);
+    return reach_.gap + primal * reach_.by_primal + dual * reach_.by_dual +
+           primal * dual * reach_.by_both;
+  }
   // What a full step gains of the quadratic model, twice; squared pixels.
   double Slope() const;
 
   const ObservationLoop& loop() const { return loop_; }
   const Cap& cap() const { return cap_; }
-
-  static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
  private:
   // What an observation's rows are made of: U = [a b; 0 c] and sqrt(h'l).
@@ -116,9 +229,8 @@ class BoundedSystem {
   const int32_t num_views_;
   const ObservationLoop loop_;
   const BlockStructure structure_;
-  // R_rw of the frames that an observation has.
-  const std::vector<Eigen::Matrix3d> frame_rotations_;
-  CentreElimination elimination_;
+  const std::vector<Eigen::Matrix3d> rig_from_world_;
+  CentredLeastSquares<3> least_squares_;
   const std::vector<ViewedError>* viewed_ = nullptr;
   const std::vector<Vector>* multipliers_ = nullptr;
   double mu_ = 0;

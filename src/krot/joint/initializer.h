@@ -5,7 +5,7 @@
 
 #include "krot/base/context.h"
 #include "krot/joint/joint.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 

@@ -7,7 +7,7 @@
 #include "krot/base/checkpoint.h"
 #include "krot/base/context.h"
 #include "krot/joint/known_multipliers.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 

@@ -33,13 +33,6 @@ class KnownMultipliers {
     values->OnFirst(&optimum_);
   }
 
-  // What it and its user hold for so many observations, bytes.
-  static int64_t MemoryBytes(int64_t num_observations) {
-    constexpr int64_t kPerObservation =
-        sizeof(CertifiedObservation) + sizeof(Multiplier) + sizeof(int64_t);
-    return num_observations * kPerObservation;
-  }
-
  private:
   std::vector<CertifiedObservation> known_;
   std::vector<double> optimum_;  // one, if any

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "krot/linear/triangle.h"
 #include "krot/minimax/descent_constants.h"
 
 namespace krot {
@@ -20,24 +21,6 @@ double DistanceFromCamera(const Residual& residual, const Vector3d& x) {
   const double focal_length = residual.A.norm() / std::sqrt(2.0);
   return std::hypot(residual.Depth(x),
                     residual.Numerator(x).norm() / focal_length);
-}
-
-// The inverse of the Cholesky factor L of H = L L'; reads the lower triangle.
-Matrix3d InverseCholesky(const Matrix3d& H) {
-  const double floor = kPivotRounding * H.trace();
-  const double i00 = 1 / std::sqrt(H(0, 0));
-  const double l10 = H(1, 0) * i00;
-  const double l20 = H(2, 0) * i00;
-  const double i11 = 1 / std::sqrt(std::max(H(1, 1) - l10 * l10, floor));
-  const double l21 = (H(2, 1) - l20 * l10) * i11;
-  const double i22 =
-      1 / std::sqrt(std::max(H(2, 2) - l20 * l20 - l21 * l21, floor));
-  const double i10 = -l10 * i00 * i11;
-  Matrix3d inverse;
-  inverse << i00, 0, 0,  //
-      i10, i11, 0,       //
-      -(l20 * i00 + l21 * i10) * i22, -l21 * i11 * i22, i22;
-  return inverse;
 }
 
 }  // namespace
@@ -159,7 +142,9 @@ Matrix3d LocalModel::Hessian(double kappa) const {
 
 LocalModel::Step LocalModel::Minimize(double kappa) {
   // With H = L L', the step in L'd has unit curvature.
-  const Matrix3d L_inverse = InverseCholesky(Hessian(kappa));
+  const Matrix3d H = Hessian(kappa);
+  Matrix3d L_inverse;
+  InvertCholesky(H, kPivotRounding * H.trace(), &L_inverse);
   scaled_pieces_.resize(pieces_.size());
   for (size_t k = 0; k < pieces_.size(); ++k) {
     scaled_pieces_[k].value = pieces_[k].value;

@@ -49,15 +49,6 @@ void DifferentiateNorm(const Vector2d& v, Norm norm, double n,
 
 }  // namespace
 
-double internal::NormOtherThanL2(const Vector2d& v, Norm norm) {
-  if (norm.p == 1) return std::abs(v[0]) + std::abs(v[1]);
-  const double largest = std::max(std::abs(v[0]), std::abs(v[1]));
-  if (norm.IsPolyhedral() || !(largest > 0)) return largest;
-  return largest * std::pow(std::pow(std::abs(v[0]) / largest, norm.p) +
-                                std::pow(std::abs(v[1]) / largest, norm.p),
-                            1 / norm.p);
-}
-
 double ResidualValue(const Residual& residual, const Vector3d& x, Norm norm) {
   const double w = residual.Depth(x);
   if (!(w > 0)) return std::numeric_limits<double>::infinity();

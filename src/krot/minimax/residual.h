@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 
 namespace krot {
 
@@ -19,15 +19,6 @@ struct Residual {
   }
   double Depth(const Eigen::Vector3d& x) const { return c.dot(x) + d; }
 };
-
-namespace internal {
-double NormOtherThanL2(const Eigen::Vector2d& v, Norm norm);
-}  // namespace internal
-
-// ||v||_p.
-inline double NormOf(const Eigen::Vector2d& v, Norm norm) {
-  return norm.p == 2 ? v.norm() : internal::NormOtherThanL2(v, norm);
-}
 
 // r(x); infinity unless the depth is positive.
 double ResidualValue(const Residual& residual, const Eigen::Vector3d& x,

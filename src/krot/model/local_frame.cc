@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
@@ -19,28 +21,22 @@ using Real = long double;
 constexpr double kFarOut = 10;
 
 // By coordinate; none without positions.
-std::optional<Vector3d> Median(const std::vector<Vector3d>& positions) {
+std::optional<Vector3d> MedianPosition(const std::vector<Vector3d>& positions) {
   if (positions.empty()) return std::nullopt;
   Vector3d median;
   std::vector<double> values(positions.size());
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   for (int axis = 0; axis < 3; ++axis) {
     for (size_t n = 0; n < values.size(); ++n) values[n] = positions[n][axis];
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
+    median[axis] = Median(values);
   }
   return median;
 }
 
 double MedianDistance(const std::vector<Vector3d>& positions,
                       const Vector3d& from) {
-  std::vector<Vector3d> distances;
-  for (const Vector3d& x : positions) {
-    distances.push_back(Vector3d::Constant((x - from).norm()));
-  }
-  const std::optional<Vector3d> median = Median(distances);
-  return median ? median->x() : 0;
+  std::vector<double> distances;
+  for (const Vector3d& x : positions) distances.push_back((x - from).norm());
+  return distances.empty() ? 0 : Median(std::move(distances));
 }
 
 // Of the frames' rigs.
@@ -116,7 +112,7 @@ void ShiftBack(const Vector3d& origin, const Pose& was, Pose* pose) {
 LocalFrame::LocalFrame(const Model& model, const FixedParts& fixed,
                        const std::vector<KnownPosition>& known) {
   const std::vector<Vector3d> positions = Positions(model, fixed, known);
-  const std::optional<Vector3d> middle = Median(positions);
+  const std::optional<Vector3d> middle = MedianPosition(positions);
   if (!middle) return;
   double extent = MedianDistance(positions, *middle);
   if (extent == 0) extent = MedianDistance(Points(model, {}), *middle);

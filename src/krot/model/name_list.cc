@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 
 namespace krot {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 #include "krot/model/name_list.h"

@@ -2,7 +2,7 @@
 #include <string_view>
 #include <utility>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 #include "krot/base/write_file.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/sensor_type.h"

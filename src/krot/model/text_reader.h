@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 #include "krot/model/file_bytes.h"
 #include "krot/model/model_error.h"
 

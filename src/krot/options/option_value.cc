@@ -6,7 +6,7 @@
 #include <numeric>
 #include <sstream>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 
 namespace krot {
 namespace {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "krot/base/parallel_for.h"
-#include "krot/conic/excess_program.h"
+#include "krot/conic/slack_program.h"
 #include "krot/outliers/reweighting.h"
 #include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
@@ -79,17 +79,17 @@ std::vector<double> RemovalSearch::WeightsOfErrors() const {
 void RemovalSearch::Excess(const std::vector<int64_t>& part,
                            double smallest_mu) {
   const ProblemSubset subset(rows_, part);
-  ExcessOptions options;
+  SlackOptions options;
   options.norm = norm_;
   options.smallest_mu = smallest_mu;
   for (const int64_t i : part) options.weights.push_back(weights_[i]);
   Estimate own = subset.Restrict(estimate_);
   const double level = (1 - kInside) * max_error_;
-  const ExcessSolution solution =
-      MinimizeExcess(subset.problem(), level, options, context_, &own);
+  const SlackSolution solution =
+      MinimizeSlack(subset.problem(), level, options, context_, &own);
   subset.Replace(own, &estimate_);
   const std::vector<double> weights =
-      WeightsAgainst(solution.excess, level, kDear);
+      WeightsAgainst(solution.slack, level, kDear);
   for (size_t n = 0; n < part.size(); ++n) {
     if (solution.price[n] > kSmallPrice) is_tight_[part[n]] = 1;
     weights_[part[n]] = weights[n];

@@ -6,7 +6,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/reprojection.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/model.h"
 #include "krot/outliers/decision.h"
 #include "krot/outliers/near_set.h"

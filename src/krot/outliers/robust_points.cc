@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include <Eigen/Geometry>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/retriangulate.h"
 #include "krot/problem/cameras.h"
@@ -104,11 +106,7 @@ double MedianDepthOfOthers(const KnownRotationProblem& problem,
     if (std::binary_search(points.begin(), points.end(), o.point)) continue;
     depths.push_back(ViewPoint(problem, o, estimate).depth);
   }
-  if (depths.empty()) return 1;
-  const auto middle =
-      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 1 : Median(std::move(depths));
 }
 
 }  // namespace

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
+#include <utility>
 #include <vector>
 
-#include "krot/conic/excess_program.h"
+#include "krot/base/numbers.h"
+#include "krot/conic/slack_program.h"
 #include "krot/outliers/reweighting.h"
 #include "krot/outliers/robust_points.h"
 #include "krot/problem/components.h"
@@ -81,15 +83,15 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   const std::vector<int64_t> tracks = ConnectedTracks(problem);
   const ProblemSubset part(problem, tracks);
   Estimate own = part.Restrict(estimate);
-  ExcessOptions options;
+  SlackOptions options;
   options.norm = norm;
   options.smallest_mu = kStartMu;
   for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
     context.Stage("positions from rotations and tracks, programme", n + 1,
                   kStartReweightings + 1);
-    const ExcessSolution solution =
-        MinimizeExcess(part.problem(), level, options, context, &own);
-    options.weights = WeightsAgainst(solution.excess, level, kDearExcess);
+    const SlackSolution solution =
+        MinimizeSlack(part.problem(), level, options, context, &own);
+    options.weights = WeightsAgainst(solution.slack, level, kDearExcess);
   }
   part.Replace(own, &estimate);
   std::vector<char> is_placed(problem.num_points, 0);
@@ -125,11 +127,7 @@ double MedianError(const KnownRotationProblem& problem,
   for (const Observation& o : problem.observations) {
     errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), norm));
   }
-  if (errors.empty()) return 0;
-  const auto middle =
-      errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return *middle;
+  return errors.empty() ? 0 : Median(std::move(errors));
 }
 
 }  // namespace krot

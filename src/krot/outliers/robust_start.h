@@ -1,7 +1,7 @@
 #pragma once
 
 #include "krot/base/context.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

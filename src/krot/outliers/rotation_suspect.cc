@@ -8,7 +8,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
 #include "krot/minimax/residual.h"

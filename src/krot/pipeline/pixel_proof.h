@@ -7,7 +7,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/model/model.h"
 #include "krot/pipeline/round_bounds.h"
 #include "krot/pipeline/solve_model.h"

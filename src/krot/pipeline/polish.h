@@ -3,7 +3,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
-#include "krot/finish/error_loss.h"
+#include "krot/finish/bounded_least_squares.h"
 #include "krot/model/model.h"
 
 namespace krot {

@@ -2,7 +2,7 @@
 
 #include "krot/base/context.h"
 #include "krot/bridge/reprojection.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

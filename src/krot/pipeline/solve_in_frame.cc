@@ -90,10 +90,7 @@ void CountProblem(const Model& model, const BuiltProblem& built,
       context.Sum(built.num_retriangulated_points);
   summary->num_same_image_tracks = context.Sum(built.num_same_image_tracks);
   if (context.ranks != nullptr) return;
-  const SolveMemory memory =
-      EstimateSolveMemory(model, built, *summary, context);
-  summary->likely_bytes = memory.likely;
-  summary->largest_bytes = memory.at_most;
+  summary->needed_bytes = EstimateSolveMemory(model, built, *summary, context);
 }
 
 // With the final cost. What is claimed is what the numbers say, whatever the

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 
-#include "krot/conic/interior_point.h"
-#include "krot/finish/bounded_least_squares.h"
 #include "krot/joint/working_set.h"
+#include "krot/linear/reduced_camera_system.h"
+#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
-#include "krot/proof/dual_repair.h"
 
 namespace krot {
 namespace {
@@ -42,12 +41,6 @@ int64_t PartBytes(const KnownRotationProblem& problem) {
   return ProblemBytes(problem) + Size(problem.observations.size(), 8);
 }
 
-int64_t JointBytes(const KnownRotationProblem& problem, Norm norm) {
-  return EstimateInteriorPointMemory(problem, norm) +
-         KnownMultipliers::MemoryBytes(
-             static_cast<int64_t>(problem.observations.size()));
-}
-
 // What the joint solver looks at first.
 ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm,
                                   const Context& context) {
@@ -58,15 +51,29 @@ ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm,
   return ProblemSubset(problem, set.Observations());
 }
 
-// What is in use when most is.
-SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
-                             const SolveSummary& summary,
-                             const Context& context) {
+// What an interior point on these observations takes: so many bytes for each,
+// and the reduced camera system.
+int64_t InteriorPointBytes(const KnownRotationProblem& problem,
+                           size_t bytes_per_observation) {
+  return Size(problem.observations.size(), bytes_per_observation) +
+         ReducedCameraSystem(AnchoredStructure(problem)).MemoryBytes();
+}
+
+}  // namespace
+
+int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
+                            const SolveSummary& summary,
+                            const Context& context) {
   constexpr int64_t kProcess = 14000000;  // code and libraries
   // The record of a block, in sweeps.
   constexpr int64_t kBytesPerBlock = 200;
   // The start, the estimate, and those that sweeps and iterations compare.
   constexpr int64_t kEstimates = 5;
+  // Counted in the code of the joint solver and of the finish.
+  constexpr size_t kJointBytes = 600;
+  constexpr size_t kFinishBytes = 300;
+  // What the allocator keeps beside what is in use.
+  constexpr double kAllocated = 1.05;
   const KnownRotationProblem& problem = built.problem;
   const int64_t held = kProcess + ModelBytes(model) + ProblemBytes(problem) +
                        kEstimates * EstimateBytes(problem);
@@ -75,51 +82,26 @@ SolveMemory CountSolveMemory(const Model& model, const BuiltProblem& built,
   // In the end, the model that is given back and the pixel errors.
   const int64_t result =
       ModelBytes(model) + Size(model.track_elements.size(), 2 * sizeof(double));
-  SolveMemory memory;
-  memory.likely = memory.at_most = held + std::max(sweeps, result);
-  if (summary.method == SolveMethod::kResInt &&
-      summary.init == SolveInit::kModel) {
-    return memory;
-  }
+  int64_t most = std::max(sweeps, result);
   // The lists of which observation is in which component and working set, and
   // the largest component, which is a copy unless there is but one.
   const int64_t component =
-      held + Size(problem.observations.size(), 16) +
+      Size(problem.observations.size(), 16) +
       (summary.num_components > 1 ? PartBytes(problem) : 0);
-  const int64_t joint = component + JointBytes(problem, summary.norm);
-  memory.at_most =
-      std::max(memory.at_most, joint + EstimateRepairMemory(problem));
   if (summary.init == SolveInit::kFeasible) {
-    memory.likely = std::max(memory.likely, joint);
-    return memory;
+    most = std::max(most, component + InteriorPointBytes(problem, kJointBytes));
+  } else if (summary.method != SolveMethod::kResInt) {
+    // Beside the interior point, sweeps place what it does not look at.
+    const ProblemSubset working =
+        FirstWorkingProblem(built, summary.norm, context);
+    most =
+        std::max(most, component + PartBytes(working.problem()) + sweeps +
+                           InteriorPointBytes(working.problem(), kJointBytes));
+    if (summary.method == SolveMethod::kAuto) {
+      most = std::max(most, InteriorPointBytes(problem, kFinishBytes));
+    }
   }
-  // Beside the interior point, sweeps place what it does not look at.
-  const ProblemSubset subset =
-      FirstWorkingProblem(built, summary.norm, context);
-  const KnownRotationProblem& working = subset.problem();
-  memory.likely =
-      std::max(memory.likely, component + PartBytes(working) +
-                                  JointBytes(working, summary.norm) + sweeps);
-  if (summary.method == SolveMethod::kAuto) {
-    memory.likely = std::max(
-        memory.likely, held + EstimateBoundedMemory(problem, summary.norm));
-  }
-  memory.at_most = std::max(memory.at_most, memory.likely);
-  return memory;
-}
-
-}  // namespace
-
-SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
-                                const SolveSummary& summary,
-                                const Context& context) {
-  // What the allocator keeps beside what is in use.
-  constexpr double kAllocated = 1.05;
-  const auto resident = [](int64_t bytes) {
-    return static_cast<int64_t>(kAllocated * static_cast<double>(bytes));
-  };
-  const SolveMemory counted = CountSolveMemory(model, built, summary, context);
-  return {resident(counted.likely), resident(counted.at_most)};
+  return static_cast<int64_t>(kAllocated * static_cast<double>(held + most));
 }
 
 }  // namespace krot

@@ -10,19 +10,11 @@
 namespace krot {
 
 // The largest resident set, in bytes, of a process that holds `model` and runs
-// SolveModel on it. How near that comes is measured in
-// docs/method/joint_solver.md, "Memory".
-struct SolveMemory {
-  // If the joint solver gets by with what it looks at first.
-  int64_t likely = 0;
-  // If it takes in every observation, as it does on its way to a start, and
-  // repairs all multipliers at once.
-  int64_t at_most = 0;
-};
-
-// For summary.method, summary.init and summary.norm. O(problem).
-SolveMemory EstimateSolveMemory(const Model& model, const BuiltProblem& built,
-                                const SolveSummary& summary,
-                                const Context& context = {});
+// SolveModel on it with summary.method and summary.init, if the joint solver
+// gets by with the observations that it looks at first: within a quarter of the
+// truth then (docs/method/joint_solver.md, "Memory"). O(problem).
+int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
+                            const SolveSummary& summary,
+                            const Context& context = {});
 
 }  // namespace krot

@@ -162,10 +162,9 @@ struct SolveSummary {
   // is the polished one; everything above speaks of the one before.
   std::optional<PolishSummary> polish;
 
-  // What a process that holds the model is likely to need at its peak, and at
-  // most; see solve_memory.h.
-  int64_t likely_bytes = 0;
-  int64_t largest_bytes = 0;
+  // What a process that holds the model is likely to need at its peak; see
+  // solve_memory.h.
+  int64_t needed_bytes = 0;
 
   double seconds_build = 0;  // wall clock
   double seconds_solve = 0;

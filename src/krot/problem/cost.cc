@@ -4,9 +4,11 @@
 #include <atomic>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 
 namespace krot {
@@ -32,10 +34,7 @@ double MedianDepth(const KnownRotationProblem& problem,
   for (const Observation& observation : problem.observations) {
     depths.push_back(ViewPoint(problem, observation, estimate).depth);
   }
-  const auto median =
-      depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), median, depths.end());
-  return *median;
+  return Median(std::move(depths));
 }
 
 double ResidualAbove(double level, const KnownRotationProblem& problem,

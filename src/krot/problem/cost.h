@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/minimax/residual.h"
 #include "krot/problem/cameras.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -24,12 +24,6 @@ std::string Sentence(const std::string& start, double value,
   return text.str();
 }
 
-long double DualNorm(const Eigen::Matrix<long double, 2, 1>& y, Norm norm) {
-  if (norm.p == 1) return y.cwiseAbs().maxCoeff();
-  if (norm.p == 2) return y.norm();
-  return y.cwiseAbs().sum();
-}
-
 std::optional<std::string> RefuseNumbers(const KnownRotationProblem& problem,
                                          Norm norm,
                                          const Certificate& certificate) {
@@ -57,7 +51,8 @@ std::optional<std::string> RefuseNumbers(const KnownRotationProblem& problem,
     if (!std::isfinite(o.lambda) || !o.y.allFinite() || !(o.lambda > 0)) {
       return which + " are not finite, or lambda is not positive";
     }
-    if (!(DualNorm(o.y.cast<Real>(), norm) <= o.lambda * (1 + kMaxExcess))) {
+    if (!(DualNorm<Real>(o.y.cast<Real>(), norm) <=
+          o.lambda * (1 + kMaxExcess))) {
       return which + " are infeasible: y is longer than lambda";
     }
   }

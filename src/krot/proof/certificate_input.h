@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate_check.h"
 
@@ -28,9 +28,6 @@ std::optional<std::string> RefuseNumbers(const KnownRotationProblem& problem,
 // Every R_cw must be R_sr R_rw, to kRotationError per entry, for one R_rw per
 // frame; and all must be rotations as far as the proof relies on it.
 std::optional<std::string> RefuseRotations(const KnownRotationProblem& problem);
-
-// The norm dual to ||.||_p; p = 1, 2 or infinity.
-long double DualNorm(const Eigen::Matrix<long double, 2, 1>& y, Norm norm);
 
 // "start" value "end", with all digits of the value.
 std::string Sentence(const std::string& start, double value,

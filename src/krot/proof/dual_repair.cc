@@ -30,11 +30,6 @@ constexpr int kMaxSteps = 20;
 // Steps end where the next promises less than this, of the bound.
 constexpr double kSmallestGain = 1e-9;
 
-double DualNorm(const Vector2d& y, Norm norm) {
-  if (norm.p == 1) return y.cwiseAbs().maxCoeff();
-  return norm.p == 2 ? y.norm() : y.cwiseAbs().sum();
-}
-
 // Directions, by rows, in which the dual ball is round (p = 2: along y and
 // across it) or ends at the coordinates +-1 (otherwise), and those coordinates.
 struct DualFrame {
@@ -194,16 +189,6 @@ RepairedMultipliers RepairMultipliers(
     const std::vector<Multiplier>& multipliers, const RepairOptions& options) {
   if (multipliers.empty()) return {};
   return Repair(problem, norm, delta, multipliers, options).Run();
-}
-
-int64_t EstimateRepairMemory(const KnownRotationProblem& problem) {
-  // The multipliers, theirs and the problem's as a part, and a step of them.
-  constexpr int64_t kPerObservation = 4 * sizeof(Multiplier) +
-                                      sizeof(Matrix2d) + sizeof(Observation) +
-                                      3 * sizeof(double);
-  return static_cast<int64_t>(problem.observations.size()) *
-             (kPerObservation + DualSystem::BytesPerObservation()) +
-         LeastNormSolver::MemoryBytes(problem);
 }
 
 }  // namespace krot

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/conic/interior_point.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate_check.h"
 
@@ -40,8 +40,5 @@ RepairedMultipliers RepairMultipliers(
     const KnownRotationProblem& problem, Norm norm, double delta,
     const std::vector<Multiplier>& multipliers,
     const RepairOptions& options = {});
-
-// What a repair of all of the problem's multipliers occupies, bytes.
-int64_t EstimateRepairMemory(const KnownRotationProblem& problem);
 
 }  // namespace krot

@@ -46,6 +46,7 @@ DualSystem::DualSystem(const KnownRotationProblem& problem, double delta,
   Real sum = 0;
   Real size = 0;
   std::vector<const View*> first_view(problem.num_frames, nullptr);
+  std::vector<Matrix3r> rig_from_world(problem.num_frames);
   for (size_t i = 0; i < problem.observations.size(); ++i) {
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
@@ -54,23 +55,28 @@ DualSystem::DualSystem(const KnownRotationProblem& problem, double delta,
         delta * observation.E.row(0).cast<Real>();
     Block block;
     block.point = E * view.cam_from_world_rotation.cast<Real>();
-    block.frame = E * view.cam_from_rig_rotation.cast<Real>();
     block.point_index = observation.point;
     if (!problem.IsFixedPoint(observation.point)) {
       block.point_equation = equations[observation.point];
     }
     block.frame_index = index_of_frame[view.frame];
     const View*& first = first_view[view.frame];
-    if (first == nullptr) first = &view;
+    const Matrix3r by_rig = E * view.cam_from_rig_rotation.cast<Real>();
+    if (first == nullptr) {
+      first = &view;
+      rig_from_world[view.frame] =
+          Matrix3r(view.cam_from_rig_rotation.cast<Real>()).inverse() *
+          view.cam_from_world_rotation.cast<Real>();
+    }
+    block.frame = -by_rig * rig_from_world[view.frame];
     if (fixed.IsAwayFromOrigin(view.frame)) {
       block.constants = E * fixed.OfFrame(view).x_cam;
     } else if (first != &view) {
       const Matrix3r rig_from_first =
           Matrix3r(first->cam_from_rig_rotation.cast<Real>()).inverse();
-      block.constants =
-          E * view.cam_from_rig_translation.cast<Real>() -
-          block.frame *
-              (rig_from_first * first->cam_from_rig_translation.cast<Real>());
+      block.constants = E * view.cam_from_rig_translation.cast<Real>() -
+                        by_rig * (rig_from_first *
+                                  first->cam_from_rig_translation.cast<Real>());
     }
     if (problem.IsFixedPoint(observation.point)) {
       block.constants += E * fixed.OfPoint(view, observation.point).x_cam;
@@ -115,16 +121,11 @@ LeastNormProblem DualSystem::Changes(
     LeastNormProblem::Columns columns;
     columns.point = block.point_index;
     columns.frame = block.frame_index;
-    columns.point_rows = (units * block.point).cast<double>();
-    columns.frame_rows = (units * block.frame).cast<double>();
+    columns.rows = (units * block.point).cast<double>();
     columns.last_row = (units * block.constants).cast<double>();
     equations.columns.push_back(columns);
   }
   return equations;
-}
-
-int64_t DualSystem::BytesPerObservation() {
-  return sizeof(Block) + sizeof(Multiplier);
 }
 
 }  // namespace krot

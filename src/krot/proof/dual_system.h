@@ -22,10 +22,9 @@ namespace krot {
 // of the frame's first view and from one of the positions (fixed_constants.h).
 // Observation i fills, in the equations of
 //
-//   its point            P_i' (y_i; lambda_i) + ...  = 0     P_i = E_i R_sr
-//   R_rw its frame, if not 0  F_i' (y_i; lambda_i) + ...  = 0     F_i = E_i
-//   R_sr the constants        k_i' (y_i; lambda_i) + ... <= 0     k_i = (b;
-//   delta d)
+//   its point        P_i' (y_i; lambda_i) + ... = 0      P_i = E_i R_sr R_rw
+//   its frame       -P_i' (y_i; lambda_i) - ... = 0      if that is not 0
+//   the constants    k_i' (y_i; lambda_i) + ... <= 0     k_i = (b; delta d)
 //
 // with E_i = (J_i (I2 | -u_i); delta e3'). To be used so: Changes once, to be
 // factorised; Miss of the multipliers in hand, to be solved for a change of
@@ -44,14 +43,13 @@ class DualSystem {
   // of lambda_i: of y_i by axes[i]' x_1,2, and of both y_i and lambda_i by x_3.
   LeastNormProblem Changes(const std::vector<Eigen::Matrix2d>& axes) const;
 
-  static int64_t BytesPerObservation();
-
  private:
   using Real = long double;
   using Matrix3r = Eigen::Matrix<Real, 3, 3>;
   using Vector3r = Eigen::Matrix<Real, 3, 1>;
   using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  // (A; delta c) by the two unknowns of an observation, and (b; delta d).
+  // (A; delta c) by the point and the frame's centre, both in the world, and
+  // (b; delta d). Up to the rounding of R_cw the first two add up to 0.
   struct Block {
     Matrix3r point;
     Matrix3r frame;

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate_check.h"
 #include "krot/proof/force_checker.h"

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_check.h"

@@ -27,7 +27,7 @@ std::vector<int64_t> LeastNormProblem::EquationsOfPoints() const {
 
 bool LeastNormSolver::Factorize(LeastNormProblem problem) {
   problem_ = std::move(problem);
-  elimination_.reset();
+  by_points_.reset();
   if (problem_.num_rows() > 3 * static_cast<int64_t>(problem_.columns.size())) {
     return false;
   }
@@ -36,7 +36,7 @@ bool LeastNormSolver::Factorize(LeastNormProblem problem) {
 }
 
 VectorXd LeastNormSolver::Solve(const VectorXd& rhs) const {
-  return elimination_ ? SolveByPoints(rhs) : qr_->SolveLeastNorm(rhs);
+  return by_points_ ? SolveByPoints(rhs) : qr_->SolveLeastNorm(rhs);
 }
 
 // The rows of a point's observations, of the transposed equations.
@@ -63,12 +63,12 @@ void LeastNormSolver::AppendPoint(size_t begin, size_t end) {
   for (size_t i = begin; i < end; ++i) {
     const LeastNormProblem::Columns& c = problem_.columns[i];
     const int64_t row = 3 * static_cast<int64_t>(i - begin);
-    if (!is_fixed) own.middleRows<3>(row) = c.point_rows;
+    if (!is_fixed) own.middleRows<3>(row) = c.rows;
     if (c.frame > 0) {
       const int64_t n =
           std::lower_bound(frames.begin(), frames.end(), c.frame) -
           frames.begin();
-      shared.block<3, 3>(row, 3 * n) = c.frame_rows;
+      shared.block<3, 3>(row, 3 * n) = -c.rows;
     }
     if (problem_.has_last_row) {
       shared.rightCols<1>().segment<3>(row) = c.last_row;
@@ -107,16 +107,14 @@ bool LeastNormSolver::FactorizeByPoints() {
   structure_.frame_is_fixed.assign(problem_.num_frames, 0);
   structure_.frame_is_fixed[0] = 1;
   structure_.point_is_fixed = problem_.point_is_fixed;
-  elimination_ =
-      std::make_unique<PointElimination<3>>(structure_, num_threads_);
+  by_points_ = std::make_unique<CentredLeastSquares<3>>(structure_,
+                                                        Context{num_threads_});
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   for (size_t i = 0; i < problem_.columns.size(); ++i) {
-    const LeastNormProblem::Columns& c = problem_.columns[i];
-    const int64_t n = static_cast<int64_t>(i);
-    Eigen::Map<RowMajor>(elimination_->point_rows(n)) = c.point_rows;
-    Eigen::Map<RowMajor>(elimination_->frame_rows(n)) = c.frame_rows;
+    Eigen::Map<RowMajor>(by_points_->rows(static_cast<int64_t>(i))) =
+        problem_.columns[i].rows;
   }
-  if (!elimination_->Factorize()) return false;
+  if (!by_points_->Factorize()) return false;
   if (!problem_.has_last_row) return true;
   last_row_.resize(3 * static_cast<int64_t>(problem_.columns.size()));
   for (size_t i = 0; i < problem_.columns.size(); ++i) {
@@ -124,12 +122,9 @@ bool LeastNormSolver::FactorizeByPoints() {
         problem_.columns[i].last_row;
   }
   const double norm2 = last_row_.squaredNorm();
-  BlockVector zero;
-  zero.SetZero(problem_.num_points, problem_.num_frames);
   BlockVector x;
-  elimination_->Solve(zero, last_row_.data(), &x);
   VectorXd in_span(last_row_.size());
-  elimination_->Multiply(x, in_span.data());
+  by_points_->SolveRefined(nullptr, last_row_.data(), &x, in_span.data());
   last_row_ -= in_span;
   last_row_norm2_ = last_row_.squaredNorm();
   return last_row_norm2_ > kSmallestLastRow * norm2;
@@ -149,9 +144,8 @@ VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {
     g.frames[f] = rhs.segment<3>(3 * (num_free_points + f - 1));
   }
   BlockVector x;
-  elimination_->Solve(g, nullptr, &x);
   VectorXd solution(3 * static_cast<int64_t>(problem_.columns.size()));
-  elimination_->Multiply(x, solution.data());
+  by_points_->SolveRefined(&g, nullptr, &x, solution.data());
   if (problem_.has_last_row) {
     double rest = rhs[rhs.size() - 1];
     for (size_t i = 0; i < problem_.columns.size(); ++i) {
@@ -161,14 +155,6 @@ VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {
     solution += rest / last_row_norm2_ * last_row_;
   }
   return solution;
-}
-
-int64_t LeastNormSolver::MemoryBytes(const KnownRotationProblem& problem) {
-  // Of the elimination: the rows by point and frame, Q, and their order.
-  constexpr int64_t kPerObservation =
-      sizeof(LeastNormProblem::Columns) + 3 * sizeof(Eigen::Matrix3d) + 8;
-  return static_cast<int64_t>(problem.observations.size()) * kPerObservation +
-         FrameSystem(AnchoredStructure(problem)).MemoryBytes();
 }
 
 }  // namespace krot

@@ -8,25 +8,22 @@
 
 #include <Eigen/Core>
 
-#include "krot/conic/block_structure.h"
-#include "krot/conic/point_elimination.h"
-#include "krot/problem/known_rotation_problem.h"
+#include "krot/linear/schur_complement.h"
 #include "krot/proof/block_angular_qr.h"
 
 namespace krot {
 
-// Under-determined equations M x = rhs with the structure of bundle adjustment:
-// three equations per point that is not fixed, three per frame but frame 0, and
-// perhaps one more that concerns everything. An observation has three unknowns
-// (those that no equation mentions stay 0), which meet the equations of its
-// point and of its frame.
+// Under-determined equations M x = rhs with the structure of the known rotation
+// problem: three equations per point that is not fixed, three per frame but
+// frame 0, and perhaps one more that concerns everything. An observation has
+// three unknowns (those that no equation mentions stay 0), which meet the
+// equations of its point and, with the opposite sign, of its frame.
 struct LeastNormProblem {
   struct Columns {
     int32_t point = 0;
     int32_t frame = 0;
-    // By unknown (row) and equation (column).
-    Eigen::Matrix3d point_rows = Eigen::Matrix3d::Zero();
-    Eigen::Matrix3d frame_rows = Eigen::Matrix3d::Zero();
+    // By unknown (row) and equation of the point (column).
+    Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
     Eigen::Vector3d last_row = Eigen::Vector3d::Zero();
   };
   int32_t num_points = 0;
@@ -56,10 +53,10 @@ struct LeastNormProblem {
 //              points          frames but 0    last
 //            0    1    2       1    2    3
 //   obs 0  [ P              |                | l ]   of frame 0
-//   obs 1  [ P              |  F             | l ]   P: point_rows, 3 x 3
-//   obs 2  [      P         |       F        | l ]   F: frame_rows, 3 x 3
-//   obs 3  [      P         |            F   | l ]   l: last_row, 3 x 1
-//   obs 4  [           P    |  F             | l ]
+//   obs 1  [ P              | -P             | l ]   P: rows, 3 x 3
+//   obs 2  [      P         |      -P        | l ]   l: last_row, 3 x 1
+//   obs 3  [      P         |           -P   | l ]
+//   obs 4  [           P    | -P             | l ]
 //
 // By Householder's reflections (block_angular_qr.h), where that is affordable,
 // as their multipliers span many decades; beyond `max_dense_rows` by
@@ -75,9 +72,6 @@ class LeastNormSolver {
 
   // False if the equations may have no solution.
   bool Factorize(LeastNormProblem problem);
-
-  // What a solver of a repair of all of the problem's multipliers occupies.
-  static int64_t MemoryBytes(const KnownRotationProblem& problem);
 
   // Three unknowns per observation.
   Eigen::VectorXd Solve(const Eigen::VectorXd& rhs) const;
@@ -95,7 +89,7 @@ class LeastNormSolver {
   std::optional<BlockAngularQr> qr_;
   // By points.
   BlockStructure structure_;
-  std::unique_ptr<PointElimination<3>> elimination_;
+  std::unique_ptr<CentredLeastSquares<3>> by_points_;
   Eigen::VectorXd last_row_;  // without its part in the span of the others
   double last_row_norm2_ = 0;
 };

@@ -120,22 +120,21 @@ Json PolishJson(const std::optional<PolishSummary>& polish) {
           {"seconds", adjustment.seconds}};
 }
 
-const char* FinishTerminationName(BoundedTermination termination) {
+const char* FinishTerminationName(InteriorPointTermination termination) {
   switch (termination) {
-    case BoundedTermination::kConverged:
+    case InteriorPointTermination::kConverged:
       return "converged";
-    case BoundedTermination::kMaxIterations:
+    case InteriorPointTermination::kMaxIterations:
       return "max_iterations";
-    case BoundedTermination::kNoProgress:
+    case InteriorPointTermination::kNoProgress:
       return "no_progress";
-    case BoundedTermination::kSingular:
+    case InteriorPointTermination::kSingular:
       return "singular";
-    case BoundedTermination::kInterrupted:
+    case InteriorPointTermination::kInterrupted:
       return "interrupted";
-    case BoundedTermination::kNotRun:
-      break;
+    default:
+      return "not_run";
   }
-  return "not_run";
 }
 
 Json FinishJson(const std::optional<FinishSummary>& finish) {
@@ -251,8 +250,7 @@ std::string SolveJson(const SolveReport& report) {
         {"write", report.run.seconds_write},
         {"total", report.run.seconds_total}}},
       {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"announced_memory_bytes",
-       {{"likely", summary.likely_bytes}, {"most", summary.largest_bytes}}},
+      {"announced_memory_bytes", summary.needed_bytes},
       {"threads", report.run.threads},
       {"seed", report.run.seed},
   };

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "krot/base/number_text.h"
+#include "krot/base/numbers.h"
 #include "krot/report/text_table.h"
 
 namespace krot {

@@ -64,7 +64,7 @@ std::string FinishSentence(const SolveSummary& summary) {
          Counted(solve.iterations, "iteration") +
          ", where the lowest maximum alone left " + rms(solve.cost_initial) +
          " px" +
-         (solve.termination == BoundedTermination::kConverged
+         (solve.termination == InteriorPointTermination::kConverged
               ? "."
               : "; a little less might be possible.");
 }

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/math/norm.h"
 #include "krot/minimax/fast_descent.h"
-#include "krot/minimax/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

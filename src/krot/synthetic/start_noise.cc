@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/synthetic/rigid_motion.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/synthetic/rigid_motion.h"
 
 namespace krot {

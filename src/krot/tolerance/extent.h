@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/minimax/norm.h"
+#include "krot/math/norm.h"
 #include "krot/proof/extent_check.h"
 
 namespace krot {

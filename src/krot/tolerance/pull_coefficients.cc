@@ -2,7 +2,7 @@
 
 namespace krot {
 
-// C = -R_cw'(R_sr t_f + t_sr).
+// A view's centre moves as its frame's does.
 BlockVector CoefficientsOf(const KnownRotationProblem& problem,
                            const Pull& pull) {
   BlockVector coefficients;
@@ -14,9 +14,7 @@ BlockVector CoefficientsOf(const KnownRotationProblem& problem,
   }
   const View& view = problem.views[pull.index];
   if (problem.IsFixedFrame(view.frame)) return coefficients;
-  coefficients.frames[view.frame] =
-      -(view.cam_from_rig_rotation.transpose() *
-        (view.cam_from_world_rotation * pull.direction));
+  coefficients.frames[view.frame] = pull.direction;
   return coefficients;
 }
 

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "krot/base/progress.h"
-#include "krot/conic/nt_scaling.h"
+#include "krot/conic/cones.h"
 
 namespace krot {
 

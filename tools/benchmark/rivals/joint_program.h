@@ -5,7 +5,7 @@
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
 
-#include "krot/conic/nt_scaling.h"
+#include "krot/conic/cones.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

@@ -4,7 +4,7 @@
 
 #include <Eigen/Dense>
 
-#include "krot/conic/nt_scaling.h"
+#include "krot/conic/cones.h"
 #include "tools/benchmark/subproblem.h"
 
 namespace krot {

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+#include <vector>
+
+namespace krot {
+
+inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kHalfPi = kPi / 2;
+inline constexpr double kDegreesPerRadian = 180 / kPi;
+
+// The upper one of two. Requires a value.
+inline double Median(std::vector<double> values) {
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// What std::from_chars and std::to_chars do with doubles, for standard
+// libraries that have them for integers alone, by way of the C library.
+std::optional<double> ParseRealByC(std::string_view text);
+std::string ShortestTextByC(double value);
+
+#ifdef __cpp_lib_to_chars
+inline constexpr bool kCharconvHasReals = true;
+#else
+inline constexpr bool kCharconvHasReals = false;
+#endif
+
+// The number that the whole of `text` is, as std::from_chars reads it: no
+// blank, no plus sign, whatever the locale; nothing if it is none, or none that
+// `Number` can hold.
+template <typename Number>
+std::optional<Number> ParseNumber(std::string_view text) {
+  if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
+    return ParseRealByC(text);
+  } else {
+    Number value;
+    const char* const end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || stop != end) return std::nullopt;
+    return value;
+  }
+}
+
+// Appends the shortest text that ParseNumber reads as `value`, as std::to_chars
+// has it.
+template <typename Number>
+void AppendNumber(Number value, std::string* text) {
+  if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
+    text->append(ShortestTextByC(value));
+  } else {
+    char digits[32];
+    const auto result = std::to_chars(digits, digits + sizeof(digits), value);
+    text->append(digits, result.ptr);
+  }
+}
+
+}  // namespace krot

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace krot {
+
+// The Cholesky factor of a dense symmetric positive definite matrix, by tiles
+// that are shared out to threads. The same bits at any number of threads. It is
+// compiled for the machine at hand and has no Eigen type in its interface; and
+// it does without BLAS, as the serial OpenBLAS of Debian 12 lets two threads
+// use one buffer.
+//
+//   SetZero; all of the lower triangle that is not 0; Factorize; Solve
+class DenseCholesky {
+ public:
+  void SetZero(int64_t num_columns);
+  double& At(int64_t row, int64_t column);  // column <= row
+  // Sets `count` numbers of a column from that row on.
+  void SetRun(int64_t row, int64_t column, int64_t count,
+              const double* numbers);
+
+  // False if the matrix is not positive definite up to rounding; there is
+  // nothing to solve with then. O(n^3 / 3).
+  bool Factorize(int num_threads);
+
+  // x := matrix^-1 x. O(2 n^2): reads the factor twice.
+  void Solve(double* x) const;
+
+ private:
+  int64_t NumTiles() const;            // along a side
+  int64_t Size(int64_t i) const;       // rows, or columns, of tile i
+  int64_t stride() const;              // of every tile
+  double* Tile(int64_t i, int64_t j);  // j <= i
+  const double* Tile(int64_t i, int64_t j) const;
+
+  int64_t size_ = 0;
+  int num_threads_ = 1;
+  // Of the lower triangle, row by row. Each tile is stored by itself, its
+  // columns one after another: in a matrix as a whole they would lie pages
+  // apart.
+  std::vector<double> tiles_;
+};
+
+}  // namespace krot

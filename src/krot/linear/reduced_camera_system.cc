@@ -1,0 +1,298 @@
+#include "krot/linear/reduced_camera_system.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "krot/base/parallel_for.h"
+#include "krot/linear/block_update.h"
+
+namespace krot {
+namespace {
+
+// The first is relative to the diagonal; whoever solves removes the error that
+// it causes by refinement. It grows up to the second.
+constexpr double kRegularization = 1e-14;
+constexpr double kLargestRegularization = 1e-7;
+// Up to here a dense factor is the fastest way whatever the pattern.
+constexpr int64_t kAlwaysDenseFrames = 500;
+// Parts of the sum: fewer where each may be large. With 10,000 frames that
+// share points without order a part takes 300 MB.
+constexpr int kNumParts = 4;
+constexpr int kNumLargeParts = 2;
+constexpr int64_t kLargeFrames = 1500;
+
+// What is predicted to take the least time, in operations of a dense factor.
+// An operation of a sparse factor takes so many: 12 to 21 were measured with
+// 800 to 3000 frames of many patterns, on one thread.
+constexpr double kSparseOperation = 15;
+// So does reading a number of a matrix that is multiplied by a vector.
+constexpr double kNumberRead = 60;
+// The systems that are solved with a factor: an interior point's, each refined.
+constexpr double kSolves = 12;
+// The iterations that a solve is thought to take. They grow from 30 to 200 and
+// more on the way to an optimum.
+constexpr int kLikelyIterations = 100;
+
+double DenseCost(const BlockPattern& pattern) {
+  const double n = 3.0 * pattern.num_columns();
+  return n * n * n / 3 + kSolves * kNumberRead * n * n / 2;
+}
+
+double IterativeCost(const BlockPattern& pattern, int num_iterations) {
+  return kSparseOperation * IncompleteCholesky::Operations(pattern) +
+         kSolves * num_iterations * kNumberRead * 9 *
+             static_cast<double>(pattern.num_blocks());
+}
+
+// That of a factor without any fill. Its columns of c blocks take 27 c^2, and
+// the sum of these is least where all are alike.
+double LeastSparseCost(const BlockPattern& pattern) {
+  const auto num_blocks = static_cast<double>(pattern.num_blocks());
+  return kSparseOperation * 27 * num_blocks * num_blocks /
+         pattern.num_columns();
+}
+
+double Regularized(double diagonal, double regularization) {
+  return diagonal * (1 + regularization) + std::numeric_limits<double>::min();
+}
+
+}  // namespace
+
+ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
+                                         Ranks* ranks)
+    : column_of_frame_(structure.num_frames(), -1) {
+  int32_t num_free = 0;
+  for (int64_t f = 0; f < structure.num_frames(); ++f) {
+    if (!structure.frame_is_fixed[f]) column_of_frame_[f] = 3 * num_free++;
+  }
+  num_columns_ = 3 * int64_t{num_free};
+  num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
+  parts_.resize(num_parts_);
+  if (num_free <= kAlwaysDenseFrames) {
+    pattern_ = FullPattern(num_free);
+  } else {
+    pattern_ = PairsThatSharePoints(structure, ranks);
+    kind_ = CheapestKind();
+  }
+}
+
+// The size of a sparse factor is looked at only where it may be the cheapest.
+ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
+  const double dense = DenseCost(pattern_);
+  const double iterative = IterativeCost(pattern_, kLikelyIterations);
+  const double cost = std::min(dense, iterative);
+  if (LeastSparseCost(pattern_) < cost) {
+    const SparseFactorSize factor = FindSparseFactorSize(pattern_);
+    if (kSparseOperation * factor.operations < cost &&
+        factor.numbers <= std::numeric_limits<int>::max()) {  // Eigen's indices
+      num_sparse_numbers_ = factor.numbers;
+      return Kind::kSparse;
+    }
+  }
+  return iterative < dense ? Kind::kIterative : Kind::kDense;
+}
+
+void ReducedCameraSystem::SetZero() {
+  for (std::vector<double>& part : parts_) part.assign(num_numbers(), 0.0);
+}
+
+ReducedCameraSystem::Block ReducedCameraSystem::BlockOf(int part, int32_t a,
+                                                        int32_t b) {
+  const int32_t row = column(a) / 3;
+  const int32_t col = column(b) / 3;
+  const int64_t begin = pattern_.begin[col];
+  const int64_t end = pattern_.begin[col + 1];
+  // Where a column has no gaps, as in a band: no search.
+  int64_t n = row - col;
+  if (n >= end - begin || pattern_.row[begin + n] != row) {
+    n = std::lower_bound(pattern_.row.begin() + begin,
+                         pattern_.row.begin() + end, row) -
+        pattern_.row.begin() - begin;
+  }
+  return {parts_[part].data() + 9 * begin + 3 * n, 3 * (end - begin)};
+}
+
+void ReducedCameraSystem::AddBlock(int part, int32_t a, int32_t b,
+                                   const double block[9]) {
+  const Block target = BlockOf(part, a, b);
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) {
+      target.first[c * target.stride + r] += block[3 * c + r];
+    }
+  }
+}
+
+// By runs of frames that follow each other: there the rows do, too.
+void ReducedCameraSystem::SubtractSquare(int part,
+                                         const std::vector<int32_t>& frames,
+                                         const std::vector<char>& is_apart,
+                                         const double* const G[3]) {
+  const size_t n = frames.size();
+  for (size_t b = 0; b < n; ++b) {
+    double S[9];
+    for (int r = 0; r < 3; ++r) std::copy_n(G[r] + 3 * b, 3, S + 3 * r);
+    for (size_t begin = b; begin < n;) {
+      if (is_apart[b] && is_apart[begin]) {
+        ++begin;
+        continue;
+      }
+      size_t end = begin + 1;
+      while (end < n && column(frames[end]) == column(frames[end - 1]) + 3 &&
+             !(is_apart[b] && is_apart[end])) {
+        ++end;
+      }
+      const Block target = BlockOf(part, frames[begin], frames[b]);
+      const double* const rows[3] = {G[0] + 3 * begin, G[1] + 3 * begin,
+                                     G[2] + 3 * begin};
+      SubtractFromColumns(rows, S, 3 * static_cast<int64_t>(end - begin),
+                          target.first, target.stride);
+      begin = end;
+    }
+  }
+}
+
+void ReducedCameraSystem::AddUpParts() {
+  ParallelFor(num_numbers(), 65536, num_threads_,
+              [&](int64_t begin, int64_t end, int) {
+                for (int part = 1; part < num_parts_; ++part) {
+                  for (int64_t n = begin; n < end; ++n) {
+                    parts_[0][n] += parts_[part][n];
+                  }
+                }
+              });
+}
+
+// Calls visit(row, column, count, numbers) for runs of numbers of the sum that
+// stand below each other, column by column; of blocks on the diagonal for both
+// triangles.
+template <typename Visit>
+void ReducedCameraSystem::ForEachRun(const Visit& visit) const {
+  const double* numbers = parts_[0].data();
+  for (int64_t column = 0; column < num_columns_; ++column) {
+    const int64_t end = pattern_.begin[column / 3 + 1];
+    for (int64_t n = pattern_.begin[column / 3]; n < end;) {
+      const int32_t row = pattern_.row[n];
+      int64_t count = 0;
+      while (n < end && pattern_.row[n] == row + count) ++n, ++count;
+      visit(3 * int64_t{row}, column, 3 * count, numbers);
+      numbers += 3 * count;
+    }
+  }
+}
+
+std::vector<Eigen::Matrix3d> ReducedCameraSystem::Blocks() const {
+  std::vector<Eigen::Matrix3d> blocks;
+  blocks.reserve(pattern_.num_blocks());
+  for (int32_t j = 0; j < pattern_.num_columns(); ++j) {
+    const int64_t begin = pattern_.begin[j];
+    const int64_t count = pattern_.begin[j + 1] - begin;
+    for (int64_t n = 0; n < count; ++n) {
+      blocks.emplace_back(
+          Eigen::Map<const Eigen::Matrix3d, 0, Eigen::OuterStride<>>(
+              &parts_[0][9 * begin + 3 * n], Eigen::OuterStride<>(3 * count)));
+    }
+  }
+  return blocks;
+}
+
+bool ReducedCameraSystem::FactorizeDensely(double regularization) {
+  dense_.SetZero(num_columns_);
+  ForEachRun([&](int64_t row, int64_t column, int64_t count, const double* x) {
+    const int64_t above = std::max<int64_t>(0, column - row);
+    dense_.SetRun(row + above, column, count - above, x + above);
+  });
+  for (int64_t n = 0; n < num_columns_; ++n) {
+    dense_.At(n, n) = Regularized(dense_.At(n, n), regularization);
+  }
+  return dense_.Factorize(num_threads_);
+}
+
+bool ReducedCameraSystem::FactorizeSparsely(double regularization) {
+  if (sparse_matrix_.size() == 0) {
+    std::vector<Eigen::Triplet<double>> zeros;
+    ForEachRun([&](int64_t row, int64_t column, int64_t count, const double*) {
+      for (int64_t r = row; r < row + count; ++r) {
+        zeros.emplace_back(static_cast<int>(r), static_cast<int>(column), 0);
+      }
+    });
+    sparse_matrix_.resize(num_columns_, num_columns_);
+    sparse_matrix_.setFromTriplets(zeros.begin(), zeros.end());
+    sparse_.analyzePattern(sparse_matrix_);
+  }
+  std::copy(parts_[0].begin(), parts_[0].end(), sparse_matrix_.valuePtr());
+  for (int64_t n = 0; n < num_columns_; ++n) {
+    double& number = sparse_matrix_.coeffRef(n, n);
+    number = Regularized(number, regularization);
+  }
+  sparse_.factorize(sparse_matrix_);
+  return sparse_.info() == Eigen::Success;
+}
+
+bool ReducedCameraSystem::FactorizeDirectly() {
+  for (double regularization = kRegularization;
+       regularization < kLargestRegularization; regularization *= 100) {
+    if (kind_ == Kind::kDense ? FactorizeDensely(regularization)
+                              : FactorizeSparsely(regularization)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+bool ReducedCameraSystem::Factorize(int num_threads) {
+  num_threads_ = num_threads;
+  AddUpParts();
+  if (kind_ == Kind::kIterative) {
+    const int num_iterations = std::exchange(most_iterations_, 0);
+    if (IterativeCost(pattern_, num_iterations) <= DenseCost(pattern_) &&
+        iterative_.Factorize(pattern_, Blocks(), num_threads)) {
+      return true;
+    }
+    GoOnDensely();
+  }
+  return FactorizeDirectly();
+}
+
+void ReducedCameraSystem::GoOnDensely() {
+  kind_ = Kind::kDense;
+  iterative_ = {};
+}
+
+Eigen::VectorXd ReducedCameraSystem::Solve(const Eigen::VectorXd& rhs,
+                                           double tolerance) {
+  Eigen::VectorXd x = rhs;
+  if (num_columns_ == 0) return x;
+  if (kind_ == Kind::kIterative) {
+    const bool has_ended = iterative_.Solve(rhs, tolerance, &x);
+    most_iterations_ = std::max(most_iterations_, iterative_.num_iterations());
+    if (has_ended) return x;
+    GoOnDensely();
+    if (!FactorizeDirectly()) return x;
+    x = rhs;
+  }
+  if (kind_ == Kind::kSparse) return sparse_.solve(rhs);
+  dense_.Solve(x.data());
+  return x;
+}
+
+int64_t ReducedCameraSystem::MemoryBytes() const {
+  const auto n = static_cast<double>(num_columns_);
+  const auto block_numbers = static_cast<double>(num_numbers());
+  double numbers = num_parts_ * block_numbers;
+  switch (kind_) {
+    case Kind::kDense:
+      numbers += n * n / 2;
+      break;
+    case Kind::kSparse:  // with their rows
+      numbers +=
+          1.5 * (2 * block_numbers + static_cast<double>(num_sparse_numbers_));
+      break;
+    case Kind::kIterative:  // the incomplete factor in single precision
+      numbers += 1.3 * block_numbers;
+      break;
+  }
+  return static_cast<int64_t>(8 * numbers);
+}
+
+}  // namespace krot

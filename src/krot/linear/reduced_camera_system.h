@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+#include "krot/base/ranks.h"
+#include "krot/linear/block_structure.h"
+#include "krot/linear/conjugate_gradients.h"
+#include "krot/linear/dense_cholesky.h"
+
+namespace krot {
+
+// The normal equations of the frames, or of whatever else points share, once
+// the points are eliminated: symmetric, positive definite up to rounding, in
+// 3x3 blocks. Its matrix is a sum over points, which is taken in parts: how
+// many and in which order depends on the structure alone. More threads than
+// parts do not make it faster.
+//
+//   SetZero; AddBlock and SubtractSquare; Factorize; Solve as often as need be
+//
+// Up to a few hundred frames it has a dense Cholesky factor; with more,
+// whatever is predicted to take the least time: a dense one, a sparse one in a
+// fill-reducing order, or conjugate gradients with an incomplete one.
+class ReducedCameraSystem {
+ public:
+  // Where ranks share the points they make one each, of their shares.
+  explicit ReducedCameraSystem(const BlockStructure& structure,
+                               Ranks* ranks = nullptr);
+
+  enum class Kind { kDense, kSparse, kIterative };
+
+  Kind kind() const { return kind_; }
+  int num_parts() const { return num_parts_; }
+  int64_t num_columns() const { return num_columns_; }
+  // The first column of a frame; -1 if it is fixed.
+  int32_t column(int32_t frame) const { return column_of_frame_[frame]; }
+
+  void SetZero();
+  // The numbers of each part, as many as num_numbers().
+  std::vector<std::vector<double>>* parts() { return &parts_; }
+  int64_t num_numbers() const { return 9 * pattern_.num_blocks(); }
+  // Adds a 3x3 block (column-major) at frames a, b with column(a) >=
+  // column(b) >= 0. Different parts may be filled at the same time.
+  void AddBlock(int part, int32_t a, int32_t b, const double block[9]);
+  // Subtracts G'G, G = [G_0 G_1 ...] standing for the free frames
+  // `frames`, ascending, but for the blocks of two frames that `is_apart`
+  // marks. G is given by its three rows of 3 x frames.size() numbers.
+  void SubtractSquare(int part, const std::vector<int32_t>& frames,
+                      const std::vector<char>& is_apart,
+                      const double* const G[3]);
+
+  // Adds up the parts, and factorises with growing regularisation until there
+  // is a factor; false if there never is.
+  bool Factorize(int num_threads);
+
+  // The relative error in the energy norm is about `tolerance` at most, and
+  // that of rounding. Where conjugate gradients do not end, a dense factor
+  // takes their place.
+  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs, double tolerance);
+
+  // What a system of this structure occupies, with its parts.
+  int64_t MemoryBytes() const;
+
+ private:
+  // A block: three columns of three numbers, `stride` apart. Of frames that
+  // follow each other the blocks of one column do too, without a gap.
+  struct Block {
+    double* first;
+    int64_t stride;
+  };
+  using SparseMatrix = Eigen::SparseMatrix<double>;
+
+  Kind CheapestKind();
+  Block BlockOf(int part, int32_t a, int32_t b);
+  template <typename Visit>
+  void ForEachRun(const Visit& visit) const;
+  void AddUpParts();
+  std::vector<Eigen::Matrix3d> Blocks() const;
+  bool FactorizeDensely(double regularization);
+  bool FactorizeSparsely(double regularization);
+  bool FactorizeDirectly();
+  void GoOnDensely();
+
+  Kind kind_ = Kind::kDense;
+  int num_threads_ = 1;
+  int num_parts_ = 1;
+  int64_t num_columns_ = 0;
+  std::vector<int32_t> column_of_frame_;
+  // Per part, each block column of the pattern as three columns of numbers.
+  // Once they are added up, parts_[0] is the sum.
+  BlockPattern pattern_;
+  std::vector<std::vector<double>> parts_;
+  DenseCholesky dense_;
+  int64_t num_sparse_numbers_ = 0;
+  SparseMatrix sparse_matrix_;
+  Eigen::SimplicialLLT<SparseMatrix, Eigen::Lower, Eigen::AMDOrdering<int>>
+      sparse_;
+  ConjugateGradients iterative_;
+  int most_iterations_ = 0;  // of a Solve since the last Factorize
+};
+
+}  // namespace krot
