@@ -13,7 +13,7 @@
 
 #include "krot/analysis/pixel_errors.h"
 #include "krot/analysis/settle_contradictions.h"
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 #include "krot/model/model_io.h"

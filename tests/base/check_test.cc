@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 
 namespace krot {
 namespace {

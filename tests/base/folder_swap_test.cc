@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/base/folder_tree.h"
 #include "krot/base/write_file.h"
 #include "tests/testing/temp_folder.h"
 

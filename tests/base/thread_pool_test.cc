@@ -1,4 +1,4 @@
-#include "krot/base/thread_pool.h"
+#include "krot/base/parallel_for.h"
 
 #include <atomic>
 #include <cfenv>
@@ -14,8 +14,6 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include "krot/base/parallel_for.h"
 
 namespace krot {
 namespace {

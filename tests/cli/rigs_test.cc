@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
 #include "krot/model/validate.h"

@@ -1,9 +1,7 @@
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
-
-#include "krot/geometry/similarity.h"
 
 namespace krot {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/geometry/rotation.h"
+#include "krot/geometry/transform.h"
 
 #include <cmath>
 #include <random>

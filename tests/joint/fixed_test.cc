@@ -1,4 +1,4 @@
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 
 #include <vector>
 

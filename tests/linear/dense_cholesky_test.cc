@@ -1,4 +1,4 @@
-#include "krot/linear/dense_cholesky.h"
+#include "krot/linear/native_kernels.h"
 
 #include <random>
 

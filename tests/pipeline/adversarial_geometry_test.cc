@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/analysis/pixel_errors.h"
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/trivial_rigs.h"
 #include "krot/model/validate.h"
 #include "krot/pipeline/solve_model.h"

@@ -1,8 +1,7 @@
-#include "krot/problem/observation_rows.h"
+#include "krot/problem/cost.h"
 
 #include <gtest/gtest.h>
 
-#include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
 namespace krot {

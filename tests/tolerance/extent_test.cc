@@ -8,8 +8,7 @@
 
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/fixed.h"
-#include "krot/tolerance/pull_coefficients.h"
+#include "krot/problem/known_rotation_problem.h"
 #include "tests/oracle/lp_oracle.h"
 #include "tests/problem/random_problem.h"
 

@@ -17,7 +17,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 echo "| observations | frames | before it s | finish s | ratio | iterations | RMS lowest | RMS | announced MB | peak MB |"
-echo "|---|---|---|---|---|---|---|---|---|---|---|"
+echo "|---|---|---|---|---|---|---|---|---|---|"
 for observations in "$@"; do
   gap=1e-4
   ((observations > 2000000)) && gap=1e-3

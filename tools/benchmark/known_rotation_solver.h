@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Dense>
 
-#include "krot/problem/observation_rows.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

@@ -4,7 +4,7 @@
 #include <mutex>
 #include <thread>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 
 namespace krot {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 
 namespace krot {
 

@@ -11,8 +11,7 @@
 #include <system_error>
 #include <vector>
 
-#include "krot/base/file_descriptor.h"
-#include "krot/base/folder_tree.h"
+#include "krot/base/folder_swap.h"
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
 #include "krot/bridge/model_digest.h"

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "krot/camera/camera_model.h"
-#include "krot/geometry/rotation.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/model_error.h"
 
 namespace krot {

@@ -21,7 +21,8 @@ Pose ToPose(const PoseBlock& block);
 Eigen::Matrix3d RotationOf(const PoseBlock& block);
 Eigen::Map<const Eigen::Vector3d> TranslationOf(const PoseBlock& block);
 
-// One reprojection error: which blocks it ties, and the measured pixel.
+// One observation: the blocks that its reprojection error depends on, and the
+// measured pixel.
 struct AdjustmentObservation {
   int32_t frame = -1;   // in AdjustmentBlocks::frames
   int32_t sensor = -1;  // in sensors; -1: the rig's reference sensor
@@ -38,13 +39,13 @@ struct AdjustmentBlocks {
   std::vector<std::vector<double>> cameras;
   std::vector<int> camera_models;  // their ids
   std::vector<Eigen::Vector3d> points;
-  // The cap on every error, squared, of a bounded adjustment; pixels^2. Not of
-  // the model, but unknown where it is lowered.
+  // The square of the cap on every error in a bounded adjustment, pixels^2. It
+  // is an unknown where the cap is lowered.
   double cap2 = std::numeric_limits<double>::infinity();
   std::vector<AdjustmentObservation> observations;  // point by point
-  // Marks of what must not move, one per block of the kind.
+  // Marks the blocks that must not move.
   std::vector<char> frame_is_fixed;
-  std::vector<char> sensor_is_fixed;  // those of fixed frames
+  std::vector<char> sensor_is_fixed;  // if a fixed frame sees through it
   std::vector<char> point_is_fixed;
 
   int64_t num_images = 0;  // with observations
@@ -54,15 +55,15 @@ struct AdjustmentBlocks {
 };
 
 // Leaves out observations without a pose, behind their camera or without a
-// finite projection, then points with fewer than `min_track_length` others,
-// fixed ones excepted. Throws ModelError for a camera without an image plane
-// that an image with a point uses. O(observations).
+// finite projection, and then all observations of points that have fewer than
+// `min_track_length` left and are not fixed. Throws ModelError if a camera
+// without an image plane sees a point. O(observations).
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
                                       const FixedParts& fixed = {});
 
-// A copy of the model with the blocks in place of what they were made from.
-// Records whose blocks are those of `before` keep their bits; the poses of
-// images follow their frames.
+// A copy of the model with the values of the blocks. Records whose blocks did
+// not change since `before` keep their bits; the poses of images follow their
+// frames.
 Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
                   const AdjustmentBlocks& after);
 

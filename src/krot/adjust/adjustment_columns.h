@@ -9,24 +9,24 @@
 
 namespace krot {
 
-// The free coordinates of a camera's parameters: focal length(s), principal
-// point and others are refined or held still by the options, each as a whole.
-// In COLMAP's order.
+// The indices of the camera parameters that the options refine, in COLMAP's
+// order. Each group is refined as a whole: focal length(s), principal point,
+// others.
 std::vector<int> RefinedParams(int camera_model,
                                const BundleAdjustmentOptions& options);
 
-// Which unknowns move, the points aside: in blocks of three columns, by the
-// index of their block, in the order frames, sensors, cameras, cap. What takes
-// part in no observation is held still, and so is what is fixed.
+// The unknowns that move. Points aside, they are in blocks of three columns,
+// which are numbered in the order frames, sensors, cameras, cap. Nothing that
+// is fixed or takes part in no observation moves.
 struct AdjustmentColumns {
   static constexpr int32_t kHeld = -1;
-  // Of x -> R (x - c): R turns to R exp([theta]x), c moves.
+  // The blocks of theta and c, where x -> R exp([theta]x) (x - c).
   struct Pose {
     int32_t rotation = kHeld;
     int32_t center = kHeld;
   };
-  // As many blocks as the parameters that move need; the last one may have
-  // columns to spare, which stand for nothing.
+  // As many blocks as the refined parameters need. Columns that are left over
+  // in the last block stand for nothing.
   struct Camera {
     int32_t first_block = kHeld;
     std::vector<int> params;
@@ -45,13 +45,14 @@ struct AdjustmentColumns {
   std::vector<Camera> cameras;
   int32_t cap = kHeld;  // one column
   int32_t num_blocks = 0;
-  int64_t num_unknowns = 0;  // with those of points; the cap is none
+  int64_t num_unknowns = 0;  // including points, without the cap
 
   void AddCap() { cap = num_blocks++; }
 };
 
-// Sets the unknowns of `*to` to those of `from`, moved along a direction of
-// points and blocks. What is held still keeps its bits. Both are of one model.
+// Sets the unknowns of `*to` to those of `from`, moved by `step` along a
+// direction of points and blocks. Unknowns that do not move keep their bits.
+// Both are blocks of the same model.
 void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
                const BlockVector& direction, double step, AdjustmentBlocks* to);
 

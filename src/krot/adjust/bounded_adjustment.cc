@@ -14,44 +14,38 @@
 namespace krot {
 namespace {
 
-// The first weight, as a share of the cost by observation: a small one holds a
-// start near the cap there, or leads to a poorer local minimum. At 1.02 times
-// its lowest maximum, door took 19 steps to 11164 pixels^2 with 15, 23 to 11222
-// with 10, and 21 to 11323 with 3; elsewhere 3 to 30 differ by less.
+// The first weight, as a multiple of the mean cost of an observation. With a
+// small weight a start near the cap stays there, or a poorer local minimum is
+// found: at 1.02 times its lowest maximum, a model took 19 steps to 11164
+// pixels^2 with 15, 23 steps to 11222 with 10, and 21 steps to 11323 with 3.
 constexpr double kStartWeight = 15;
-// The path ends with a gap of this share of what is minimised, and is there if
-// it is no less stationary than the second.
+// The path has converged once the gap, relative to what is minimised, and the
+// stationarity are below these.
 constexpr double kGapTolerance = 1e-4;
 constexpr double kStationarityTolerance = 1e-6;
-// What a step leaves of the way to the cap, and of a multiplier, at least.
+// A step leaves at least this share of the way to the cap, and of a multiplier.
 constexpr double kBoundaryShare = 0.01;
 // Multipliers stay within this factor of mu / h.
 constexpr double kMultiplierRange = 100;
-// The weight falls by this factor after a step at least this long: after
-// shorter ones its minimum is still far, and slacks that fall behind the weight
-// make all further steps short.
+// The weight falls by this factor after a step of at least the second length.
+// After a shorter step its minimum is still far away; if the weight fell then,
+// all further steps would be short.
 constexpr double kCentring = 0.2;
 constexpr double kFallingStep = 0.5;
 // A step that leads too far is shortened by this factor.
 constexpr double kBacktracking = 0.7;
-constexpr double kLeastStep = 1e-6;
-// The trust region shrinks after a step of less than this share of what the
-// linearised errors promised, and no further than to the second radius; it
-// grows up to the third.
+// The trust region shrinks after a step of less than this share of the one that
+// the linearised errors allow. Its radius stays between the other two.
 constexpr double kPoorShare = 0.3;
 constexpr double kLeastRadius = 1e-6;
 constexpr double kLargestRadius = 1e6;
-// What a step may add to the barrier cost by rounding, relative.
-constexpr double kCostRounding = 1e-12;
-// Multipliers above this count as active; a squared error has the weight 1.
-constexpr double kActiveMultiplier = 1e-3;
-// Where the cap is lowered, it begins so far above the largest error, and
-// weighs so many times what the squared errors do: they raise the square of the
-// lowest maximum by at most twice the inverse, relative.
+// Where the cap is lowered, it begins at so many times the largest error, and
+// its weight is so many times that of the squared errors: these raise the
+// square of the lowest maximum by at most twice the inverse, relative.
 constexpr double kFirstCap = 1.1;
 constexpr double kCapWeight = 1e4;
-// The cap of the least squares behind that is so far above the lowest maximum,
-// and they start no nearer to it, relative.
+// The cap of the least squares that follow is so far above the lowest maximum,
+// and their start is at least so far below the cap, relative.
 constexpr double kCapRoom = 5e-4;
 constexpr double kLeastRoom = 1e-4;
 
@@ -79,21 +73,56 @@ class BarrierPath {
         radius_(kLargestRadius),
         summary_(*summary) {}
 
-  // Where the cap stays, and where it is lowered.
+  // Begin where the cap stays, and where it is lowered.
   void BeginBelowCap() { Begin(kStartWeight * cost_ / count(), 0); }
-  void BeginAtCap();
+  // Here mu is that for which the cap has no slope.
+  void BeginAtCap() {
+    const double cap_weight = kCapWeight * cost_ / cap2();
+    double sum = 0;
+    for (const ProjectedError& error : errors_) sum += 1 / SlackOf(error);
+    Begin(cap_weight / sum, cap_weight);
+  }
+
   InteriorPointTermination Follow() {
     return FollowPath(context_, options_.max_num_iterations, this,
                       &summary_.num_iterations);
   }
 
   // FollowPath's.
-  bool Factorize() { return true; }  // with every trust region's radius
+  bool Factorize() { return true; }  // TakeStep does, for every radius
   bool IsThere() const { return false; }
   void FindDirection(double) {}
-  double TakeStep();
-  bool Recover();
-  std::optional<InteriorPointTermination> Report(int iteration, double step);
+  double TakeStep() {
+    const double highest =
+        BarrierCost(errors_, cap2()) + kCostRounding * Objective();
+    for (; radius_ >= kLeastRadius; radius_ /= 100) {
+      const double longest = FindNewtonDirection() ? LongestStep() : 0;
+      const double step = Backtrack(longest, kBacktracking, [&](double length) {
+        return TryStep(length, highest);
+      });
+      if (step == 0) continue;
+      UpdateRadius(step / longest);
+      return step;
+    }
+    radius_ = kLargestRadius;
+    CentreMultipliers();
+    return 0;
+  }
+
+  // An iteration without a step counts, too.
+  bool Recover() {
+    Tell(++summary_.num_iterations, 0);
+    if (IsGapReached()) return false;
+    LowerWeight(1);
+    return true;
+  }
+
+  std::optional<InteriorPointTermination> Report(int iteration, double step) {
+    Tell(iteration, step);
+    if (IsConverged()) return InteriorPointTermination::kConverged;
+    LowerWeight(step);
+    return std::nullopt;
+  }
 
   // The gap is the sum of multiplier times slack, relative to what is
   // minimised, the cap with its weight included.
@@ -104,7 +133,11 @@ class BarrierPath {
     return count() * mu_ <= kGapTolerance * Objective();
   }
   // g' D^-1 g / 2, relative to what is minimised: BarrierSystem::SingleGains.
-  std::optional<double> MeasureStationarity();
+  std::optional<double> MeasureStationarity() {
+    if (!FindNewtonDirection()) return std::nullopt;
+    return Objective() > 0 ? system_.SingleGains() / Objective() : 0;
+  }
+
   bool IsConverged() {
     if (!IsGapReached()) return false;
     const std::optional<double> stationarity = MeasureStationarity();
@@ -113,9 +146,24 @@ class BarrierPath {
 
   const AdjustmentBlocks& blocks() const { return now_; }
   double LargestError() const { return krot::LargestError(errors_); }
-  int64_t NumActive() const;
+  int64_t NumActive() const {
+    return std::count_if(errors_.begin(), errors_.end(),
+                         [&](const ProjectedError& error) {
+                           return mu_ / SlackOf(error) > kActiveMultiplier;
+                         });
+  }
+
   // As bundle adjustment's summary has it.
-  const char* SolverName() const;
+  const char* SolverName() const {
+    switch (system_.kind()) {
+      case ReducedCameraSystem::Kind::kSparse:
+        return "sparse_schur";
+      case ReducedCameraSystem::Kind::kIterative:
+        return "iterative_schur";
+      default:
+        return "dense_schur";
+    }
+  }
 
  private:
   using Errors = std::vector<ProjectedError>;
@@ -126,25 +174,130 @@ class BarrierPath {
     return Slack(cap2(), error.r.squaredNorm());
   }
   double Objective() const { return cost_ + cap_weight_ * cap2() / 2; }
-  double BarrierCost(const Errors& errors, double cap2) const;
+  double BarrierCost(const Errors& errors, double cap2) const {
+    double sum = 0;
+    for (const ProjectedError& error : errors) {
+      const double squared = error.r.squaredNorm();
+      sum += squared / 2 - mu_ * std::log1p(-squared / cap2);
+    }
+    if (cap_weight_ > 0) {
+      sum += cap_weight_ * cap2 / 2 - mu_ * count() * std::log(cap2);
+    }
+    return sum;
+  }
 
   // Begins with this weight, and with the multipliers that its minimum has.
   // Half of cap_weight is the price of the cap's square, where that moves.
-  void Begin(double mu, double cap_weight);
+  void Begin(double mu, double cap_weight) {
+    mu_ = mu;
+    cap_weight_ = cap_weight;
+    CentreMultipliers();
+  }
+
   // Newton's direction, if there is one.
-  bool FindNewtonDirection();
-  // The derivative of a slack along it, as that of w h by w.
-  double SlackSlope(size_t i) const;
+  bool FindNewtonDirection() {
+    if (!factor_radius_) system_.Linearize(now_, errors_, multipliers_);
+    if (factor_radius_ != radius_) {
+      factor_radius_.reset();
+      if (!system_.Factorize(radius_)) return false;
+      factor_radius_ = radius_;
+    }
+    system_.Solve(mu_, cap_weight_);
+    return true;
+  }
+
+  // The derivative of a slack along the direction: that of w h, divided by w.
+  double SlackSlope(size_t i) const {
+    const Eigen::Vector3d& slope = system_.direction().slopes[i];
+    return SlackOf(errors_[i]) * slope[2] / errors_[i].w -
+           errors_[i].r.dot(slope.head<2>()) + system_.cap2_slope() / 2;
+  }
+
   // The longest step at most 1 that the linearised errors allow.
-  double LongestStep() const;
-  // Moves that far if it may.
-  bool TryStep(double step, double highest_cost);
-  void CentreMultipliers();
-  void UpdateMultipliers(const Errors& stepped, double stepped_cap2);
+  double LongestStep() const {
+    double longest = 1;
+    for (size_t i = 0; i < errors_.size(); ++i) {
+      // w r, w and cap w are nearly affine: |r + step v| = cap (1 + step u)
+      const Eigen::Vector3d& slope = system_.direction().slopes[i];
+      const double w_slope = slope[2] / errors_[i].w;
+      const Eigen::Vector2d v = slope.head<2>() + w_slope * errors_[i].r;
+      const double u = w_slope + system_.cap2_slope() / (2 * cap2());
+      const double a = cap2() * u * u - v.squaredNorm();
+      const double b = cap2() * u - errors_[i].r.dot(v);
+      const double c = 2 * SlackOf(errors_[i]);
+      const double discriminant = b * b - a * c;
+      if (discriminant < 0) continue;
+      const double denominator = std::sqrt(discriminant) - b;
+      if (denominator <= 0) continue;
+      longest = std::min(longest, (1 - kBoundaryShare) * c / denominator);
+    }
+    return longest;
+  }
+
+  // Takes a step of that length if the errors stay below the cap and the
+  // barrier cost is at most the given one.
+  bool TryStep(double step, double highest_cost) {
+    MoveAlong(columns_, now_, system_.direction().unknowns, step, &trial_);
+    std::optional<Errors> stepped =
+        ProjectErrors(trial_, std::sqrt(trial_.cap2), context_.num_threads);
+    if (!stepped || !(BarrierCost(*stepped, trial_.cap2) <= highest_cost)) {
+      return false;
+    }
+    UpdateMultipliers(*stepped, trial_.cap2);
+    std::swap(now_, trial_);
+    errors_ = std::move(*stepped);
+    cost_ = HalfSquaredNorm(errors_);
+    factor_radius_.reset();
+    return true;
+  }
+
+  void CentreMultipliers() {
+    for (size_t i = 0; i < errors_.size(); ++i) {
+      multipliers_[i] = mu_ / SlackOf(errors_[i]);
+    }
+    factor_radius_.reset();
+  }
+  void UpdateMultipliers(const Errors& stepped, double stepped_cap2) {
+    for (size_t i = 0; i < errors_.size(); ++i) {
+      const double h = SlackOf(errors_[i]);
+      const double lambda = multipliers_[i];
+      // lambda h + h dlambda + lambda dh = mu
+      const double newton = (mu_ - lambda * SlackSlope(i)) / h;
+      const double central =
+          mu_ / Slack(stepped_cap2, stepped[i].r.squaredNorm());
+      multipliers_[i] =
+          std::clamp(std::max(newton, kBoundaryShare * lambda),
+                     central / kMultiplierRange, central * kMultiplierRange);
+    }
+  }
+
   // After a step that was this share of the longest.
-  void UpdateRadius(double share);
-  void LowerWeight(double step);
-  void Tell(int iteration, double step) const;
+  void UpdateRadius(double share) {
+    if (share < kPoorShare) {
+      radius_ = std::max(radius_ / 10, std::min(radius_, 1.0));
+    } else if (share > 0.5) {
+      radius_ = std::min(10 * radius_, kLargestRadius);
+    }
+  }
+
+  void LowerWeight(double step) {
+    if (step < kFallingStep) return;
+    const double last = 0.5 * kGapTolerance * Objective() / count();
+    mu_ = std::max(last, kCentring * mu_);
+  }
+
+  void Tell(int iteration, double step) const {
+    if (!options_.callback) return;
+    BundleAdjustmentIteration told;
+    told.iteration = iteration;
+    told.cost = cost_;
+    told.radius = radius_;
+    told.is_successful = step > 0;
+    told.barrier = mu_;
+    told.cap = std::sqrt(cap2());
+    told.seconds = timer_.Seconds();
+    options_.callback(told);
+  }
 
   const BundleAdjustmentOptions& options_;
   const Context& context_;
@@ -158,193 +311,10 @@ class BarrierPath {
   double mu_ = 0;          // pixels^2
   double cap_weight_ = 0;  // 0 where the cap stays as it is
   double radius_;          // of the trust region
-  // That the system is factorised with; none if it is not that of now.
+  // The radius with which the system at now_ is factorised; none if it is not.
   std::optional<double> factor_radius_;
   BundleAdjustmentSummary& summary_;
 };
-
-// With the mu for which a cap of this weight has no slope.
-void BarrierPath::BeginAtCap() {
-  const double cap_weight = kCapWeight * cost_ / cap2();
-  double sum = 0;
-  for (const ProjectedError& error : errors_) sum += 1 / SlackOf(error);
-  Begin(cap_weight / sum, cap_weight);
-}
-
-void BarrierPath::Begin(double mu, double cap_weight) {
-  mu_ = mu;
-  cap_weight_ = cap_weight;
-  CentreMultipliers();
-}
-
-std::optional<double> BarrierPath::MeasureStationarity() {
-  if (!FindNewtonDirection()) return std::nullopt;
-  return Objective() > 0 ? system_.SingleGains() / Objective() : 0;
-}
-
-void BarrierPath::CentreMultipliers() {
-  for (size_t i = 0; i < errors_.size(); ++i) {
-    multipliers_[i] = mu_ / SlackOf(errors_[i]);
-  }
-  factor_radius_.reset();
-}
-
-double BarrierPath::BarrierCost(const Errors& errors, double cap2) const {
-  double sum = 0;
-  for (const ProjectedError& error : errors) {
-    const double squared = error.r.squaredNorm();
-    sum += squared / 2 - mu_ * std::log1p(-squared / cap2);
-  }
-  if (cap_weight_ > 0) {
-    sum += cap_weight_ * cap2 / 2 - mu_ * count() * std::log(cap2);
-  }
-  return sum;
-}
-
-bool BarrierPath::FindNewtonDirection() {
-  if (!factor_radius_) system_.Linearize(now_, errors_, multipliers_);
-  if (factor_radius_ != radius_) {
-    factor_radius_.reset();
-    if (!system_.Factorize(radius_)) return false;
-    factor_radius_ = radius_;
-  }
-  system_.Solve(mu_, cap_weight_);
-  return true;
-}
-
-double BarrierPath::SlackSlope(size_t i) const {
-  const Eigen::Vector3d& slope = system_.direction().slopes[i];
-  return SlackOf(errors_[i]) * slope[2] / errors_[i].w -
-         errors_[i].r.dot(slope.head<2>()) + system_.cap2_slope() / 2;
-}
-
-double BarrierPath::LongestStep() const {
-  double longest = 1;
-  for (size_t i = 0; i < errors_.size(); ++i) {
-    // w r, w and cap w are nearly affine: |r + step v| = cap (1 + step u)
-    const Eigen::Vector3d& slope = system_.direction().slopes[i];
-    const double w_slope = slope[2] / errors_[i].w;
-    const Eigen::Vector2d v = slope.head<2>() + w_slope * errors_[i].r;
-    const double u = w_slope + system_.cap2_slope() / (2 * cap2());
-    const double a = cap2() * u * u - v.squaredNorm();
-    const double b = cap2() * u - errors_[i].r.dot(v);
-    const double c = 2 * SlackOf(errors_[i]);
-    const double discriminant = b * b - a * c;
-    if (discriminant < 0) continue;
-    const double denominator = std::sqrt(discriminant) - b;
-    if (denominator <= 0) continue;
-    longest = std::min(longest, (1 - kBoundaryShare) * c / denominator);
-  }
-  return longest;
-}
-
-bool BarrierPath::TryStep(double step, double highest_cost) {
-  MoveAlong(columns_, now_, system_.direction().unknowns, step, &trial_);
-  std::optional<Errors> stepped =
-      ProjectErrors(trial_, std::sqrt(trial_.cap2), context_.num_threads);
-  if (!stepped || !(BarrierCost(*stepped, trial_.cap2) <= highest_cost)) {
-    return false;
-  }
-  UpdateMultipliers(*stepped, trial_.cap2);
-  std::swap(now_, trial_);
-  errors_ = std::move(*stepped);
-  cost_ = HalfSquaredNorm(errors_);
-  factor_radius_.reset();
-  return true;
-}
-
-void BarrierPath::UpdateMultipliers(const Errors& stepped,
-                                    double stepped_cap2) {
-  for (size_t i = 0; i < errors_.size(); ++i) {
-    const double h = SlackOf(errors_[i]);
-    const double lambda = multipliers_[i];
-    // lambda h + h dlambda + lambda dh = mu
-    const double newton = (mu_ - lambda * SlackSlope(i)) / h;
-    const double central =
-        mu_ / Slack(stepped_cap2, stepped[i].r.squaredNorm());
-    multipliers_[i] =
-        std::clamp(std::max(newton, kBoundaryShare * lambda),
-                   central / kMultiplierRange, central * kMultiplierRange);
-  }
-}
-
-double BarrierPath::TakeStep() {
-  const double highest =
-      BarrierCost(errors_, cap2()) + kCostRounding * Objective();
-  for (; radius_ >= kLeastRadius; radius_ /= 100) {
-    const double longest = FindNewtonDirection() ? LongestStep() : 0;
-    const double step =
-        Backtrack(longest, kBacktracking, kLeastStep,
-                  [&](double length) { return TryStep(length, highest); });
-    if (step == 0) continue;
-    UpdateRadius(step / longest);
-    return step;
-  }
-  radius_ = kLargestRadius;
-  CentreMultipliers();
-  return 0;
-}
-
-void BarrierPath::UpdateRadius(double share) {
-  if (share < kPoorShare) {
-    radius_ = std::max(radius_ / 10, std::min(radius_, 1.0));
-  } else if (share > 0.5) {
-    radius_ = std::min(10 * radius_, kLargestRadius);
-  }
-}
-
-void BarrierPath::LowerWeight(double step) {
-  if (step < kFallingStep) return;
-  const double last = 0.5 * kGapTolerance * Objective() / count();
-  mu_ = std::max(last, kCentring * mu_);
-}
-
-void BarrierPath::Tell(int iteration, double step) const {
-  if (!options_.callback) return;
-  BundleAdjustmentIteration told;
-  told.iteration = iteration;
-  told.cost = cost_;
-  told.radius = radius_;
-  told.is_successful = step > 0;
-  told.barrier = mu_;
-  told.cap = std::sqrt(cap2());
-  told.seconds = timer_.Seconds();
-  options_.callback(told);
-}
-
-// An iteration without a step counts, too.
-bool BarrierPath::Recover() {
-  Tell(++summary_.num_iterations, 0);
-  if (IsGapReached()) return false;
-  LowerWeight(1);
-  return true;
-}
-
-std::optional<InteriorPointTermination> BarrierPath::Report(int iteration,
-                                                            double step) {
-  Tell(iteration, step);
-  if (IsConverged()) return InteriorPointTermination::kConverged;
-  LowerWeight(step);
-  return std::nullopt;
-}
-
-int64_t BarrierPath::NumActive() const {
-  return std::count_if(errors_.begin(), errors_.end(),
-                       [&](const ProjectedError& error) {
-                         return mu_ / SlackOf(error) > kActiveMultiplier;
-                       });
-}
-
-const char* BarrierPath::SolverName() const {
-  switch (system_.kind()) {
-    case ReducedCameraSystem::Kind::kSparse:
-      return "sparse_schur";
-    case ReducedCameraSystem::Kind::kIterative:
-      return "iterative_schur";
-    default:
-      return "dense_schur";
-  }
-}
 
 BundleAdjustmentTermination TerminationOf(InteriorPointTermination end,
                                           bool is_converged) {

@@ -7,18 +7,19 @@
 
 namespace krot {
 
-// Least squares below blocks->cap2, along the minima of the barrier problem,
-// from a start whose errors are all below it. Every iterate is, and so is the
-// end. Fills in what the summary says of it: termination, num_iterations,
-// stationarity, duality_gap, num_active, linear_solver.
+// Minimises the squared errors below the cap blocks->cap2, by following the
+// minima of barrier problems. All errors of the start must be below the cap;
+// those of every iterate are. Sets termination, num_iterations, stationarity,
+// duality_gap, num_active and linear_solver of the summary.
 void AdjustBelowCap(const BundleAdjustmentOptions& options,
                     const Context& context, const AdjustmentColumns& columns,
                     AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);
 
-// Moves to a local minimum of the largest error, nearly: with the cap as one
-// more unknown, whose weight leaves next to none to the squared errors. Counts
-// iterations in the summary and sets its lowest_max_error, the start's if that
-// is not lowered, and blocks->cap2, 5e-4 above that. The blocks are below it.
+// Moves nearly to a local minimum of the largest error. The cap is one more
+// unknown for that, with a weight beside which the squared errors hardly count.
+// Counts iterations in the summary and sets its lowest_max_error, which is that
+// of the start if it cannot be lowered, and blocks->cap2, 5e-4 above that. In
+// the end all errors are below this cap.
 void LowerMaxError(const BundleAdjustmentOptions& options,
                    const Context& context, const AdjustmentColumns& columns,
                    AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);

@@ -25,22 +25,18 @@ namespace krot {
 namespace {
 
 void CheckOptions(const BundleAdjustmentOptions& options) {
-  const auto at_least = [](auto least, const char* name, auto value) {
-    CheckArgument(value >= least, name, value, ">= " + std::to_string(least));
-  };
-  at_least(1, "min_track_length", options.min_track_length);
-  CheckArgument(options.loss_scale > 0, "loss_scale", options.loss_scale,
-                "> 0");
-  at_least(0, "max_num_iterations", options.max_num_iterations);
-  at_least(1, "max_linear_solver_iterations",
-           options.max_linear_solver_iterations);
-  at_least(0, "function_tolerance", options.function_tolerance);
-  at_least(0, "gradient_tolerance", options.gradient_tolerance);
-  at_least(0, "parameter_tolerance", options.parameter_tolerance);
-  at_least(0, "max_num_images_direct_dense",
-           options.max_num_images_direct_dense);
-  at_least(0, "max_num_images_direct_sparse",
-           options.max_num_images_direct_sparse);
+  CheckAtLeast(1, options.min_track_length, "min_track_length");
+  CheckPositive(options.loss_scale, "loss_scale");
+  CheckAtLeast(0, options.max_num_iterations, "max_num_iterations");
+  CheckAtLeast(1, options.max_linear_solver_iterations,
+               "max_linear_solver_iterations");
+  CheckAtLeast(0, options.function_tolerance, "function_tolerance");
+  CheckAtLeast(0, options.gradient_tolerance, "gradient_tolerance");
+  CheckAtLeast(0, options.parameter_tolerance, "parameter_tolerance");
+  CheckAtLeast(0, options.max_num_images_direct_dense,
+               "max_num_images_direct_dense");
+  CheckAtLeast(0, options.max_num_images_direct_sparse,
+               "max_num_images_direct_sparse");
   if (!options.IsBounded()) return;
   CheckArgument(options.max_error.value_or(1) > 0, "max_error",
                 *options.max_error, "> 0");
@@ -107,8 +103,8 @@ void Count(const AdjustmentBlocks& blocks, const AdjustmentColumns& columns,
   summary->num_parameters = columns.num_unknowns;
 }
 
-// Half the sum of the squared errors under the loss, if there is one; none
-// where an error is not finite or reaches the cap.
+// Half the sum of the squared errors, with the loss if there is one. None if an
+// error is not finite or reaches the cap.
 std::optional<double> RobustCost(const Context& context,
                                  const ceres::LossFunction* loss,
                                  const AdjustmentBlocks& blocks) {
@@ -125,7 +121,7 @@ std::optional<double> RobustCost(const Context& context,
   return sum / 2;
 }
 
-// The options with a callback that also keeps the iterations in the summary.
+// The options with a callback that also adds the iterations to the summary.
 BundleAdjustmentOptions RecordIterations(const BundleAdjustmentOptions& options,
                                          BundleAdjustmentSummary* summary) {
   BundleAdjustmentOptions recorded = options;
@@ -157,7 +153,7 @@ void Minimize(const BundleAdjustmentOptions& options, const Context& context,
                    *RobustCost(context, loss, *blocks), &problem);
 }
 
-// The same below a cap, which is lowered first if that is asked for.
+// Solves a problem below a cap, which is lowered first if the options say so.
 void MinimizeBelowCap(const BundleAdjustmentOptions& options,
                       const Context& context, const AdjustmentColumns& columns,
                       AdjustmentBlocks* blocks,

@@ -15,7 +15,7 @@
 #include "krot/adjust/reprojection_errors.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 
 namespace krot {
 namespace {
@@ -61,7 +61,7 @@ struct BlockTransform : RigidTransform {
   Vector3d v;
 };
 
-// Writes a Jacobian where Ceres asks for it, nowhere if `to` is null.
+// Writes a Jacobian if Ceres asks for it, that is if `to` is not null.
 template <int kCols>
 void StoreJacobian(const Eigen::Matrix<double, 2, kCols>& jacobian,
                    double* to) {
@@ -73,12 +73,12 @@ void StoreJacobian(const Eigen::Matrix<double, 2, kCols>& jacobian,
 using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
                                             ceres::EuclideanManifold<3>>;
 
-// The gauge is free, so the normal equations are singular but for the damping,
-// which is the diagonal of J'J divided by the radius: a larger one would leave
-// it to rounding whether they are positive definite.
+// As the gauge is free, only the damping, the diagonal of J'J divided by the
+// radius, makes the normal equations positive definite. With a larger radius
+// rounding would decide whether they are.
 constexpr double kLargestTrustRegion = 1e8;
 
-// Holds still the coordinates in `constant` of a block of `size`.
+// Makes the coordinates in `constant` of a block of `size` constant.
 void HoldStill(double* block, int size, const std::vector<int>& constant,
                ceres::Problem* problem) {
   if (!problem->HasParameterBlock(block) || constant.empty()) return;
@@ -230,8 +230,8 @@ ceres::Solver::Options AdjustmentSolverOptions(
     solver.linear_solver_type = ceres::ITERATIVE_SCHUR;
     solver.preconditioner_type = ceres::SCHUR_JACOBI;
   }
-  // One group per camera: within a group Ceres goes by addresses, which for
-  // blocks of separate vectors differ from run to run.
+  // One group per camera, because within a group Ceres orders blocks by their
+  // addresses, which differ from run to run for separate vectors.
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   const auto add = [&](double* block, int group) {
     if (problem.HasParameterBlock(block)) {

@@ -37,29 +37,31 @@ class ReprojectionCost final : public ceres::CostFunction {
   int camera_model_;
 };
 
-// Adds every observation of `blocks` to a problem that does not own the loss,
-// in their order, and holds still what the options do. `loss` may be null. The
-// blocks are solved in place and must outlive the problem.
+// Adds every observation of `blocks`, in their order, to a problem that does
+// not own the loss, and makes constant what the options do not refine. `loss`
+// may be null. The blocks are solved in place and must outlive the problem.
 void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
                             ceres::LossFunction* loss, AdjustmentBlocks* blocks,
                             ceres::Problem* problem);
 
-// What such a problem does not own.
+// The options for such a problem, which does not own the loss.
 ceres::Problem::Options AdjustmentProblemOptions();
 
-// Points are eliminated first; the rest is chosen by the number of images.
+// Points are eliminated first; the linear solver depends on the number of
+// images.
 ceres::Solver::Options AdjustmentSolverOptions(
     const BundleAdjustmentOptions& options, const Context& context,
     AdjustmentBlocks* blocks, const ceres::Problem& problem);
 
-// g' D^-1 g / (2 cost), loss included: g is the gradient of the cost by what
-// may move and D the diagonal of J'J, so that g_j^2 / (2 D_j) is what moving
-// unknown j alone gains, to first order. 0 at a stationary point and where the
-// cost is 0. Invariant to the units of the unknowns. Memory: one Jacobian.
+// g' D^-1 g / (2 cost), with the loss: g is the gradient of the cost by the
+// unknowns that move, and D the diagonal of J'J, so that g_j^2 / (2 D_j) is the
+// gain of moving unknown j alone, to first order. 0 at a stationary point and
+// where the cost is 0. Independent of the units of the unknowns. Memory: one
+// Jacobian.
 std::optional<double> Stationarity(int num_threads, double cost,
                                    ceres::Problem* problem);
 
-// Tells the caller of every iteration, and ends a solve that is cancelled.
+// Reports every iteration to the caller, and ends a solve that is cancelled.
 class IterationObserver final : public ceres::IterationCallback {
  public:
   using Callback = std::function<void(const BundleAdjustmentIteration&)>;
@@ -94,7 +96,7 @@ class IterationObserver final : public ceres::IterationCallback {
   const Context context_;
   const Timer timer_;
   int num_iterations_ = 0;
-  double cost_ = 0;  // where the solve is
+  double cost_ = 0;  // at the current estimate
 };
 
 }  // namespace krot

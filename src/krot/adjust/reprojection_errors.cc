@@ -9,7 +9,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/models.h"
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 
 namespace krot {
 namespace {
@@ -104,7 +104,8 @@ struct PlacedPose {
   Vector3d center;
 };
 
-// Writes the derivatives by a pose R (x - c), given those by x.
+// Writes the derivatives by the pose of R (x - c), given those by x, and
+// returns where the next ones go.
 Matrix3d* StorePose(const AdjustmentColumns::Pose& columns, const Matrix3d& D_x,
                     const Vector3d& x_less_center, Matrix3d* to) {
   if (columns.rotation != kHeld) {
@@ -117,7 +118,8 @@ Matrix3d* StorePose(const AdjustmentColumns::Pose& columns, const Matrix3d& D_x,
   return to;
 }
 
-// Writes those by the parameters of a camera and returns those by x_cam.
+// Writes the derivatives by the parameters of a camera, and returns those by
+// x_cam.
 Matrix3d Project(int camera_model, const std::vector<double>& params,
                  const Vector3d& x_cam,
                  const AdjustmentColumns::Camera& columns, Matrix3d* to) {

@@ -11,21 +11,21 @@
 
 namespace krot {
 
-// What an observation is projected to.
+// The error and the depth of an observation.
 struct ProjectedError {
   Eigen::Vector2d r;  // projected minus measured, pixels
   double w;           // depth, > 0
 };
 
-// By observation. None where a point is not in front of its camera or its error
-// not below `max_error`. O(observations).
+// Those of all observations. None if a point is not in front of its camera, or
+// an error not below `max_error`. O(observations).
 std::optional<std::vector<ProjectedError>> ProjectErrors(
     const AdjustmentBlocks& blocks, double max_error, int num_threads);
 
 // Half the sum of the squared errors.
 double HalfSquaredNorm(const std::vector<ProjectedError>& errors);
 
-// The norm of the largest; 0 if there are none.
+// The norm of the largest error; 0 if there are no errors.
 double LargestError(const std::vector<ProjectedError>& errors);
 
 // No camera model has more parameters.
@@ -37,10 +37,11 @@ struct DifferentiatedPixel {
   Eigen::Matrix2d J_ray;
 };
 
-// By forward differentiation through lens and distortion, behind which the
-// pixel is affine in focal lengths and principal point. Writes the derivatives
-// by the camera's parameters, too: 2 x num_params, row by row; nowhere if
-// `J_params` is null. Throws as ProjectRay does; not finite where that is not.
+// Differentiates forwards through lens and distortion, and in closed form by
+// focal lengths and principal point, in which the pixel is affine. If
+// `J_params` is not null it gets the derivatives by the camera's parameters, 2
+// x num_params, row by row. Throws as ProjectRay does; not finite where that is
+// not.
 DifferentiatedPixel DifferentiatePixel(int model_id, const double* params,
                                        const Eigen::Vector2d& ray,
                                        double* J_params);
@@ -53,16 +54,16 @@ DifferentiatedPixel DifferentiatePixel(int model_id, const double* params,
 // with R exp([theta]x) in place of R (AdjustmentColumns::Pose).
 class ErrorJacobians {
  public:
-  // Keeps a reference to `columns`. Of the blocks only the observations count.
+  // Keeps a reference to `columns`. Reads only the observations of the blocks.
   ErrorJacobians(const AdjustmentColumns& columns,
                  const AdjustmentBlocks& blocks);
 
-  // At blocks of the same observations, whose points are in front of their
-  // cameras.
+  // Evaluates at blocks with the same observations, whose points are in front
+  // of their cameras.
   void Evaluate(const AdjustmentBlocks& blocks, int num_threads);
 
   const Eigen::Matrix3d& by_point(int64_t i) const { return D_[begin_[i]]; }
-  // Of blocks(i)[n]; that of the cap, which comes last, is 0.
+  // By the block blocks(i)[n]. For the cap, which is the last, it is 0.
   const Eigen::Matrix3d& by_block(int64_t i, int n) const {
     return D_[begin_[i] + 1 + n];
   }

@@ -7,9 +7,7 @@
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/medians.h"
 #include "krot/geometry/consensus.h"
-#include "krot/geometry/rigid_transform.h"
-#include "krot/geometry/rotation.h"
-#include "krot/geometry/similarity.h"
+#include "krot/geometry/transform.h"
 
 namespace krot {
 namespace {
@@ -17,8 +15,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// What moves together: indices of AdjustmentBlocks. Sensors only where they are
-// refined; else `has_fixed_scale` says whether they have a translation.
+// The parts of a connected component, as indices of AdjustmentBlocks. Sensors
+// are listed only if they are refined; otherwise `has_fixed_scale` says whether
+// any has a translation.
 struct Component {
   std::vector<size_t> frames;
   std::vector<size_t> sensors;
@@ -97,7 +96,8 @@ CenterStatistics Summarize(const std::vector<PoseBlock>& frames,
   return statistics;
 }
 
-// The rotation nearest to the sum of R_before^T R_after; none if several are.
+// The rotation nearest to the sum of R_before^T R_after; the identity if
+// several are.
 Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
                       const std::vector<PoseBlock>& after,
                       const std::vector<size_t>& indices) {
@@ -147,8 +147,8 @@ std::vector<size_t> HeldFrames(const AdjustmentBlocks& before,
   return held;
 }
 
-// Moves the frame's centre to `center`; turns it with the world unless
-// `keep_rotation`.
+// Moves the frame's centre to `center`, and turns the frame with the world
+// unless `keep_rotation`.
 void MoveFrame(const Vector3d& center, const Matrix3d& world_rotation,
                bool keep_rotation, PoseBlock* frame) {
   Pose pose = ToPose(*frame);
@@ -186,7 +186,7 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
                    rotation_of(component.frames));
     const CenterStatistics old_centers = Summarize(before.frames, held);
     const CenterStatistics new_centers = Summarize(after->frames, held);
-    // Of what lies around the new centroid.
+    // Applies to coordinates relative to the new centroid.
     Similarity similarity;
     similarity.translation = old_centers.centroid;
     if (!component.has_fixed_scale && old_centers.rms > 0 &&

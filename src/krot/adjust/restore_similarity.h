@@ -6,14 +6,13 @@
 
 namespace krot {
 
-// Moves every connected component of `after` by the similarity that gives it
-// back what `before` has: the centroid of its camera centres, their RMS
-// distance to it, and the mean of its rotations; of those that keep their place
-// among the others (krot/geometry/consensus.h). No error changes but by
-// rounding. The scale stays where a constant sensor_from_rig with a translation
-// fixes it, the rotation where rotations are constant; nothing is done where
-// frames or points are, or to a component in which any must not move.
-// O(observations).
+// Moves every connected component of `after` by a similarity that gives it the
+// centroid of its camera centres, their RMS distance to it, and the mean
+// rotation that it has in `before`, all of those cameras that keep their place
+// among the others (krot/geometry/consensus.h). Errors change only by rounding.
+// The scale stays if a constant sensor_from_rig with a translation fixes it,
+// and the rotation if rotations are constant. Nothing is done if frames or
+// points are constant, or to a component with anything fixed. O(observations).
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before, AdjustmentBlocks* after);
 

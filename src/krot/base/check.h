@@ -21,4 +21,14 @@ void CheckArgument(bool ok, std::string_view name, const Value& value,
   throw std::invalid_argument(message.str());
 }
 
+template <typename Value>
+void CheckPositive(const Value& value, std::string_view name) {
+  CheckArgument(value > 0, name, value, "> 0");
+}
+
+template <typename Value>
+void CheckAtLeast(int least, const Value& value, std::string_view name) {
+  CheckArgument(value >= least, name, value, ">= " + std::to_string(least));
+}
+
 }  // namespace krot

@@ -21,36 +21,36 @@ class CheckpointError : public std::runtime_error {
 };
 
 // The steps that a run has completed, in their order. Runs are deterministic:
-// the same one, begun anew after it was killed, takes all decisions again and
-// comes to the same steps, whose results it takes from here (RunStep), so that
-// it ends with the same bits. This one keeps nothing: of ranks, all but the
-// first one have such.
+// one that was killed and is started again takes all its decisions again, comes
+// to the same steps, and reads their results from here (RunStep). So it ends
+// with the same bits. The base class stores nothing; ranks other than 0 use it.
 class Checkpoint {
  public:
   virtual ~Checkpoint() = default;
 
-  // What the next step came to; none behind the last one that was completed,
-  // and from then on.
+  // The record of the next step; none once all completed steps were read.
   virtual std::optional<std::string> Next() { return std::nullopt; }
 
-  // Behind all that Next has given. Throws WriteError if it is not kept.
+  // Adds a record after those that Next has returned. Throws WriteError if it
+  // cannot be stored.
   virtual void Append(const std::string& /*record*/) {}
 };
 
-// What a step changes: one function names the values, in the same order when
-// they are written as when they are read. T holds no pointer.
+// Writes or reads the values that a step changes. One function names them, so
+// that they are read in the order in which they were written. T holds no
+// pointer.
 class StepValues {
  public:
-  // Writes. Where ranks share the points they name their values together.
+  // Writes. Where ranks share the points, all of them name the values together.
   explicit StepValues(Ranks* ranks) : ranks_(ranks) {}
-  // Reads; of ranks the first one has the record.
+  // Reads. Only the first rank has the record.
   StepValues(std::string record, Ranks* ranks)
       : ranks_(ranks), is_read_(true), record_(std::move(record)) {}
 
-  // The same on every rank.
+  // A value that is the same on every rank.
   template <typename T>
   void Value(T* value) {
-    struct Boxed {  // vectors of bool are no plain values
+    struct Boxed {  // because a vector of bool does not hold plain values
       T value;
     };
     std::vector<Boxed> boxed = {{*value}};
@@ -62,8 +62,8 @@ class StepValues {
     OnFirst(values);
     if (is_read_ && ranks_ != nullptr) ranks_->Broadcast(values);
   }
-  // Whether it is there is the same on every rank; then `describe` names what
-  // it holds.
+  // A value that is present on all ranks or on none. If it is present,
+  // `describe` names what it holds.
   template <typename T, typename Describe>
   void Optional(std::optional<T>* value, const Describe& describe) {
     bool is_there = value->has_value();
@@ -73,8 +73,8 @@ class StepValues {
     describe(&**value);
   }
 
-  // Of points: every rank has its share, and the same when it reads. The record
-  // does not depend on how many share them.
+  // A value per point, of which every rank has its share. The record does not
+  // depend on the number of ranks.
   template <typename T>
   void Shared(std::vector<T>* values) {
     if (ranks_ == nullptr) return OnFirst(values);
@@ -97,7 +97,7 @@ class StepValues {
     *values = std::move(ranks_->ExchangeValues(std::move(to))[0]);
   }
 
-  // Only the first rank's counts, and only it has it back.
+  // The values of the first rank alone; reading gives them to it alone.
   template <typename T>
   void OnFirst(std::vector<T>* values) {
     if (ranks_ != nullptr && !ranks_->IsFirst()) return;
@@ -138,10 +138,12 @@ class StepValues {
   size_t offset_ = 0;
 };
 
-// Computes, and keeps what `describe(StepValues*)` names of it unless the run
-// is cut short; or takes that from the checkpoint and computes nothing. Without
-// a checkpoint (null) it computes. Every rank must call it, all with or all
-// without one. A step that cannot be kept ends no run.
+// Runs a step. If the checkpoint has its record, the values that
+// `describe(StepValues*)` names are read from it and nothing is computed.
+// Otherwise the step is computed and, unless the run was interrupted, recorded;
+// a record that cannot be stored does not end the run. Without a checkpoint
+// (null) it only computes. Every rank must call it, all with a checkpoint or
+// all without.
 template <typename Compute, typename Describe>
 void RunStep(Checkpoint* checkpoint, const Context& context,
              const Compute& compute, const Describe& describe) {

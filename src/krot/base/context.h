@@ -1,30 +1,38 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "krot/base/progress.h"
 #include "krot/base/ranks.h"
 
 namespace krot {
 
-// How work is done, as opposed to what: handed on by every stage of a solve to
-// those below it, which keep a copy if they keep anything. No result depends on
-// it, unless it is cut short. What a stage has to tell of its own iterations
-// goes to the callback in its options, whose type says what there is to tell.
+// Set from another thread or a signal handler; solvers look at it between
+// steps and return what they have with the termination "interrupted".
+using CancelFlag = std::atomic<bool>;
+
+inline bool IsCancelled(const CancelFlag* cancel) {
+  return cancel != nullptr && cancel->load(std::memory_order_relaxed);
+}
+
+// How work is done, as opposed to what is done. Every stage of a solve passes
+// it on to the stages below. No result depends on it, unless the solve is
+// interrupted. A stage reports its own iterations through the callback in its
+// options.
 struct Context {
   int num_threads = -1;                // -1: all
   const CancelFlag* cancel = nullptr;  // may be null
-  // Takes a sentence on what was chosen, and why; may be empty.
+  // Receives a sentence about a choice that was made, and why; may be empty.
   std::function<void(const std::string&)> on_note = {};
   // Takes what a stage that may last does, as "looking for conflicts", and how
   // much of it is done; of 0: not known. From any thread; may be empty.
   std::function<void(const std::string& what, int64_t done, int64_t of)>
       on_stage = {};
-  // The processes that share the points; null: this one has them all.
+  // The processes that share the points; null if this one has them all.
   Ranks* ranks = nullptr;
 
   bool IsCancelled() const { return krot::IsCancelled(cancel); }
@@ -46,14 +54,14 @@ struct Context {
     return part;
   }
 
-  // The same for work on this process's own share.
+  // For work on this process's own share.
   Context Alone() const {
     Context alone = *this;
     alone.ranks = nullptr;
     return alone;
   }
 
-  // Of the whole, from what it is of this process's share.
+  // The largest value and the sum over all processes' shares.
   double Max(double own) const {
     return Reduced(own, [](double a, double b) { return std::max(a, b); });
   }
@@ -66,7 +74,7 @@ struct Context {
   void Reduce(const Combine& combine, std::vector<T>* values) const {
     if (ranks != nullptr) ranks->Reduce(combine, values);
   }
-  // What `change` makes of the value in the order of the points of the whole.
+  // change(value), on every process in turn, in the order of their points.
   template <typename T, typename Change>
   void InTurn(const Change& change, std::vector<T>* value) const {
     if (ranks == nullptr) return change(value);

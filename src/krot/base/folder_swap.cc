@@ -1,17 +1,18 @@
 #include "krot/base/folder_swap.h"
 
+#include <dirent.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
+#include <memory>
 #include <new>
-#include <string>
-#include <system_error>
+#include <string_view>
 #include <utility>
 
-#include "krot/base/folder_tree.h"
 #include "krot/base/write_file.h"
 
 namespace krot {
@@ -19,7 +20,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Without symbolic links, dots and a trailing slash: what rename acts on.
+std::error_code LastError() { return {errno, std::generic_category()}; }
+
+std::error_code ListEntries(const fs::path& folder,
+                            std::vector<fs::path>* names) {
+  const std::unique_ptr<DIR, int (*)(DIR*)> stream(::opendir(folder.c_str()),
+                                                   &::closedir);
+  if (!stream) return LastError();
+  for (;;) {
+    errno = 0;
+    const dirent* entry = ::readdir(stream.get());
+    if (entry == nullptr) break;
+    const std::string_view name = entry->d_name;
+    if (name != "." && name != "..") names->emplace_back(name);
+  }
+  return errno == 0 ? std::error_code() : LastError();
+}
+
+// The path that rename acts on: without symbolic links, dots and a trailing
+// slash.
 fs::path Resolve(const fs::path& target) {
   if (target.empty()) throw WriteError("found no name of an output folder");
   const fs::path resolved = fs::weakly_canonical(fs::absolute(target));
@@ -28,7 +47,7 @@ fs::path Resolve(const fs::path& target) {
 
 std::string Reason(int error) { return std::generic_category().message(error); }
 
-// False where the system does not tell.
+// False where the system cannot tell.
 bool IsMountPoint([[maybe_unused]] const fs::path& folder) {
 #ifdef STATX_ATTR_MOUNT_ROOT
   struct statx status;
@@ -39,8 +58,8 @@ bool IsMountPoint([[maybe_unused]] const fs::path& folder) {
 #endif
 }
 
-// Exchanges two names in one step; false, with errno, where that is not to be
-// had.
+// Exchanges two names in one step. Returns false, with errno, where the system
+// or the file system cannot do that.
 bool ExchangeNames([[maybe_unused]] const fs::path& a,
                    [[maybe_unused]] const fs::path& b) {
 #ifdef RENAME_EXCHANGE
@@ -88,12 +107,12 @@ fs::path CreateSibling(const fs::path& target) {
   }
 }
 
-// Puts `from` into place as `to`: the same file by a hard link, a copy where
-// the file system has none, a folder entry by entry.
+// Makes `to` the same as `from`: a file by a hard link, or by a copy where the
+// file system has no hard links, a folder entry by entry.
 void Carry(const fs::path& from, const fs::path& to) {
   const fs::file_status status = fs::symlink_status(from);
   if (fs::is_directory(status)) {
-    // Removing the old folder would empty what is mounted there.
+    // Removing the old folder would empty the mounted file system.
     if (IsMountPoint(from)) {
       throw WriteError(from.string() +
                        ": is a mount point inside the folder to be replaced; "
@@ -111,9 +130,9 @@ void Carry(const fs::path& from, const fs::path& to) {
   fs::copy(from, to, fs::copy_options::copy_symlinks);
 }
 
-// Exchanges two folders; returns where the old one is now. File systems without
-// RENAME_EXCHANGE need two renames; between them the old folder bears a name of
-// its own, which it keeps.
+// Exchanges two folders and returns the path at which the old one is now. File
+// systems without RENAME_EXCHANGE need two renames; the first gives the old
+// folder a name of its own, which it keeps.
 fs::path Exchange(const fs::path& staging, const fs::path& target) {
   if (ExchangeNames(staging, target)) return staging;
   if (errno != EINVAL && errno != ENOSYS) {
@@ -133,6 +152,32 @@ fs::path Exchange(const fs::path& staging, const fs::path& target) {
 }
 
 }  // namespace
+
+std::vector<fs::path> FolderEntries(const fs::path& folder) {
+  std::vector<fs::path> names;
+  if (const std::error_code error = ListEntries(folder, &names)) {
+    throw fs::filesystem_error("cannot be listed", folder, error);
+  }
+  return names;
+}
+
+std::error_code RemoveTree(const fs::path& path) try {
+  std::error_code failure;
+  const fs::file_status status = fs::symlink_status(path, failure);
+  if (status.type() == fs::file_type::not_found) return {};
+  if (fs::is_directory(status)) {
+    std::vector<fs::path> names;
+    failure = ListEntries(path, &names);
+    for (const fs::path& name : names) {
+      const std::error_code error = RemoveTree(path / name);
+      if (!failure) failure = error;
+    }
+  }
+  if (::remove(path.c_str()) != 0 && !failure) failure = LastError();
+  return failure;
+} catch (const std::bad_alloc&) {
+  return std::make_error_code(std::errc::not_enough_memory);
+}
 
 void CheckSwappable(const fs::path& target) {
   const fs::path resolved = Resolve(target);
@@ -173,11 +218,11 @@ FolderSwap::~FolderSwap() {
   try {
     note_(sibling_.string() + " cannot be removed: " + error.message());
   } catch (const std::bad_alloc&) {
-    // Nothing is left to say it with.
+    // There is no memory left for the sentence.
   }
 }
 
-// The new folder is in place: what fails now is only worth a note.
+// The new folder is in place, so a failure here is only worth a note.
 void FolderSwap::SyncPlace() const {
   try {
     SyncFolder(target_.parent_path());
@@ -186,8 +231,9 @@ void FolderSwap::SyncPlace() const {
   }
 }
 
-// Of a target that did not exist. Where others have made some of its parents
-// meanwhile, what those still lack.
+// Renames the staging folder to a target that did not exist. Where somebody
+// else has created some of its parents meanwhile, only what is missing below
+// them is moved.
 void FolderSwap::MoveIntoPlace() {
   const fs::path inner = staging_.lexically_relative(sibling_);
   fs::path from = sibling_;

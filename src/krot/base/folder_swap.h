@@ -3,8 +3,21 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <system_error>
+#include <vector>
 
 namespace krot {
+
+// The names in a folder, in no particular order. Throws
+// std::filesystem::filesystem_error. Where memory runs out, std::filesystem's
+// own directory_iterator and remove_all would end the process; these do not.
+std::vector<std::filesystem::path> FolderEntries(
+    const std::filesystem::path& folder);
+
+// Removes a file, or a folder with all that it holds, if it exists. Does not
+// follow links. It does not throw: it returns the first failure, and goes on
+// with the rest after it.
+std::error_code RemoveTree(const std::filesystem::path& path);
 
 // Throws WriteError if FolderSwap would refuse this target: it is a file, a
 // mount point or the working directory (which cannot be replaced under a
@@ -13,37 +26,37 @@ namespace krot {
 void CheckSwappable(const std::filesystem::path& target);
 
 // Replaces a whole folder at once. A new folder is made beside the target,
-// filled by the caller, and exchanged with the target in one system call, so
-// that whoever looks, and whenever this process ends, finds the old folder or
-// the new one. Only a SIGKILL or a power cut leaves the sibling behind, named
+// filled by the caller, and exchanged with the target in one system call. So
+// the old folder or the new one is there at any time, even if this process
+// ends. Only a SIGKILL or a power cut leaves the other folder behind, named
 // ".<target>.krot-<process>-<number>"; nobody reads it.
 //
 //   FolderSwap swap("out");
 //   ... write into swap.staging() ...
 //   swap.Commit(is_replaced);
 //
-// Throws WriteError or std::filesystem::filesystem_error; nothing has changed
-// then.
+// Throws WriteError or std::filesystem::filesystem_error; then nothing has
+// changed.
 class FolderSwap {
  public:
   using Note = std::function<void(const std::string& sentence)>;
 
-  // Creates the staging folder. Parents that the target lacks are created in
-  // it and come into place with it. `note` takes a sentence
-  // where the old folder could not be removed in the end, or the new one's name
-  // not be forced to the disk; may be empty.
+  // Creates the staging folder, with the parents that the target lacks; they
+  // come into place together with it. `note` receives a sentence if the old
+  // folder could not be removed in the end, or if the new one's name could not
+  // be forced to the disk; it may be empty.
   explicit FolderSwap(const std::filesystem::path& target, Note note = {});
-  // Removes the old folder after Commit, the new one without.
+  // Removes the old folder after Commit, and the new one if there was none.
   ~FolderSwap();
   FolderSwap(const FolderSwap&) = delete;
   FolderSwap& operator=(const FolderSwap&) = delete;
 
   const std::filesystem::path& staging() const { return staging_; }
 
-  // Carries the old folder's entries over into the new one (files as hard
-  // links where possible), except those for which `is_replaced` is true or
-  // that the new folder has already; then forces the new one's to the disk, and
-  // swaps.
+  // Carries the old folder's entries over into the new one (files as hard links
+  // where possible), except those for which `is_replaced` is true and those
+  // that the new folder has already. Then forces the new folder's names to the
+  // disk, and exchanges the folders.
   void Commit(const std::function<bool(const std::filesystem::path& file_name)>&
                   is_replaced);
 

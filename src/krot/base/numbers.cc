@@ -19,8 +19,8 @@ std::string Print(const char* format, int decimals, double value) {
 
 }  // namespace
 
-// strtod is more generous at the beginning, takes hexadecimal digits, and gives
-// infinity or zero for what is out of range.
+// strtod accepts more than from_chars at the beginning of a text, accepts
+// hexadecimal digits, and returns infinity or zero for numbers out of range.
 std::optional<double> ParseRealByC(std::string_view text) {
   const std::string copy(text);
   const bool is_negative = !copy.empty() && copy[0] == '-';

@@ -16,7 +16,8 @@ inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kHalfPi = kPi / 2;
 inline constexpr double kDegreesPerRadian = 180 / kPi;
 
-// The upper one of two. Requires a value.
+// The median, and of an even number of values the larger of the middle two.
+// Requires at least one value.
 inline double Median(std::vector<double> values) {
   const auto middle =
       values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -24,8 +25,8 @@ inline double Median(std::vector<double> values) {
   return *middle;
 }
 
-// What std::from_chars and std::to_chars do with doubles, for standard
-// libraries that have them for integers alone, by way of the C library.
+// std::from_chars and std::to_chars for doubles, by the C library, for standard
+// libraries that have them for integers alone.
 std::optional<double> ParseRealByC(std::string_view text);
 std::string ShortestTextByC(double value);
 
@@ -35,9 +36,9 @@ inline constexpr bool kCharconvHasReals = true;
 inline constexpr bool kCharconvHasReals = false;
 #endif
 
-// The number that the whole of `text` is, as std::from_chars reads it: no
-// blank, no plus sign, whatever the locale; nothing if it is none, or none that
-// `Number` can hold.
+// The number that `text` as a whole stands for, read as std::from_chars does:
+// no blank, no plus sign, independent of the locale. None if it is not a
+// number, or one that `Number` cannot hold.
 template <typename Number>
 std::optional<Number> ParseNumber(std::string_view text) {
   if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
@@ -51,8 +52,8 @@ std::optional<Number> ParseNumber(std::string_view text) {
   }
 }
 
-// Appends the shortest text that ParseNumber reads as `value`, as std::to_chars
-// has it.
+// Appends the shortest text that ParseNumber reads as `value`, in the format of
+// std::to_chars.
 template <typename Number>
 void AppendNumber(Number value, std::string* text) {
   if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {

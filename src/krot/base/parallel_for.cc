@@ -1,19 +1,99 @@
 #include "krot/base/parallel_for.h"
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <atomic>
+#include <cfenv>
 #include <exception>
-#include <mutex>
 #include <thread>
 
 #include "krot/base/check.h"
-#include "krot/base/thread_pool.h"
 
 namespace krot {
+// One call of Run. It lives on the caller's stack until no call of its work
+// runs or may begin.
+struct ThreadPool::Task {
+  const std::function<void(int)>& work;
+  std::fenv_t environment;
+  int num_begun = 1;    // the caller's own
+  int num_workers;      // at most
+  int num_running = 0;  // in the pool
+  std::condition_variable is_done;
+};
+
+ThreadPool& ThreadPool::Get() {
+  static ThreadPool* pool = nullptr;
+  // A child process has none of the threads, and its locks are in the state in
+  // which the fork found them.
+  const auto make_pool = [] { pool = new ThreadPool; };
+  [[maybe_unused]] static const bool made = [&] {
+    make_pool();
+    pthread_atfork(nullptr, nullptr, make_pool);
+    return true;
+  }();
+  return *pool;
+}
+
+void ThreadPool::Run(int num_workers, const std::function<void(int)>& work) {
+  if (num_workers <= 1) return work(0);
+  Task task{work, {}, 1, num_workers, 0, {}};
+  std::fegetenv(&task.environment);
+  {
+    std::lock_guard<std::mutex> lock(mutex_);
+    open_.push_back(&task);
+    num_to_begin_ += num_workers - 1;
+    AddThreads();
+  }
+  for (int worker = 1; worker < num_workers; ++worker) is_open_.notify_one();
+  work(0);
+  std::unique_lock<std::mutex> lock(mutex_);
+  Close(&task);
+  task.is_done.wait(lock, [&] { return task.num_running == 0; });
+}
+
+// Creates as many threads as there are calls that have not begun.
+void ThreadPool::AddThreads() {
+  for (; num_idle_ < num_to_begin_; ++num_idle_) {
+    try {
+      std::thread([this] { Serve(); }).detach();
+    } catch (const std::exception&) {
+      return;  // the system has no more threads; the existing ones do the work
+    }
+  }
+}
+
+// The endless loop of a thread of the pool.
+void ThreadPool::Serve() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  for (;;) {
+    is_open_.wait(lock, [&] { return !open_.empty(); });
+    Task& task = *open_.back();
+    const int worker = task.num_begun++;
+    --num_to_begin_;
+    if (task.num_begun == task.num_workers) Close(&task);
+    --num_idle_;
+    ++task.num_running;
+    lock.unlock();
+    std::fesetenv(&task.environment);
+    task.work(worker);
+    lock.lock();
+    ++num_idle_;
+    if (--task.num_running == 0) task.is_done.notify_one();
+  }
+}
+
+// No further call of `task` begins.
+void ThreadPool::Close(const Task* task) {
+  const auto found = std::find(open_.begin(), open_.end(), task);
+  if (found == open_.end()) return;
+  open_.erase(found);
+  num_to_begin_ -= task->num_workers - task->num_begun;
+}
 
 int ResolveNumThreads(int requested) {
   if (requested > 0) return requested;
-  // Asking the system opens a file, which takes longer than a small loop.
+  // Asking the system opens a file, which takes longer than a small loop runs.
   static const int num_hardware_threads =
       std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   return num_hardware_threads;
@@ -27,7 +107,7 @@ void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
   const int num_workers = static_cast<int>(
       std::min<int64_t>(ResolveNumThreads(num_threads), num_chunks));
 
-  // Chunks are fixed; which thread takes which is not, and must not matter.
+  // Which thread takes which chunk is left to chance, and must not matter.
   std::atomic<int64_t> next_chunk{0};
   std::mutex mutex;
   int64_t failed_chunk = num_chunks;

@@ -11,12 +11,12 @@
 
 namespace krot {
 
-// Processes that solve one problem together. Each has all frames and a share
-// of the points, with their observations: the ranks' shares one after another
-// are the whole, in its order. All take the same steps in the same order, and
-// meet where a number is of the whole. Largest values are exact; whatever else
-// is reduced is combined in the order that one process takes, so the result has
-// the same bits at any number of ranks.
+// Processes that solve one problem together. Each has all frames and a share of
+// the points, with their observations; the shares of rank 0, 1, ... one after
+// another are the whole problem in its order. All ranks take the same steps,
+// and exchange numbers where a number of the whole problem is needed. Numbers
+// are combined in the order in which one process combines them, so that the
+// result has the same bits at any number of ranks.
 class Ranks {
  public:
   virtual ~Ranks() = default;
@@ -24,13 +24,13 @@ class Ranks {
   virtual int rank() const = 0;   // in [0, count)
   virtual int count() const = 0;  // >= 1
 
-  // Sends bytes[r] to every rank r, and returns what every rank r has sent
-  // here. Every rank must call it.
+  // Sends bytes[r] to each rank r, and returns what each rank r has sent to
+  // this one. Every rank must call it.
   virtual std::vector<std::string> Exchange(std::vector<std::string> bytes) = 0;
 
   bool IsFirst() const { return rank() == 0; }
 
-  // The same for plain values: T holds no pointer.
+  // The same for plain values; T holds no pointer.
   template <typename T>
   std::vector<std::vector<T>> ExchangeValues(
       std::vector<std::vector<T>> values) {
@@ -47,8 +47,8 @@ class Ranks {
     return received;
   }
 
-  // The values of all ranks, one rank's after another's; only on the first, or
-  // on all.
+  // The values of all ranks in the order of the ranks: returned on the first
+  // rank only, or on all.
   template <typename T>
   std::vector<T> GatherOnFirst(const std::vector<T>& values) {
     std::vector<std::vector<T>> to(count());
@@ -60,7 +60,7 @@ class Ranks {
     return Joined(ExchangeValues(std::vector<std::vector<T>>(count(), values)));
   }
 
-  // Replaces the values by those of one rank.
+  // Replaces the values on all ranks by those of one.
   template <typename T>
   void Broadcast(std::vector<T>* values, int from = 0) {
     std::vector<std::vector<T>> to(count());
@@ -69,7 +69,7 @@ class Ranks {
   }
   template <typename T>
   void Broadcast(T* value, int from = 0) {
-    struct Boxed {  // vectors of bool are no plain values
+    struct Boxed {  // because a vector of bool does not hold plain values
       T value;
     };
     std::vector<Boxed> boxed = {{*value}};
@@ -77,8 +77,8 @@ class Ranks {
     *value = boxed[0].value;
   }
 
-  // combine(combine(a, b), c) of the ranks' values, one by one; all have as
-  // many.
+  // Replaces values[n] by combine(combine(a, b), c) ... of all ranks'
+  // values[n]. All ranks must have equally many.
   template <typename T, typename Combine>
   void Reduce(const Combine& combine, std::vector<T>* values) {
     const std::vector<std::vector<T>> all =
@@ -91,14 +91,14 @@ class Ranks {
     }
   }
 
-  // What the ranks before this one have, together.
+  // The sum of `own` over the ranks before this one.
   int64_t SumBefore(int64_t own) {
     const std::vector<int64_t> all = Gather(std::vector<int64_t>{own});
     return std::accumulate(all.begin(), all.begin() + rank(), int64_t{0});
   }
 
-  // Hands `value` on from rank to rank, each of which changes it in turn: a
-  // fold over the points in their order. All have the last one.
+  // Passes `value` from rank to rank, and each changes it in turn: a fold over
+  // the points in their order. In the end all ranks have the last value.
   template <typename T, typename Change>
   void InTurn(const Change& change, T* value) {
     for (int r = 0; r < count(); ++r) {
@@ -132,7 +132,7 @@ class Ranks {
   }
 };
 
-// What several processes cannot do together; one sentence.
+// Something that several processes cannot do together; what() is one sentence.
 class RanksError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -2,13 +2,10 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <optional>
 #include <system_error>
-
-#include "krot/base/file_descriptor.h"
 
 namespace krot {
 namespace {
@@ -20,12 +17,12 @@ fs::path ParentFolder(const fs::path& file) {
   return parent.empty() ? fs::path(".") : parent;
 }
 
-// As a folder: "out/" and "out" are the same.
+// "out/" and "out" are the same folder.
 fs::path Normal(const fs::path& folder) {
   return (fs::absolute(folder) / "").lexically_normal();
 }
 
-// What could not be done with a file, and why.
+// The action that failed on a file, and why.
 struct Failure {
   const char* action;
   std::string reason;
@@ -52,7 +49,7 @@ std::optional<Failure> TryToWrite(const fs::path& file,
     if (result < 0) return FailureOf("written");
     contents.remove_prefix(static_cast<size_t>(result));
   }
-  // Some file systems know only now that there is no space.
+  // Some file systems report only now that there is no space left.
   if (!Sync(descriptor)) return FailureOf("written");
   if (!descriptor.Close()) return FailureOf("written");
   return std::nullopt;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <unistd.h>
+
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -8,8 +10,30 @@
 
 namespace krot {
 
-// A model, report or certificate that cannot be written; what() is one
-// sentence.
+// An open file that is closed when it goes out of scope.
+class FileDescriptor {
+ public:
+  explicit FileDescriptor(int value) : value_(value) {}
+  ~FileDescriptor() {
+    if (is_open()) ::close(value_);
+  }
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+
+  bool is_open() const { return value_ >= 0; }
+  int get() const { return value_; }
+  // Returns false, with errno, if earlier writes did not reach the file.
+  bool Close() {
+    const int value = value_;
+    value_ = -1;
+    return ::close(value) == 0;
+  }
+
+ private:
+  int value_;
+};
+
+// A file or folder that cannot be written; what() is one sentence.
 class WriteError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -20,25 +44,24 @@ class WriteError : public std::runtime_error {
 // nothing stays.
 std::error_code TryToCreateIn(const std::filesystem::path& folder);
 
-// Throws WriteError if WriteFileAtomically would fail for want of a folder
-// (unless that is `folder_to_come`, which will exist by then), of permission,
-// or because something other than a regular file stands there. Changes
+// Throws WriteError if WriteFileAtomically would fail because there is no
+// folder (unless that is `folder_to_come`, which will exist by then), no
+// permission, or something other than a regular file in its place. Changes
 // nothing.
 void CheckFileWritable(const std::filesystem::path& file,
                        const std::filesystem::path& folder_to_come = {});
 
 // Creates `file` or replaces its content, and forces it to the disk. Throws
-// WriteError if it cannot be written in full (no space left, for one).
+// WriteError if it cannot be written in full.
 void WriteFile(const std::filesystem::path& file, std::string_view contents);
 
-// The same to a new file beside `file`, which is then renamed, so that an
-// interruption leaves the old file or the new one. Throws WriteError.
+// Does the same to a new file beside `file`, which is then renamed, so that an
+// interruption leaves either the old file or the new one. Throws WriteError.
 void WriteFileAtomically(const std::filesystem::path& file,
                          std::string_view contents);
 
-// Forces the names that a folder holds to the disk, as a rename needs it to
-// outlast a power cut; a folder that may not be read is left to the system.
-// Throws WriteError.
+// Forces the names that a folder holds to the disk, so that a rename outlasts a
+// power cut. Does nothing for a folder that may not be read. Throws WriteError.
 void SyncFolder(const std::filesystem::path& folder);
 
 }  // namespace krot

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "krot/problem/gathered_part.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {

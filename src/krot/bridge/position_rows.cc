@@ -8,8 +8,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/geometry/rigid_transform.h"
-#include "krot/problem/cameras.h"
+#include "krot/geometry/transform.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

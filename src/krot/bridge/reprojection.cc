@@ -11,7 +11,7 @@
 #include "krot/camera/projection_row.h"
 #include "krot/minimax/residual.h"
 #include "krot/model/image_geometry.h"
-#include "krot/problem/cameras.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

@@ -52,7 +52,7 @@ struct SecondOrderCone {
   }
 
   // Of lambda = W z = W^-1 s, W being the scaling of a pair in the cone
-  // (nt_scaling.h), the smallest eigenvalue squared: the lesser root of
+  // (NtScaling), the smallest eigenvalue squared: the lesser root of
   // t^2 - 2 s'z t + det(s) det(z).
   static double SmallestProduct(const Vector& s, const Vector& z) {
     const double half_sum = s.dot(z);

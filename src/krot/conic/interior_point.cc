@@ -7,7 +7,7 @@
 #include "krot/base/check.h"
 #include "krot/conic/newton_system.h"
 #include "krot/conic/path_following.h"
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 namespace {
@@ -30,17 +30,74 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
  public:
   ConicSolver(const KnownRotationProblem& problem,
               const InteriorPointOptions& options, const Context& context,
-              const ConeProgram& program, const Estimate& start, double scalar);
+              const ConeProgram& program, const Estimate& start, double scalar)
+      : Base(problem, program, options.norm, context.num_threads),
+        options_(options),
+        context_(context),
+        program_(program),
+        start_(scalar),
+        best_(start),
+        multipliers_(problem.observations.size()) {
+    now_.x = start;
+    now_.scalar = scalar;
+    now_.z.resize(problem.observations.size());
+    system_.ViewAll(&now_);
+    trial_ = now_;
+    FindStartMultipliers();
+    best_reached_ = program.IsLinear() ? scalar : Cost(now_.viewed);
+  }
 
-  InteriorPointSummary Run();
+  InteriorPointSummary Run() {
+    summary_.termination = FollowPath(context_, options_.max_iterations, this,
+                                      &summary_.iterations);
+    return summary_;
+  }
 
   // FollowPath's.
   bool Factorize() {
     return std::exchange(is_factorized_, false) || system_.Factorize(now_);
   }
   bool IsThere() const { return false; }
-  void FindDirection(double step);
-  std::optional<InteriorPointTermination> Report(int iteration, double step);
+  void FindDirection(double step) {
+    if (program_.IsLinear() && !is_stationary_) {
+      Base::Centre(1);
+    } else if (step < Base::kShortStep) {
+      Base::Centre(Base::kCentring);
+    } else {
+      Base::PredictAndCorrect();
+    }
+  }
+
+  std::optional<InteriorPointTermination> Report(int iteration, double step) {
+    using Termination = InteriorPointTermination;
+    if (program_.IsLinear()) {
+      if (!FactorizeStationary()) return Termination::kSingular;
+      is_factorized_ = true;
+    }
+    system_.loop().ForEach([&](int64_t i) {
+      const Eigen::Vector3d z = system_.ToMultiplier(now_.z[i]);
+      multipliers_[i] = {z[0], z.tail<2>()};
+    });
+    summary_.gamma = now_.scalar;
+    summary_.gap = RelativeGap();
+    const double cost = Cost(now_.viewed);
+    const double reached = program_.IsLinear() ? now_.scalar : cost;
+    if (reached < best_reached_) {
+      best_reached_ = reached;
+      best_ = now_.x;
+    }
+    const ConicIterate iterate{iteration,    now_.scalar, cost,
+                               summary_.gap, step,        &now_.x,
+                               &multipliers_};
+    if (options_.stop && options_.stop(iterate)) return Termination::kStopped;
+    if (program_.kind == ConeProgram::Kind::kFeasibility &&
+        cost < program_.bound) {
+      best_ = now_.x;
+      return Termination::kFeasible;
+    }
+    if (summary_.gap <= options_.smallest_gap) return Termination::kConverged;
+    return std::nullopt;
+  }
 
   const Estimate& best() const { return best_; }
   std::vector<Multiplier> TakeMultipliers() { return std::move(multipliers_); }
@@ -52,11 +109,76 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   using Base::system_;
   using Base::trial_;
 
-  void FindStartMultipliers();
-  void JoinKnownMultipliers(const std::vector<Multiplier>& known);
-  bool FactorizeStationary();
-  double Cost(const std::vector<ViewedPoint>& viewed) const;
-  double RelativeGap() const;
+  // z = s^-1, perfectly centred: scaled so that the row of g holds, which is
+  // sum lambda w = 1 in the cost programme; likewise near known ones; or, in
+  // the linear programme, so that from the middle of the cones they are soon
+  // stationary.
+  void FindStartMultipliers() {
+    system_.loop().ForEach([&](int64_t i) {
+      now_.z[i] = Cone::Divide(system_.Slack(now_, i), Cone::Identity());
+    });
+    if (program_.IsLinear()) {
+      if (!system_.Factorize(now_)) return;
+      const double mu = kMuPerLength * system_.ObjectiveLength();
+      system_.loop().ForEach([&](int64_t i) { now_.z[i] *= mu; });
+      return;
+    }
+    const double sum = system_.loop().Sum([&](int64_t i) {
+      return system_.ToMultiplier(now_.z[i])[0] *
+             program_.TopPerScalar(now_.viewed[i].depth);
+    });
+    system_.loop().ForEach([&](int64_t i) { now_.z[i] /= sum; });
+    if (options_.known_multipliers != nullptr && program_.IsCost()) {
+      JoinKnownMultipliers(*options_.known_multipliers);
+    }
+  }
+  // All but a small share of the centred ones give way to the known ones: far
+  // from the path, but near to where it ends. The share goes with the margin
+  // that the start has, so that both are as far from there.
+  void JoinKnownMultipliers(const std::vector<Multiplier>& known) {
+    const double share = std::min(kCentredPerMargin * options_.start_margin,
+                                  kLargestCentredShare);
+    const double sum = system_.loop().Sum(
+        [&](int64_t i) { return known[i].lambda * now_.viewed[i].depth; });
+    if (!(sum > 0)) return;
+    system_.loop().ForEach([&](int64_t i) {
+      const Vector of_known = FromMultiplier<Cone::kDim>(
+          options_.norm, known[i].lambda, known[i].y);
+      now_.z[i] = share * now_.z[i] + (1 - share) / sum * of_known;
+    });
+  }
+
+  // Factorises at the iterate. The linear programme's multipliers take the
+  // least change, in the scaling, that makes them stationary, if that stays
+  // well inside of the cones; the second change is for what rounding left.
+  bool FactorizeStationary() {
+    if (!system_.Factorize(now_)) return false;
+    for (int change = 0; change < 2; ++change) {
+      system_.SolveForStationarity(now_.z);
+      const double room = system_.loop().Min([&](int64_t i) {
+        return Cone::MaxStep(system_.lambda()[i], system_.direction().dz[i],
+                             kSmallChange);
+      });
+      const bool is_inside = room >= kStationaryRoom;
+      if (change == 0) is_stationary_ = is_inside;
+      if (!is_inside) return true;
+      system_.loop().ForEach(
+          [&](int64_t i) { now_.z[i] += system_.UnscaledDz(i); });
+      if (room < kSmallChange && !system_.Factorize(now_)) return false;
+    }
+    return true;
+  }
+
+  double Cost(const std::vector<ViewedPoint>& viewed) const {
+    return -system_.loop().Min(
+        [&](int64_t i) { return -ResidualOf(viewed[i], options_.norm); });
+  }
+
+  // The linear programme's is relative to the way from the start to the dual's.
+  double RelativeGap() const {
+    if (!program_.IsLinear()) return now_.gap / now_.scalar;
+    return now_.gap / std::max(now_.gap, start_ - now_.scalar + now_.gap);
+  }
 
   const InteriorPointOptions options_;
   const Context context_;
@@ -72,156 +194,6 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   std::vector<Multiplier> multipliers_;
   InteriorPointSummary summary_;
 };
-
-template <typename Cone>
-ConicSolver<Cone>::ConicSolver(const KnownRotationProblem& problem,
-                               const InteriorPointOptions& options,
-                               const Context& context,
-                               const ConeProgram& program,
-                               const Estimate& start, double scalar)
-    : Base(problem, program, options.norm, context.num_threads),
-      options_(options),
-      context_(context),
-      program_(program),
-      start_(scalar),
-      best_(start),
-      multipliers_(problem.observations.size()) {
-  now_.x = start;
-  now_.scalar = scalar;
-  now_.z.resize(problem.observations.size());
-  system_.ViewAll(&now_);
-  trial_ = now_;
-  FindStartMultipliers();
-  best_reached_ = program.IsLinear() ? scalar : Cost(now_.viewed);
-}
-
-template <typename Cone>
-double ConicSolver<Cone>::Cost(const std::vector<ViewedPoint>& viewed) const {
-  return -system_.loop().Min(
-      [&](int64_t i) { return -ResidualOf(viewed[i], options_.norm); });
-}
-
-// z = s^-1, perfectly centred: scaled so that the row of g holds, which is
-// sum lambda w = 1 in the cost programme; likewise near known ones; or, in the
-// linear programme, so that from the middle of the cones they are soon
-// stationary.
-template <typename Cone>
-void ConicSolver<Cone>::FindStartMultipliers() {
-  system_.loop().ForEach([&](int64_t i) {
-    now_.z[i] = Cone::Divide(system_.Slack(now_, i), Cone::Identity());
-  });
-  if (program_.IsLinear()) {
-    if (!system_.Factorize(now_)) return;
-    const double mu = kMuPerLength * system_.ObjectiveLength();
-    system_.loop().ForEach([&](int64_t i) { now_.z[i] *= mu; });
-    return;
-  }
-  const double sum = system_.loop().Sum([&](int64_t i) {
-    return system_.ToMultiplier(now_.z[i])[0] *
-           program_.TopPerScalar(now_.viewed[i].depth);
-  });
-  system_.loop().ForEach([&](int64_t i) { now_.z[i] /= sum; });
-  if (options_.known_multipliers != nullptr && program_.IsCost()) {
-    JoinKnownMultipliers(*options_.known_multipliers);
-  }
-}
-
-// All but a small share of the centred ones give way to the known ones: far
-// from the path, but near to where it ends. The share goes with the margin that
-// the start has, so that both are as far from there.
-template <typename Cone>
-void ConicSolver<Cone>::JoinKnownMultipliers(
-    const std::vector<Multiplier>& known) {
-  const double share =
-      std::min(kCentredPerMargin * options_.start_margin, kLargestCentredShare);
-  const double sum = system_.loop().Sum(
-      [&](int64_t i) { return known[i].lambda * now_.viewed[i].depth; });
-  if (!(sum > 0)) return;
-  system_.loop().ForEach([&](int64_t i) {
-    const Vector of_known =
-        FromMultiplier<Cone::kDim>(options_.norm, known[i].lambda, known[i].y);
-    now_.z[i] = share * now_.z[i] + (1 - share) / sum * of_known;
-  });
-}
-
-template <typename Cone>
-void ConicSolver<Cone>::FindDirection(double step) {
-  if (program_.IsLinear() && !is_stationary_) {
-    Base::Centre(1);
-  } else if (step < Base::kShortStep) {
-    Base::Centre(Base::kCentring);
-  } else {
-    Base::PredictAndCorrect();
-  }
-}
-
-// Factorises at the iterate. The linear programme's multipliers take the least
-// change, in the scaling, that makes them stationary, if that stays well inside
-// of the cones; the second change is for what rounding left.
-template <typename Cone>
-bool ConicSolver<Cone>::FactorizeStationary() {
-  if (!system_.Factorize(now_)) return false;
-  for (int change = 0; change < 2; ++change) {
-    system_.SolveForStationarity(now_.z);
-    const double room = system_.loop().Min([&](int64_t i) {
-      return Cone::MaxStep(system_.lambda()[i], system_.direction().dz[i],
-                           kSmallChange);
-    });
-    const bool is_inside = room >= kStationaryRoom;
-    if (change == 0) is_stationary_ = is_inside;
-    if (!is_inside) return true;
-    system_.loop().ForEach(
-        [&](int64_t i) { now_.z[i] += system_.UnscaledDz(i); });
-    if (room < kSmallChange && !system_.Factorize(now_)) return false;
-  }
-  return true;
-}
-
-// The linear programme's is relative to the way from the start to the dual's.
-template <typename Cone>
-double ConicSolver<Cone>::RelativeGap() const {
-  if (!program_.IsLinear()) return now_.gap / now_.scalar;
-  return now_.gap / std::max(now_.gap, start_ - now_.scalar + now_.gap);
-}
-
-template <typename Cone>
-std::optional<InteriorPointTermination> ConicSolver<Cone>::Report(int iteration,
-                                                                  double step) {
-  using Termination = InteriorPointTermination;
-  if (program_.IsLinear()) {
-    if (!FactorizeStationary()) return Termination::kSingular;
-    is_factorized_ = true;
-  }
-  system_.loop().ForEach([&](int64_t i) {
-    const Eigen::Vector3d z = system_.ToMultiplier(now_.z[i]);
-    multipliers_[i] = {z[0], z.tail<2>()};
-  });
-  summary_.gamma = now_.scalar;
-  summary_.gap = RelativeGap();
-  const double cost = Cost(now_.viewed);
-  const double reached = program_.IsLinear() ? now_.scalar : cost;
-  if (reached < best_reached_) {
-    best_reached_ = reached;
-    best_ = now_.x;
-  }
-  const ConicIterate iterate{iteration, now_.scalar, cost,         summary_.gap,
-                             step,      &now_.x,     &multipliers_};
-  if (options_.stop && options_.stop(iterate)) return Termination::kStopped;
-  if (program_.kind == ConeProgram::Kind::kFeasibility &&
-      cost < program_.bound) {
-    best_ = now_.x;
-    return Termination::kFeasible;
-  }
-  if (summary_.gap <= options_.smallest_gap) return Termination::kConverged;
-  return std::nullopt;
-}
-
-template <typename Cone>
-InteriorPointSummary ConicSolver<Cone>::Run() {
-  summary_.termination =
-      FollowPath(context_, options_.max_iterations, this, &summary_.iterations);
-  return summary_;
-}
 
 template <typename Cone>
 InteriorPointSummary RunInCone(
@@ -244,12 +216,9 @@ InteriorPointSummary Run(const KnownRotationProblem& problem,
                          const Estimate& start, double scalar,
                          Estimate* estimate,
                          std::vector<Multiplier>* multipliers) {
-  CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
-                options.norm.p, "1, 2 or infinity");
-  CheckArgument(options.max_iterations >= 1, "max_iterations",
-                options.max_iterations, ">= 1");
-  CheckArgument(options.smallest_gap > 0, "smallest_gap", options.smallest_gap,
-                "> 0");
+  CheckConic(options.norm);
+  CheckAtLeast(1, options.max_iterations, "max_iterations");
+  CheckPositive(options.smallest_gap, "smallest_gap");
   const auto run = options.norm.p == 2 ? &RunInCone<SecondOrderCone>
                                        : &RunInCone<FourHalfLines>;
   return run(problem, options, context, program, start, scalar, estimate,
@@ -262,8 +231,7 @@ InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
                                      const InteriorPointOptions& options,
                                      const Context& context, Estimate* estimate,
                                      std::vector<Multiplier>* multipliers) {
-  CheckArgument(options.start_margin > 0, "start_margin", options.start_margin,
-                "> 0");
+  CheckPositive(options.start_margin, "start_margin");
   const double cost =
       Cost(problem, *estimate, options.norm, context.num_threads);
   CheckArgument(std::isfinite(cost), "cost of the start", cost,
@@ -289,8 +257,8 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   const Context& context, double bound,
                                   double unit_depth, Estimate* estimate,
                                   std::vector<Multiplier>* multipliers) {
-  CheckArgument(bound > 0, "bound", bound, "> 0");
-  CheckArgument(unit_depth > 0, "unit_depth", unit_depth, "> 0");
+  CheckPositive(bound, "bound");
+  CheckPositive(unit_depth, "unit_depth");
   const ConeProgram program = {ConeProgram::Kind::kFeasibility, bound,
                                unit_depth};
   const Estimate origin = AllAtOrigin(problem);

@@ -52,12 +52,18 @@ inline double MehrotraSigma(double share_left, double least) {
   return std::min(1.0, std::max(least, left * left * left));
 }
 
+// What rounding may add to a barrier cost, relative.
+inline constexpr double kCostRounding = 1e-12;
+// Multipliers above this count as active where the weight of a squared error
+// is 1.
+inline constexpr double kActiveMultiplier = 1e-3;
+
 // The first of the lengths `longest`, factor * longest, ... for which
-// try_step(length) is true; 0 if none is that is not below `least`.
+// try_step(length) is true; 0 if none is.
 template <typename TryStep>
-double Backtrack(double longest, double factor, double least,
-                 const TryStep& try_step) {
-  for (double step = longest; step >= least; step *= factor) {
+double Backtrack(double longest, double factor, const TryStep& try_step) {
+  constexpr double kLeastStep = 1e-8;
+  for (double step = longest; step >= kLeastStep; step *= factor) {
     if (try_step(step)) return step;
   }
   return 0;
@@ -97,7 +103,22 @@ class ConePath {
       : system_(std::forward<Arguments>(arguments)...) {}
 
   bool Recover() { return false; }
-  double TakeStep();
+  // Returns the shorter of the two step lengths.
+  double TakeStep() {
+    const StepLengths longest = MaxSteps(kDamping);
+    const auto try_share = [&](double share) {
+      system_.Move(now_, share * longest.primal, &trial_);
+      system_.loop().ForEach([&](int64_t i) {
+        trial_.z[i] = now_.z[i] + share * longest.dual * system_.UnscaledDz(i);
+      });
+      trial_.gap = system_.loop().Sum(
+          [&](int64_t i) { return system_.Slack(trial_, i).dot(trial_.z[i]); });
+      if (!IsInside(trial_)) return false;
+      std::swap(now_, trial_);
+      return true;
+    };
+    return longest.Least() * Backtrack(1, kBacktracking, try_share);
+  }
 
  protected:
   // Along ds, and so x, and along dz.
@@ -112,14 +133,36 @@ class ConePath {
   static constexpr double kNeighbourhood = 1e-3;
   static constexpr double kLeastSigma = 1e-6;
   // A step goes so far of the way to the boundary, and so far of a step that
-  // left the neighbourhood. One shorter than the last is none.
+  // left the neighbourhood.
   static constexpr double kDamping = 0.98;
   static constexpr double kBacktracking = 0.7;
-  static constexpr double kLeastStep = 1e-8;
 
   // Only centres, with this sigma, or aims at the end.
-  void Centre(double sigma);
-  void PredictAndCorrect();
+  // Of lambda o f = sigma mu e.
+  void Centre(double sigma) {
+    system_.Solve(
+        [&](int64_t i) -> Vector {
+          return Cone::Divide(system_.lambda()[i],
+                              sigma * system_.mu() * Cone::Identity());
+        },
+        sigma);
+    ImproveCentrality(sigma);
+  }
+
+  // Of lambda o f = 0, then of lambda o f = sigma mu e - ds o dz of that.
+  void PredictAndCorrect() {
+    system_.Solve([](int64_t) -> Vector { return Vector::Zero(); }, 0);
+    const double sigma = PredictedSigma();
+    system_.Solve(
+        [&](int64_t i) -> Vector {
+          const Vector target = sigma * system_.mu() * Cone::Identity() -
+                                Cone::Product(system_.direction().ds[i],
+                                              system_.direction().dz[i]);
+          return Cone::Divide(system_.lambda()[i], target);
+        },
+        sigma);
+    ImproveCentrality(sigma);
+  }
 
   double MuOf(double gap) const {
     return gap / static_cast<double>(system_.loop().count() * Cone::kDegree);
@@ -129,137 +172,80 @@ class ConePath {
   State now_, trial_;
 
  private:
-  StepLengths MaxSteps(double damping) const;
-  double PredictedSigma() const;
-  void ImproveCentrality(double sigma);
-  bool IsInside(const State& trial) const;
-};
+  // `damping` times the steps to the boundary, at most 1.
+  StepLengths MaxSteps(double damping) const {
+    const auto max_step = [&](const std::vector<Vector>& direction) {
+      return damping * system_.loop().Min([&](int64_t i) {
+        return Cone::MaxStep(system_.lambda()[i], direction[i], 1 / damping);
+      });
+    };
+    StepLengths steps{max_step(system_.direction().ds),
+                      max_step(system_.direction().dz)};
+    if (system_.HasOneStep()) steps.primal = steps.dual = steps.Least();
+    return steps;
+  }
 
-// Of lambda o f = sigma mu e.
-template <typename System>
-void ConePath<System>::Centre(double sigma) {
-  system_.Solve(
-      [&](int64_t i) -> Vector {
-        return Cone::Divide(system_.lambda()[i],
-                            sigma * system_.mu() * Cone::Identity());
-      },
-      sigma);
-  ImproveCentrality(sigma);
-}
-
-// Of lambda o f = 0, then of lambda o f = sigma mu e - ds o dz of that.
-template <typename System>
-void ConePath<System>::PredictAndCorrect() {
-  system_.Solve([](int64_t) -> Vector { return Vector::Zero(); }, 0);
-  const double sigma = PredictedSigma();
-  system_.Solve(
-      [&](int64_t i) -> Vector {
-        const Vector target =
-            sigma * system_.mu() * Cone::Identity() -
-            Cone::Product(system_.direction().ds[i], system_.direction().dz[i]);
-        return Cone::Divide(system_.lambda()[i], target);
-      },
-      sigma);
-  ImproveCentrality(sigma);
-}
-
-template <typename System>
-double ConePath<System>::PredictedSigma() const {
-  StepLengths steps = MaxSteps(1);
-  if (!System::kGapAfterOwnSteps) steps.primal = steps.dual = steps.Least();
-  const double gap = system_.loop().Sum([&](int64_t i) {
-    const Vector& lambda = system_.lambda()[i];
-    return (lambda + steps.primal * system_.direction().ds[i])
-        .dot(lambda + steps.dual * system_.direction().dz[i]);
-  });
-  return MehrotraSigma(MuOf(gap) / system_.mu(), kLeastSigma);
-}
-
-// `damping` times the steps to the boundary, at most 1.
-template <typename System>
-typename ConePath<System>::StepLengths ConePath<System>::MaxSteps(
-    double damping) const {
-  const auto max_step = [&](const std::vector<Vector>& direction) {
-    return damping * system_.loop().Min([&](int64_t i) {
-      return Cone::MaxStep(system_.lambda()[i], direction[i], 1 / damping);
+  double PredictedSigma() const {
+    StepLengths steps = MaxSteps(1);
+    if (!System::kGapAfterOwnSteps) steps.primal = steps.dual = steps.Least();
+    const double gap = system_.loop().Sum([&](int64_t i) {
+      const Vector& lambda = system_.lambda()[i];
+      return (lambda + steps.primal * system_.direction().ds[i])
+          .dot(lambda + steps.dual * system_.direction().dz[i]);
     });
-  };
-  StepLengths steps{max_step(system_.direction().ds),
-                    max_step(system_.direction().dz)};
-  if (system_.HasOneStep()) steps.primal = steps.dual = steps.Least();
-  return steps;
-}
+    return MehrotraSigma(MuOf(gap) / system_.mu(), kLeastSigma);
+  }
 
-// Centrality correctors, each a solve without a factor. One aims at a step that
-// is longer by kLonger: it adds to lambda o f what the products of the pairs
-// lack there of being within a factor kRange of mu. It is taken back if the
-// step becomes shorter, and one that does not gain kWorthwhile is the last
-// [Colombo, Gondzio 2008]. Two took a fifth of the joint iterations away
-// (docs/history/journal.md).
-template <typename System>
-void ConePath<System>::ImproveCentrality(double sigma) {
-  if constexpr (System::kNumCorrectors > 0) {
-    constexpr double kLonger = 0.3;
-    constexpr double kRange = 10;
-    constexpr double kWorthwhile = 0.03;
-    constexpr double kLongStep = 0.9;  // needs no corrector
-    const double mu = sigma * system_.mu();
-    for (int n = 0; n < System::kNumCorrectors; ++n) {
-      const double before = MaxSteps(kDamping).Least();
-      if (before > kLongStep) return;
-      const double ahead = std::min(1.0, before + kLonger);
-      typename System::Direction direction = system_.direction();
-      system_.Solve(
-          [&](int64_t i) -> Vector {
-            const Vector& lambda = system_.lambda()[i];
-            const Vector product =
-                Cone::Product(lambda + ahead * direction.ds[i],
-                              lambda + ahead * direction.dz[i]);
-            const Vector lacking =
-                Cone::Clamp(product, mu / kRange, mu * kRange) - product;
-            return system_.target()[i] +
-                   Cone::Divide(
-                       lambda, Cone::Clamp(lacking, -mu * kRange, mu * kRange));
-          },
-          sigma);
-      const double gain = MaxSteps(kDamping).Least() - before;
-      if (gain < 0) system_.Restore(std::move(direction));
-      if (gain < kWorthwhile) return;
+  // Centrality correctors, each a solve without a factor. One aims at a step
+  // that is longer by kLonger: it adds to lambda o f what the products of the
+  // pairs lack there of being within a factor kRange of mu. It is taken back if
+  // the step becomes shorter, and one that does not gain kWorthwhile is the
+  // last [Colombo, Gondzio 2008]. Two took a fifth of the joint iterations away
+  // (docs/history/journal.md).
+  void ImproveCentrality(double sigma) {
+    if constexpr (System::kNumCorrectors > 0) {
+      constexpr double kLonger = 0.3;
+      constexpr double kRange = 10;
+      constexpr double kWorthwhile = 0.03;
+      constexpr double kLongStep = 0.9;  // needs no corrector
+      const double mu = sigma * system_.mu();
+      for (int n = 0; n < System::kNumCorrectors; ++n) {
+        const double before = MaxSteps(kDamping).Least();
+        if (before > kLongStep) return;
+        const double ahead = std::min(1.0, before + kLonger);
+        typename System::Direction direction = system_.direction();
+        system_.Solve(
+            [&](int64_t i) -> Vector {
+              const Vector& lambda = system_.lambda()[i];
+              const Vector product =
+                  Cone::Product(lambda + ahead * direction.ds[i],
+                                lambda + ahead * direction.dz[i]);
+              const Vector lacking =
+                  Cone::Clamp(product, mu / kRange, mu * kRange) - product;
+              return system_.target()[i] +
+                     Cone::Divide(lambda, Cone::Clamp(lacking, -mu * kRange,
+                                                      mu * kRange));
+            },
+            sigma);
+        const double gain = MaxSteps(kDamping).Least() - before;
+        if (gain < 0) system_.Restore(std::move(direction));
+        if (gain < kWorthwhile) return;
+      }
     }
   }
-}
 
-template <typename System>
-bool ConePath<System>::IsInside(const State& trial) const {
-  const double least = kNeighbourhood * MuOf(trial.gap);
-  return system_.loop().Min([&](int64_t i) {
-    if (!system_.IsPlausible(now_, trial, i)) return -1.0;
-    const Vector s = system_.Slack(trial, i);
-    if (!(Cone::SmallestEigenvalue(s) > 0) ||
-        !(Cone::SmallestEigenvalue(trial.z[i]) > 0)) {
-      return -1.0;
-    }
-    return Cone::SmallestProduct(s, trial.z[i]) - least;
-  }) >= 0;
-}
-
-// Returns the shorter of the two step lengths.
-template <typename System>
-double ConePath<System>::TakeStep() {
-  const StepLengths longest = MaxSteps(kDamping);
-  const auto try_share = [&](double share) {
-    system_.Move(now_, share * longest.primal, &trial_);
-    system_.loop().ForEach([&](int64_t i) {
-      trial_.z[i] = now_.z[i] + share * longest.dual * system_.UnscaledDz(i);
-    });
-    trial_.gap = system_.loop().Sum(
-        [&](int64_t i) { return system_.Slack(trial_, i).dot(trial_.z[i]); });
-    if (!IsInside(trial_)) return false;
-    std::swap(now_, trial_);
-    return true;
-  };
-  return longest.Least() *
-         Backtrack(1, kBacktracking, kLeastStep / longest.Least(), try_share);
-}
+  bool IsInside(const State& trial) const {
+    const double least = kNeighbourhood * MuOf(trial.gap);
+    return system_.loop().Min([&](int64_t i) {
+      if (!system_.IsPlausible(now_, trial, i)) return -1.0;
+      const Vector s = system_.Slack(trial, i);
+      if (!(Cone::SmallestEigenvalue(s) > 0) ||
+          !(Cone::SmallestEigenvalue(trial.z[i]) > 0)) {
+        return -1.0;
+      }
+      return Cone::SmallestProduct(s, trial.z[i]) - least;
+    }) >= 0;
+  }
+};
 
 }  // namespace krot

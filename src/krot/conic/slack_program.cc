@@ -56,9 +56,32 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
   SlackSolver(const KnownRotationProblem& problem, double bound,
               const SlackOptions& options, const Context& context,
               const Estimate& start, const std::vector<double>& depths,
-              bool is_from_nothing);
+              bool is_from_nothing)
+      : Base(problem, options.norm, bound, CostsFor(options, depths), depths,
+             is_from_nothing ? kMinDepthFromNothing : 0,
+             is_from_nothing ? nullptr : &start, context.num_threads),
+        options_(options),
+        context_(context),
+        bound_(bound),
+        min_depth_(is_from_nothing ? kMinDepthFromNothing : 0),
+        depths_(depths),
+        costs_(CostsFor(options, depths)) {
+    Start(start, bound * (is_from_nothing ? kStartMuFromNothing : kStartMu));
+    if (!is_from_nothing) size_ = system_.Size(start);
+  }
 
-  SlackSolution Run(Estimate* estimate);
+  SlackSolution Run(Estimate* estimate) {
+    SlackSolution solution;
+    solution.termination = FollowPath(context_, options_.max_iterations, this,
+                                      &solution.iterations);
+    *estimate = now_.x;
+    for (size_t i = 0; i < costs_.size(); ++i) {
+      solution.slack.push_back(now_.sigma[i] / depths_[i]);
+      solution.price.push_back(
+          std::clamp(1 - Cone::Last(now_.z[i]) / costs_[i], 0.0, 1.0));
+    }
+    return solution;
+  }
 
   // FollowPath's.
   bool Factorize() {
@@ -80,8 +103,41 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
   using Base::system_;
   using Base::trial_;
 
-  double CentredSigma(const ViewedPoint& viewed, double cost, double mu) const;
-  void Start(const Estimate& start, double mu);
+  // Where the multipliers of both pairs, centred, add up to the cost,
+  //
+  //   mu (q's^-1 + 1 / sigma) = c_i,
+  //
+  // whose left side is convex and falls: Newton's method, from below.
+  double CentredSigma(const ViewedPoint& viewed, double cost, double mu) const {
+    const double least =
+        std::max(0.0, NormOf(viewed.v, options_.norm) -
+                          bound_ * (viewed.depth - min_depth_));
+    double sigma = least + 0.5 * mu / cost;
+    for (int n = 0; n < kNewtonSteps; ++n) {
+      const typename BoundCone::Vector inverse = BoundCone::Divide(
+          system_.BoundSlack(viewed, sigma), BoundCone::Identity());
+      const double value =
+          mu * (system_.Multiplier(inverse) + 1 / sigma) - cost;
+      const double slope =
+          -mu * (system_.Multiplier(BoundCone::Product(inverse, inverse)) +
+                 1 / (sigma * sigma));
+      sigma -= value / slope;
+    }
+    return sigma;
+  }
+
+  // Centred, z = mu s^-1 and zeta = mu / sigma, whatever the weights.
+  void Start(const Estimate& start, double mu) {
+    now_.x = start;
+    now_.sigma.resize(costs_.size());
+    now_.z.resize(costs_.size());
+    system_.ViewAll(&now_);
+    system_.loop().ForEach([&](int64_t i) {
+      now_.sigma[i] = CentredSigma(now_.viewed[i], costs_[i], mu);
+      now_.z[i] = mu * Cone::Divide(system_.Slack(now_, i), Cone::Identity());
+    });
+    trial_ = now_;
+  }
 
   const SlackOptions options_;
   const Context context_;
@@ -92,87 +148,14 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
   double size_ = 1;  // e'x
 };
 
-template <typename BoundCone>
-SlackSolver<BoundCone>::SlackSolver(const KnownRotationProblem& problem,
-                                    double bound, const SlackOptions& options,
-                                    const Context& context,
-                                    const Estimate& start,
-                                    const std::vector<double>& depths,
-                                    bool is_from_nothing)
-    : Base(problem, options.norm, bound, CostsFor(options, depths), depths,
-           is_from_nothing ? kMinDepthFromNothing : 0,
-           is_from_nothing ? nullptr : &start, context.num_threads),
-      options_(options),
-      context_(context),
-      bound_(bound),
-      min_depth_(is_from_nothing ? kMinDepthFromNothing : 0),
-      depths_(depths),
-      costs_(CostsFor(options, depths)) {
-  Start(start, bound * (is_from_nothing ? kStartMuFromNothing : kStartMu));
-  if (!is_from_nothing) size_ = system_.Size(start);
-}
-
-// Where the multipliers of both pairs, centred, add up to the cost,
-//
-//   mu (q's^-1 + 1 / sigma) = c_i,
-//
-// whose left side is convex and falls: Newton's method, from below.
-template <typename BoundCone>
-double SlackSolver<BoundCone>::CentredSigma(const ViewedPoint& viewed,
-                                            double cost, double mu) const {
-  const double least = std::max(0.0, NormOf(viewed.v, options_.norm) -
-                                         bound_ * (viewed.depth - min_depth_));
-  double sigma = least + 0.5 * mu / cost;
-  for (int n = 0; n < kNewtonSteps; ++n) {
-    const typename BoundCone::Vector inverse = BoundCone::Divide(
-        system_.BoundSlack(viewed, sigma), BoundCone::Identity());
-    const double value = mu * (system_.Multiplier(inverse) + 1 / sigma) - cost;
-    const double slope =
-        -mu * (system_.Multiplier(BoundCone::Product(inverse, inverse)) +
-               1 / (sigma * sigma));
-    sigma -= value / slope;
-  }
-  return sigma;
-}
-
-// Centred, z = mu s^-1 and zeta = mu / sigma, whatever the weights.
-template <typename BoundCone>
-void SlackSolver<BoundCone>::Start(const Estimate& start, double mu) {
-  now_.x = start;
-  now_.sigma.resize(costs_.size());
-  now_.z.resize(costs_.size());
-  system_.ViewAll(&now_);
-  system_.loop().ForEach([&](int64_t i) {
-    now_.sigma[i] = CentredSigma(now_.viewed[i], costs_[i], mu);
-    now_.z[i] = mu * Cone::Divide(system_.Slack(now_, i), Cone::Identity());
-  });
-  trial_ = now_;
-}
-
-template <typename BoundCone>
-SlackSolution SlackSolver<BoundCone>::Run(Estimate* estimate) {
-  SlackSolution solution;
-  solution.termination =
-      FollowPath(context_, options_.max_iterations, this, &solution.iterations);
-  *estimate = now_.x;
-  for (size_t i = 0; i < costs_.size(); ++i) {
-    solution.slack.push_back(now_.sigma[i] / depths_[i]);
-    solution.price.push_back(
-        std::clamp(1 - Cone::Last(now_.z[i]) / costs_[i], 0.0, 1.0));
-  }
-  return solution;
-}
-
 }  // namespace
 
 SlackSolution MinimizeSlack(const KnownRotationProblem& problem, double bound,
                             const SlackOptions& options, const Context& context,
                             Estimate* estimate) {
-  CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
-                options.norm.p, "1, 2 or infinity");
-  CheckArgument(bound > 0, "bound", bound, "> 0");
-  CheckArgument(options.smallest_mu > 0, "smallest_mu", options.smallest_mu,
-                "> 0");
+  CheckConic(options.norm);
+  CheckPositive(bound, "bound");
+  CheckPositive(options.smallest_mu, "smallest_mu");
   CheckArgument(options.weights.empty() ||
                     options.weights.size() == problem.observations.size(),
                 "weights.size()", options.weights.size(),

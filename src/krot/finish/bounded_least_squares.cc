@@ -22,13 +22,9 @@ constexpr double kStartWeight = 10;
 constexpr double kStartSlack = 0.01;
 // A step goes so far of the way to the boundary: one that all but reached it
 // would leave a slack that the next direction cannot predict. One that does not
-// lower the barrier cost is shortened by the second factor, and one shorter
-// than the last is none.
+// lower the barrier cost is shortened by the second factor.
 constexpr double kDamping = 0.95;
 constexpr double kBacktracking = 0.5;
-constexpr double kLeastStep = 1e-6;
-// What rounding may add to the barrier cost, relative.
-constexpr double kCostRounding = 1e-13;
 // No pair's product is less than this share of mu: what the step leaves of a
 // multiplier may be too little to keep its error off the cap in the next one,
 // and a single pair holds back the step of all. Nor is it more than the second.
@@ -46,8 +42,6 @@ constexpr int kPatience = 3;
 constexpr double kLeastSigma = 0.03;
 // mu does not fall below this share of what the gap asked for needs.
 constexpr double kLastShare = 0.5;
-// Multipliers above this count as active: an error's own weight is 1.
-constexpr double kActiveMultiplier = 1e-3;
 
 // One run along the central path: the minima of
 //
@@ -66,18 +60,98 @@ class BoundedPath {
  public:
   BoundedPath(const KnownRotationProblem& problem,
               const BoundedOptions& options, const Context& context,
-              const Estimate& start);
+              const Estimate& start)
+      : problem_(problem),
+        options_(options),
+        context_(context),
+        system_(problem, Cap(options.norm, options.cap), options.loss,
+                NumViews(), context),
+        multipliers_(problem.observations.size()) {
+    now_.x = start;
+    now_.viewed.resize(problem.observations.size());
+    trial_ = now_;
+  }
 
-  BoundedSummary Run();
+  BoundedSummary Run() {
+    if (!View(&now_)) {  // as only rows can make it that are not those of x
+      summary_.termination = InteriorPointTermination::kNoProgress;
+      return summary_;
+    }
+    summary_.cost_initial = now_.cost;
+    CentreMultipliers(MuOf(kStartWeight), kStartSlack);
+    summary_.termination = FollowPath(context_, options_.max_iterations, this,
+                                      &summary_.iterations);
+    summary_.cost_final = now_.cost;
+    summary_.num_active = NumActive();
+    return summary_;
+  }
+
   const Estimate& estimate() const { return now_.x; }
 
   // FollowPath's.
   bool Factorize() { return system_.Factorize(now_.viewed, multipliers_); }
-  bool IsThere();
-  void FindDirection(double step);
-  double TakeStep();
-  bool Recover();
-  std::optional<InteriorPointTermination> Report(int iteration, double step);
+  // Where the gap is small enough, Newton's step is looked at.
+  bool IsThere() {
+    summary_.duality_gap = RelativeGap();
+    if (*summary_.duality_gap > options_.gap_tolerance) return false;
+    system_.Solve(mu_);
+    summary_.stationarity =
+        now_.cost > 0 ? system_.Slope() / (2 * now_.cost) : 0;
+    return *summary_.stationarity <= options_.stationarity_tolerance;
+  }
+
+  // All multipliers take one step in what a predictor is thought to leave of
+  // the gap: their full ones would promise too much.
+  void FindDirection(double step) {
+    target_mu_ = mu_;
+    if (*summary_.duality_gap <= options_.gap_tolerance) return;  // Newton's
+    if (step < kShortStep) return system_.Solve(mu_);
+    system_.Solve(0);
+    const double sigma =
+        MehrotraSigma(system_.PredictedGap() / (Count() * mu_), kLeastSigma);
+    target_mu_ =
+        std::max(MuOf(kLastShare * options_.gap_tolerance), sigma * mu_);
+    system_.Correct(target_mu_);
+  }
+
+  double TakeStep() {
+    const double before = BarrierCost(now_, target_mu_);
+    const double highest =
+        before + kCostRounding * (now_.cost + target_mu_ * Count());
+    const auto search = [&] {
+      return Backtrack(system_.MaxStep(kDamping), kBacktracking,
+                       [&](double step) { return TryStep(step, highest); });
+    };
+    double step = search();
+    if (step == 0) {
+      TakeRows(now_.x);
+      system_.Solve(target_mu_);
+      step = search();
+    }
+    if (step == 0) TakeRows(now_.x);
+    gain_ = before - BarrierCost(now_, target_mu_);
+    return step;
+  }
+
+  bool Recover() {
+    if (std::exchange(is_centred_, true)) return false;
+    CentreMultipliers(target_mu_, 0);
+    return true;
+  }
+
+  std::optional<InteriorPointTermination> Report(int iteration, double step) {
+    is_centred_ = false;
+    if (options_.callback) {
+      options_.callback({iteration, now_.cost, RelativeGap(), step});
+    }
+    const bool is_idle =
+        step < kIdleStep &&
+        gain_ < kLeastGain * options_.gap_tolerance * now_.cost &&
+        *summary_.duality_gap <= kNearGap * options_.gap_tolerance;
+    num_idle_ = is_idle ? num_idle_ + 1 : 0;
+    if (num_idle_ == kPatience) return InteriorPointTermination::kNoProgress;
+    return std::nullopt;
+  }
 
  private:
   using Vector = typename Cap::Vector;
@@ -97,7 +171,38 @@ class BoundedPath {
     return !options_.take_rows || context_.All(options_.take_rows(x));
   }
   // Whether every error is below the cap.
-  bool View(State* state);
+  bool View(State* state) {
+    if (!TakeRows(state->x)) return false;
+    struct Totals {
+      double least;  // slack
+      double cost;
+      double log_slacks;
+    };
+    const Totals totals = system_.loop().Reduce(
+        Totals{std::numeric_limits<double>::infinity(), 0, 0},
+        [&](int64_t i) -> Totals {
+          const ViewedPoint viewed =
+              ViewPoint(problem_, problem_.observations[i], state->x);
+          if (!(viewed.depth > 0)) return {-1, 0, 0};
+          const Eigen::Vector2d e = viewed.v / viewed.depth;
+          state->viewed[i] = {e, viewed.depth};
+          const Vector h = system_.cap().Slacks(e);
+          if (!(h.minCoeff() > 0)) return {-1, 0, 0};
+          const double loss = problem_.observations[i].view < NumViews()
+                                  ? options_.loss.Value(e.squaredNorm())
+                                  : 0;
+          return {h.minCoeff(), loss / 2,
+                  std::log(system_.cap().RelativeSlack(h))};
+        },
+        [](const Totals& a, const Totals& b) {
+          return Totals{std::min(a.least, b.least), a.cost + b.cost,
+                        a.log_slacks + b.log_slacks};
+        });
+    state->cost = totals.cost;
+    state->barrier = -totals.log_slacks;
+    return totals.least > 0 && std::isfinite(state->cost);
+  }
+
   double BarrierCost(const State& state, double mu) const {
     return state.cost + mu * state.barrier;
   }
@@ -112,10 +217,46 @@ class BoundedPath {
   }
 
   // mu / h, with slacks h of no less than this share of the cap's.
-  void CentreMultipliers(double mu, double least_slack);
-  bool TryStep(double step, double highest);
-  void MoveMultipliers();
-  int64_t NumActive() const;
+  void CentreMultipliers(double mu, double least_slack) {
+    const Vector least =
+        least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
+    const double gap = system_.loop().Sum([&](int64_t i) {
+      const Vector h = system_.cap().Slacks(now_.viewed[i].e);
+      multipliers_[i] = mu * h.cwiseMax(least).cwiseInverse();
+      return multipliers_[i].dot(h);
+    });
+    mu_ = gap / Count();
+  }
+
+  bool TryStep(double step, double highest) {
+    system_.Move(now_.x, step, &trial_.x);
+    if (!View(&trial_) || !(BarrierCost(trial_, target_mu_) <= highest)) {
+      return false;
+    }
+    MoveMultipliers();
+    std::swap(now_, trial_);
+    return true;
+  }
+
+  // To those of trial_.
+  void MoveMultipliers() {
+    const double gap = system_.loop().Sum([&](int64_t i) {
+      Vector& l = multipliers_[i];
+      const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
+      const Vector centred = target_mu_ * h.cwiseInverse();
+      l = (l + system_.StepOf(i).dl)
+              .cwiseMax(kLeastProduct * centred)
+              .cwiseMin(kLargestProduct * centred);
+      return l.dot(h);
+    });
+    mu_ = gap / Count();
+  }
+  int64_t NumActive() const {
+    return static_cast<int64_t>(system_.loop().Sum([&](int64_t i) {
+      return system_.cap().Share(multipliers_[i]) > kActiveMultiplier ? 1.0
+                                                                      : 0.0;
+    }));
+  }
 
   const KnownRotationProblem& problem_;  // rows: those of the last state viewed
   const BoundedOptions options_;
@@ -132,181 +273,6 @@ class BoundedPath {
 };
 
 template <typename Cap>
-BoundedPath<Cap>::BoundedPath(const KnownRotationProblem& problem,
-                              const BoundedOptions& options,
-                              const Context& context, const Estimate& start)
-    : problem_(problem),
-      options_(options),
-      context_(context),
-      system_(problem, Cap(options.norm, options.cap), options.loss, NumViews(),
-              context),
-      multipliers_(problem.observations.size()) {
-  now_.x = start;
-  now_.viewed.resize(problem.observations.size());
-  trial_ = now_;
-}
-
-template <typename Cap>
-bool BoundedPath<Cap>::View(State* state) {
-  if (!TakeRows(state->x)) return false;
-  struct Totals {
-    double least;  // slack
-    double cost;
-    LogProduct slacks;
-  };
-  const Totals totals = system_.loop().Reduce(
-      Totals{std::numeric_limits<double>::infinity(), 0, {}},
-      [&](int64_t i) -> Totals {
-        const ViewedPoint viewed =
-            ViewPoint(problem_, problem_.observations[i], state->x);
-        if (!(viewed.depth > 0)) return {-1, 0, {}};
-        const Eigen::Vector2d e = viewed.v / viewed.depth;
-        state->viewed[i] = {e, viewed.depth};
-        const Vector h = system_.cap().Slacks(e);
-        if (!(h.minCoeff() > 0)) return {-1, 0, {}};
-        const double loss = problem_.observations[i].view < NumViews()
-                                ? options_.loss.Value(e.squaredNorm())
-                                : 0;
-        return {h.minCoeff(), loss / 2,
-                LogProduct(system_.cap().RelativeSlack(h))};
-      },
-      [](const Totals& a, const Totals& b) {
-        return Totals{std::min(a.least, b.least), a.cost + b.cost,
-                      a.slacks.Times(b.slacks)};
-      });
-  state->cost = totals.cost;
-  state->barrier = -totals.slacks.Log();
-  return totals.least > 0 && std::isfinite(state->cost);
-}
-
-template <typename Cap>
-void BoundedPath<Cap>::CentreMultipliers(double mu, double least_slack) {
-  const Vector least =
-      least_slack * system_.cap().Slacks(Eigen::Vector2d::Zero());
-  const double gap = system_.loop().Sum([&](int64_t i) {
-    const Vector h = system_.cap().Slacks(now_.viewed[i].e);
-    multipliers_[i] = mu * h.cwiseMax(least).cwiseInverse();
-    return multipliers_[i].dot(h);
-  });
-  mu_ = gap / Count();
-}
-
-// Where the gap is small enough, Newton's step is looked at.
-template <typename Cap>
-bool BoundedPath<Cap>::IsThere() {
-  summary_.duality_gap = RelativeGap();
-  if (*summary_.duality_gap > options_.gap_tolerance) return false;
-  system_.Solve(mu_);
-  summary_.stationarity = now_.cost > 0 ? system_.Slope() / (2 * now_.cost) : 0;
-  return *summary_.stationarity <= options_.stationarity_tolerance;
-}
-
-// All multipliers take one step in what a predictor is thought to leave of the
-// gap: their full ones would promise too much.
-template <typename Cap>
-void BoundedPath<Cap>::FindDirection(double step) {
-  target_mu_ = mu_;
-  if (*summary_.duality_gap <= options_.gap_tolerance) return;  // Newton's
-  if (step < kShortStep) return system_.Solve(mu_);
-  system_.Solve(0);
-  const double sigma =
-      MehrotraSigma(system_.PredictedGap() / (Count() * mu_), kLeastSigma);
-  target_mu_ = std::max(MuOf(kLastShare * options_.gap_tolerance), sigma * mu_);
-  system_.Correct(target_mu_);
-}
-
-template <typename Cap>
-bool BoundedPath<Cap>::TryStep(double step, double highest) {
-  system_.Move(now_.x, step, &trial_.x);
-  if (!View(&trial_) || !(BarrierCost(trial_, target_mu_) <= highest)) {
-    return false;
-  }
-  MoveMultipliers();
-  std::swap(now_, trial_);
-  return true;
-}
-
-template <typename Cap>
-double BoundedPath<Cap>::TakeStep() {
-  const double before = BarrierCost(now_, target_mu_);
-  const double highest =
-      before + kCostRounding * (now_.cost + target_mu_ * Count());
-  const auto search = [&] {
-    return Backtrack(system_.MaxStep(kDamping), kBacktracking, kLeastStep,
-                     [&](double step) { return TryStep(step, highest); });
-  };
-  double step = search();
-  if (step == 0) {
-    TakeRows(now_.x);
-    system_.Solve(target_mu_);
-    step = search();
-  }
-  if (step == 0) TakeRows(now_.x);
-  gain_ = before - BarrierCost(now_, target_mu_);
-  return step;
-}
-
-// To those of trial_.
-template <typename Cap>
-void BoundedPath<Cap>::MoveMultipliers() {
-  const double gap = system_.loop().Sum([&](int64_t i) {
-    Vector& l = multipliers_[i];
-    const Vector h = system_.cap().Slacks(trial_.viewed[i].e);
-    const Vector centred = target_mu_ * h.cwiseInverse();
-    l = (l + system_.StepOf(i).dl)
-            .cwiseMax(kLeastProduct * centred)
-            .cwiseMin(kLargestProduct * centred);
-    return l.dot(h);
-  });
-  mu_ = gap / Count();
-}
-
-template <typename Cap>
-bool BoundedPath<Cap>::Recover() {
-  if (std::exchange(is_centred_, true)) return false;
-  CentreMultipliers(target_mu_, 0);
-  return true;
-}
-
-template <typename Cap>
-std::optional<InteriorPointTermination> BoundedPath<Cap>::Report(int iteration,
-                                                                 double step) {
-  is_centred_ = false;
-  if (options_.callback) {
-    options_.callback({iteration, now_.cost, RelativeGap(), step});
-  }
-  const bool is_idle =
-      step < kIdleStep &&
-      gain_ < kLeastGain * options_.gap_tolerance * now_.cost &&
-      *summary_.duality_gap <= kNearGap * options_.gap_tolerance;
-  num_idle_ = is_idle ? num_idle_ + 1 : 0;
-  if (num_idle_ == kPatience) return InteriorPointTermination::kNoProgress;
-  return std::nullopt;
-}
-
-template <typename Cap>
-int64_t BoundedPath<Cap>::NumActive() const {
-  return static_cast<int64_t>(system_.loop().Sum([&](int64_t i) {
-    return system_.cap().Share(multipliers_[i]) > kActiveMultiplier ? 1.0 : 0.0;
-  }));
-}
-
-template <typename Cap>
-BoundedSummary BoundedPath<Cap>::Run() {
-  if (!View(&now_)) {  // as only rows can make it that are not those of x
-    summary_.termination = InteriorPointTermination::kNoProgress;
-    return summary_;
-  }
-  summary_.cost_initial = now_.cost;
-  CentreMultipliers(MuOf(kStartWeight), kStartSlack);
-  summary_.termination =
-      FollowPath(context_, options_.max_iterations, this, &summary_.iterations);
-  summary_.cost_final = now_.cost;
-  summary_.num_active = NumActive();
-  return summary_;
-}
-
-template <typename Cap>
 BoundedSummary Run(const KnownRotationProblem& problem,
                    const BoundedOptions& options, const Context& context,
                    Estimate* estimate) {
@@ -321,17 +287,12 @@ BoundedSummary Run(const KnownRotationProblem& problem,
 BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const BoundedOptions& options,
                                const Context& context, Estimate* estimate) {
-  CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
-                options.norm.p, "1, 2 or infinity");
-  CheckArgument(options.cap > 0, "cap", options.cap, "> 0");
-  CheckArgument(options.loss.scale > 0, "loss.scale", options.loss.scale,
-                "> 0");
-  CheckArgument(options.gap_tolerance > 0, "gap_tolerance",
-                options.gap_tolerance, "> 0");
-  CheckArgument(options.stationarity_tolerance > 0, "stationarity_tolerance",
-                options.stationarity_tolerance, "> 0");
-  CheckArgument(options.max_iterations >= 1, "max_iterations",
-                options.max_iterations, ">= 1");
+  CheckConic(options.norm);
+  CheckPositive(options.cap, "cap");
+  CheckPositive(options.loss.scale, "loss.scale");
+  CheckPositive(options.gap_tolerance, "gap_tolerance");
+  CheckPositive(options.stationarity_tolerance, "stationarity_tolerance");
+  CheckAtLeast(1, options.max_iterations, "max_iterations");
   const double cost =
       context.Max(Cost(problem, *estimate, options.norm, context.num_threads));
   CheckArgument(cost < options.cap, "cost of the start", cost, "below the cap");

@@ -6,9 +6,9 @@
 #include "krot/joint/extend_solution.h"
 #include "krot/joint/step_values.h"
 #include "krot/problem/components.h"
-#include "krot/problem/fixed.h"
-#include "krot/problem/gathered_part.h"
 #include "krot/problem/gauge.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
 
 namespace krot {

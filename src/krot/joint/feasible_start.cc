@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "krot/problem/cost.h"
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 namespace {

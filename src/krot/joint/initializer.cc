@@ -8,8 +8,8 @@
 #include "krot/joint/joint.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/fixed.h"
 #include "krot/problem/gauge.h"
+#include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 
 namespace krot {

@@ -5,7 +5,7 @@
 
 #include "krot/base/context.h"
 #include "krot/math/norm.h"
-#include "krot/problem/cameras.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "krot/base/parallel_for.h"
-#include "krot/linear/block_update.h"
 
 namespace krot {
 namespace {
@@ -16,11 +15,8 @@ constexpr double kRegularization = 1e-14;
 constexpr double kLargestRegularization = 1e-7;
 // Up to here a dense factor is the fastest way whatever the pattern.
 constexpr int64_t kAlwaysDenseFrames = 500;
-// Parts of the sum: fewer where each may be large. With 10,000 frames that
-// share points without order a part takes 300 MB.
+// Parts of the sum.
 constexpr int kNumParts = 4;
-constexpr int kNumLargeParts = 2;
-constexpr int64_t kLargeFrames = 1500;
 
 // What is predicted to take the least time, in operations of a dense factor.
 // An operation of a sparse factor takes so many: 12 to 21 were measured with
@@ -67,8 +63,7 @@ ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
     if (!structure.frame_is_fixed[f]) column_of_frame_[f] = 3 * num_free++;
   }
   num_columns_ = 3 * int64_t{num_free};
-  num_parts_ = num_free > kLargeFrames ? kNumLargeParts : kNumParts;
-  parts_.resize(num_parts_);
+  parts_.resize(kNumParts);
   if (num_free <= kAlwaysDenseFrames) {
     pattern_ = FullPattern(num_free);
   } else {
@@ -155,7 +150,7 @@ void ReducedCameraSystem::SubtractSquare(int part,
 void ReducedCameraSystem::AddUpParts() {
   ParallelFor(num_numbers(), 65536, num_threads_,
               [&](int64_t begin, int64_t end, int) {
-                for (int part = 1; part < num_parts_; ++part) {
+                for (int part = 1; part < kNumParts; ++part) {
                   for (int64_t n = begin; n < end; ++n) {
                     parts_[0][n] += parts_[part][n];
                   }
@@ -279,7 +274,7 @@ Eigen::VectorXd ReducedCameraSystem::Solve(const Eigen::VectorXd& rhs,
 int64_t ReducedCameraSystem::MemoryBytes() const {
   const auto n = static_cast<double>(num_columns_);
   const auto block_numbers = static_cast<double>(num_numbers());
-  double numbers = num_parts_ * block_numbers;
+  double numbers = kNumParts * block_numbers;
   switch (kind_) {
     case Kind::kDense:
       numbers += n * n / 2;

@@ -10,7 +10,7 @@
 #include "krot/base/ranks.h"
 #include "krot/linear/block_structure.h"
 #include "krot/linear/conjugate_gradients.h"
-#include "krot/linear/dense_cholesky.h"
+#include "krot/linear/native_kernels.h"
 
 namespace krot {
 
@@ -34,7 +34,7 @@ class ReducedCameraSystem {
   enum class Kind { kDense, kSparse, kIterative };
 
   Kind kind() const { return kind_; }
-  int num_parts() const { return num_parts_; }
+  int num_parts() const { return static_cast<int>(parts_.size()); }
   int64_t num_columns() const { return num_columns_; }
   // The first column of a frame; -1 if it is fixed.
   int32_t column(int32_t frame) const { return column_of_frame_[frame]; }
@@ -87,7 +87,6 @@ class ReducedCameraSystem {
 
   Kind kind_ = Kind::kDense;
   int num_threads_ = 1;
-  int num_parts_ = 1;
   int64_t num_columns_ = 0;
   std::vector<int32_t> column_of_frame_;
   // Per part, each block column of the pattern as three columns of numbers.

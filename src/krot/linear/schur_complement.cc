@@ -16,8 +16,6 @@ using Rows = Eigen::Map<const Eigen::Matrix<double, kRows, 1>>;
 
 // Beyond this |Q_f|^2 of a frame, B_f'B_f and G_f'G_f all but cancel.
 constexpr double kHighLeverage = 0.5;
-// As |Q|^2 = 3, fewer frames have it, but for rounding.
-constexpr size_t kMaxHighLeverage = 6;
 // Parts of the loops that add up nothing.
 constexpr int kFineParts = 64;
 // Waking a thread takes longer than its share of so few observations.
@@ -139,8 +137,7 @@ void CentredLeastSquares<kRows>::FindSightings(int64_t k,
     }
     s.frames.push_back(frame);
     s.H.push_back(H);
-    s.is_high.push_back(leverage > kHighLeverage &&
-                        s.high.size() < kMaxHighLeverage);
+    s.is_high.push_back(leverage > kHighLeverage);
     if (s.is_high.back()) s.high.push_back(f);
   }
 }

@@ -15,7 +15,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Points outside a ball by less than this, relative to its radius, are on it.
+// A point that is outside a ball by less than this, relative to the radius,
+// counts as being on it.
 constexpr double kRadiusRounding = 1e-12;
 
 bool Holds(const Ball& ball, const Vector3d* points, int count) {
@@ -84,7 +85,7 @@ Ball MinEnclosingBall(const Vector3d* points, int count) {
     }
   }
   if (count == 4) keep_if_smallest(ThroughFour(points));
-  // All candidates of nearly coincident points may fail by rounding.
+  // If points nearly coincide, rounding may make all candidates fail.
   if (!(best.radius < std::numeric_limits<double>::infinity())) {
     best.center.setZero();
     for (int i = 0; i < count; ++i) best.center += points[i] / count;

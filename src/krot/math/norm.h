@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/check.h"
+
 namespace krot {
 
 // The p of ||.||_p; 1 <= p <= infinity.
@@ -33,6 +35,13 @@ inline double NormOf(const Eigen::Vector2d& v, Norm norm) {
   return largest * std::pow(std::pow(std::abs(v[0]) / largest, norm.p) +
                                 std::pow(std::abs(v[1]) / largest, norm.p),
                             1 / norm.p);
+}
+
+// Throws std::invalid_argument unless the norm's cone is one of the conic
+// solvers'.
+inline void CheckConic(Norm norm) {
+  CheckArgument(norm.p == 2 || norm.IsPolyhedral(), "norm.p", norm.p,
+                "1, 2 or infinity");
 }
 
 // The norm dual to ||.||_p; p = 1, 2 or infinity.

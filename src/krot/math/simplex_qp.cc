@@ -16,13 +16,13 @@ using Eigen::Vector3d;
 constexpr double kDependence = 1e-10;
 // Pieces above the level by less than this, relative, do not violate it.
 constexpr double kRounding = 1e-15;
-// Far beyond what well-posed inputs need (about 2 changes per final piece);
-// rounding alone could make the method cycle.
+// Well-posed inputs need far fewer changes, about 2 per final piece. The limit
+// ends cycles, which only rounding could cause.
 constexpr int kMaxChanges = 200;
 
 // The active pieces of a solution, with the affine hull of their gradients,
 // g_0 + range(D), as D = Q U by Gram-Schmidt: the columns of Q orthogonal, U
-// unit upper triangular. What the active set keeps in front, the hull keeps.
+// unit upper triangular. Columns of leading pieces that stay active are kept.
 class ActiveSet {
  public:
   // `scale`: the largest gradient's length.
@@ -34,14 +34,59 @@ class ActiveSet {
 
   // Brings the weights to the minimiser on the convex hull of a subset of the
   // active pieces.
-  void Minimize();
+  void Minimize() {
+    while (active_.size > 1) {
+      if (!CompleteHull()) {
+        GiveUpLast();  // dependent, by rounding only
+        continue;
+      }
+      double direction[4];
+      Barycentric(minimizer_, direction);
+      for (int k = 0; k < active_.size; ++k) direction[k] -= active_.weight[k];
+      const int size = active_.size;
+      MoveWeights(direction, /*limit=*/1);
+      if (active_.size == size) return;
+    }
+    active_.weight[0] = 1;
+  }
 
-  // Adds piece j. If its gradient depends on the others, it takes the place of
-  // the one that blocks the move in its favour; `false` if the move is not
-  // blocked (by rounding only).
-  bool Add(int j);
+  // Adds piece j. If its gradient depends on the others, it replaces the piece
+  // whose weight vanishes first as that of j grows. Returns false if none does,
+  // which only rounding could cause.
+  bool Add(int j) {
+    const Coordinates column = CoordinatesOf(pieces_[j].gradient);
+    const int k = active_.size;
+    if (k < 4) {
+      active_.index[k] = j;
+      active_.weight[k] = 0;
+      if (AppendColumn(column)) {
+        ++active_.size;
+        return true;
+      }
+    }
+    double direction[4];
+    Barycentric(column.y, direction);
+    for (int m = 0; m < active_.size; ++m) direction[m] = -direction[m];
+    const double step =
+        MoveWeights(direction, std::numeric_limits<double>::infinity());
+    if (!std::isfinite(step) || active_.size == 4) return false;
+    active_.index[active_.size] = j;
+    active_.weight[active_.size] = step;
+    ++active_.size;
+    return true;
+  }
 
-  void SetStepAndLevel();
+  void SetStepAndLevel() {
+    active_.step.setZero();
+    for (int k = 0; k < active_.size; ++k) {
+      active_.step -= active_.weight[k] * Gradient(k);
+    }
+    active_.level = 0;  // as a weighted mean; at the minimiser all are equal
+    for (int k = 0; k < active_.size; ++k) {
+      active_.level += active_.weight[k] * (pieces_[active_.index[k]].value +
+                                            Gradient(k).dot(active_.step));
+    }
+  }
 
  private:
   // g - g_0 = Q y + rest.
@@ -53,12 +98,88 @@ class ActiveSet {
   const Vector3d& Gradient(int k) const {
     return pieces_[active_.index[k]].gradient;
   }
-  Coordinates CoordinatesOf(const Vector3d& g) const;
-  bool AppendColumn(const Coordinates& column);
-  bool CompleteHull();
-  void Barycentric(const double y[3], double weights[4]) const;
-  double MoveWeights(const double direction[4], double limit);
-  void GiveUpLast();
+  Coordinates CoordinatesOf(const Vector3d& g) const {
+    Coordinates result;
+    result.rest = g - Gradient(0);
+    for (int m = 0; m < rank_; ++m) {
+      result.y[m] = Q_[m].dot(result.rest) * inverse_squared_[m];
+      result.rest -= result.y[m] * Q_[m];
+    }
+    return result;
+  }
+
+  // Appends the next piece's column; returns false if it depends on the others.
+  // The QP on the hull, D'D nu = delta - D'g_0 with delta the differences of
+  // the values, is diagonal in y = U nu.
+  bool AppendColumn(const Coordinates& column) {
+    const double squared = column.rest.squaredNorm();
+    if (!(squared > smallest_squared_)) return false;
+    const int m = rank_++;
+    Q_[m] = column.rest;
+    inverse_squared_[m] = 1 / squared;
+    z_[m] =
+        pieces_[active_.index[m + 1]].value - pieces_[active_.index[0]].value;
+    for (int k = 0; k < m; ++k) {
+      U_[k][m] = column.y[k];
+      z_[m] -= U_[k][m] * z_[k];
+    }
+    minimizer_[m] = (z_[m] - Q_[m].dot(Gradient(0))) * inverse_squared_[m];
+    return true;
+  }
+
+  bool CompleteHull() {
+    while (rank_ + 1 < active_.size) {
+      if (!AppendColumn(CoordinatesOf(Gradient(rank_ + 1)))) return false;
+    }
+    return true;
+  }
+
+  // The weights of the point with coordinates y: of any sign, and with sum 1.
+  void Barycentric(const double y[3], double weights[4]) const {
+    weights[0] = 1;
+    for (int m = rank_ - 1; m >= 0; --m) {
+      double weight = y[m];
+      for (int k = m + 1; k < rank_; ++k) weight -= U_[m][k] * weights[k + 1];
+      weights[m + 1] = weight;
+      weights[0] -= weight;
+    }
+  }
+
+  // Moves the weights along `direction`, by the step `limit` or until the first
+  // of them vanishes, and drops the pieces whose weights have vanished. Returns
+  // the step; if nothing bounds it, infinity, and then nothing has moved.
+  double MoveWeights(const double direction[4], double limit) {
+    double step = limit;
+    int blocking = -1;
+    for (int k = 0; k < active_.size; ++k) {
+      if (direction[k] < 0 && active_.weight[k] + step * direction[k] < 0) {
+        step = -active_.weight[k] / direction[k];
+        blocking = k;
+      }
+    }
+    if (!std::isfinite(step)) return step;
+    int kept = 0;
+    for (int k = 0; k < active_.size; ++k) {
+      const double weight = active_.weight[k] + step * direction[k];
+      if (k == blocking || !(weight > 0)) {
+        rank_ = std::min(rank_, std::max(kept - 1, 0));
+        continue;
+      }
+      active_.index[kept] = active_.index[k];
+      active_.weight[kept] = weight;
+      ++kept;
+    }
+    active_.size = kept;
+    return step;
+  }
+
+  void GiveUpLast() {
+    --active_.size;
+    double sum = 0;
+    for (int k = 0; k < active_.size; ++k) sum += active_.weight[k];
+    if (!(sum > 0)) active_.weight[0] = sum = 1;
+    for (int k = 0; k < active_.size; ++k) active_.weight[k] /= sum;
+  }
 
   const LinearPiece* pieces_;
   double smallest_squared_;
@@ -71,144 +192,11 @@ class ActiveSet {
   double minimizer_[3];        // in coordinates y
 };
 
-ActiveSet::Coordinates ActiveSet::CoordinatesOf(const Vector3d& g) const {
-  Coordinates result;
-  result.rest = g - Gradient(0);
-  for (int m = 0; m < rank_; ++m) {
-    result.y[m] = Q_[m].dot(result.rest) * inverse_squared_[m];
-    result.rest -= result.y[m] * Q_[m];
-  }
-  return result;
-}
-
-// The next piece's column; `false` if it depends on the others. The QP on the
-// hull, D'D nu = delta - D'g_0 with delta the differences of the values, is
-// diagonal in y = U nu.
-bool ActiveSet::AppendColumn(const Coordinates& column) {
-  const double squared = column.rest.squaredNorm();
-  if (!(squared > smallest_squared_)) return false;
-  const int m = rank_++;
-  Q_[m] = column.rest;
-  inverse_squared_[m] = 1 / squared;
-  z_[m] = pieces_[active_.index[m + 1]].value - pieces_[active_.index[0]].value;
-  for (int k = 0; k < m; ++k) {
-    U_[k][m] = column.y[k];
-    z_[m] -= U_[k][m] * z_[k];
-  }
-  minimizer_[m] = (z_[m] - Q_[m].dot(Gradient(0))) * inverse_squared_[m];
-  return true;
-}
-
-bool ActiveSet::CompleteHull() {
-  while (rank_ + 1 < active_.size) {
-    if (!AppendColumn(CoordinatesOf(Gradient(rank_ + 1)))) return false;
-  }
-  return true;
-}
-
-// The weights, of any sign and sum 1, of the point with coordinates y.
-void ActiveSet::Barycentric(const double y[3], double weights[4]) const {
-  weights[0] = 1;
-  for (int m = rank_ - 1; m >= 0; --m) {
-    double weight = y[m];
-    for (int k = m + 1; k < rank_; ++k) weight -= U_[m][k] * weights[k + 1];
-    weights[m + 1] = weight;
-    weights[0] -= weight;
-  }
-}
-
-// Moves the weights along `direction`, at most by the step `limit`, until
-// the first of them vanishes, and drops every piece whose weight has. Returns
-// the step; infinite, with nothing moved, if nothing bounds it.
-double ActiveSet::MoveWeights(const double direction[4], double limit) {
-  double step = limit;
-  int blocking = -1;
-  for (int k = 0; k < active_.size; ++k) {
-    if (direction[k] < 0 && active_.weight[k] + step * direction[k] < 0) {
-      step = -active_.weight[k] / direction[k];
-      blocking = k;
-    }
-  }
-  if (!std::isfinite(step)) return step;
-  int kept = 0;
-  for (int k = 0; k < active_.size; ++k) {
-    const double weight = active_.weight[k] + step * direction[k];
-    if (k == blocking || !(weight > 0)) {
-      rank_ = std::min(rank_, std::max(kept - 1, 0));
-      continue;
-    }
-    active_.index[kept] = active_.index[k];
-    active_.weight[kept] = weight;
-    ++kept;
-  }
-  active_.size = kept;
-  return step;
-}
-
-void ActiveSet::GiveUpLast() {
-  --active_.size;
-  double sum = 0;
-  for (int k = 0; k < active_.size; ++k) sum += active_.weight[k];
-  if (!(sum > 0)) active_.weight[0] = sum = 1;
-  for (int k = 0; k < active_.size; ++k) active_.weight[k] /= sum;
-}
-
-void ActiveSet::Minimize() {
-  while (active_.size > 1) {
-    if (!CompleteHull()) {
-      GiveUpLast();  // dependent, by rounding only
-      continue;
-    }
-    double direction[4];
-    Barycentric(minimizer_, direction);
-    for (int k = 0; k < active_.size; ++k) direction[k] -= active_.weight[k];
-    const int size = active_.size;
-    MoveWeights(direction, /*limit=*/1);
-    if (active_.size == size) return;
-  }
-  active_.weight[0] = 1;
-}
-
-bool ActiveSet::Add(int j) {
-  const Coordinates column = CoordinatesOf(pieces_[j].gradient);
-  const int k = active_.size;
-  if (k < 4) {
-    active_.index[k] = j;
-    active_.weight[k] = 0;
-    if (AppendColumn(column)) {
-      ++active_.size;
-      return true;
-    }
-  }
-  double direction[4];
-  Barycentric(column.y, direction);
-  for (int m = 0; m < active_.size; ++m) direction[m] = -direction[m];
-  const double step =
-      MoveWeights(direction, std::numeric_limits<double>::infinity());
-  if (!std::isfinite(step) || active_.size == 4) return false;
-  active_.index[active_.size] = j;
-  active_.weight[active_.size] = step;
-  ++active_.size;
-  return true;
-}
-
-void ActiveSet::SetStepAndLevel() {
-  active_.step.setZero();
-  for (int k = 0; k < active_.size; ++k) {
-    active_.step -= active_.weight[k] * Gradient(k);
-  }
-  active_.level = 0;  // the mean: all agree at the minimiser
-  for (int k = 0; k < active_.size; ++k) {
-    active_.level += active_.weight[k] * (pieces_[active_.index[k]].value +
-                                          Gradient(k).dot(active_.step));
-  }
-}
-
 }  // namespace
 
 void SolveSimplexQp(const LinearPiece* pieces, int count,
                     SimplexQpSolution* solution) {
-  CheckArgument(count >= 1, "count", count, ">= 1");
+  CheckAtLeast(1, count, "count");
   double scale = 0;
   double values = 0;
   int best = 0;

@@ -6,7 +6,7 @@
 
 namespace krot {
 
-// Where `value + gradient . d` bounds a function from a step d = 0.
+// A linear piece `value + gradient . d` of a function of the step d.
 struct LinearPiece {
   double value = 0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -24,7 +24,7 @@ struct LinearPiece {
 struct SimplexQpSolution {
   Eigen::Vector3d step = Eigen::Vector3d::Zero();  // d
   double level = 0;  // max_i (value_i + gradient_i . d)
-  // The pieces that hold the maximum, at most 4 and affinely independent.
+  // The pieces that attain the maximum: at most 4, affinely independent.
   int size = 0;
   int index[4] = {0, 0, 0, 0};
   double weight[4] = {0, 0, 0, 0};  // mu > 0, sum 1
@@ -39,7 +39,7 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
                     SimplexQpSolution* solution);
 
 // The point of least norm of the convex hull of `count` >= 1 vectors. `scratch`
-// keeps its memory between calls.
+// is memory that callers keep between calls.
 Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count,
                              std::vector<LinearPiece>* scratch);
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "krot/base/file_descriptor.h"
+#include "krot/base/write_file.h"
 #include "krot/model/model_error.h"
 
 namespace krot {

@@ -5,7 +5,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/model.h"
 
 namespace krot {

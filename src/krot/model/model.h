@@ -9,8 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/geometry/rigid_transform.h"
-#include "krot/geometry/rotation.h"
+#include "krot/geometry/transform.h"
 
 namespace krot {
 

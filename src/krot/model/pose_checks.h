@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/geometry/rotation.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/model.h"
 
 namespace krot {

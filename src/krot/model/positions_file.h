@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "krot/geometry/ellipsoid.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/file_bytes.h"
 #include "krot/model/model.h"
 

@@ -7,7 +7,7 @@
 
 namespace krot {
 
-// The observations that an excess programme looks at: those that come near the
+// The observations that a slack programme looks at: those that come near the
 // bound, and enough others to tie their points and every frame. An optimum of
 // theirs is one of all as long as no other exceeds the bound there.
 class NearSet {

@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/problem/cameras.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

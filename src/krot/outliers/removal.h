@@ -23,7 +23,7 @@ struct Removal {
   std::vector<int64_t> tight;
 };
 
-// Few observations to remove, by the excess programme (conic/excess_program.h):
+// Few observations to remove, by the slack programme (conic/slack_program.h):
 // solved with weights that make those dear that exceed the bound by little at
 // the start, and again with those of the solution, as long as that makes them
 // fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. It looks at

@@ -4,7 +4,7 @@
 
 namespace krot {
 
-// Weights for the next excess programme [Candes, Wakin, Boyd 2008]: an excess
+// Weights for the next slack programme [Candes, Wakin, Boyd 2008]: an excess
 // much below the share `dear` of `bound` costs 1 / dear times as much as one of
 // the bound.
 inline std::vector<double> WeightsAgainst(const std::vector<double>& excess,

@@ -9,7 +9,6 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/retriangulate.h"
-#include "krot/problem/cameras.h"
 #include "krot/problem/cost.h"
 
 namespace krot {

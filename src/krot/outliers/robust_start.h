@@ -14,7 +14,7 @@ inline constexpr double kLevelOfStart = 2;
 //
 //   1. the longest tracks, so many that every frame has a hundred observations
 //      among them and all hang together;
-//   2. their excess programme from nothing (conic/excess_program.h), and again
+//   2. their slack programme from nothing (conic/slack_program.h), and again
 //      with weights that let large errors count less;
 //   3. the other points where most of their rays agree.
 //

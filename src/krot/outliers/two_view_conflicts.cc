@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/problem/cameras.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

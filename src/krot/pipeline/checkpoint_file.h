@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "krot/base/checkpoint.h"
-#include "krot/base/file_descriptor.h"
+#include "krot/base/write_file.h"
 
 namespace krot {
 

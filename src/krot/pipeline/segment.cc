@@ -14,18 +14,6 @@ constexpr double kShorter = 0.7;
 constexpr double kShortestStep = 1e-3;
 constexpr int64_t kPointsPerChunk = 256;
 
-Estimate Between(const Estimate& from, const Estimate& to, double step) {
-  Estimate estimate = from;
-  for (size_t f = 0; f < from.translations.size(); ++f) {
-    estimate.translations[f] +=
-        step * (to.translations[f] - from.translations[f]);
-  }
-  for (size_t k = 0; k < from.points.size(); ++k) {
-    estimate.points[k] += step * (to.points[k] - from.points[k]);
-  }
-  return estimate;
-}
-
 }  // namespace
 
 Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,

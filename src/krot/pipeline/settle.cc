@@ -10,7 +10,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 #include "krot/pipeline/settling.h"
-#include "krot/problem/cameras.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

@@ -23,7 +23,7 @@
 #include "krot/pipeline/start.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 namespace {

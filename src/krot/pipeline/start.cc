@@ -5,7 +5,7 @@
 
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 #include "krot/joint/initializer.h"
 #include "krot/joint/step_values.h"
 

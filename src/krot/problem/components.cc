@@ -9,7 +9,7 @@
 namespace krot {
 namespace {
 
-// What other ranks' points connect, too.
+// Unites frames that points of other ranks connect.
 void UniteRanks(Ranks* ranks, std::vector<char>* is_seen,
                 DisjointSets* frames) {
   const auto num_frames = static_cast<int64_t>(is_seen->size());
@@ -22,7 +22,7 @@ void UniteRanks(Ranks* ranks, std::vector<char>* is_seen,
   }
 }
 
-// Of the graph that these observations span.
+// Components of the graph that has these edges.
 Components FindComponentsOf(const KnownRotationProblem& problem,
                             const std::vector<int64_t>& observations,
                             const Context& context) {

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdint>
-#include <limits>
 #include <utility>
-#include <vector>
 
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
@@ -97,7 +94,7 @@ bool AllDepthsPositive(const KnownRotationProblem& problem,
 
 double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
             Norm norm, int num_threads) {
-  CheckArgument(norm.p >= 1, "norm.p", norm.p, ">= 1");
+  CheckAtLeast(1, norm.p, "norm.p");
   CheckArgument(
       estimate.translations.size() == static_cast<size_t>(problem.num_frames),
       "estimate.translations.size()", estimate.translations.size(),

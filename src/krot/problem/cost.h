@@ -8,10 +8,36 @@
 
 #include "krot/math/norm.h"
 #include "krot/minimax/residual.h"
-#include "krot/problem/cameras.h"
+#include "krot/minimax/residual_kernel.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
+
+// x -> R x + o as the matrix [R o].
+using AffineMap = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
+
+// Takes world coordinates to those of a view's camera if its frame has this
+// translation: R = R_sr R_rw, o = R_sr t_f + t_sr.
+inline AffineMap CamFromWorld(const View& view,
+                              const Eigen::Vector3d& translation) {
+  AffineMap map;
+  map.leftCols<3>() = view.cam_from_world_rotation;
+  map.col(3) =
+      view.cam_from_rig_rotation * translation + view.cam_from_rig_translation;
+  return map;
+}
+
+// The same for every view.
+inline std::vector<AffineMap> CamerasFromWorld(
+    const KnownRotationProblem& problem,
+    const std::vector<Eigen::Vector3d>& translations) {
+  std::vector<AffineMap> cameras;
+  cameras.reserve(problem.views.size());
+  for (const View& view : problem.views) {
+    cameras.push_back(CamFromWorld(view, translations[view.frame]));
+  }
+  return cameras;
+}
 
 // Observation i as its camera sees it: the depth w and the v of the residual
 // ||v||_p / w.
@@ -38,28 +64,28 @@ inline double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   return residual < kInfinity ? residual : kInfinity;
 }
 
-// Whether every observation has its point in front of the camera, w > 0: where
-// the cost is finite. A third of the work of Cost.
+// Whether every point is in front of every camera that sees it, w > 0: only
+// then is the cost finite. A third of the work of Cost.
 bool AllDepthsPositive(const KnownRotationProblem& problem,
                        const Estimate& estimate, int num_threads);
 
-// The median of the depths of all observations, of which there must be one;
-// scene units. O(observations).
+// The median of the depths of all observations, scene units. Requires at least
+// one observation. O(observations).
 double MedianDepth(const KnownRotationProblem& problem,
                    const Estimate& estimate);
 
-// The first residual of observations [begin, end) above `level`, or the
-// largest if none is; in pixels.
+// Of observations [begin, end), the first residual above `level`, or the
+// largest residual if none is above it; pixels.
 double ResidualAbove(double level, const KnownRotationProblem& problem,
                      const std::vector<AffineMap>& cameras,
                      const std::vector<Eigen::Vector3d>& points, Norm norm,
                      int64_t begin, int64_t end);
 
-// The largest residual of a point, in pixels; 0 without observations.
+// The largest residual of a point, pixels; 0 if it has no observation.
 double PointCost(const KnownRotationProblem& problem, const Estimate& estimate,
                  Norm norm, int64_t point);
 
-// The same of a frame.
+// The same for a frame.
 double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
                  Norm norm, int64_t frame);
 
@@ -70,8 +96,78 @@ double FrameCost(const KnownRotationProblem& problem, const Estimate& estimate,
 double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
             Norm norm, int num_threads);
 
-// Whether a cost, pixels, is as good as zero: rounding alone makes as much of
-// residuals that are.
+// Whether a cost, pixels, may be the rounding error of residuals that are 0.
 inline bool IsZeroUpToRounding(double cost) { return cost < 1e-9; }
+
+// One observation as a residual of problem (1) of [Zhang18]: in the unknown x
+// (a point or a frame's translation, the other one held fixed) its
+//
+//   v = A x + b,   w = c'x + d                              [Zhang18, (2), (3)]
+//
+// are affine. With x_cam = R x + o,
+//
+//   (c'; A) = E R,   (d; b) = E o.
+//
+// In the layout of residual_kernel.h:
+//   {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
+
+namespace internal {
+
+inline void AffineRow(const Observation& observation, const AffineMap& map,
+                      double row[kResidualRow]) {
+  const auto& E = observation.E;
+  for (int k = 0; k < 4; ++k) {  // columns: of x and of 1
+    const auto component = [&](int r) {
+      return E(r, 0) * map(0, k) + E(r, 1) * map(1, k) + E(r, 2) * map(2, k);
+    };
+    row[k] = component(1);
+    row[4 + k] = component(2);
+    row[8 + k] = component(0);
+  }
+}
+
+}  // namespace internal
+
+// Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr.
+inline void IntersectionRow(const AffineMap& cam_from_world,
+                            const Observation& observation,
+                            double row[kResidualRow]) {
+  internal::AffineRow(observation, cam_from_world, row);
+}
+
+// Res_j: the unknown is the frame's translation t_f, its point at `point`;
+// R = R_sr, o = R_sr R_rw s + t_sr.
+inline void ResectionRow(const View& view, const Observation& observation,
+                         const Eigen::Vector3d& point,
+                         double row[kResidualRow]) {
+  AffineMap map;
+  map.leftCols<3>() = view.cam_from_rig_rotation;
+  map.col(3) =
+      view.cam_from_world_rotation * point + view.cam_from_rig_translation;
+  internal::AffineRow(observation, map, row);
+}
+
+// Whether R_sr = I, as of a frame's reference sensor.
+inline bool IsReference(const View& view) {
+  return view.cam_from_rig_rotation == Eigen::Matrix3d::Identity();
+}
+
+// ResectionRow of a view with R_sr = I, by 18 products instead of 45: A and c
+// are E's rows.
+inline void ReferenceResectionRow(const View& view,
+                                  const Observation& observation,
+                                  const Eigen::Vector3d& point,
+                                  double row[kResidualRow]) {
+  const auto& E = observation.E;
+  const Eigen::Vector3d o =
+      view.cam_from_world_rotation * point + view.cam_from_rig_translation;
+  const auto write = [&](int r, double* out) {
+    for (int k = 0; k < 3; ++k) out[k] = E(r, k);
+    out[3] = E(r, 0) * o[0] + E(r, 1) * o[1] + E(r, 2) * o[2];
+  };
+  write(1, row);
+  write(2, row + 4);
+  write(0, row + 8);
+}
 
 }  // namespace krot

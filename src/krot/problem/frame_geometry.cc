@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 
 namespace krot {
 namespace {

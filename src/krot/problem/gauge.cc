@@ -9,7 +9,6 @@
 
 #include "krot/base/medians.h"
 #include "krot/geometry/consensus.h"
-#include "krot/problem/cameras.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/frame_geometry.h"

@@ -33,8 +33,8 @@ struct Observation {
   int32_t point = 0;
 };
 
-// The row that is taken at the observation itself: u on the plane z = 1 is its
-// ray and J = d pixel / d u there, det J > 0. E = [e3'; J (I2 | -u)].
+// The row of an observation at its own ray: u on the plane z = 1 is the ray,
+// and J = d pixel / d u there, det J > 0. E = [e3'; J (I2 | -u)].
 Eigen::Matrix3d RowAtRay(const Eigen::Vector2d& u, const Eigen::Matrix2d& J);
 
 // Observations stand in the order of their points; an index lists them by
@@ -50,9 +50,8 @@ struct KnownRotationProblem {
   // [frame_begin[f], frame_begin[f + 1]).
   std::vector<int64_t> frame_begin;
   std::vector<int32_t> frame_observations;
-  // What does not move, and where it stands: t_f per frame, s_k per point;
-  // empty where nothing of the kind is fixed. Every estimate of the problem has
-  // it there (krot/problem/fixed.h).
+  // Fixed positions: t_f per frame, s_k per point; empty if nothing of the kind
+  // is fixed. Every estimate of the problem must have them.
   std::vector<std::optional<Eigen::Vector3d>> fixed_translations;
   std::vector<std::optional<Eigen::Vector3d>> fixed_points;
 
@@ -70,15 +69,46 @@ struct Estimate {
   std::vector<Eigen::Vector3d> points;        // s_k
 };
 
+// from + share (to - from).
+Estimate Between(const Estimate& from, const Estimate& to, double share);
+
 // Builds the indices from views and observations, which must already be
 // sorted by point; a frame's observations are listed in that order too.
 // Throws std::invalid_argument where an index is out of range or the order is
 // broken. O(observations); 4 bytes per observation and 8 per point and frame.
 void IndexObservations(KnownRotationProblem* problem);
 
-// Whether a camera stands off its frame's origin, t_sr != 0: without any, the
-// problem is homogeneous and its scale is free, if no two positions are fixed
-// either (IsScaleFree). O(views).
+// Whether any camera is away from its frame's origin, t_sr != 0. If none is,
+// the problem is homogeneous, and its scale is free unless two positions are
+// fixed (IsScaleFree). O(views).
 bool HasBaseline(const KnownRotationProblem& problem);
+
+// Fixed are the frames and points for which the problem has a position. Once
+// one position is fixed, the translation of the whole is no longer free; once
+// two positions or a baseline are, nor is the scale (docs/method/positions.md,
+// "What is fixed").
+
+// Whether anything is fixed.
+bool HasFixed(const KnownRotationProblem& problem);
+
+// One of the fixed positions: the centre of the first fixed frame's first view,
+// or the first fixed point. None if nothing is fixed. O(frames + views +
+// points).
+std::optional<Eigen::Vector3d> FixedOrigin(const KnownRotationProblem& problem);
+
+// The largest distance of a fixed position from FixedOrigin, scene units. 0 if
+// all coincide up to rounding, or nothing is fixed.
+double FixedExtent(const KnownRotationProblem& problem);
+
+// Whether scaling everything that moves, about FixedOrigin if there is one,
+// does not change the cost of a connected problem.
+bool IsScaleFree(const KnownRotationProblem& problem);
+
+// An estimate with everything that is fixed in its place, and all other points
+// and frames' origins at FixedOrigin or, without one, at zero.
+Estimate AllAtOrigin(const KnownRotationProblem& problem);
+
+// Gives everything that is fixed exactly its fixed position.
+void PutFixed(const KnownRotationProblem& problem, Estimate* estimate);
 
 }  // namespace krot

@@ -1,7 +1,6 @@
 #include "krot/problem/subset.h"
 
 #include <algorithm>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -14,7 +13,7 @@ bool IsAll(const std::vector<char>& is_kept) {
   return std::find(is_kept.begin(), is_kept.end(), 0) == is_kept.end();
 }
 
-// Numbers the marked elements in their order; the others get -1.
+// Numbers the marked elements in their order; unmarked ones get -1.
 std::vector<int32_t> Renumber(const std::vector<char>& is_kept,
                               std::vector<int32_t>* old_of) {
   std::vector<int32_t> new_of(is_kept.size(), -1);
@@ -40,7 +39,7 @@ void CheckAscending(const KnownRotationProblem& problem,
   }
 }
 
-// Where `value` stands among ascending ones.
+// The index of `value` among ascending values, if it is one of them.
 std::optional<int32_t> FindAscending(const std::vector<int32_t>& values,
                                      int32_t value) {
   const auto found = std::lower_bound(values.begin(), values.end(), value);
@@ -154,10 +153,10 @@ std::vector<int64_t> PruneUnconstrained(
   const size_t count = observations.size();
   std::vector<int64_t> left_of_point(p.num_points);
   std::vector<int64_t> left_of_frame(p.num_frames);
-  std::vector<int64_t> doomed;  // still to be dropped; may repeat
+  std::vector<int64_t> doomed;  // to be dropped; may have duplicates
   std::vector<char> is_dropped(count, 0);
 
-  // Dooms the last observation of a point, or of a frame.
+  // Adds the only observation of a point, or of a frame.
   const auto check_point = [&](int32_t k) {
     if (left_of_point[k] != 1 || p.IsFixedPoint(k)) return;
     for (int64_t i = p.point_begin[k]; i < p.point_begin[k + 1]; ++i) {
@@ -198,6 +197,66 @@ std::vector<int64_t> PruneUnconstrained(
     if (!is_dropped[i]) kept.push_back(observations[i]);
   }
   return kept;
+}
+
+GatheredPart::GatheredPart(const KnownRotationProblem& problem,
+                           const std::vector<int64_t>& observations,
+                           Ranks* ranks)
+    : ranks_(*ranks) {
+  const int64_t first_in_whole =
+      ranks->SumBefore(static_cast<int64_t>(problem.observations.size()));
+  for (const int64_t i : observations) {
+    const int32_t k = problem.observations[i].point;
+    if (points_.empty() || points_.back() != k) points_.push_back(k);
+  }
+  num_points_ =
+      ranks->Gather(std::vector<int64_t>{static_cast<int64_t>(points_.size())});
+  auto point = static_cast<int32_t>(
+                   ranks->SumBefore(static_cast<int64_t>(points_.size()))) -
+               1;
+  int32_t last = -1;  // its index on this rank
+  std::vector<Observation> own;
+  std::vector<int64_t> in_whole;
+  for (const int64_t i : observations) {
+    own.push_back(problem.observations[i]);
+    if (own.back().point != last) ++point;
+    last = std::exchange(own.back().point, point);
+    in_whole.push_back(first_in_whole + i);
+  }
+  problem_.num_frames = problem.num_frames;
+  problem_.views = problem.views;
+  problem_.observations = ranks->GatherOnFirst(own);
+  in_whole_ = ranks->GatherOnFirst(in_whole);
+  if (ranks->IsFirst()) {
+    for (const int64_t count : num_points_) {
+      problem_.num_points += static_cast<int32_t>(count);
+    }
+  }
+  IndexObservations(&problem_);
+}
+
+Estimate GatheredPart::Collect(const Estimate& estimate) const {
+  std::vector<Eigen::Vector3d> points;
+  for (const int32_t k : points_) points.push_back(estimate.points[k]);
+  return {estimate.translations, ranks_.GatherOnFirst(points)};
+}
+
+void GatheredPart::Scatter(const Estimate& part, Estimate* estimate) const {
+  estimate->translations = part.translations;
+  ranks_.Broadcast(&estimate->translations);
+  std::vector<std::vector<Eigen::Vector3d>> to(ranks_.count());
+  if (ranks_.IsFirst()) {
+    auto begin = part.points.begin();
+    for (int r = 0; r < ranks_.count(); ++r) {
+      to[r].assign(begin, begin + num_points_[r]);
+      begin += num_points_[r];
+    }
+  }
+  const std::vector<Eigen::Vector3d> points =
+      ranks_.ExchangeValues(std::move(to))[0];
+  for (size_t n = 0; n < points_.size(); ++n) {
+    estimate->points[points_[n]] = points[n];
+  }
 }
 
 }  // namespace krot

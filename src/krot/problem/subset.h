@@ -5,14 +5,15 @@
 #include <optional>
 #include <vector>
 
+#include "krot/base/ranks.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 
-// Some of a problem's observations as a problem of its own, and the way back to
-// the whole. It has only the points, views and frames that they see, in the
-// order that they have in the whole, so its optimal cost is at most that of the
-// whole. Where that is everything it is the whole itself, not a copy.
+// Some of a problem's observations as a problem of its own, with only the
+// points, views and frames that take part in them, in the order of the whole.
+// Its optimal cost is at most that of the whole. A subset that has everything
+// refers to the whole and is no copy.
 class ProblemSubset {
  public:
   // `observations` must ascend strictly and be indices of `whole` (throws
@@ -21,7 +22,7 @@ class ProblemSubset {
   ProblemSubset(const KnownRotationProblem& whole,
                 std::vector<int64_t> observations);
 
-  // All of it.
+  // Everything.
   explicit ProblemSubset(const KnownRotationProblem& whole) : whole_(whole) {}
 
   const KnownRotationProblem& problem() const {
@@ -29,20 +30,21 @@ class ProblemSubset {
   }
   bool IsWhole() const { return copy_ == nullptr; }
 
-  // What the subset's observation is called in the whole.
+  // The index in the whole of the subset's observation.
   int64_t InWhole(int64_t observation) const {
     return IsWhole() ? observation : observation_of_[observation];
   }
   std::vector<int64_t> InWhole(std::vector<int64_t> observations) const;
 
-  // What the whole's view or point is called here; none if it is not.
+  // The index in the subset of a view or point of the whole; none if it is not
+  // in the subset.
   std::optional<int32_t> FindView(int32_t view) const;
   std::optional<int32_t> FindPoint(int32_t point) const;
 
-  // The part of an estimate of the whole problem that the subset sees.
+  // The subset's part of an estimate of the whole.
   Estimate Restrict(const Estimate& whole) const;
 
-  // Puts the subset's estimate into its place in `whole`.
+  // Replaces the subset's part of `whole`.
   void Replace(const Estimate& estimate, Estimate* whole) const;
 
  private:
@@ -51,7 +53,8 @@ class ProblemSubset {
             const std::vector<char>& has_frame);
 
   const KnownRotationProblem& whole_;
-  // Unless it is the whole: the problem, and what its parts are called there.
+  // Unless it refers to the whole: the problem, and the indices of its parts in
+  // the whole.
   std::unique_ptr<KnownRotationProblem> copy_;
   std::vector<int64_t> observation_of_;
   std::vector<int32_t> point_of_;
@@ -59,12 +62,43 @@ class ProblemSubset {
   std::vector<int32_t> frame_of_;
 };
 
-// Drops, until none is left, every observation that alone holds a point or a
-// frame that is not fixed: that point or frame can be moved until the residual
-// is zero, so such an observation bounds nothing. Takes and returns ascending
-// indices. O(observations given + points + frames).
+// Drops every observation that is the only one of a point or a frame that is
+// not fixed, until none is left: that point or frame can be moved until the
+// residual is zero, and so the observation bounds nothing. Takes and returns
+// ascending indices. O(observations given + points + frames).
 std::vector<int64_t> PruneUnconstrained(
     const KnownRotationProblem& problem,
     const std::vector<int64_t>& observations);
+
+// Some observations of a problem whose points ranks share, and their points,
+// gathered on the first rank. The index of an observation "in the whole" counts
+// through the problems of rank 0, 1, ... one after another.
+//
+// Every rank makes one, and all call Collect and Scatter together.
+class GatheredPart {
+ public:
+  // `observations` of this rank's `problem`, ascending.
+  GatheredPart(const KnownRotationProblem& problem,
+               const std::vector<int64_t>& observations, Ranks* ranks);
+
+  // On the first rank: all frames and views, and the gathered points in the
+  // order of the whole. On others: without points.
+  const KnownRotationProblem& problem() const { return problem_; }
+  // Per observation of problem(), its index in the whole; ascending.
+  const std::vector<int64_t>& in_whole() const { return in_whole_; }
+
+  // On the first rank, its part of the ranks' estimates.
+  Estimate Collect(const Estimate& estimate) const;
+  // Gives all frames and these points their positions in the first rank's
+  // estimate.
+  void Scatter(const Estimate& part, Estimate* estimate) const;
+
+ private:
+  Ranks& ranks_;
+  std::vector<int32_t> points_;      // of this rank, gathered
+  std::vector<int64_t> num_points_;  // per rank
+  KnownRotationProblem problem_;
+  std::vector<int64_t> in_whole_;
+};
 
 }  // namespace krot

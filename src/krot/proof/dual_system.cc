@@ -4,7 +4,7 @@
 
 #include <Eigen/LU>
 
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/fixed_constants.h"
 
 namespace krot {

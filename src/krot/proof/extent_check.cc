@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "krot/problem/components.h"
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_input.h"
 

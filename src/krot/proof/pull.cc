@@ -1,7 +1,7 @@
 #include "krot/proof/pull.h"
 
-#include "krot/geometry/rigid_transform.h"
-#include "krot/problem/cameras.h"
+#include "krot/geometry/transform.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 

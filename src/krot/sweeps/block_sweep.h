@@ -1,30 +1,60 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/base/ranks.h"
 #include "krot/minimax/fast_descent.h"
 #include "krot/minimax/side_by_side_descent.h"
-#include "krot/problem/cameras.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/sweeps/frame_share.h"
 
 namespace krot {
+
+// The frames that this rank resects, of a problem whose points ranks share:
+// they are consecutive, and every rank has about as many of their observations.
+// The observations are held a second time, in the order of the whole problem,
+// so that a frame's sub-problem has the same rows as in one process.
+//
+// Every rank makes one, and all call its functions together.
+class FrameShare {
+ public:
+  FrameShare(const KnownRotationProblem& problem, Ranks* ranks);
+
+  // All frames and views, the observations of this rank's frames, and the
+  // points of these observations.
+  const KnownRotationProblem& problem() const { return problem_; }
+
+  // An estimate of problem(). Every rank sends 24 bytes for each of its points
+  // and each rank whose frames see it.
+  Estimate Receive(const Estimate& estimate) const;
+
+  // Gives the translations of this rank's frames to all ranks.
+  void Publish(const Estimate& share, Estimate* estimate) const;
+
+ private:
+  Ranks& ranks_;
+  KnownRotationProblem problem_;
+  std::vector<int32_t> frame_begin_;  // first frame per rank, and the end
+  // Per rank, the points of this rank that its frames see.
+  std::vector<std::vector<int32_t>> seen_by_;
+};
 
 // The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
 // other and spread over threads; the result does not depend on how many. Points
 // are solved side by side, in the order of their numbers of observations. Each
 // thread keeps its descents, so that sweeps do not allocate once warm.
-// Once it is cancelled, the blocks that are left are skipped. What the problem
-// fixes stays.
+// After a cancellation the remaining blocks are skipped. What the problem fixes
+// does not move.
 //
-// Where ranks share the points each takes its own, and a share of the frames
-// (frame_share.h): they call both together.
+// Where ranks share the points, each takes its own points and a share of the
+// frames; all ranks call both functions together.
 //
-// Both return the cost that is reached, pixels, to rounding what Cost() gives:
-// infinity where a block starts at a depth that is not positive, and then the
-// estimate is of no use.
+// Both return the cost that is reached, pixels: up to rounding that of Cost().
+// It is infinite if a block starts at a depth that is not positive; the
+// estimate is useless then.
 class BlockSweep {
  public:
   // Keeps a reference to `problem`.
@@ -32,7 +62,7 @@ class BlockSweep {
              const FastDescentOptions& options, Norm norm,
              const Context& context);
 
-  // How far blocks go from now on; at first, to their optima.
+  // How far blocks go from now on. At first they go to their optima.
   void SetGoal(const DescentGoal& goal) { goal_ = goal; }
 
   // Line 3: every point's own optimum, the frames fixed: (Int_k) for all k.
@@ -42,7 +72,7 @@ class BlockSweep {
   double ResectFrames(Estimate* estimate);
 
  private:
-  // What a thread keeps.
+  // The memory that a thread keeps between sweeps.
   struct Worker {
     FastDescent frame_descent;
     SideBySideDescent point_descent;
@@ -70,14 +100,15 @@ class BlockSweep {
   Norm norm_;
   const Context context_;
   DescentGoal goal_;
-  // One per thread, made when that begins: of a thousand only a few may exist.
+  // One per thread, made at its first use: of the threads that were asked for,
+  // the system may provide only a few.
   std::vector<std::unique_ptr<Worker>> workers_;
   std::vector<AffineMap> cameras_;  // per view, while points move
   std::vector<char> is_reference_;  // per view
-  // Every block's warm start.
+  // The warm starts of all blocks.
   std::vector<ActiveResiduals> point_active_;
   std::vector<ActiveResiduals> frame_active_;
-  // Where ranks share the points, once frames have moved.
+  // Where ranks share the points; made when frames move for the first time.
   std::unique_ptr<FrameShare> frame_share_;
   std::unique_ptr<BlockSweep> frame_blocks_;
 };

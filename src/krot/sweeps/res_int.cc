@@ -2,19 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "krot/base/check.h"
 #include "krot/base/timer.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
-#include "krot/sweeps/momentum.h"
 
 namespace krot {
 namespace {
 
-// How far coarse sweeps take a block: see res_int.h. A tolerance of 1e-2
-// throughout, and alternation ends higher (docs/history/journal.md, "Res-Int,
-// the first ten sweeps").
+// How far coarse sweeps take a block: see res_int.h. With a tolerance of 1e-2
+// throughout, alternation ended at a higher cost (docs/history/journal.md,
+// "Res-Int, the first ten sweeps").
 constexpr double kCoarseShareOfGain = 0.1;
 constexpr double kFinestCoarse = 1e-3;
 constexpr double kCoarsest = 1e-2;
@@ -26,13 +26,71 @@ DescentGoal CoarseGoal(double gain, double cost) {
           kCoarseLevel * cost};
 }
 
+// An extrapolation after which a depth is not positive is halved so many times.
+constexpr int kMaxHalvings = 4;
+
+// Nesterov's momentum with restarts [Nesterov 1983; O'Donoghue, Candes 2015],
+// around a method that improves an estimate: every sweep starts a little
+// further along the last improvement. A sweep that ends above the best cost
+// is thrown away, so the best cost never rises.
+//
+// Alternation converges slowly along the directions in which points and
+// frames must move together; momentum is what follows them.
+class Momentum {
+ public:
+  // Starts at `start`, of cost `cost`; keeps a reference to `problem`.
+  Momentum(const KnownRotationProblem& problem, const Context& context,
+           const Estimate& start, double cost)
+      : problem_(problem),
+        context_(context),
+        best_(start),
+        previous_(start),
+        best_cost_(cost) {}
+
+  // The start of the next sweep: the best estimate, or one beyond it at which
+  // all depths are positive.
+  Estimate NextStart() {
+    if (improvements_ == 0) return best_;
+    double beta = improvements_ / (improvements_ + 3.0);
+    for (int halving = 0; halving < kMaxHalvings; ++halving, beta /= 2) {
+      Estimate start = Between(best_, previous_, -beta);
+      if (context_.All(
+              AllDepthsPositive(problem_, start, context_.num_threads))) {
+        return start;
+      }
+    }
+    improvements_ = 0;
+    return best_;
+  }
+
+  // Takes the result of the sweep from NextStart() unless it is worse. One of
+  // equal cost is taken, because it may have moved other blocks.
+  void Accept(const Estimate& reached, double cost) {
+    const bool improves = cost < best_cost_;
+    improvements_ = improves ? improvements_ + 1 : 0;
+    if (!improves && cost != best_cost_) return;
+    previous_ = std::move(best_);
+    best_ = reached;
+    best_cost_ = cost;
+  }
+
+  const Estimate& best() const { return best_; }
+  double best_cost() const { return best_cost_; }
+
+ private:
+  const KnownRotationProblem& problem_;
+  const Context context_;
+  Estimate best_;
+  Estimate previous_;  // the best one before it
+  double best_cost_;
+  int improvements_ = 0;  // since the last restart
+};
+
 void CheckOptions(const ResIntOptions& options) {
-  CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
-  CheckArgument(options.max_sweeps >= 0, "max_sweeps", options.max_sweeps,
-                ">= 0");
-  CheckArgument(options.sweep_tolerance >= 0, "sweep_tolerance",
-                options.sweep_tolerance, ">= 0");
-  CheckArgument(options.patience >= 1, "patience", options.patience, ">= 1");
+  CheckAtLeast(1, options.norm.p, "norm.p");
+  CheckAtLeast(0, options.max_sweeps, "max_sweeps");
+  CheckAtLeast(0, options.sweep_tolerance, "sweep_tolerance");
+  CheckAtLeast(1, options.patience, "patience");
 }
 
 }  // namespace
@@ -57,7 +115,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   BlockSweep blocks(problem, options.fast_descent, options.norm, context);
   Momentum momentum(problem, context, *estimate, summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
-  double gain = 1;      // of the last sweep, relative; of none, as if large
+  double gain = 1;      // of the last sweep, relative; at first as if large
   int idle_sweeps = 0;  // in a row
   for (int sweep = 1; sweep <= options.max_sweeps; ++sweep) {
     const bool is_last = sweep == options.max_sweeps;

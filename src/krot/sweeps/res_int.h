@@ -13,30 +13,31 @@ namespace krot {
 // Resection-Intersection [Zhang18, Alg. 1]: sweeps that minimise every
 // point's own maximum residual with the frames fixed, then every frame's with
 // the points fixed. With `paper` settings of the descent the sweeps are the
-// paper's; with `fast` ones they have momentum (momentum.h), and are coarse
-// until they would stop: a block whose maximum is below half of the cost stays
-// where it is, any other ends with the step that promises less than a tenth of
-// what the last sweep gained, relative, but for bounds of 1e-3 and 1e-2. From
-// then on, and in the last of `max_sweeps`, every block goes to its optimum.
+// paper's. With `fast` settings they have momentum, and are coarse at first: a
+// block whose maximum is below half of the cost stays where it is, and any
+// other stops once a step promises less than a tenth of the last sweep's
+// relative gain, kept between 1e-3 and 1e-2. When coarse sweeps no longer help,
+// and in the last of `max_sweeps`, every block goes to its optimum.
 //
 // The result is a fixed point of such sweeps at best. That need not be the
 // optimum, whatever the paper says (docs/method/problem.md, "How alternation
 // gets stuck").
 
 struct Sweep {
-  double cost = 0;     // pixels, the best after the sweep, to rounding
+  double cost = 0;     // the lowest so far, up to rounding; pixels
   double seconds = 0;  // wall clock since the start
 };
 
 struct ResIntOptions {
   Norm norm;
-  // Literally as in the paper, or the same sub-problem optima by better means.
+  // Literally as in the paper, or faster ways to the same sub-problem optima.
   FastDescentOptions fast_descent;
   int max_sweeps = 1000;  // >= 0
   // Stop when sweeps lower the cost by less than this, relative; >= 0.
   double sweep_tolerance = 1e-6;
-  // After so many such sweeps in a row; >= 1. A sweep with momentum may fail
-  // where the next one, without, does not. Paper settings: after the first.
+  // Stop after so many such sweeps in a row; >= 1. A sweep with momentum may
+  // fail where the next one, without, does not. Paper settings stop after the
+  // first.
   int patience = 3;
   bool update_frames = true;  // false: points only (triangulation)
   // After every sweep, counted from 1; may be empty.

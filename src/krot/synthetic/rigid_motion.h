@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/model.h"
 
 namespace krot {

@@ -10,10 +10,10 @@
 
 namespace krot {
 
-// One end of an interval that estimates reach.
+// One end of the interval in which a coordinate may be.
 struct BoxEnd {
-  double reached = 0;            // by an estimate that was met
-  std::optional<double> proved;  // no estimate lies beyond; none: not bounded
+  double reached = 0;            // by an estimate that was found
+  std::optional<double> proved;  // no estimate is beyond it; none: no bound
 };
 
 // Smallest and largest value of each coordinate of a position, over all
@@ -24,11 +24,11 @@ struct PositionBox {
   int64_t num_programmes = 0;  // that were solved
 };
 
-// Finds them by working sets: an end that is proved on some of the observations
-// is one for all, and it is reached where the other points fit in, too
-// (docs/method/outliers.md, "What the data allow"). Ends agree to `tolerance`
-// of the way from the centre, unless lenses take more. `target` has any
-// direction.
+// Finds the box by working sets: an end that is proved with some observations
+// holds for all, and it is reached if the other points fit in, too
+// (docs/method/outliers.md, "What the data allow"). The reached and the proved
+// end agree to `tolerance`, relative to the way from the centre, unless lenses
+// prevent it. The direction of `target` does not matter.
 PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
                     double tolerance, const Context& context);
 

@@ -5,20 +5,20 @@
 #include <limits>
 
 #include "krot/conic/interior_point.h"
-#include "krot/tolerance/pull_coefficients.h"
 
 namespace krot {
 namespace {
 
-// Where p'x has gone farther than so many times the size of the scene there is
-// no end to find.
+// If p'x grows by more than so many times the size of the scene, there is no
+// end to find.
 constexpr double kFarAway = 1e4;
-// A gap so many times the tolerance is worth a proof: a better one may fail.
+// A proof is tried once the gap is below so many times the tolerance, because a
+// later one, with a smaller gap, may fail.
 constexpr double kFirstProof = 20;
-// Of the few operations behind the last check.
+// The relative rounding error of the few operations after the check.
 constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
 
-// What multipliers prove of p'x, if anything.
+// The upper bound of p'x that the multipliers prove, if any.
 std::optional<double> Prove(const KnownRotationProblem& problem,
                             const Pull& pull,
                             const std::optional<ScaleRow>& scale,
@@ -95,6 +95,22 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
                      &extent.estimate, &multipliers)
           .iterations;
   return extent;
+}
+
+// A view's centre moves as its frame's does.
+BlockVector CoefficientsOf(const KnownRotationProblem& problem,
+                           const Pull& pull) {
+  BlockVector coefficients;
+  coefficients.SetZero(problem.num_points, problem.num_frames);
+  if (pull.kind == Pull::Kind::kPoint) {
+    if (problem.IsFixedPoint(pull.index)) return coefficients;
+    coefficients.points[pull.index] = pull.direction;
+    return coefficients;
+  }
+  const View& view = problem.views[pull.index];
+  if (problem.IsFixedFrame(view.frame)) return coefficients;
+  coefficients.frames[view.frame] = pull.direction;
+  return coefficients;
 }
 
 }  // namespace krot

@@ -11,16 +11,17 @@
 #include "krot/base/timer.h"
 #include "krot/model/local_frame.h"
 #include "krot/problem/components.h"
-#include "krot/problem/fixed.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
 namespace {
 
-// A model whose largest error is no larger a share of the bound is taken as it
-// is.
+// A model whose largest error is at most this share of the bound is not solved
+// first.
 constexpr double kFitShare = 0.95;
 
-// Where each of the model's is in the problem; -1: nowhere.
+// The inverse of a list of indices in the model: for each element of the model
+// its index in the problem, or -1.
 std::vector<int32_t> Inverse(const std::vector<int32_t>& of, size_t count) {
   std::vector<int32_t> inverse(count, -1);
   for (size_t n = 0; n < of.size(); ++n) {
@@ -35,7 +36,7 @@ double TrueCostOf(const Model& model, const BuiltProblem& built, Norm norm,
       .TrueCost(built.start, norm, context.num_threads);
 }
 
-// Finds an estimate within the bound; false if there is none.
+// Finds an estimate within the bound; returns false if none was found.
 bool FindModel(const ToleranceOptions& options, const Context& context,
                BuiltProblem* built, ToleranceResult* result) {
   ToleranceSummary& summary = result->summary;
@@ -207,7 +208,8 @@ ToleranceResult AnalyzeInFrame(const Model& model,
   return result;
 }
 
-// Into a frame whose origin lies elsewhere; outwards, but for what cannot move.
+// Moves a box by a vector, rounding the proved ends outwards, except those of
+// what cannot move.
 void Shift(const Eigen::Vector3d& by, ToleranceBox* box) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
@@ -225,10 +227,9 @@ void Shift(const Eigen::Vector3d& by, ToleranceBox* box) {
 }
 
 void CheckOptions(const Model& model, const ToleranceOptions& options) {
-  CheckArgument(options.max_error > 0, "max_error", options.max_error, "> 0");
-  CheckArgument(options.tolerance > 0, "tolerance", options.tolerance, "> 0");
-  CheckArgument(options.solve.norm.p == 2 || options.solve.norm.IsPolyhedral(),
-                "norm.p", options.solve.norm.p, "1, 2 or infinity");
+  CheckPositive(options.max_error, "max_error");
+  CheckPositive(options.tolerance, "tolerance");
+  CheckConic(options.solve.norm);
   const auto check = [](const char* name, const std::vector<int32_t>& indices,
                         size_t count) {
     for (const int32_t index : indices) {

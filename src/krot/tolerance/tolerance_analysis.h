@@ -14,9 +14,9 @@
 
 namespace krot {
 
-// What the data allow: not the position of a camera or a point, but all of
-// them, over all estimates whose errors are within a bound; rotations and
-// intrinsics as given. What `krot tolerance_analyzer` does between reading and
+// What the data allow: all positions that a camera or a point may have in an
+// estimate whose errors are within a bound, with rotations and intrinsics as
+// given. This is what `krot tolerance_analyzer` does between reading and
 // writing.
 
 struct ToleranceOptions {
@@ -25,15 +25,16 @@ struct ToleranceOptions {
   // Indices in Model::images and Model::points3D whose boxes are wanted.
   std::vector<int32_t> images;
   std::vector<int32_t> points;
-  // Two images that hold place and scale, indices; empty: chosen, or what
-  // solve.problem.fixed marks.
+  // The indices of two images that hold place and scale. Empty: what
+  // solve.problem.fixed marks does or, if that is nothing, two images are
+  // chosen.
   std::vector<int32_t> gauge_images;
-  // Of the problem, and of the solve that finds estimates within the bound
-  // where the model is not one.
+  // Options of the problem, and of the solve that finds an estimate within the
+  // bound if the model is none.
   SolveModelOptions solve;
   // Called once there is an estimate within the bound, then after every box,
-  // with how many boxes there are by now; may be empty, must be safe to call
-  // from several threads.
+  // with the number of boxes so far. May be empty; must be safe to call from
+  // several threads.
   std::function<void(int64_t num_boxes)> on_box;
 };
 
@@ -45,15 +46,14 @@ enum class ToleranceTermination {
   kInterrupted,
 };
 
-// All that an image's centre or a point may be.
+// The box in which an image's centre or a point may be.
 struct ToleranceBox {
   bool is_image = false;
   uint64_t id = 0;
-  std::string name;  // of an image
-  Eigen::Vector3d position =
-      Eigen::Vector3d::Zero();  // in the model given back
-  // Nothing holds it: it takes no part in the optimisation, or does not hang
-  // together with what holds place and scale.
+  std::string name;                                    // of an image
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in the resulting model
+  // It has no box: it takes no part in the optimisation, or is not connected to
+  // what holds place and scale.
   bool is_free = false;
   PositionBox box;
 };
@@ -71,19 +71,20 @@ struct ToleranceSummary {
   ToleranceTermination termination = ToleranceTermination::kNotRun;
   double max_error = 0;  // as asked for, pixels
   Norm norm;
-  double cost = 0;  // the largest error of the model given back, pixels
-  // Where the model had to be solved first: what that proves, pixels.
+  double cost = 0;  // the largest error of the resulting model, pixels
+  // Whether the model had to be solved first, and the bound that this proved,
+  // pixels.
   bool is_solved = false;
   std::optional<double> lower_bound;
   int64_t num_frames = 0;
   int64_t num_points = 0;
   int64_t num_observations = 0;
-  int64_t num_rowless = 0;     // that no region of their lens allows to use
-  int64_t num_far_points = 0;  // that say nothing about where cameras stand
+  int64_t num_rowless = 0;     // observations without an outer row
+  int64_t num_far_points = 0;  // which bound no camera: see FindFarPoints
   int64_t num_programmes = 0;
   int64_t num_fixed_frames = 0;  // by options, not by the gauge
   int64_t num_fixed_points = 0;
-  std::vector<std::string> gauge_images;  // none where options fix what holds
+  std::vector<std::string> gauge_images;  // empty if the options fix something
   std::vector<ToleranceBox> boxes;        // images, then points, as asked for
   // In the frame in which they are found: far from the origin the last digits
   // of coordinates are as large as a narrow box.
@@ -92,13 +93,13 @@ struct ToleranceSummary {
 };
 
 struct ToleranceResult {
-  Model model;  // the input, or the solved one: the boxes stand around it
+  Model model;  // the input, or the solved one; the boxes are around it
   ToleranceSummary summary;
 };
 
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for
-// options out of range, as for gauge images that hold nothing together. The
-// same bits at any number of threads.
+// options out of range, and for gauge images that are not connected. The same
+// bits at any number of threads.
 ToleranceResult AnalyzeTolerances(const Model& model,
                                   const ToleranceOptions& options,
                                   const Context& context = {});

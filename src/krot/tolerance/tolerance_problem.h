@@ -8,33 +8,41 @@
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
 #include "krot/model/model.h"
+#include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/tolerance/extent.h"
 
 namespace krot {
 
-// What holds the estimates in their place.
+// Marks the points whose residuals are all below `bound`, pixels, if the point
+// is infinitely far away in some direction. Wherever the frames are, such a
+// point fits in if it is far enough away, and so it says nothing about the
+// frames. O(observations).
+std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
+                                double bound, const Context& context);
+
+// What holds place and scale of the estimates.
 struct ToleranceGauge {
-  // Views: the first one's frame stands still and, where that leaves the scale
-  // free, the second one keeps its distance from it along the line between the
-  // two. Without a first, what the problem fixes does both.
+  // Views: the frame of the first is fixed and, if that leaves the scale free,
+  // the second keeps its distance from it along the line between the two.
+  // Without a first, what the problem fixes does both.
   std::optional<int32_t> first;
   std::optional<int32_t> second;
 };
 
 // A gauge for a problem that fixes nothing: the view with the most observations
-// and the one farthest from it, at the estimate, that is connected to it. No
-// second if a baseline sets the scale.
+// and, of the views connected to it, the one that is farthest away in the
+// estimate. No second if a baseline sets the scale.
 ToleranceGauge ChooseGauge(const KnownRotationProblem& problem,
                            const Estimate& estimate);
 
-// The estimates whose true errors are all at most `bound`, in a gauge: what the
-// ends of all boxes share.
+// The estimates whose true errors are all at most `bound`, in a gauge: the
+// problem that all boxes are about.
 class ToleranceProblem {
  public:
-  // `centre` is one of them, all of whose errors are below the bound, and tells
-  // where the gauge holds. Keeps references to all but the gauge; takes the
-  // rows of `built` anew (TakeOuterRows).
+  // `centre` is an estimate whose errors are all below the bound; the gauge
+  // holds what it holds at its place there. Keeps references to all arguments
+  // but the gauge. Takes the rows of `built` anew (TakeOuterRows).
   ToleranceProblem(const Model& model, BuiltProblem* built,
                    const Estimate& centre, const ToleranceGauge& gauge,
                    Norm norm, double bound, const Context& context);
@@ -47,9 +55,9 @@ class ToleranceProblem {
   Norm norm() const { return norm_; }
   double bound() const { return bound_; }
 
-  // Of the observations that bound anything and hang together with what is
-  // fixed: without those that have no outer row, and without far points, but
-  // for `target`. None if the target is not among what they see.
+  // The part of the problem that bounds anything and is connected to something
+  // fixed: without observations that have no outer row, and without far points
+  // other than `target`. None if it does not contain the target.
   std::optional<ProblemSubset> UsablePart(const Pull& target) const;
 
   int64_t num_rowless() const { return num_rowless_; }
@@ -68,8 +76,8 @@ class ToleranceProblem {
   int64_t num_far_points_ = 0;
 };
 
-// Of some observations of a problem, those in components in which something is
-// fixed. Ascending.
+// Those of some observations that are in components in which something is
+// fixed; ascending.
 std::vector<int64_t> HeldObservations(const KnownRotationProblem& problem,
                                       std::vector<int64_t> observations);
 

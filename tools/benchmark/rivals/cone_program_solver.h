@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/base/progress.h"
+#include "krot/base/context.h"
 #include "krot/conic/cones.h"
 
 namespace krot {

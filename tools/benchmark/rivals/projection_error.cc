@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "krot/problem/observation_rows.h"
+#include "krot/problem/cost.h"
 
 namespace krot {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/geometry/rotation.h"
+#include "krot/geometry/transform.h"
 
 #include <cmath>
 #include <limits>
@@ -8,8 +8,9 @@
 namespace krot {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Quaterniond;
+
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 // The nearest rotation is unique if the two least singular values, the last

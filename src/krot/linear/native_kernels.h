@@ -5,11 +5,22 @@
 
 namespace krot {
 
+// What is compiled for the machine at hand. It has no Eigen type in its
+// interface: vector flags change their alignment, and so what callers expect.
+
+// Three columns of a matrix, `stride` numbers apart, lose G'S:
+//
+//   column_j[k] -= sum_r s[3 r + j] g_r[k],   k < n, j < 3,
+//
+// g_r being the rows of G (3 x n) and s those of S (3 x 3). The innermost loop
+// of the Schur complement. The columns overlap neither each other nor G.
+void SubtractFromColumns(const double* const g[3], const double s[9], int64_t n,
+                         double* first_column, int64_t stride);
+
 // The Cholesky factor of a dense symmetric positive definite matrix, by tiles
-// that are shared out to threads. The same bits at any number of threads. It is
-// compiled for the machine at hand and has no Eigen type in its interface; and
-// it does without BLAS, as the serial OpenBLAS of Debian 12 lets two threads
-// use one buffer.
+// that are shared out to threads. The same bits at any number of threads. It
+// does without BLAS, as the serial OpenBLAS of Debian 12 lets two threads use
+// one buffer.
 //
 //   SetZero; all of the lower triangle that is not 0; Factorize; Solve
 class DenseCholesky {
