@@ -8,7 +8,7 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${build_needs[@]}" libgtest-dev libgmock-dev coinor-libclp-dev \
+install_missing "${build_needs[@]}" libgtest-dev libgmock-dev libssl-dev coinor-libclp-dev \
   coinor-libcoinutils-dev gcovr:gcovr python3:python3
 folder=$root/build-coverage
 cmake -S "$root" --preset coverage

@@ -8,7 +8,7 @@
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-install_missing "${build_needs[@]}" libgtest-dev libgmock-dev coinor-libclp-dev \
+install_missing "${build_needs[@]}" libgtest-dev libgmock-dev libssl-dev coinor-libclp-dev \
   coinor-libcoinutils-dev
 status=0
 for preset in asan tsan; do

@@ -19,7 +19,7 @@ list_skipped() {
        /^skipped: / { print name ": " substr($0, 10) }' "$1" | sort -u
 }
 
-install_missing "${build_needs[@]}" libgtest-dev libgmock-dev \
+install_missing "${build_needs[@]}" libgtest-dev libgmock-dev libssl-dev \
   coinor-libclp-dev coinor-libcoinutils-dev colmap:colmap python3:python3 \
   chromium:chromium chromedriver:chromium-driver povray:povray jq:jq \
   CartConvert:geographiclib-tools \

@@ -14,7 +14,7 @@
 #include "krot/analysis/model_comparison.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_verdict.h"
+#include "krot/bridge/conflict_file.h"
 #include "krot/options/adjustment_options.h"
 #include "krot/options/outlier_filter_options.h"
 #include "krot/options/solve_options.h"

@@ -1,4 +1,4 @@
-#include "krot/bridge/retriangulate.h"
+#include "krot/bridge/point_repair.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_verdict.h"
+#include "krot/bridge/conflict_file.h"
 #include "krot/model/model_error.h"
 #include "krot/pipeline/solve_model.h"
 #include "tests/fuzz/fuzz.h"

@@ -1,4 +1,3 @@
-#include "krot/joint/extend_solution.h"
 
 #include <algorithm>
 

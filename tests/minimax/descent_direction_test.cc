@@ -1,11 +1,10 @@
-#include "krot/minimax/descent_direction.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "krot/math/simplex_qp.h"
-#include "krot/minimax/active_set.h"
+#include "krot/minimax/descent_step.h"
 #include "krot/minimax/fast_descent.h"
 #include "tests/testing/random_residuals.h"
 

@@ -1,4 +1,4 @@
-#include "krot/minimax/step_size.h"
+#include "krot/minimax/descent_step.h"
 
 #include <cmath>
 

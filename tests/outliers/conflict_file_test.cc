@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/bridge/conflict_verdict.h"
 #include "krot/model/model_error.h"
 #include "krot/outliers/conflict.h"
 #include "tests/outliers/outlier_scenes.h"

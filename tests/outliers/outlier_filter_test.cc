@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/analysis/pixel_errors.h"
-#include "krot/bridge/conflict_verdict.h"
+#include "krot/bridge/conflict_file.h"
 #include "krot/model/validate.h"
 #include "tests/outliers/outlier_scenes.h"
 

@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/joint/feasible_start.h"
+#include "krot/joint/initializer.h"
 #include "krot/problem/cost.h"
 #include "krot/proof/certificate_search.h"
 #include "krot/proof/dual_repair.h"

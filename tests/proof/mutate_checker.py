@@ -24,8 +24,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROOF = ROOT / "src" / "krot" / "proof"
 # What judges, as opposed to what makes certificates.
 CHECKER = ("certificate_check.cc", "certificate_input.cc", "extent_check.cc",
-           "fixed_constants.cc", "force_balance.cc", "force_checker.cc",
-           "observation_force.cc", "pull.cc")
+           "force_balance.cc", "force_checker.cc", "pull.cc")
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent_mutants.txt")
 TIMEOUT = 60  # seconds of a test: what takes longer hangs, and is noticed
 

@@ -1,4 +1,4 @@
-#include "krot/proof/observation_force.h"
+#include "krot/proof/force_balance.h"
 
 #include <cmath>
 #include <cstdint>

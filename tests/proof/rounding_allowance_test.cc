@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/proof/fixed_constants.h"
+#include "krot/proof/force_balance.h"
 #include "krot/proof/force_checker.h"
 #include "tests/problem/random_problem.h"
 

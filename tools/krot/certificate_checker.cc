@@ -4,7 +4,7 @@
 
 #include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_verdict.h"
+#include "krot/bridge/conflict_file.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/outlier_report.h"
 #include "krot/version.h"

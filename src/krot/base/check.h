@@ -28,7 +28,8 @@ void CheckPositive(const Value& value, std::string_view name) {
 
 template <typename Value>
 void CheckAtLeast(int least, const Value& value, std::string_view name) {
-  CheckArgument(value >= least, name, value, ">= " + std::to_string(least));
+  if (value >= least) return;  // without a string
+  CheckArgument(false, name, value, ">= " + std::to_string(least));
 }
 
 }  // namespace krot

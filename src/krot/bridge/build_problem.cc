@@ -12,7 +12,6 @@
 #include "krot/bridge/order_of_ids.h"
 #include "krot/bridge/point_repair.h"
 #include "krot/bridge/position_rows.h"
-#include "krot/bridge/same_image.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
@@ -278,8 +277,7 @@ void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
 
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options) {
-  CheckArgument(options.min_track_length >= 1, "options.min_track_length",
-                options.min_track_length, ">= 1");
+  CheckAtLeast(1, options.min_track_length, "options.min_track_length");
   Sources sources{model, ImageGeometries(model), ImageIndices(model)};
   if (options.ignore_translations) PlaceByRotations(&sources.geometries);
   BuiltProblem built;
@@ -289,6 +287,26 @@ BuiltProblem BuildProblem(const Model& model,
   AddPositions(options.positions, &built);
   IndexObservations(&built.problem);
   return built;
+}
+
+const char* LeftOutName(LeftOut reason) {
+  switch (reason) {
+    case LeftOut::kBehind:
+      return "behind";
+    case LeftOut::kUndistortion:
+      return "undistortion";
+    case LeftOut::kOffAxis:
+      return "off_axis";
+    case LeftOut::kShortTrack:
+      return "short_track";
+    case LeftOut::kNoPose:
+      return "no_pose";
+    case LeftOut::kSameImage:
+      return "same_image";
+    case LeftOut::kFixed:
+      return "fixed";
+  }
+  return "unknown";
 }
 
 }  // namespace krot

@@ -4,8 +4,8 @@
 #include <map>
 #include <utility>
 
+#include "krot/bridge/point_repair.h"
 #include "krot/bridge/position_rows.h"
-#include "krot/bridge/same_image.h"
 #include "krot/problem/cost.h"
 
 namespace krot {

@@ -1,10 +1,19 @@
 #include "krot/bridge/conflict_file.h"
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <tuple>
 #include <utility>
+#include <vector>
 
+#include "krot/bridge/built_part.h"
 #include "krot/bridge/certificate_json.h"
 #include "krot/bridge/model_digest.h"
+#include "krot/bridge/pixel_certificate.h"
 #include "krot/model/model_error.h"
+#include "krot/problem/subset.h"
 
 namespace krot {
 namespace {
@@ -88,6 +97,135 @@ ConflictFile ParseConflicts(const std::string& json,
   } catch (const Json::exception& error) {
     throw ModelError(file_name + ": no JSON: " + error.what());
   }
+}
+
+namespace {
+
+using Support = CertificateFile::SupportObservation;
+
+// An entry of the file and the conflict that it is of.
+struct Entry {
+  size_t conflict = 0;
+  const Support* observation = nullptr;
+  int64_t index = -1;  // in the problem; -1: not found
+};
+
+// Every observation of the problem serves one entry.
+std::vector<Entry> FindEntries(const Model& model, const BuiltProblem& built,
+                               const ConflictFile& file) {
+  using Key = std::tuple<ImageId, uint32_t, Point3DId>;
+  std::vector<Entry> entries;
+  std::multimap<Key, size_t> by_key;
+  for (size_t n = 0; n < file.conflicts.size(); ++n) {
+    for (const Support& o : file.conflicts[n].observations) {
+      by_key.emplace(Key(o.image_id, o.point2D_idx, o.point3D_id),
+                     entries.size());
+      entries.push_back({n, &o});
+    }
+  }
+  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
+    const Observation& own = built.problem.observations[i];
+    const auto found =
+        by_key.find({model.images[built.image_of[own.view]].id,
+                     static_cast<uint32_t>(built.point2D_of[i]),
+                     model.points3D[built.point_of[own.point]].id});
+    if (found == by_key.end()) continue;
+    entries[found->second].index = static_cast<int64_t>(i);
+    by_key.erase(found);
+  }
+  return entries;
+}
+
+const Entry* FirstMissing(const std::vector<Entry>& entries) {
+  for (const Entry& entry : entries) {
+    if (entry.index < 0) return &entry;
+  }
+  return nullptr;
+}
+
+std::string NameOfConflict(size_t n) {
+  return "conflict " + std::to_string(n + 1);
+}
+
+// Why one conflict is refused, or nothing.
+std::optional<std::string> RefuseConflict(const Model& model,
+                                          const BuiltProblem& built,
+                                          const ConflictFile& file, size_t n,
+                                          std::vector<Entry> entries) {
+  const ConflictFile::Conflict& conflict = file.conflicts[n];
+  if (!(conflict.lower_bound > file.max_error)) {
+    return NameOfConflict(n) + " has a bound that is not above max_error";
+  }
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.index < b.index; });
+  std::vector<int64_t> observations;
+  PixelCertificate certificate;
+  certificate.lower_bound = conflict.lower_bound;
+  certificate.rows.lower_bound = conflict.rows_bound;
+  certificate.rows.defect = conflict.defect;
+  for (const Entry& entry : entries) {
+    certificate.rows.observations.push_back(
+        {static_cast<int64_t>(observations.size()), entry.observation->lambda,
+         entry.observation->y});
+    certificate.bearings.push_back(entry.observation->bearing);
+    observations.push_back(entry.index);
+  }
+  if (observations.empty()) return NameOfConflict(n) + " is empty";
+  const ProblemSubset subset(built.problem, std::move(observations));
+  const PixelCertificateCheck check = CheckPixelCertificate(
+      model, BuiltPart(built, subset, built.start), file.norm, certificate, {});
+  if (check.is_accepted) return std::nullopt;
+  return NameOfConflict(n) + ": " + check.refusal;
+}
+
+}  // namespace
+
+ConflictVerdict VerifyConflictFile(const Model& model,
+                                   const ConflictFile& file) {
+  ConflictVerdict verdict;
+  if (file.model_sha256 != ModelSha256(model)) {
+    verdict.refusal =
+        "it belongs to another model: cameras, rotations or observations "
+        "differ";
+    return verdict;
+  }
+  if (!(file.max_error > 0) || !std::isfinite(file.max_error)) {
+    verdict.refusal = "its max_error is no positive number";
+    return verdict;
+  }
+  BuiltProblem built = BuildProblem(model, {});
+  std::vector<Entry> entries = FindEntries(model, built, file);
+  if (FirstMissing(entries) != nullptr) {
+    BuildProblemOptions rays_alone;
+    rays_alone.ignore_translations = true;
+    built = BuildProblem(model, rays_alone);
+    entries = FindEntries(model, built, file);
+  }
+  if (const Entry* missing = FirstMissing(entries)) {
+    verdict.refusal =
+        "observation " + std::to_string(missing->observation->point2D_idx) +
+        " of image " + std::to_string(missing->observation->image_id) + " in " +
+        NameOfConflict(missing->conflict) +
+        " is not among those that can be used, or is there twice";
+    return verdict;
+  }
+  std::vector<std::vector<Entry>> of_conflict(file.conflicts.size());
+  for (const Entry& entry : entries) {
+    of_conflict[entry.conflict].push_back(entry);
+  }
+  for (size_t n = 0; n < of_conflict.size(); ++n) {
+    const std::optional<std::string> refusal =
+        RefuseConflict(model, built, file, n, std::move(of_conflict[n]));
+    if (refusal) {
+      verdict.refusal = *refusal;
+      return verdict;
+    }
+  }
+  verdict.is_accepted = true;
+  verdict.num_conflicts = static_cast<int64_t>(file.conflicts.size());
+  verdict.num_observations = static_cast<int64_t>(entries.size());
+  verdict.max_error = file.max_error;
+  return verdict;
 }
 
 }  // namespace krot

@@ -4,11 +4,11 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <numeric>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "krot/bridge/order_of_ids.h"
 #include "krot/bridge/sha256.h"
 #include "krot/model/image_geometry.h"
 
@@ -63,16 +63,6 @@ class Digest {
   Sha256Stream sha256_;
   std::vector<unsigned char> buffer_;
 };
-
-// Indices in the order of their ids.
-template <typename Record>
-std::vector<size_t> OrderById(const std::vector<Record>& records) {
-  std::vector<size_t> order(records.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](size_t a, size_t b) { return records[a].id < records[b].id; });
-  return order;
-}
 
 void AddQuaternion(const Pose& pose, Digest* digest) {
   for (const double q : pose.quaternion_wxyz) digest->Number(q);
@@ -141,13 +131,13 @@ void AddObservations(const Image& image, const Observations& observations,
 std::string ModelSha256(const Model& model) {
   Digest digest;
   digest.Integer(model.cameras.size());
-  for (const size_t n : OrderById(model.cameras)) {
+  for (const int32_t n : OrderOfIds(model.cameras)) {
     AddCamera(model.cameras[n], &digest);
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const Observations observations = SortedObservations(model);
   digest.Integer(model.images.size());
-  for (const size_t n : OrderById(model.images)) {
+  for (const int32_t n : OrderOfIds(model.images)) {
     const Image& image = model.images[n];
     digest.Integer(image.id);
     digest.Integer(image.camera_id);

@@ -2,12 +2,108 @@
 
 #include <optional>
 
-#include "krot/bridge/retriangulate.h"
+#include <Eigen/Eigenvalues>
 
 namespace krot {
+bool HasImageTwice(const Observation* observations, int count) {
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < i; ++j) {
+      if (observations[i].view == observations[j].view) return true;
+    }
+  }
+  return false;
+}
+
+std::vector<char> ClosestOfImages(const std::vector<ImageGeometry>& images,
+                                  const Observation* observations, int count,
+                                  const Eigen::Vector3d& xyz) {
+  std::vector<double> errors;
+  for (int i = 0; i < count; ++i) {
+    const Observation& o = observations[i];
+    const Eigen::Vector3d wv = o.E * (images[o.view].cam_from_world * xyz);
+    errors.push_back(wv.tail<2>().norm() / wv[0]);
+  }
+  std::vector<char> is_closest(count, 1);
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < i; ++j) {
+      if (observations[i].view != observations[j].view) continue;
+      is_closest[errors[i] < errors[j] ? j : i] = 0;
+    }
+  }
+  return is_closest;
+}
+
+// Observations stand in the order of their tracks, in front of positions' rows.
+std::vector<Role> RolesOf(const Model& model, const BuiltProblem& built,
+                          SameImage same_image) {
+  const KnownRotationProblem& problem = built.problem;
+  std::vector<Role> roles(model.track_elements.size(), Role::kOut);
+  for (size_t k = 0; k < built.point_of.size(); ++k) {
+    const int64_t begin = problem.point_begin[k];
+    const int64_t end = problem.point_begin[k + 1];
+    const auto is_of_image = [&](int64_t i, const TrackElement& element) {
+      return built.HasPixel(i) &&
+             model.images[built.image_of[problem.observations[i].view]].id ==
+                 element.image_id;
+    };
+    int64_t next = begin;
+    const Point3D& point = model.points3D[built.point_of[k]];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      if (next < end && is_of_image(next, element) &&
+          static_cast<uint32_t>(built.point2D_of[next]) ==
+              element.point2D_idx) {
+        roles[e] = Role::kIn;
+        ++next;
+        continue;
+      }
+      if (same_image == SameImage::kKeep) continue;
+      for (int64_t i = begin; i < end && roles[e] == Role::kOut; ++i) {
+        if (is_of_image(i, element)) roles[e] = Role::kTwin;
+      }
+    }
+  }
+  return roles;
+}
+
 namespace {
 
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+// The least eigenvalue of mean(I - d d') is half the mean squared sine
+// between the rays and their mean direction, or so. Below this (angles of
+// 1e-6) it is the rounding of rotations.
+constexpr double kParallel = 1e-12;
+
+}  // namespace
+
+std::optional<Vector3d> RetriangulateMidpoint(const std::vector<Ray>& rays) {
+  if (rays.empty()) return std::nullopt;
+  // Relative to the mean centre, where rounding is least.
+  Vector3d mean_centre = Vector3d::Zero();
+  for (const Ray& ray : rays) mean_centre += ray.centre;
+  mean_centre /= static_cast<double>(rays.size());
+
+  Matrix3d normal_matrix = Matrix3d::Zero();
+  Vector3d right_hand_side = Vector3d::Zero();
+  for (const Ray& ray : rays) {
+    const Matrix3d across =
+        Matrix3d::Identity() - ray.direction * ray.direction.transpose();
+    normal_matrix += across;
+    right_hand_side += across * (ray.centre - mean_centre);
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(normal_matrix);
+  const Vector3d& eigenvalues = solver.eigenvalues();
+  if (!(eigenvalues[0] > kParallel * static_cast<double>(rays.size()))) {
+    return std::nullopt;
+  }
+  const Matrix3d& axes = solver.eigenvectors();
+  return mean_centre +
+         axes * (axes.transpose() * right_hand_side).cwiseQuotient(eigenvalues);
+}
+
+namespace {
 
 // C = -R' t; its direction is where v = 0 and w > 0.
 Ray RayOf(const ImageGeometry& image, const Observation& observation) {

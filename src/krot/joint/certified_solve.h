@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/conic/interior_point.h"
-#include "krot/joint/feasible_start.h"
+#include "krot/joint/initializer.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -3,8 +3,8 @@
 #include <numeric>
 #include <utility>
 
-#include "krot/joint/extend_solution.h"
 #include "krot/joint/step_values.h"
+#include "krot/joint/working_set.h"
 #include "krot/problem/components.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"

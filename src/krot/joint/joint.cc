@@ -16,14 +16,10 @@ namespace krot {
 namespace {
 
 void CheckOptions(const JointOptions& options) {
-  CheckArgument(options.norm.p == 2 || options.norm.IsPolyhedral(), "norm.p",
-                options.norm.p, "1, 2 or infinity");
-  CheckArgument(options.relative_gap > 0, "relative_gap", options.relative_gap,
-                "> 0");
-  CheckArgument(options.sufficient_cost >= 0, "sufficient_cost",
-                options.sufficient_cost, ">= 0");
-  CheckArgument(options.max_iterations >= 1, "max_iterations",
-                options.max_iterations, ">= 1");
+  CheckConic(options.norm);
+  CheckPositive(options.relative_gap, "relative_gap");
+  CheckAtLeast(0, options.sufficient_cost, "sufficient_cost");
+  CheckAtLeast(1, options.max_iterations, "max_iterations");
 }
 
 }  // namespace

@@ -4,8 +4,7 @@
 #include <optional>
 
 #include "krot/base/check.h"
-#include "krot/minimax/active_set.h"
-#include "krot/minimax/descent_direction.h"
+#include "krot/minimax/descent_step.h"
 
 namespace krot {
 
@@ -29,7 +28,7 @@ void CheckOptions(const FastDescentOptions& options) {
 FastDescent::FastDescent(const FastDescentOptions& options, Norm norm)
     : options_(options), norm_(norm) {
   CheckOptions(options);
-  CheckArgument(norm.p >= 1, "norm.p", norm.p, ">= 1");
+  CheckAtLeast(1, norm.p, "norm.p");
 }
 
 DescentSummary FastDescent::Minimize(Eigen::Vector3d* x) {

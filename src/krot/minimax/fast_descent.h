@@ -2,9 +2,9 @@
 
 #include <vector>
 
+#include "krot/minimax/descent_step.h"
 #include "krot/minimax/newton_descent.h"
 #include "krot/minimax/residual_set.h"
-#include "krot/minimax/step_size.h"
 
 namespace krot {
 

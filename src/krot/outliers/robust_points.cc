@@ -8,7 +8,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/bridge/retriangulate.h"
+#include "krot/bridge/point_repair.h"
 #include "krot/problem/cost.h"
 
 namespace krot {

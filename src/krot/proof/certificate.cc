@@ -29,8 +29,7 @@ void CheckInput(const KnownRotationProblem& problem,
   CheckArgument(multipliers.size() == problem.observations.size(),
                 "multipliers.size()", multipliers.size(),
                 "the number of observations");
-  CheckArgument(options.max_unknowns >= 1, "options.max_unknowns",
-                options.max_unknowns, ">= 1");
+  CheckAtLeast(1, options.max_unknowns, "options.max_unknowns");
 }
 
 bool IsSpread(const KnownRotationProblem& problem,

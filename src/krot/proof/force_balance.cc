@@ -1,14 +1,63 @@
 #include "krot/proof/force_balance.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <queue>
 #include <tuple>
 #include <utility>
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/proof/certificate_check.h"
+
 namespace krot {
 namespace {
 
-using Real = long double;
+using Real = ObservationForce::Real;
+using Vector3 = ObservationForce::Vector3;
+using Matrix3 = Eigen::Matrix<Real, 3, 3>;
+
+constexpr Real kRoundoff = std::numeric_limits<Real>::epsilon();
+
+}  // namespace
+
+ObservationForce MakeForce(const Observation& observation,
+                           const ObservationForce::Vector2& y,
+                           Real delta_lambda) {
+  const Matrix3 E = observation.E.cast<Real>();
+  const Vector3 multipliers(delta_lambda, y[0], y[1]);
+  return {E.transpose() * multipliers,
+          E.cwiseAbs().transpose() * multipliers.cwiseAbs()};
+}
+
+Real RoundingError(size_t count) {
+  return (static_cast<Real>(count) + 12) * kRoundoff;
+}
+
+Real ForceError(size_t count) {
+  return 2 * (kRotationError + RoundingError(count));
+}
+
+// With e_k the rows of E, those of E^-T are e_1 x e_2, e_2 x e_0 and e_0 x e_1
+// over det E = e_0'(e_1 x e_2). Their roundings are less than 4 of kRoundoff
+// each of the product of the rows' lengths; as |det E| <= |e_0||e_1 x e_2| and
+// so on, what is taken from it makes up for those of a product, too.
+std::optional<Compliance> MakeCompliance(const Observation& observation) {
+  const Matrix3 E = observation.E.cast<Real>();
+  const auto length = [&](int i, int j) {
+    return Vector3(E.row(i)).cross(Vector3(E.row(j))).norm();
+  };
+  const Real det =
+      std::abs(E.determinant()) -
+      16 * kRoundoff * E.row(0).norm() * E.row(1).norm() * E.row(2).norm();
+  if (!(det > 0)) return std::nullopt;
+  return Compliance{std::hypot(length(2, 0), length(0, 1)) / det * kOutward,
+                    length(1, 2) / det * kOutward};
+}
+
+namespace {
 
 // Points are nodes 0, 1, ...; frames come after them.
 struct Branch {
@@ -119,6 +168,47 @@ std::vector<Real> BoundCorrections(const KnownRotationProblem& problem,
     load[branch->parent] += load[branch->node];
   }
   return corrections;
+}
+
+namespace {
+
+Real SizeOf(const Vector3& x) { return x.cwiseAbs().sum(); }
+
+}  // namespace
+
+FixedConstants::FixedConstants(const KnownRotationProblem& problem)
+    : problem_(problem) {
+  for (const Observation& observation : problem.observations) {
+    const View& view = problem.views[observation.view];
+    if (!problem.IsFixedFrame(view.frame)) continue;
+    const Part minus_origin = OfFrame(view);  // in the camera, of O = 0
+    origin_frame_ = view.frame;
+    origin_ = -(view.cam_from_world_rotation.transpose().cast<Real>() *
+                minus_origin.x_cam);
+    origin_size_ = minus_origin.size + SizeOf(origin_);
+    return;
+  }
+  for (const std::optional<Eigen::Vector3d>& point : problem.fixed_points) {
+    if (!point) continue;
+    origin_ = point->cast<Real>();
+    return;
+  }
+}
+
+FixedConstants::Part FixedConstants::OfFrame(const View& view) const {
+  const Vector3 t = problem_.fixed_translations[view.frame]->cast<Real>();
+  const Vector3 t_sr = view.cam_from_rig_translation.cast<Real>();
+  return {view.cam_from_rig_rotation.cast<Real>() * t + t_sr +
+              view.cam_from_world_rotation.cast<Real>() * origin_,
+          SizeOf(t) + SizeOf(t_sr) + origin_size_};
+}
+
+FixedConstants::Part FixedConstants::OfPoint(const View& view,
+                                             int32_t point) const {
+  if (!problem_.IsFixedPoint(point)) return {};
+  const Vector3 x = problem_.fixed_points[point]->cast<Real>() - origin_;
+  return {view.cam_from_world_rotation.cast<Real>() * x,
+          SizeOf(x) + origin_size_};
 }
 
 }  // namespace krot

@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 
 #include "krot/proof/certificate_input.h"
-#include "krot/proof/fixed_constants.h"
+#include "krot/proof/force_balance.h"
 
 namespace krot {
 namespace {

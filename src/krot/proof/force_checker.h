@@ -12,7 +12,6 @@
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_check.h"
 #include "krot/proof/force_balance.h"
-#include "krot/proof/observation_force.h"
 #include "krot/proof/pull.h"
 
 namespace krot {

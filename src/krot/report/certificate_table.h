@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_verdict.h"
+#include "krot/bridge/conflict_file.h"
 
 namespace krot {
 

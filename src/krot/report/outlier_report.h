@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/bridge/conflict_verdict.h"
+#include "krot/bridge/conflict_file.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/run_record.h"
 

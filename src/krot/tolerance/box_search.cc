@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/joint/extend_solution.h"
+#include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 
 namespace krot {

@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-#include "krot/bridge/outer_rows.h"
+#include "krot/bridge/reprojection.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"

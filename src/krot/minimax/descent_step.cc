@@ -1,9 +1,43 @@
-#include "krot/minimax/step_size.h"
+#include "krot/minimax/descent_step.h"
 
 #include <algorithm>
 #include <limits>
 
+#include "krot/math/min_enclosing_ball.h"
+
 namespace krot {
+void FindDescentNormals(const ResidualSet& residuals, const Eigen::Vector3d& x,
+                        Norm norm, double active_tolerance,
+                        std::vector<Eigen::Vector3d>* descent_normals) {
+  descent_normals->clear();
+  const double* values = residuals.values();
+  const double cost = *std::max_element(values, values + residuals.size());
+  const double share = 1 - active_tolerance;
+  for (int i = 0; i < residuals.size(); ++i) {
+    if (values[i] < share * cost) continue;  // (5)
+    ResidualPiece pieces[kMaxPieces];
+    const int count = ResidualPieces(residuals[i], x, norm, share, pieces);
+    for (int k = 0; k < count; ++k) {
+      const double length = pieces[k].gradient.norm();
+      if (!(length > 0)) continue;
+      descent_normals->push_back(-pieces[k].gradient / length);  // (6)
+    }
+  }
+}
+
+std::optional<Eigen::Vector3d> FindDescentDirection(
+    const std::vector<Eigen::Vector3d>& descent_normals,
+    double stationarity_tolerance, std::vector<LinearPiece>* scratch) {
+  const int count = static_cast<int>(descent_normals.size());
+  if (count == 0) return std::nullopt;
+  const Eigen::Vector3d center =  // (7)
+      count <= 4 ? MinEnclosingBall(descent_normals.data(), count).center
+                 : MinNormPoint(descent_normals.data(), count, scratch);
+  const double length = center.norm();
+  if (!(length > stationarity_tolerance)) return std::nullopt;
+  return center / length;
+}
+
 namespace {
 
 // f(alpha) = max_i r_i(alpha)  [Zhang18, Alg. 4, line 2]

@@ -1,4 +1,4 @@
-#include "krot/bridge/portable_sha256.h"
+#include "krot/bridge/sha256.h"
 
 #include <random>
 #include <vector>
@@ -9,7 +9,7 @@
 namespace krot {
 namespace {
 
-TEST(PortableSha256, AgreesWithOpenSslAtEveryLengthAroundItsBlocks) {
+TEST(Sha256Stream, AgreesWithOpenSslAtEveryLengthAroundItsBlocks) {
   std::mt19937 random(1);
   for (size_t size = 0; size < 300; ++size) {
     std::vector<unsigned char> bytes(size);
@@ -17,7 +17,7 @@ TEST(PortableSha256, AgreesWithOpenSslAtEveryLengthAroundItsBlocks) {
       byte = static_cast<unsigned char>(random());
     std::array<unsigned char, 32> expected;
     SHA256(bytes.data(), size, expected.data());
-    PortableSha256 digest;
+    Sha256Stream digest;
     const size_t first = size / 3;
     digest.Append(bytes.data(), first);
     digest.Append(bytes.data() + first, size - first);

@@ -1,4 +1,4 @@
-#include "krot/bridge/portable_sha256.h"
+#include "krot/bridge/sha256.h"
 
 namespace krot {
 namespace {
@@ -44,9 +44,9 @@ uint32_t Turn(uint32_t word, int bits) {
 
 }  // namespace
 
-PortableSha256::PortableSha256() : state_(kStart) {}
+Sha256Stream::Sha256Stream() : state_(kStart) {}
 
-void PortableSha256::Append(const unsigned char* bytes, size_t size) {
+void Sha256Stream::Append(const unsigned char* bytes, size_t size) {
   num_bytes_ += size;
   for (size_t n = 0; n < size; ++n) {
     block_[block_size_++] = bytes[n];
@@ -55,7 +55,7 @@ void PortableSha256::Append(const unsigned char* bytes, size_t size) {
 }
 
 // Named as in the standard: the schedule w, the working variables a to h.
-void PortableSha256::DigestBlock() {
+void Sha256Stream::DigestBlock() {
   std::array<uint32_t, 64> w;
   for (size_t t = 0; t < 16; ++t) {
     w[t] = uint32_t{block_[4 * t]} << 24 | uint32_t{block_[4 * t + 1]} << 16 |
@@ -79,7 +79,7 @@ void PortableSha256::DigestBlock() {
   block_size_ = 0;
 }
 
-std::array<unsigned char, 32> PortableSha256::Finish() {
+std::array<unsigned char, 32> Sha256Stream::Finish() {
   const uint64_t num_bits = 8 * num_bytes_;
   const unsigned char one = 0x80, zero = 0;
   Append(&one, 1);
