@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "krot/analysis/pixel_errors.h"
+#include "krot/base/numbers.h"
 #include "krot/model/model_error.h"
 
 namespace krot {
@@ -21,15 +22,13 @@ constexpr double kFits = 0.01;
 // A wrong convention multiplies errors by far more than this.
 constexpr double kFarSmaller = 5;
 
-std::optional<double> Median(std::vector<double> errors) {
+std::optional<double> FiniteMedian(std::vector<double> errors) {
   if (errors.empty()) return std::nullopt;
   for (double& error : errors) {
     if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
   }
-  const auto middle =
-      errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return std::isfinite(*middle) ? std::optional<double>(*middle) : std::nullopt;
+  const double median = Median(std::move(errors));
+  return std::isfinite(median) ? std::optional<double>(median) : std::nullopt;
 }
 
 // Leaves those that differ, if any do: those of the images that were turned.
@@ -70,8 +69,8 @@ RotationInput TakeRotations(const FileBytes& file, Model* model,
   input.replaced = ReplaceRotations(file, model, note);
   std::vector<double> after = PixelErrors(*model, num_threads);
   KeepChanged(&before, &after);
-  input.median_error_before = Median(std::move(before));
-  input.median_error_after = Median(std::move(after));
+  input.median_error_before = FiniteMedian(std::move(before));
+  input.median_error_after = FiniteMedian(std::move(after));
   const bool model_fits =
       input.median_error_before &&
       *input.median_error_before <= kFits * LargestSide(*model);

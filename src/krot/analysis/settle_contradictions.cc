@@ -9,6 +9,7 @@
 
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/validate.h"
 
@@ -32,13 +33,6 @@ struct SideFit {
   int64_t count = 0;
   bool is_any_finite = false;
 };
-
-double Median(std::vector<double>* values) {
-  const auto middle =
-      values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
 
 // Of the tracks of a valid model and so many elements that do not exist. None
 // without an observation that has a pose.
@@ -64,8 +58,8 @@ std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
   if (px.empty()) return std::nullopt;
   fit.count = static_cast<int64_t>(px.size());
   fit.px.max = *std::max_element(px.begin(), px.end());
-  fit.px.median = Median(&px);
-  fit.relative_median = Median(&relative);
+  fit.px.median = Median(px);
+  fit.relative_median = Median(relative);
   return fit;
 }
 

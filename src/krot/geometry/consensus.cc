@@ -16,7 +16,7 @@ constexpr double kTypicalMoves = 10;
 // The common move is found from those that share it, which it decides on.
 constexpr int kMaxRounds = 3;
 
-double Median(std::vector<double> values) {
+double LowerMedian(std::vector<double> values) {
   const auto middle =
       values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -41,13 +41,13 @@ double Spread(const std::vector<CameraMove>& cameras) {
     for (const CameraMove& camera : cameras) {
       values.push_back(camera.before[axis]);
     }
-    middle[axis] = Median(std::move(values));
+    middle[axis] = LowerMedian(std::move(values));
   }
   std::vector<double> distances;
   for (const CameraMove& camera : cameras) {
     distances.push_back((camera.before - middle).norm());
   }
-  return Median(std::move(distances));
+  return LowerMedian(std::move(distances));
 }
 
 CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
@@ -58,7 +58,7 @@ CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
     for (const CameraMove& camera : cameras) {
       shifts.push_back(camera.before[axis] - scale * camera.after[axis]);
     }
-    move.shift[axis] = Median(std::move(shifts));
+    move.shift[axis] = LowerMedian(std::move(shifts));
   }
   return move;
 }
@@ -107,15 +107,17 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
   }
   if (cameras.size() < 3 || 2 * scales.size() < cameras.size()) return keeps;
 
-  const double far = std::min(Median(std::move(distances)), Spread(cameras));
+  const double far =
+      std::min(LowerMedian(std::move(distances)), Spread(cameras));
   CommonMove move =
-      MedianMove(cameras, scale_is_free ? Median(std::move(scales)) : 1);
+      MedianMove(cameras, scale_is_free ? LowerMedian(std::move(scales)) : 1);
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<double> residuals;
     for (const CameraMove& camera : cameras) {
       residuals.push_back(move.Residual(camera));
     }
-    const double allowed = std::max(far, kTypicalMoves * Median(residuals));
+    const double allowed =
+        std::max(far, kTypicalMoves * LowerMedian(residuals));
     std::vector<char> now;
     for (const double residual : residuals) now.push_back(residual <= allowed);
     if (round > 0 && now == keeps) break;

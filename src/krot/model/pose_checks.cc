@@ -8,6 +8,7 @@
 #include <limits>
 #include <sstream>
 
+#include "krot/base/numbers.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {
@@ -96,7 +97,7 @@ WorldTurn FindWorldTurn(const Rotations& own, const Rotations& listed) {
   const size_t step = (own.size() + kTried - 1) / kTried;
   for (size_t n = 0; n < own.size(); n += step) {
     const Eigen::Quaterniond turn = own[n].conjugate() * listed[n];
-    const double median_deg = MedianAngle(AnglesDeg(own, listed, turn));
+    const double median_deg = Median(AnglesDeg(own, listed, turn));
     if (median_deg < best.median_deg) best = {turn, median_deg};
   }
   const std::vector<double> angles =
@@ -109,7 +110,7 @@ WorldTurn FindWorldTurn(const Rotations& own, const Rotations& listed) {
   const std::optional<Eigen::Matrix3d> mean = NearestRotation(sum);
   if (!mean) return best;
   const Eigen::Quaterniond turn(*mean);
-  const double median_deg = MedianAngle(AnglesDeg(own, listed, turn));
+  const double median_deg = Median(AnglesDeg(own, listed, turn));
   return median_deg < best.median_deg ? WorldTurn{turn, median_deg} : best;
 }
 
@@ -188,20 +189,13 @@ void FindStaleImages(const Model& model,
     }
   }
   checks->num_stale = static_cast<int64_t>(turns_deg.size());
-  if (!turns_deg.empty()) checks->median_turn_deg = MedianAngle(turns_deg);
+  if (!turns_deg.empty()) checks->median_turn_deg = Median(turns_deg);
 }
 
 }  // namespace
 
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return a.angularDistance(b) * 180 / M_PI;
-}
-
-double MedianAngle(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 PoseChecks CheckPoses(const Model& model) {
@@ -237,7 +231,7 @@ RotationAgreement CompareRotations(const Rotations& own,
     return agreement;
   }
   const double median_deg =
-      MedianAngle(AnglesDeg(own, as_written, Eigen::Quaterniond::Identity()));
+      Median(AnglesDeg(own, as_written, Eigen::Quaterniond::Identity()));
   if (IsMuchBetter(turn.median_deg, median_deg)) {
     agreement.own_world_from_list = turn.own_world_from_list;
   }

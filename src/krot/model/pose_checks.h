@@ -15,9 +15,6 @@ namespace krot {
 // The angle between two rotations, in [0, 180] degrees.
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
-// The upper one of the middle, of at least one value.
-double MedianAngle(std::vector<double> values);
-
 // What is odd about the poses of a model that can be read all the same.
 struct PoseChecks {
   int64_t num_images = 0;  // with a pose

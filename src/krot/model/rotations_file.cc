@@ -9,6 +9,7 @@
 
 #include <Eigen/Geometry>
 
+#include "krot/base/numbers.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_error.h"
 #include "krot/model/name_list.h"
@@ -186,7 +187,7 @@ void Replacement::CountTurns(const std::vector<Eigen::Quaterniond>& before,
       replaced->largest_turn_image = model_.images[image].name;
     }
   }
-  replaced->median_turn_deg = MedianAngle(turns_deg);
+  replaced->median_turn_deg = Median(turns_deg);
 }
 
 bool Replacement::Turn(const QuaternionWxyz& rig_from_world,
