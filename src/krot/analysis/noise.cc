@@ -1,0 +1,250 @@
+#include "krot/analysis/noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "krot/analysis/track_noise.h"
+#include "krot/base/check.h"
+#include "krot/base/parallel_for.h"
+
+namespace krot {
+namespace {
+
+constexpr int64_t kPointsPerChunk = 256;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+// The medians of chi^2 with one and two degrees of freedom.
+constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
+
+// w of a sum over so many directions: that of two with the same probability to
+// be exceeded, exp(-w^2 / 2).
+double StandardizedError(double chi2, int num_directions) {
+  if (num_directions == 2) return std::sqrt(chi2);
+  if (num_directions == 0) return kNaN;
+  const double probability = std::erfc(std::sqrt(chi2 / 2));
+  if (probability > 1e-300) return std::sqrt(-2 * std::log(probability));
+  // erfc(x) ~ exp(-x^2) / (x sqrt(pi))
+  return std::sqrt(chi2 + std::log(chi2 * std::acos(-1.0) / 2));
+}
+
+void CheckOptions(const Model& model, const NoiseOptions& options) {
+  CheckArgument(options.false_alarm > 0 && options.false_alarm < 1,
+                "false_alarm", options.false_alarm, "in (0, 1)");
+  if (options.relative_sigmas.empty()) return;
+  CheckArgument(options.relative_sigmas.size() == model.track_elements.size(),
+                "relative_sigmas.size()", options.relative_sigmas.size(),
+                "the number of track elements, or 0");
+  for (size_t e = 0; e < options.relative_sigmas.size(); ++e) {
+    const double sigma = options.relative_sigmas[e];
+    CheckArgument(std::isfinite(sigma) && sigma > 0,
+                  "relative_sigmas[" + std::to_string(e) + "]", sigma,
+                  "a number > 0");
+  }
+}
+
+// Of two ranks the lower one. Requires some; changes their order.
+double Quantile(double share, std::vector<double>* values) {
+  const auto rank = static_cast<std::ptrdiff_t>(
+      share * static_cast<double>(values->size() - 1));
+  std::nth_element(values->begin(), values->begin() + rank, values->end());
+  return (*values)[rank];
+}
+
+// The scale of a Cauchy loss, over sigma, given the ratio of the 90 % quantile
+// of w^2 to its median: a Student's t of two variables and nu degrees of
+// freedom has P(w^2 > x) = (1 + x / c^2)^(-nu / 2), and its maximum likelihood
+// is this loss with scale c [Lange, Little, Taylor 1989]. With a = 2^(2 / nu):
+// the median is c^2 (a - 1), the quantile c^2 (a^log2(10) - 1).
+std::optional<double> TailScale(double ratio) {
+  if (!(ratio > std::log2(10.0) && std::isfinite(ratio))) return std::nullopt;
+  const auto ratio_of = [](double log_a) {
+    return std::expm1(log_a * std::log2(10.0)) / std::expm1(log_a);
+  };
+  double low = 0, high = 1;
+  while (ratio_of(high) < ratio) high *= 2;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (ratio_of(middle) < ratio ? low : high) = middle;
+  }
+  return std::sqrt(kMedians[2] / std::expm1(high));
+}
+
+// Keypoints come as single precision numbers: no model has less noise.
+double SmallestSigma(const Model& model) {
+  uint64_t size = 0;
+  for (const Camera& camera : model.cameras) {
+    size = std::max({size, camera.width, camera.height});
+  }
+  return static_cast<double>(size) * std::numeric_limits<float>::epsilon();
+}
+
+class Snooper {
+ public:
+  // Without a sigma it is measured.
+  Snooper(const Model& model, const NoiseOptions& options,
+          const Context& context, std::optional<double> sigma_px = {})
+      : model_(model),
+        options_(options),
+        context_(context),
+        given_sigma_(sigma_px),
+        tracks_(model, options.relative_sigmas) {
+    std::vector<int64_t> all(model.points3D.size());
+    std::iota(all.begin(), all.end(), int64_t{0});
+    Fit(all);
+    Measure();
+  }
+
+  const ModelNoise& noise() const { return noise_; }
+  NoiseSnooping Snoop();
+  ModelNoise TakeNoise();
+
+ private:
+  const ObservationNoise& Of(uint64_t e) const {
+    return tracks_.observations()[e];
+  }
+  bool IsTested(uint64_t e) const {
+    return tracks_.TakesPart(e) && Of(e).num_controlled > 0;
+  }
+  double StandardizedErrorOf(uint64_t e) const {
+    return StandardizedError(
+        tracks_.SquaredError(e) / (*noise_.sigma_px * *noise_.sigma_px),
+        Of(e).num_controlled);
+  }
+  void Fit(const std::vector<int64_t>& points);
+  // Sigma, w and what is above.
+  void Measure();
+  std::vector<SnoopedObservation> RemoveWorst(const Point3D& point) const;
+
+  const Model& model_;
+  const NoiseOptions& options_;
+  const Context& context_;
+  const std::optional<double> given_sigma_;
+  TrackNoise tracks_;
+  ModelNoise noise_;
+};
+
+void Snooper::Fit(const std::vector<int64_t>& points) {
+  ParallelFor(static_cast<int64_t>(points.size()), kPointsPerChunk,
+              context_.num_threads, [&](int64_t begin, int64_t end, int) {
+                for (int64_t n = begin; n < end; ++n) tracks_.Fit(points[n]);
+              });
+}
+
+void Snooper::Measure() {
+  std::vector<double> variances;
+  double redundancy = 0;
+  for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
+    if (!IsTested(e)) continue;
+    variances.push_back(tracks_.SquaredError(e) /
+                        kMedians[Of(e).num_controlled]);
+    redundancy += Of(e).redundancy[0] + Of(e).redundancy[1];
+  }
+  noise_ = {};
+  noise_.num_tested = static_cast<int64_t>(variances.size());
+  if (variances.empty()) return;
+  noise_.sigma_px = given_sigma_.value_or(
+      std::max(std::sqrt(Quantile(0.5, &variances)), SmallestSigma(model_)));
+  // The median of n exponential variables is spread as the mean of n log(2)^2.
+  noise_.degrees_of_freedom = std::pow(std::log(2.0), 2) * redundancy;
+  // w^2 / 2 is F distributed: P(w^2 > x) = (1 + x / nu)^(-nu / 2).
+  const double nu = noise_.degrees_of_freedom;
+  const double log_odds =
+      std::log(static_cast<double>(noise_.num_tested) / options_.false_alarm);
+  noise_.critical_w = std::sqrt(nu * std::expm1(2 / nu * log_odds));
+  for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
+    if (IsTested(e)) tracks_.SetW(e, StandardizedErrorOf(e));
+    noise_.num_above += Of(e).w > noise_.critical_w;
+  }
+}
+
+std::vector<SnoopedObservation> Snooper::RemoveWorst(
+    const Point3D& point) const {
+  std::vector<SnoopedObservation> seen, not_seen;
+  for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+    if (!tracks_.TakesPart(e)) continue;
+    (std::isinf(Of(e).w) ? not_seen : seen).push_back({e, Of(e).w, 0, false});
+  }
+  SnoopedObservation worst;
+  for (const SnoopedObservation& one : seen) {
+    if (one.w > worst.w) worst = one;
+  }
+  // The others decide where the point is, and then whether it is seen.
+  if (!(worst.w > noise_.critical_w)) return not_seen;
+  if (seen.size() > 2) return {worst};
+  for (SnoopedObservation& one : seen) one.is_of_two = true;
+  return seen;
+}
+
+NoiseSnooping Snooper::Snoop() {
+  NoiseSnooping result;
+  while (noise_.sigma_px) {
+    result.sigma_path_px.push_back(*noise_.sigma_px);
+    std::vector<int64_t> changed;
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      for (const SnoopedObservation& one : RemoveWorst(model_.points3D[k])) {
+        tracks_.Remove(one.element);
+        result.removed.push_back(one);
+        if (changed.empty() || changed.back() != static_cast<int64_t>(k)) {
+          changed.push_back(static_cast<int64_t>(k));
+        }
+      }
+    }
+    if (changed.empty()) break;
+    Fit(changed);
+    Measure();
+  }
+  std::vector<SnoopedObservation>& removed = result.removed;
+  for (SnoopedObservation& one : removed) {
+    one.error_px = tracks_.ErrorOf(one.element).norm();
+  }
+  std::stable_sort(removed.begin(), removed.end(),
+                   [](const auto& a, const auto& b) { return a.w > b.w; });
+  result.noise = TakeNoise();
+  return result;
+}
+
+ModelNoise Snooper::TakeNoise() {
+  std::vector<double> squares;
+  for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
+    if (IsTested(e)) squares.push_back(Of(e).w * Of(e).w);
+  }
+  if (!squares.empty()) {
+    const double median = Quantile(0.5, &squares);
+    const auto scale = TailScale(Quantile(0.9, &squares) / median);
+    if (scale) noise_.cauchy_scale_px = *scale * *noise_.sigma_px;
+  }
+  for (size_t k = 0; k < model_.points3D.size(); ++k) {
+    noise_.points.push_back(tracks_.Point(static_cast<int64_t>(k)));
+  }
+  noise_.observations = tracks_.observations();
+  return std::move(noise_);
+}
+
+}  // namespace
+
+ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options,
+                         const Context& context) {
+  CheckOptions(model, options);
+  return Snooper(model, options, context).TakeNoise();
+}
+
+NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
+                         const Context& context) {
+  CheckOptions(model, options);
+  Snooper snooper(model, options, context);
+  const auto num_tested = snooper.noise().num_tested;
+  const auto sigma = snooper.noise().sigma_px;
+  NoiseSnooping result = snooper.Snoop();
+  // The median is that of outliers where they are more than a half.
+  if (2 * static_cast<int64_t>(result.removed.size()) > num_tested) {
+    result = Snooper(model, options, context, sigma).Snoop();
+    result.is_sigma_kept = true;
+  }
+  return result;
+}
+
+}  // namespace krot

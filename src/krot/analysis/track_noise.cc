@@ -1,0 +1,278 @@
+#include "krot/analysis/track_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include "krot/camera/projection_row.h"
+#include "krot/model/image_geometry.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::Vector4d;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr int kMaxIterations = 50;
+// Of the sum of squares, that a step may still promise.
+constexpr double kTolerance = 1e-8;
+// Of the largest eigenvalue of A'A: below is rounding.
+constexpr double kSingular = 1e-13;
+
+ObservationNoise NotTested(double w) {
+  ObservationNoise noise;
+  noise.w = w;
+  return noise;
+}
+
+// Three columns that are orthonormal and orthogonal to the unit vector X.
+Eigen::Matrix<double, 4, 3> TangentBasis(const Vector4d& X) {
+  // Householder: I - 2 v v' / v'v takes X to an axis.
+  Vector4d v = X;
+  v[3] += X[3] < 0 ? -1 : 1;
+  const Eigen::Matrix4d reflection =
+      Eigen::Matrix4d::Identity() - 2 / v.squaredNorm() * v * v.transpose();
+  return reflection.leftCols<3>();
+}
+
+}  // namespace
+
+// A fit in homogeneous coordinates, so that a point at infinity, or beyond by
+// the noise of its rays, is one like any other. The origin is the first camera,
+// the unit what separates it from the farthest.
+class TrackNoise::Track {
+ public:
+  Track(TrackNoise* all, int64_t k) : all_(*all), k_(k) {
+    const Point3D& point = all_.model_.points3D[k];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (all_.takes_part_[e]) elements_.push_back(e);
+    }
+  }
+
+  void Run() {
+    if (elements_.size() < 2) {
+      for (const uint64_t e : elements_)
+        all_.observations_[e] = NotTested(kNaN);
+      return;
+    }
+    Begin();
+    Minimize();
+    Describe();
+  }
+
+ private:
+  const View& ViewOf(uint64_t e) const {
+    return all_.views_[all_.image_of_[e]];
+  }
+
+  std::optional<Row> RowAt(uint64_t e, const Vector4d& X,
+                           const Eigen::Matrix<double, 4, 3>& basis) const {
+    const View& view = ViewOf(e);
+    const Vector3d c = (view.center - origin_) / unit_;
+    const Vector3d x_cam =
+        view.cam_from_world_rotation * (X.head<3>() - X[3] * c);
+    const Point2D& pixel =
+        view.image->points2D[all_.model_.track_elements[e].point2D_idx];
+    const auto E =
+        RowAtProjection(view.camera->model_id, view.camera->params.data(),
+                        {pixel.x, pixel.y}, x_cam);
+    if (!E) return std::nullopt;
+    const double depth = E->row(0).dot(x_cam);
+    Row row;
+    row.error = E->bottomRows<2>() * x_cam / depth;
+    const Eigen::Matrix<double, 2, 3> by_world =
+        (E->bottomRows<2>() - row.error * E->row(0)) / depth *
+        view.cam_from_world_rotation;
+    row.J = by_world * (basis.topRows<3>() - c * basis.row(3));
+    if (!all_.relative_sigmas_.empty()) {
+      row.error /= all_.relative_sigmas_[e];
+      row.J /= all_.relative_sigmas_[e];
+    }
+    if (!row.J.allFinite() || !row.error.allFinite()) return std::nullopt;
+    return row;
+  }
+
+  void Begin() {
+    const Point3D& point = all_.model_.points3D[k_];
+    origin_ = ViewOf(elements_[0]).center;
+    unit_ = 0;
+    for (const uint64_t e : elements_) {
+      unit_ = std::max(unit_, (ViewOf(e).center - origin_).norm());
+    }
+    if (!(unit_ > 0)) unit_ = (point.xyz - origin_).norm();
+    if (!(unit_ > 0)) unit_ = 1;
+    X_ << (point.xyz - origin_) / unit_, 1;
+    X_.normalize();
+    const auto basis = TangentBasis(X_);
+    // Who does not see the point has no say.
+    size_t num = 0;
+    for (const uint64_t e : elements_) {
+      const auto row = RowAt(e, X_, basis);
+      if (row) {
+        rows_.push_back(*row);
+        elements_[num++] = e;
+      } else {
+        all_.observations_[e] = NotTested(kInfinity);
+      }
+    }
+    elements_.resize(num);
+    cost_ = CostOf(rows_);
+  }
+
+  static double CostOf(const std::vector<Row>& rows) {
+    double sum = 0;
+    for (const Row& row : rows) sum += row.error.squaredNorm();
+    return sum;
+  }
+
+  // Levenberg-Marquardt.
+  void Minimize() {
+    double damping = 0;
+    std::vector<Row> trial(rows_.size());
+    for (int i = 0; i < kMaxIterations; ++i) {
+      Matrix3d H = Matrix3d::Zero();
+      Vector3d g = Vector3d::Zero();
+      for (const Row& row : rows_) {
+        H.noalias() += row.J.transpose() * row.J;
+        g.noalias() += row.J.transpose() * row.error;
+      }
+      const double scale = H.trace();
+      if (!(scale > 0)) return;
+      H.diagonal().array() += (damping + kSingular) * scale;
+      const Vector3d step = -H.ldlt().solve(g);
+      if (!(-g.dot(step) > kTolerance * cost_)) return;
+      Vector4d X = X_ + TangentBasis(X_) * step;
+      X.normalize();
+      const auto basis = TangentBasis(X);
+      bool is_seen = true;
+      for (size_t n = 0; n < rows_.size() && is_seen; ++n) {
+        const auto row = RowAt(elements_[n], X, basis);
+        is_seen = row.has_value();
+        if (is_seen) trial[n] = *row;
+      }
+      const double cost = is_seen ? CostOf(trial) : kInfinity;
+      if (cost < cost_) {
+        X_ = X;
+        rows_.swap(trial);
+        cost_ = cost;
+        damping = damping < 1e-6 ? 0 : damping / 10;
+      } else {
+        damping = std::max(1e-6, 10 * damping);
+        if (damping > 1e3) return;
+      }
+    }
+  }
+
+  // R_ii and what it makes of the errors.
+  void Describe() {
+    Matrix3d H = Matrix3d::Zero();
+    for (const Row& row : rows_) H.noalias() += row.J.transpose() * row.J;
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> of_H(H);
+    Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
+    for (int j = 0; j < 3; ++j) {
+      const double value = of_H.eigenvalues()[j];
+      root.col(j) *=
+          value > kSingular * of_H.eigenvalues()[2] ? 1 / std::sqrt(value) : 0;
+    }
+    for (size_t n = 0; n < rows_.size(); ++n) {
+      const uint64_t e = elements_[n];
+      const Eigen::Matrix<double, 2, 3> B = rows_[n].J * root;
+      const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
+      of_R.computeDirect(R);
+      ObservationNoise& noise = all_.observations_[e];
+      noise = {};
+      noise.error_px = rows_[n].error;
+      if (!all_.relative_sigmas_.empty()) {
+        noise.error_px *= all_.relative_sigmas_[e];
+      }
+      double sum = 0;
+      for (int j = 0; j < 2; ++j) {
+        const double r = std::clamp(of_R.eigenvalues()[j], 0.0, 1.0);
+        noise.redundancy[j] = r;
+        if (r < kControlled) continue;
+        ++noise.num_controlled;
+        const double along = of_R.eigenvectors().col(j).dot(rows_[n].error);
+        sum += along * along / r;
+      }
+      all_.squared_errors_[e] = sum;
+    }
+    all_.points_[k_] << X_.head<3>() * unit_ + X_[3] * origin_, X_[3];
+  }
+
+  TrackNoise& all_;
+  const int64_t k_;
+  std::vector<uint64_t> elements_;
+  std::vector<Row> rows_;
+  Vector3d origin_ = Vector3d::Zero();
+  double unit_ = 1;
+  Vector4d X_ = Vector4d::Zero();
+  double cost_ = 0;
+};
+
+TrackNoise::TrackNoise(const Model& model,
+                       const std::vector<double>& relative_sigmas)
+    : model_(model),
+      relative_sigmas_(relative_sigmas),
+      takes_part_(model.track_elements.size(), 0),
+      observations_(model.track_elements.size()),
+      squared_errors_(model.track_elements.size(), 0),
+      points_(model.points3D.size(), Vector4d::Zero()) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  for (size_t n = 0; n < geometries.size(); ++n) {
+    View view;
+    if (geometries[n].has_pose) {
+      view.camera = &model.cameras[geometries[n].camera];
+      view.image = &model.images[n];
+      view.cam_from_world_rotation = geometries[n].cam_from_world.rotation;
+      view.center = Center(geometries[n].cam_from_world);
+    }
+    views_.push_back(view);
+  }
+  const auto image_indices = ImageIndices(model);
+  for (size_t e = 0; e < model.track_elements.size(); ++e) {
+    image_of_.push_back(image_indices.at(model.track_elements[e].image_id));
+    takes_part_[e] = views_[image_of_[e]].camera != nullptr;
+    observations_[e] = NotTested(kNaN);
+  }
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    point_of_.insert(point_of_.end(), point.track_end - point.track_begin,
+                     static_cast<int32_t>(k));
+  }
+}
+
+void TrackNoise::Fit(int64_t k) { Track(this, k).Run(); }
+
+void TrackNoise::Remove(uint64_t e) {
+  takes_part_[e] = 0;
+  observations_[e] = NotTested(kNaN);
+}
+
+Vector2d TrackNoise::ErrorOf(uint64_t e) const {
+  const Vector4d& X = points_[point_of_[e]];
+  const View& view = views_[image_of_[e]];
+  const Point2D& pixel =
+      view.image->points2D[model_.track_elements[e].point2D_idx];
+  return ProjectionError(
+             view.camera->model_id, view.camera->params.data(),
+             {pixel.x, pixel.y},
+             view.cam_from_world_rotation * (X.head<3>() - X[3] * view.center))
+      .value_or(Vector2d::Constant(kNaN));
+}
+
+Vector3d TrackNoise::Point(int64_t k) const {
+  const Vector4d& X = points_[k];
+  const Vector3d xyz = X.head<3>() / X[3];
+  return X[3] > 0 && xyz.allFinite() ? xyz : model_.points3D[k].xyz;
+}
+
+}  // namespace krot
