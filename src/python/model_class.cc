@@ -11,6 +11,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include "krot/analysis/noise.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/analysis/settle_contradictions.h"
 #include "krot/geometry/transform.h"
@@ -164,6 +165,32 @@ py::tuple Observations(const Model& model) {
   return py::make_tuple(pixels, images, points);
 }
 
+// EstimateNoise; what is of observations in the order of observations().
+py::dict Noise(const Model& model, double false_alarm,
+               std::vector<double> relative_sigmas) {
+  const ModelNoise noise =
+      EstimateNoise(model, {false_alarm, std::move(relative_sigmas)}, {});
+  const auto count = static_cast<py::ssize_t>(noise.observations.size());
+  py::array_t<double> w(count), errors_px({count, py::ssize_t{2}}),
+      redundancy({count, py::ssize_t{2}});
+  for (py::ssize_t e = 0; e < count; ++e) {
+    const ObservationNoise& one = noise.observations[e];
+    w.mutable_at(e) = one.w;
+    for (py::ssize_t j = 0; j < 2; ++j) {
+      errors_px.mutable_at(e, j) = one.error_px[j];
+      redundancy.mutable_at(e, j) = one.redundancy[j];
+    }
+  }
+  py::dict result;
+  result["sigma_px"] = noise.sigma_px;
+  result["cauchy_scale_px"] = noise.cauchy_scale_px;
+  result["critical_w"] = noise.critical_w;
+  result["w"] = w;
+  result["errors_px"] = errors_px;
+  result["redundancy"] = redundancy;
+  return result;
+}
+
 }  // namespace
 
 void BindModel(py::module_* module) {
@@ -198,7 +225,9 @@ void BindModel(py::module_* module) {
       .def("pixel_errors", [](const Model& model) {
         const std::vector<double> errors = PixelErrors(model);
         return Collect(errors, [](double error) { return error; });
-      });
+      })
+      .def("noise", &Noise, py::kw_only(), py::arg("false_alarm") = 0.05,
+           py::arg("relative_sigmas") = std::vector<double>());
 }
 
 }  // namespace krot

@@ -148,6 +148,21 @@ def test_errors_are_those_of_an_own_projection():
     np.testing.assert_allclose(model.pixel_errors(), expected, atol=1e-9)
 
 
+def test_noise_is_that_of_the_scene(scene):
+    model = pykrot.solve(pykrot.Model.read(scene)).model
+    noise = model.noise()
+    assert 0.4 < noise["sigma_px"] < 0.8
+    assert (noise["w"] > noise["critical_w"]).sum() == 0
+    images = model.observations()[1]
+    assert noise["w"].shape == images.shape
+    assert noise["redundancy"].min() >= 0
+    assert noise["redundancy"].max() <= 1
+    alike = model.noise(relative_sigmas=np.full(images.shape, 2.0))
+    np.testing.assert_allclose(2 * alike["sigma_px"], noise["sigma_px"])
+    with pytest.raises(ValueError, match="false_alarm = 2"):
+        model.noise(false_alarm=2)
+
+
 def test_a_certificate_of_another_model_is_refused(scene):
     problem, _ = random_problem()
     certificate = pykrot.solve(problem).certificate

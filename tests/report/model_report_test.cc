@@ -50,6 +50,47 @@ TEST(AnalyzeModel, SplitsTheErrorsByImageAndByCamera) {
   EXPECT_EQ(report.cameras[0].errors.max, report.pixel_error.max);
 }
 
+TEST(AnalyzeModel, CountsWhatTheNoiseDoesNotExplainAndWhatNothingChecks) {
+  SceneOptions options = SceneWithRepeatedImages();
+  options.num_points = 1000;
+  options.duplicate_ratio = 0;
+  options.outlier_ratio = 0.02;
+  options.track_length = 3;
+  const Model model = SynthesizeScene(options).ground_truth;
+  const NoiseFigures noise = AnalyzeModel(model, 0).noise;
+  EXPECT_NEAR(*noise.sigma_px, 0.5, 0.05);
+  const ModelNoise whole = EstimateNoise(model, {}, {});
+  int64_t num_above = 0, num_half = 0;
+  for (const ObservationNoise& one : whole.observations) {
+    num_above += one.w > noise.critical_w;
+    num_half += one.num_controlled == 1;
+  }
+  EXPECT_GT(num_above, 10);
+  EXPECT_EQ(noise.num_above, num_above);
+  EXPECT_EQ(noise.num_half_controlled, num_half);
+  EXPECT_GE(num_half, 2 * TrackLengthHistogram(model).at(2));
+  for (const NoiseFigures::Quantile& one : noise.quantiles) {
+    const int64_t num_up_to =
+        std::count_if(whole.observations.begin(), whole.observations.end(),
+                      [&](const ObservationNoise& o) { return o.w <= one.w; });
+    const double share = one.share * static_cast<double>(noise.num_tested);
+    EXPECT_GE(static_cast<double>(num_up_to), share);
+    EXPECT_LT(static_cast<double>(num_up_to), share + 1);
+  }
+  EXPECT_THAT(ModelTable(AnalyzeModel(model, 0), 0),
+              HasSubstr(std::to_string(num_above) + " of " +
+                        std::to_string(noise.num_tested) +
+                        " observations are more than that noise explains"));
+}
+
+TEST(ModelTable, SaysWhereNoNoiseCanBeTold) {
+  const ModelReport report = AnalyzeModel(Model(), 0);
+  EXPECT_THAT(ModelTable(report, 0), HasSubstr("cannot be told"));
+  EXPECT_TRUE(
+      nlohmann::json::parse(ModelJson(report, "1.2.3"))["noise"]["sigma_px"]
+          .is_null());
+}
+
 TEST(ModelTable, ShowsTheWorstImageFirst) {
   const ModelReport report =
       AnalyzeModel(SynthesizeScene(SceneWithRepeatedImages()).model, 3);

@@ -75,7 +75,8 @@ void CollectObservations(const Model& model, int min_track_length,
                                         SensorBlock(geometry, sensor_offsets),
                                         geometry.camera,
                                         static_cast<int32_t>(k),
-                                        {pixel.x, pixel.y}});
+                                        {pixel.x, pixel.y},
+                                        e});
         images_of_point.push_back(n);
       }
     }

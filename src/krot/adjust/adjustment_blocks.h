@@ -29,6 +29,7 @@ struct AdjustmentObservation {
   int32_t camera = -1;  // in cameras
   int32_t point = -1;   // in points
   Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
+  uint64_t element = 0;  // in Model::track_elements
 };
 
 // The unknowns of bundle adjustment as flat blocks of doubles, in the order of

@@ -17,12 +17,14 @@ Json ColmapJson(const ColmapStatistics& colmap) {
           {"mean_reprojection_error", colmap.mean_reprojection_error}};
 }
 
-Json ImageErrorsJson(const std::vector<ImageErrors>& images) {
+Json ImageErrorsJson(const ModelReport& report) {
   Json json = Json::array();
-  for (const ImageErrors& image : images) {
+  for (size_t n = 0; n < report.images.size(); ++n) {
+    const ImageErrors& image = report.images[n];
     json.push_back({{"image_id", image.image_id},
                     {"image_name", image.image_name},
-                    {"pixel_error", CountedErrorJson(image.errors)}});
+                    {"pixel_error", CountedErrorJson(image.errors)},
+                    {"num_above", report.noise.num_above_by_image[n]}});
   }
   return json;
 }
@@ -49,6 +51,25 @@ Json WorstJson(const std::vector<WorstObservation>& worst) {
   return json;
 }
 
+Json NoiseJson(const NoiseFigures& noise) {
+  Json quantiles = Json::array();
+  for (const NoiseFigures::Quantile& one : noise.quantiles) {
+    quantiles.push_back(
+        {{"share", one.share}, {"w", one.w}, {"gaussian_w", one.gaussian_w}});
+  }
+  const auto if_known = [&](double value) {
+    return noise.sigma_px ? Json(value) : Json();
+  };
+  return {{"sigma_px", NumberOrNull(noise.sigma_px)},
+          {"cauchy_scale_px", NumberOrNull(noise.cauchy_scale_px)},
+          {"critical_w", if_known(noise.critical_w)},
+          {"num_tested", noise.num_tested},
+          {"num_above", noise.num_above},
+          {"num_half_controlled", noise.num_half_controlled},
+          {"num_uncontrolled", noise.num_uncontrolled},
+          {"w", quantiles}};
+}
+
 Json TrackLengthsJson(const std::map<int64_t, int64_t>& track_lengths) {
   Json json = Json::array();
   for (const auto& [length, num_points] : track_lengths) {
@@ -70,8 +91,9 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
       {"poses", PosesJson(report.poses)},
       {"pixel_error", CountedErrorJson(report.pixel_error)},
       {"cameras", CamerasJson(report.cameras)},
-      {"images", ImageErrorsJson(report.images)},
+      {"images", ImageErrorsJson(report)},
       {"worst", WorstJson(report.worst)},
+      {"noise", NoiseJson(report.noise)},
       {"track_lengths", TrackLengthsJson(report.track_lengths)},
       {"num_tracks_with_repeated_image", report.num_tracks_with_repeated_image},
       {"depth",

@@ -1,7 +1,10 @@
 #include "krot/report/model_report.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
+
+#include "krot/model/image_geometry.h"
 
 namespace krot {
 namespace {
@@ -14,6 +17,35 @@ bool RepeatsAnImage(const Model& model, const Point3D& point) {
   return false;
 }
 
+NoiseFigures FiguresOf(const Model& model, const ModelNoise& noise) {
+  NoiseFigures figures;
+  figures.sigma_px = noise.sigma_px;
+  figures.cauchy_scale_px = noise.cauchy_scale_px;
+  figures.critical_w = noise.critical_w;
+  figures.num_tested = noise.num_tested;
+  figures.num_above = noise.num_above;
+  figures.num_above_by_image.assign(model.images.size(), 0);
+  const auto image_of = ImageIndices(model);
+  for (size_t e = 0; e < model.track_elements.size(); ++e) {
+    figures.num_above_by_image[image_of.at(model.track_elements[e].image_id)] +=
+        noise.observations[e].w > noise.critical_w;
+  }
+  std::vector<double> w;
+  for (const ObservationNoise& one : noise.observations) {
+    figures.num_half_controlled += one.num_controlled == 1;
+    figures.num_uncontrolled += one.num_controlled == 0;
+    if (one.num_controlled > 0) w.push_back(one.w);
+  }
+  if (w.empty()) return figures;
+  std::sort(w.begin(), w.end());
+  for (const double share : {0.5, 0.9, 0.99, 0.999}) {
+    const double rank = std::ceil(share * static_cast<double>(w.size()));
+    figures.quantiles.push_back({share, w[static_cast<size_t>(rank) - 1],
+                                 std::sqrt(-2 * std::log1p(-share))});
+  }
+  return figures;
+}
+
 }  // namespace
 
 ModelReport AnalyzeModel(const Model& model, int num_worst, int num_threads) {
@@ -24,6 +56,9 @@ ModelReport AnalyzeModel(const Model& model, int num_worst, int num_threads) {
   report.images = ErrorsByImage(model, errors_px);
   report.cameras = ErrorsByCamera(model, errors_px);
   report.worst = WorstObservations(model, errors_px, num_worst);
+  Context context;
+  context.num_threads = num_threads;
+  report.noise = FiguresOf(model, EstimateNoise(model, {}, context));
   report.track_lengths = TrackLengthHistogram(model);
   report.num_tracks_with_repeated_image = std::count_if(
       model.points3D.begin(), model.points3D.end(),

@@ -2,17 +2,39 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "krot/analysis/geometry_statistics.h"
 #include "krot/analysis/model_statistics.h"
+#include "krot/analysis/noise.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/model.h"
 #include "krot/model/pose_checks.h"
 
 namespace krot {
+
+// What EstimateNoise says, in figures; of none where nothing can be told.
+struct NoiseFigures {
+  struct Quantile {
+    double share = 0;  // of the tested observations, that w is not above
+    double w = 0;
+    double gaussian_w = 0;  // the same of Gaussian noise
+  };
+
+  std::optional<double> sigma_px;
+  std::optional<double> cauchy_scale_px;
+  double critical_w = 0;
+  int64_t num_tested = 0;
+  int64_t num_above = 0;
+  // Observations whose error would not show in one direction, or in any.
+  int64_t num_half_controlled = 0;
+  int64_t num_uncontrolled = 0;
+  std::vector<Quantile> quantiles;
+  std::vector<int64_t> num_above_by_image;  // as Model::images
+};
 
 // What a model's errors, tracks and depths look like: `krot model_analyzer`.
 struct ModelReport {
@@ -23,6 +45,7 @@ struct ModelReport {
   std::vector<ImageErrors> images;
   std::vector<CameraErrors> cameras;
   std::vector<WorstObservation> worst;
+  NoiseFigures noise;
   std::map<int64_t, int64_t> track_lengths;  // length -> points
   // Tracks that hold two or more observations of one image.
   int64_t num_tracks_with_repeated_image = 0;

@@ -97,6 +97,46 @@ std::string WorstTable(const std::vector<WorstObservation>& worst) {
   return "\nWorst observations, pixels\n" + table.ToString();
 }
 
+std::string NoiseTable(const NoiseFigures& noise) {
+  std::string text =
+      "\nNoise, with every point at the least squares of its track\n";
+  if (!noise.sigma_px) {
+    return text +
+           "  cannot be told: no observation is checked by another one.\n";
+  }
+  TextTable table;
+  std::vector<std::string> head = {"w, of so many observations at most"};
+  std::vector<std::string> own = {"this model"};
+  std::vector<std::string> gaussian = {"Gaussian noise"};
+  for (const NoiseFigures::Quantile& one : noise.quantiles) {
+    std::ostringstream share;
+    share << 100 * one.share << " %";
+    head.push_back(share.str());
+    own.push_back(FormatNumber(one.w, 2));
+    gaussian.push_back(FormatNumber(one.gaussian_w, 2));
+  }
+  table.AddRow(head);
+  table.AddRow(own);
+  table.AddRow(gaussian);
+  text += "  " + FormatNumber(*noise.sigma_px, 3) +
+          " pixels per axis (robust standard deviation); w is an error over "
+          "what such noise makes of it.\n" +
+          table.ToString() + std::to_string(noise.num_above) + " of " +
+          std::to_string(noise.num_tested) +
+          " observations are more than that noise explains (w above " +
+          FormatNumber(noise.critical_w, 2) + ")";
+  text += noise.num_above > 0 ? "; krot outlier_filter removes such.\n" : ".\n";
+  if (noise.cauchy_scale_px) {
+    text +=
+        "Its tails are heavier than Gaussian: a Cauchy loss with a scale of " +
+        FormatNumber(*noise.cauchy_scale_px, 3) + " pixels suits them.\n";
+  }
+  return text + "An error in one direction would not show in " +
+         std::to_string(noise.num_half_controlled) +
+         " observations, in any direction in " +
+         std::to_string(noise.num_uncontrolled) + ".\n";
+}
+
 // The lengths up to kLongest one by one, the rest together.
 std::string TrackTable(const ModelReport& report) {
   constexpr int64_t kLongest = 10;
@@ -143,7 +183,7 @@ std::string ModelTable(const ModelReport& report, int max_rows) {
   return ColmapFigures(report.colmap) + OverallErrors(report) +
          CameraErrorTable(report.cameras, num_rows) +
          ImageErrorTable(report.images, num_rows) + WorstTable(report.worst) +
-         TrackTable(report) + GeometryTable(report);
+         NoiseTable(report.noise) + TrackTable(report) + GeometryTable(report);
 }
 
 std::string ModelCsv(const ModelReport& report) {

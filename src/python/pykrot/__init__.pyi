@@ -53,6 +53,10 @@ class Model:
     def observations(self) -> Tuple[NDArray[np.float64], NDArray[np.int64],
                                     NDArray[np.int64]]: ...
     def pixel_errors(self) -> NDArray[np.float64]: ...
+    # sigma_px, cauchy_scale_px, critical_w, and of every observation w,
+    # errors_px and redundancy.
+    def noise(self, *, false_alarm: float = 0.05,
+              relative_sigmas: Sequence[float] = ...) -> Dict[str, Any]: ...
 
 @dataclass
 class Problem:
