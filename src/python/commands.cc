@@ -141,6 +141,7 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
   KnownFiles known;
   known.AddRotationsTo(&table);
   AssignKeywords(keywords, &table);
+  ResolveOutlierFilterOptions(table, false, &options);
   OutlierReport report;
   const ConstModelPointer input = known.WithRotations(model, &report.run);
   Follow(progress, &options.solve);

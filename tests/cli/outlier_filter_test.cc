@@ -176,7 +176,8 @@ TEST_F(OutlierFilterCommand, DoubtsMoreThanObservationsWhereAllErrorsAreLarge) {
     SceneOptions options = SmallScene();
     options.pixel_noise = pixel_noise;
     Save(SynthesizeScene(options).model, folder_ / "input");
-    const KrotResult result = WithoutABound({});
+    const KrotResult result =
+        WithoutABound({"--OutlierFilter.method", "conflicts"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_EQ(
         result.out.find("rotations, intrinsics or matches may be wrong") !=
@@ -274,20 +275,40 @@ TEST_F(OutlierFilterCommand, LeavesTwinsOfAnImageToTheEnd) {
   EXPECT_GE(closest_removed, kept_proved);
 }
 
-TEST_F(OutlierFilterCommand, RefusesToFilterWithoutABoundOrAProfile) {
-  const KrotResult result =
-      RunKrot({"outlier_filter", "--input_path", folder_ / "input",
-               "--output_path", folder_ / "output"});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("--OutlierFilter.max_error is required"));
-}
-
 TEST_F(OutlierFilterCommand, RefusesABoundThatIsNoPositiveNumber) {
   EXPECT_EQ(RunKrot({"outlier_filter", "--input_path", folder_ / "input",
                      "--output_path", folder_ / "output",
                      "--OutlierFilter.max_error", "0"})
                 .exit_code,
             1);
+}
+
+TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
+  const std::vector<std::string> arguments = {
+      "outlier_filter",   "--input_path",     folder_ / "input",
+      "--output_path",    folder_ / "output", "--report_path",
+      folder_ / "r.json", "--outliers_path",  folder_ / "o.csv",
+      "--html_path",      folder_ / "r.html"};
+  const KrotResult result = RunKrot(arguments);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("is more than noise of "));
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(report["method"], "snooping");
+  EXPECT_TRUE(report["max_error"].is_null());
+  EXPECT_TRUE(report["num_must_go"].is_null());
+  EXPECT_GT(report["num_removed"], 0);
+  for (const Json& removed : report["removed"]) {
+    EXPECT_TRUE(removed["w"].is_number() || removed["w"].is_null());
+  }
+  EXPECT_LE(report["pixel_error"]["after"]["rms"],
+            report["snooping"]["kept_error_before"]["rms"]);
+  EXPECT_EQ(WithoutABound({"--OutlierFilter.method", "threshold"}).exit_code,
+            1);
+  EXPECT_EQ(WithoutABound({"--OutlierFilter.method", "snooping",
+                           "--conflicts_path", folder_ / "c.json"})
+                .exit_code,
+            1);
+  EXPECT_EQ(Filter({"--OutlierFilter.method", "snooping"}).exit_code, 1);
 }
 
 }  // namespace

@@ -192,5 +192,91 @@ TEST(FilterOutliers, ChangesNoObservationWhereEverythingFits) {
             scene.model.track_elements.size());
 }
 
+OutlierFilterOptions Snooping() {
+  OutlierFilterOptions options;
+  options.method = OutlierMethod::kSnooping;
+  return options;
+}
+
+double SumOfSquares(const Model& model) {
+  double sum = 0;
+  for (const double error : PixelErrors(model)) sum += error * error;
+  return sum;
+}
+
+TEST(FilterOutliers, BySnoopingFindsPlantedOutliersAndNeedsNoBound) {
+  for (const uint64_t seed : {1u, 2u, 3u}) {
+    const SyntheticScene scene = MakeOutlierScene(seed, 0.03, 200);
+    const OutlierFilterResult result =
+        FilterOutliers(scene.model, Snooping(), {});
+    ValidateModel(result.model);
+    std::set<std::pair<ImageId, uint32_t>> removed;
+    for (const RemovedObservation& o : result.summary.removed) {
+      removed.emplace(o.image_id, o.point2D_idx);
+      EXPECT_GT(*o.w, result.summary.snooping->critical_w * 0.5);
+    }
+    int num_found = 0;
+    for (const int64_t e : scene.outliers) {
+      const TrackElement& element = scene.model.track_elements[e];
+      num_found += removed.count({element.image_id, element.point2D_idx}) > 0;
+    }
+    const auto num_planted = static_cast<double>(scene.outliers.size());
+    EXPECT_GE(num_found, 0.9 * num_planted);
+    EXPECT_LE(static_cast<double>(removed.size()), 1.4 * num_planted);
+    const SnoopingSummary& summary = *result.summary.snooping;
+    EXPECT_NEAR(*summary.sigma_px, 0.5, 0.1);
+    EXPECT_LE(result.summary.pixel_error_after.rms,
+              summary.kept_error_before.rms);
+    EXPECT_EQ(result.summary.pixel_error_after.count,
+              summary.kept_error_before.count);
+  }
+}
+
+TEST(FilterOutliers, BySnoopingEndsAtTheLeastSquares) {
+  const SyntheticScene scene = MakeOutlierScene(4, 0.03, 200);
+  const OutlierFilterResult result =
+      FilterOutliers(scene.model, Snooping(), {});
+  ASSERT_FALSE(result.summary.removed.empty());
+  // No small change of a centre or a point lowers the sum of squares.
+  const double cost = SumOfSquares(result.model);
+  for (const double step : {1e-3, -1e-3}) {
+    for (int c = 0; c < 3; ++c) {
+      Model moved = result.model;
+      moved.frames[1].rig_from_world.translation[c] += step;
+      EXPECT_GT(SumOfSquares(moved), cost);
+      moved = result.model;
+      moved.points3D[5].xyz[c] += step;
+      EXPECT_GT(SumOfSquares(moved), cost);
+    }
+  }
+  for (size_t n = 0; n < scene.model.frames.size(); ++n) {
+    EXPECT_EQ(result.model.frames[n].rig_from_world.quaternion_wxyz,
+              scene.model.frames[n].rig_from_world.quaternion_wxyz);
+  }
+}
+
+TEST(FilterOutliers, BySnoopingGivesBackWhatNoiseExplains) {
+  const SyntheticScene scene = MakeOutlierScene(5, 0, 200);
+  const OutlierFilterResult result =
+      FilterOutliers(scene.model, Snooping(), {});
+  ASSERT_TRUE(result.summary.removed.empty());
+  for (size_t k = 0; k < scene.model.points3D.size(); ++k) {
+    EXPECT_EQ(result.model.points3D[k].xyz, scene.model.points3D[k].xyz);
+  }
+}
+
+TEST(FilterOutliers, BySnoopingHasTheSameBitsAtAnyNumberOfThreads) {
+  const SyntheticScene scene = MakeOutlierScene(6, 0.03, 200);
+  Context one, four;
+  one.num_threads = 1;
+  four.num_threads = 4;
+  const Model a = FilterOutliers(scene.model, Snooping(), one).model;
+  const Model b = FilterOutliers(scene.model, Snooping(), four).model;
+  ASSERT_EQ(a.points3D.size(), b.points3D.size());
+  for (size_t k = 0; k < a.points3D.size(); ++k) {
+    EXPECT_EQ(a.points3D[k].xyz, b.points3D[k].xyz);
+  }
+}
+
 }  // namespace
 }  // namespace krot

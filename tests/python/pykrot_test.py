@@ -163,6 +163,11 @@ def test_noise_is_that_of_the_scene(scene):
         model.noise(false_alarm=2)
 
 
+def test_a_filter_without_a_bound_knows_the_noise(scene):
+    model = pykrot.solve(pykrot.Model.read(scene)).model
+    assert pykrot.filter(model).report["method"] == "snooping"
+
+
 def test_a_certificate_of_another_model_is_refused(scene):
     problem, _ = random_problem()
     certificate = pykrot.solve(problem).certificate

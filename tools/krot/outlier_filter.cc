@@ -64,16 +64,17 @@ void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
       &command->common, parser);
 }
 
-void CheckPairs(const OutlierCommand& command, const OptionParser& parser) {
-  if (command.options.method == OutlierMethod::kThreshold) {
+void CheckPairs(const OptionParser& parser, OutlierCommand* resolved) {
+  ResolveOutlierFilterOptions(
+      parser,
+      !resolved->profile_path.empty() || !resolved->conflicts_path.empty(),
+      &resolved->options);
+  const OutlierCommand& command = *resolved;
+  if (command.options.method != OutlierMethod::kConflicts) {
     for (const char* name : {"conflicts_path", "OutlierFilter.profile_path"}) {
-      parser.Refuse(
-          name, "with --OutlierFilter.method threshold, which proves nothing");
-    }
-    if (!command.options.max_error) {
-      throw OptionError(
-          "--OutlierFilter.max_error is required with "
-          "--OutlierFilter.method threshold");
+      parser.Refuse(name, "with --OutlierFilter.method " +
+                              OutlierMethodName(command.options.method) +
+                              ", which proves nothing");
     }
   }
   if (command.paths.html_path.empty()) {
@@ -170,6 +171,14 @@ int Run(const OutlierCommand& command) {
   OutlierFilterResult result = Filter(command, model);
   DeferInterrupts();
   report.summary = std::move(result.summary);
+  if (report.summary.snooping && !report.summary.snooping->sigma_px) {
+    throw CommandError(
+        kExitNothingToSolve,
+        "nothing to solve: no observation is checked by another one, so that "
+        "noise cannot be told from error; where the model has no positions, "
+        "krot solver makes them, and --OutlierFilter.max_error PX filters "
+        "without");
+  }
   if (result.model.track_elements.empty()) {
     throw CommandError(kExitNothingToSolve,
                        "nothing to solve: no track keeps two observations");
@@ -203,15 +212,16 @@ int Run(const OutlierCommand& command) {
 int RunOutlierFilter(const std::vector<std::string>& arguments) {
   OutlierCommand command;
   OptionParser parser("outlier_filter",
-                      "removes few observations of a COLMAP model so that all "
-                      "others are within a bound, and proves how many must go; "
-                      "rotations, intrinsics and the coordinate frame stay");
+                      "removes the observations of a COLMAP model that noise "
+                      "does not explain, or few so that all others are within "
+                      "a bound, and proves how many must go; rotations, "
+                      "intrinsics and the coordinate frame stay");
   AddOutlierOptions(&command, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;
   }
-  CheckPairs(command, parser);
+  CheckPairs(parser, &command);
   return Run(command);
 }
 

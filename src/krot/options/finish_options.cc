@@ -17,16 +17,7 @@ void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
                  Above(0.0, "relative to the lowest maximum"),
                  "With finish least_squares: how far above the lowest maximum "
                  "an error may be");
-  table->AddNamed<ErrorLoss::Kind>(
-      "Solver.finish_loss", &finish->loss.kind,
-      {{LossName(ErrorLoss::Kind::kTrivial), ErrorLoss::Kind::kTrivial},
-       {LossName(ErrorLoss::Kind::kHuber), ErrorLoss::Kind::kHuber},
-       {LossName(ErrorLoss::Kind::kCauchy), ErrorLoss::Kind::kCauchy}},
-      "With finish least_squares: what is summed of the squared errors; huber "
-      "and cauchy count large ones less");
-  table->AddReal("Solver.finish_loss_scale", &finish->loss.scale,
-                 Above(0.0, "pixels"),
-                 "With finish_loss huber or cauchy: which errors are large");
+  AddFinishLoss(options, table);
   table->AddNamed<Polish>(
       "Solver.polish", &options->polish,
       {{PolishName(Polish::kNone), Polish::kNone},
@@ -35,6 +26,26 @@ void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
       "A least squares step at the end, after which the maximum is no longer "
       "the lowest: rotations_fixed: translations and points; full: as "
       "bundle_adjuster");
+}
+
+void AddFinishLoss(SolveModelOptions* options, OptionTable* table) {
+  ErrorLoss* loss = &options->finish.loss;
+  table->AddNamed<ErrorLoss::Kind>(
+      "Solver.finish_loss", &loss->kind,
+      {{LossName(ErrorLoss::Kind::kTrivial), ErrorLoss::Kind::kTrivial},
+       {LossName(ErrorLoss::Kind::kHuber), ErrorLoss::Kind::kHuber},
+       {LossName(ErrorLoss::Kind::kCauchy), ErrorLoss::Kind::kCauchy}},
+      "What the least squares sum of the squared errors; huber and cauchy "
+      "count large ones less");
+  table->AddReal("Solver.finish_loss_scale", &loss->scale, Above(0.0, "pixels"),
+                 "With finish_loss huber or cauchy: which errors are large");
+}
+
+void CheckFinishLoss(const SolveModelOptions& options,
+                     const OptionTable& table) {
+  if (options.finish.loss.kind != ErrorLoss::Kind::kTrivial) return;
+  table.Refuse("Solver.finish_loss_scale",
+               "without --Solver.finish_loss huber or cauchy");
 }
 
 void CheckFinishOptions(const SolveModelOptions& options,
@@ -46,10 +57,7 @@ void CheckFinishOptions(const SolveModelOptions& options,
       table.Refuse(name, "without --Solver.finish least_squares");
     }
   }
-  if (options.finish.loss.kind == ErrorLoss::Kind::kTrivial) {
-    table.Refuse("Solver.finish_loss_scale",
-                 "without --Solver.finish_loss huber or cauchy");
-  }
+  CheckFinishLoss(options, table);
   if (EffectiveMethod(options) == SolveMethod::kAuto) return;
   for (const char* name : {"Solver.finish", "Solver.finish_slack",
                            "Solver.finish_loss", "Solver.finish_loss_scale"}) {

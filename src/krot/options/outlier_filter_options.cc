@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "krot/options/finish_options.h"
+#include "krot/options/option_error.h"
 #include "krot/options/solve_options.h"
 
 namespace krot {
@@ -9,9 +11,8 @@ namespace krot {
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
   table->Add({"OutlierFilter.max_error",
-              "The bound that all errors are to be within; without it what the "
-              "model's own noise explains, and nothing is removed where it is "
-              "not proved that some errors are above that",
+              "The bound that all errors are to be within; without it, what "
+              "noise does not explain is removed",
               "a number > 0, pixels", "", false,
               [options](const std::string& text) {
                 double value = 0;
@@ -22,10 +23,13 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
   table->AddNamed<OutlierMethod>(
       "OutlierFilter.method", &options->method,
       {{"conflicts", OutlierMethod::kConflicts},
-       {"threshold", OutlierMethod::kThreshold}},
+       {"threshold", OutlierMethod::kThreshold},
+       {"snooping", OutlierMethod::kSnooping}},
       "conflicts: few, by the least sum of excesses, and a proof of how many "
       "must go; threshold: what is above the bound, solve, and again, to "
-      "compare with");
+      "compare with; snooping, the default without max_error, profile_path "
+      "and conflicts_path: what noise does not explain, then least squares");
+  AddFinishLoss(&options->solve, table);
   table->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
                  Above(0.0),
                  "How far the largest error of what is left may be above the "
@@ -33,6 +37,26 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
   AddSameImage(&options->solve.problem, table);
   table->AddThreads("Solver.num_threads", &context->num_threads,
                     "the result is the same, bit by bit");
+}
+
+void ResolveOutlierFilterOptions(const OptionTable& table, bool needs_conflicts,
+                                 OutlierFilterOptions* options) {
+  if (!options->max_error && !needs_conflicts &&
+      !table.IsGiven("OutlierFilter.method")) {
+    options->method = OutlierMethod::kSnooping;
+  }
+  if (options->method == OutlierMethod::kSnooping) {
+    for (const char* name : {"OutlierFilter.max_error", "Solver.relative_gap",
+                             "Problem.same_image"}) {
+      table.Refuse(name, "with --OutlierFilter.method snooping");
+    }
+  }
+  if (options->method == OutlierMethod::kThreshold && !options->max_error) {
+    throw OptionError(
+        "--OutlierFilter.max_error is required with --OutlierFilter.method "
+        "threshold");
+  }
+  CheckFinishLoss(options->solve, table);
 }
 
 }  // namespace krot

@@ -9,4 +9,10 @@ namespace krot {
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table);
 
+// To be called after they are set: the method where none is given, which is
+// conflicts with a bound or if something is asked for that needs them. Throws
+// OptionError for options that would have no effect, or lack another.
+void ResolveOutlierFilterOptions(const OptionTable& table, bool needs_conflicts,
+                                 OutlierFilterOptions* options);
+
 }  // namespace krot

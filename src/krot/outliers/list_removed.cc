@@ -38,7 +38,8 @@ std::vector<RemovedObservation> ListRemoved(
     const Model& model, const Model& kept,
     const std::vector<double>& errors_before,
     const std::vector<char>& is_removed,
-    const std::vector<int64_t>& conflict_of, const Context& context) {
+    const std::vector<int64_t>& conflict_of, const Context& context,
+    const std::vector<double>& w) {
   std::vector<RemovedObservation> list;
   const std::vector<double> errors_after = ErrorsAfter(model, kept, context);
   const auto image_of = ImageIndices(model);
@@ -54,6 +55,7 @@ std::vector<RemovedObservation> ListRemoved(
       removed.error_before_px = errors_before[e];
       removed.error_after_px = errors_after[e];
       if (conflict_of[e] >= 0) removed.conflict = conflict_of[e];
+      if (!w.empty()) removed.w = w[e];
       list.push_back(std::move(removed));
     }
   }

@@ -14,6 +14,7 @@
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/removal_start.h"
+#include "krot/outliers/snooping_filter.h"
 #include "krot/outliers/suspects.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
@@ -326,10 +327,13 @@ OutlierFilterResult FilterOutliers(const Model& model,
   CheckArgument(!options.solve.problem.fixed.Any(), "solve.problem.fixed",
                 "something", "empty: everything moves");
   CheckArgument(
-      options.max_error || options.method == OutlierMethod::kConflicts,
+      options.max_error || options.method != OutlierMethod::kThreshold,
       "max_error", "none", "given with this method");
   OutlierFilterResult result =
       InLocalFrame(LocalFrame(model), model, [&](const Model& local) {
+        if (options.method == OutlierMethod::kSnooping) {
+          return FilterBySnooping(local, options, context);
+        }
         return OutlierFilter(local, options, context).Run();
       });
   const bool is_given_back =

@@ -23,6 +23,7 @@ namespace krot {
 enum class OutlierMethod {
   kConflicts,  // few, and a proof of how many at least
   kThreshold,  // what is above the bound, solve, again: to compare with
+  kSnooping,   // no bound: what noise does not explain (krot/analysis/noise.h)
 };
 
 struct OutlierFilterOptions {
@@ -54,6 +55,7 @@ struct RemovedObservation {
   // point went.
   double error_after_px = 0;
   std::optional<int64_t> conflict;  // that it is in, from 0
+  std::optional<double> w;  // kSnooping: as it was removed; infinite: not seen
 };
 
 // A track or an image that removed observations or conflicts gather in.
@@ -90,6 +92,19 @@ struct NoiseSummary {
   bool ExplainsAll() const { return !(lower_bound > limit.max_error); }
 };
 
+// kSnooping, in numbers.
+struct SnoopingSummary {
+  // Before the first removal and at the end, pixels; none: no observation is
+  // checked by another one, and nothing was done.
+  std::optional<double> sigma_before_px;
+  std::optional<double> sigma_px;
+  double critical_w = 0;  // at the end
+  int64_t num_tested = 0;
+  int num_rounds = 0;  // of removals with the cameras as they stand
+  // In the input, of the observations that are kept.
+  PixelErrorStatistics kept_error_before;
+};
+
 struct OutlierFilterSummary {
   OutlierMethod method = OutlierMethod::kConflicts;
   // True pixels; 0: there is none, as noise explains all errors.
@@ -121,6 +136,7 @@ struct OutlierFilterSummary {
   // Whether all errors of the result are within the bound, if there is one.
   bool is_within = false;
   std::optional<ErrorProfileSummary> profile;  // if asked for
+  std::optional<SnoopingSummary> snooping;     // kSnooping
   std::optional<SolveSummary> solve;  // of what is left; none if nothing is
   int num_solves = 0;
 
@@ -135,8 +151,10 @@ struct OutlierFilterResult {
 };
 
 // A copy of `model` without the observations that do not fit, solved with what
-// is left. Tracks that keep fewer than two go. Everything else is as SolveModel
-// leaves it. Requires a valid model; throws what SolveModel does.
+// is left: to the lowest maximum and, below the bound, the least squares; with
+// kSnooping to the least squares, or the least of solve.finish.loss. Tracks
+// that keep fewer than two go. Everything else is as SolveModel leaves it.
+// Requires a valid model; throws what SolveModel does.
 OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context);

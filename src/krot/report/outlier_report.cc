@@ -17,16 +17,6 @@ namespace {
 
 constexpr size_t kShownSuspects = 5;
 
-// "26,268".
-std::string Thousands(int64_t count) {
-  std::string digits = std::to_string(count);
-  for (std::ptrdiff_t n = static_cast<std::ptrdiff_t>(digits.size()) - 3; n > 0;
-       n -= 3) {
-    digits.insert(static_cast<size_t>(n), ",");
-  }
-  return digits;
-}
-
 Json FiniteOrNull(double value) {
   return std::isfinite(value) ? Json(value) : Json();
 }
@@ -40,7 +30,8 @@ Json RemovedJson(const std::vector<RemovedObservation>& removed) {
                     {"point3D_id", o.point3D_id},
                     {"error_before_px", FiniteOrNull(o.error_before_px)},
                     {"error_after_px", FiniteOrNull(o.error_after_px)},
-                    {"conflict", o.conflict ? Json(*o.conflict) : Json()}});
+                    {"conflict", o.conflict ? Json(*o.conflict) : Json()},
+                    {"w", o.w ? FiniteOrNull(*o.w) : Json()}});
   }
   return json;
 }
@@ -112,6 +103,52 @@ Json SolveOfRestJson(const std::optional<SolveSummary>& solve) {
           {"lower_bound", NumberOrNull(solve->lower_bound)},
           {"relative_gap", NumberOrNull(solve->relative_gap)},
           {"not_held", NotHeldJson(solve->loose)}};
+}
+
+Json SnoopingJson(const std::optional<SnoopingSummary>& snooping) {
+  if (!snooping) return {};
+  return {{"sigma_before_px", NumberOrNull(snooping->sigma_before_px)},
+          {"sigma_px", NumberOrNull(snooping->sigma_px)},
+          {"critical_w", snooping->critical_w},
+          {"num_tested", snooping->num_tested},
+          {"num_rounds", snooping->num_rounds},
+          {"kept_error_before", ErrorJson(snooping->kept_error_before)}};
+}
+
+// What noise there is and, as little is worse than not to know, whether what is
+// kept fits worse than before.
+std::string SnoopingSentences(const OutlierFilterSummary& summary) {
+  if (!summary.snooping) return "";
+  const SnoopingSummary& snooping = *summary.snooping;
+  const auto pixels = [](double value) {
+    return FormatNumber(value, 3) + " px";
+  };
+  const std::string noise = "noise of " + pixels(*snooping.sigma_px) +
+                            " per axis (w above " +
+                            FormatNumber(snooping.critical_w, 2) + ")";
+  if (summary.removed.empty()) {
+    return "\nNo observation is more than " + noise +
+           " explains: the model is written as it was read.\nTo remove "
+           "observations for a bound of your own, give "
+           "--OutlierFilter.max_error.\n";
+  }
+  std::string text =
+      "\nWhat was removed is more than " + noise +
+      " explains;\nbefore the removal it was " +
+      pixels(*snooping.sigma_before_px) +
+      ". What is left is at its least squares, rotations fixed.\n";
+  const PixelErrorStatistics& before = snooping.kept_error_before;
+  const PixelErrorStatistics& after = summary.pixel_error_after;
+  const auto rises = [&](const char* name, double was, double is) {
+    if (!(is > was)) return;
+    text += std::string("Of what is kept, the ") + name +
+            " of the errors rises from " + FormatNumber(was, 4) + " to " +
+            FormatNumber(is, 4) +
+            " px: it was not the least squares that the input minimised.\n";
+  };
+  rises("mean", before.mean, after.mean);
+  rises("RMS", before.rms, after.rms);
+  return text;
 }
 
 Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
@@ -202,7 +239,15 @@ std::string SuspectTable(const OutlierFilterSummary& summary) {
 }  // namespace
 
 std::string OutlierMethodName(OutlierMethod method) {
-  return method == OutlierMethod::kConflicts ? "conflicts" : "threshold";
+  switch (method) {
+    case OutlierMethod::kConflicts:
+      return "conflicts";
+    case OutlierMethod::kThreshold:
+      return "threshold";
+    case OutlierMethod::kSnooping:
+      break;
+  }
+  return "snooping";
 }
 
 std::string BracketSentence(const OutlierFilterSummary& summary) {
@@ -241,7 +286,7 @@ std::string OutlierTable(const OutlierReport& report) {
   AddErrorColumns({summary.pixel_error_before, summary.pixel_error_after},
                   &errors);
   text += "\nReprojection errors, pixels\n" + errors.ToString();
-  text += NoiseSentence(summary);
+  text += NoiseSentence(summary) + SnoopingSentences(summary);
   if (summary.profile) text += ProfileTable(*summary.profile);
   text += SuspectTable(summary) + RotationSentence(summary) + "\n";
   if (summary.solve) {
@@ -282,6 +327,7 @@ std::string OutlierJson(const OutlierReport& report) {
         {"after", ErrorJson(summary.pixel_error_after)}}},
       {"profile",
        summary.profile ? ProfileLevelsJson(*summary.profile) : Json()},
+      {"snooping", SnoopingJson(summary.snooping)},
       {"solve", SolveOfRestJson(summary.solve)},
       {"num_solves", summary.num_solves},
       {"removed", RemovedJson(summary.removed)},
@@ -321,7 +367,7 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
   std::ostringstream csv;
   csv.precision(9);
   csv << "image_id,image_name,point2D_idx,point3D_id,error_before_px,"
-         "error_after_px,conflict\n";
+         "error_after_px,conflict,w\n";
   for (const RemovedObservation& o : summary.removed) {
     csv << o.image_id << ',' << CsvText(o.image_name) << ',' << o.point2D_idx
         << ',' << o.point3D_id << ',';
@@ -330,6 +376,8 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
     if (std::isfinite(o.error_after_px)) csv << o.error_after_px;
     csv << ',';
     if (o.conflict) csv << *o.conflict;
+    csv << ',';
+    if (o.w) csv << *o.w;
     csv << '\n';
   }
   return csv.str();

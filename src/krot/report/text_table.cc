@@ -62,6 +62,15 @@ std::string Counted(int64_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
+std::string Thousands(int64_t count) {
+  std::string digits = std::to_string(count);
+  for (std::ptrdiff_t n = static_cast<std::ptrdiff_t>(digits.size()) - 3; n > 0;
+       n -= 3) {
+    digits.insert(static_cast<size_t>(n), ",");
+  }
+  return digits;
+}
+
 std::string FormatBytes(int64_t bytes) {
   static const char* const kUnits[] = {"B", "kB", "MB", "GB", "TB"};
   double value = static_cast<double>(bytes);

@@ -32,6 +32,9 @@ std::string FormatLength(double value);
 // "1 point", "2 points".
 std::string Counted(int64_t count, const std::string& noun);
 
+// "26,268".
+std::string Thousands(int64_t count);
+
 // With the unit that leaves one to three digits before the point: "1.5 MB".
 std::string FormatBytes(int64_t bytes);
 

@@ -24,9 +24,9 @@ from pykrot.through_memory import from_pycolmap, to_pycolmap
 __version__ = _core.__version__
 __all__ = [
     "Model", "ModelError", "NoSolutionError", "OptionError", "Problem",
-    "Result", "Verdict", "WriteError", "bundle_adjust", "check_certificate",
-    "compare", "filter", "from_pycolmap", "solve", "to_pycolmap",
-    "tolerances", "triangulate"
+    "Result", "Verdict", "WriteError", "bundle_adjust",
+    "check_certificate", "compare", "filter", "from_pycolmap", "solve",
+    "to_pycolmap", "tolerances", "triangulate"
 ]
 
 _WITHOUT_RESULT = ("nothing_to_solve", "nothing_to_adjust", "infeasible",
@@ -105,10 +105,10 @@ def triangulate(model, *, progress=None, options=None, **keywords):
 
 
 def filter(model, max_error=None, *, progress=None, options=None, **keywords):
-    """Removes few observations so that all others are within `max_error` px.
+    """Removes the observations that noise does not explain.
 
-    None: what the model's own noise explains, or nothing is removed.
-    report["num_must_go"] says how many had to go; `certificate` proves it.
+    With `max_error` px few, so that all others are within it:
+    report["num_must_go"] says how many had to go, and `certificate` proves it.
     """
     if max_error is not None:
         keywords["max_error"] = max_error

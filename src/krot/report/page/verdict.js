@@ -9,8 +9,19 @@ function movement(before, after, decimals) {
   return `${after < before ? 'fell' : 'rose'} from ${from} px to ${to} px`;
 }
 
+// What noise does not explain.
+function snoopingVerdict({ snooping, num_removed: removed, num_observations,
+  pixel_error: { after } }) {
+  const noise = `noise of ${snooping.sigma_px.toFixed(3)} px explains`;
+  if (removed === 0) return `No observation is more than ${noise}.`;
+  return `${count(removed)} of ${counted(num_observations, 'observation')} are ` +
+    `more than ${noise}. Without them the root mean square error of the ` +
+    `others ${movement(snooping.kept_error_before.rms, after.rms, 4)}.`;
+}
+
 // A bracket for the fewest that do, or why none is called wrong.
 function filterVerdict(report) {
+  if (report.snooping) return snoopingVerdict(report);
   if (report.max_error === null) {
     const { sigma, max_error: explained, lowest_max_error: lowest } =
       report.noise;
