@@ -24,6 +24,7 @@
 #include "krot/outliers/tolerant_solve.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/adjustment_report.h"
+#include "krot/report/check_report.h"
 #include "krot/report/comparison_report.h"
 #include "krot/report/outlier_report.h"
 #include "krot/report/solve_report.h"
@@ -160,6 +161,31 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
   return outcome;
 }
 
+// The cured model.
+Outcome CheckCommand(const ModelPointer& model, const Progress&,
+                     const py::dict& keywords) {
+  const Timer timer;
+  Context context;
+  OptionTable table = TableOf("pykrot.check");
+  table.AddThreads("num_threads", &context.num_threads,
+                   "the result is the same, bit by bit");
+  AssignKeywords(keywords, &table);
+  CheckReport report;
+  report.num_observations = static_cast<int64_t>(model->track_elements.size());
+  Model cured;
+  RunInterruptibly([&](const CancelFlag& cancel) {
+    context.cancel = &cancel;
+    report.check = CheckModel(*model, {}, context);
+    cured = CureModel(*model, report.check, context);
+  });
+  report.seconds_check = timer.Seconds();
+  report.pixel_error_before = Summarize(PixelErrors(*model));
+  report.pixel_error_after = Summarize(PixelErrors(cured));
+  RecordEnd(timer, context.num_threads, &report.run);
+  return {std::make_shared<Model>(std::move(cured)), CheckJson(report),
+          std::nullopt};
+}
+
 Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
                       const py::dict& keywords) {
   const Timer timer;
@@ -272,6 +298,7 @@ void BindCommands(py::module_* module) {
   define("solve", &SolveCommand);
   define("triangulate", &TriangulateCommand);
   define("filter", &FilterCommand);
+  define("check", &CheckCommand);
   define("bundle_adjust", &AdjustCommand);
   define("tolerances", &ToleranceCommand);
   module->def("compare", &CompareCommand, py::arg("model1"), py::arg("model2"),

@@ -163,6 +163,13 @@ def test_noise_is_that_of_the_scene(scene):
         model.noise(false_alarm=2)
 
 
+def test_a_check_says_what_is_wrong_and_gives_the_model_without(scene):
+    model = pykrot.solve(pykrot.Model.read(scene)).model
+    sound = pykrot.check(model)
+    assert sound.report["verdict"].startswith("Nothing is wrong")
+    assert len(sound.report["images"]) == len(model.centers)
+
+
 def test_a_filter_without_a_bound_knows_the_noise(scene):
     model = pykrot.solve(pykrot.Model.read(scene)).model
     assert pykrot.filter(model).report["method"] == "snooping"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""How often `krot model_analyzer` finds observations that noise does not explain
-in scenes that have nothing but noise.
+"""How often `krot model_checker` calls something wrong in scenes that have nothing
+but noise.
 
     false_alarms.py KROT [SCENES]
 
@@ -9,8 +9,8 @@ mean track lengths from 2 to 20, drawn at random, after a bundle adjustment as
 COLMAP would end with (panoramas have none and keep their true cameras).
 Noise: Gaussian of one pixel; Student's t with five degrees of freedom; Gaussian
 with a sigma for each image, from one to three pixels. An alarm is a scene with
-any observation above the critical value; `in an image` is the largest share of
-the observations of one image.
+anything wrong; `of an image` is the largest share of the observations of one
+image that are.
 """
 
 import json
@@ -61,7 +61,7 @@ def add_noise(path, noise, rng):
 
 
 def trial(krot, kind, noise, seed):
-    """The report of model_analyzer."""
+    """The report of model_checker."""
     rng = random.Random(seed)
     num_sensors = KINDS[kind].get("Scene.sensors_per_rig", 1)
     num_frames = max(4, round(10 * 20 ** rng.random() / num_sensors))
@@ -84,8 +84,8 @@ def trial(krot, kind, noise, seed):
             model = "adjusted"
             run(krot, "bundle_adjuster", folder, "--input_path", "scene",
                 "--output_path", model)
-        run(krot, "model_analyzer", folder, "--path", model, "--report_path",
-            "report.json")
+        run(krot, "model_checker", folder, "--input_path", model,
+            "--report_path", "report.json")
         return json.loads((folder / "report.json").read_text())
 
 
@@ -94,26 +94,28 @@ def main():
         sys.exit(__doc__)
     krot = pathlib.Path(sys.argv[1]).resolve()
     num_scenes = int(sys.argv[2]) if len(sys.argv) > 2 else 200
-    print("| noise | scene | scenes | with an alarm | observations above | of | "
-          "in an image, at most |\n|---|---|---|---|---|---|---|")
+    print("| noise | scene | scenes | with an alarm | wrong observations | of | "
+          "of an image, at most | wrong images | weakly held |\n"
+          "|---|---|---|---|---|---|---|---|---|")
     for noise in NOISES:
-        rows = {kind: [0, 0, 0, 0, 0.0] for kind in [*KINDS, "all"]}
+        rows = {kind: [0, 0, 0, 0, 0.0, 0, 0] for kind in [*KINDS, "all"]}
         for seed in range(1, num_scenes + 1):
             kind = list(KINDS)[seed % len(KINDS)]
             report = trial(krot, kind, noise, seed)
-            figures = report["noise"]
-            share = max(image["num_above"] /
-                        max(1, image["pixel_error"]["count"])
+            share = max(image["num_wrong"] / max(1, image["num_tested"])
                         for image in report["images"])
             for row in rows[kind], rows["all"]:
                 row[0] += 1
-                row[1] += figures["num_above"] > 0
-                row[2] += figures["num_above"]
-                row[3] += figures["num_tested"]
+                row[1] += report["is_anything_wrong"]
+                row[2] += report["num_wrong_observations"]
+                row[3] += report["num_tested"]
                 row[4] = max(row[4], share)
+                row[5] += report["num_wrong_images"]
+                row[6] += report["num_weakly_held_images"]
         for kind, row in rows.items():
             print(f"| {noise} | {kind} | {row[0]} | {row[1]} | {row[2]} | "
-                  f"{row[3]} | {100 * row[4]:.1f} % |", flush=True)
+                  f"{row[3]} | {100 * row[4]:.1f} % | {row[5]} | {row[6]} |",
+                  flush=True)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ int RunPointTriangulator(const std::vector<std::string>& arguments);
 int RunOutlierFilter(const std::vector<std::string>& arguments);
 int RunToleranceAnalyzer(const std::vector<std::string>& arguments);
 int RunModelAnalyzer(const std::vector<std::string>& arguments);
+int RunModelChecker(const std::vector<std::string>& arguments);
 int RunModelComparer(const std::vector<std::string>& arguments);
 int RunCertificateChecker(const std::vector<std::string>& arguments);
 int RunModelSynthesizer(const std::vector<std::string>& arguments);

@@ -18,6 +18,7 @@ enum ExitCode {
   kExitInternal = 6,
   kExitNoStart = 7,
   kExitGivenBack = 8,
+  kExitWrong = 9,
   kExitInterrupted = 130,
 };
 

@@ -44,6 +44,8 @@ constexpr Command kCommands[] = {
      &RunPointTriangulator},
     {"bundle_adjuster", "least squares, below a cap if you want",
      &RunBundleAdjuster},
+    {"model_checker", "say what is wrong with a model, and cure it",
+     &RunModelChecker},
     {"outlier_filter", "remove few observations, and prove how many must go",
      &RunOutlierFilter},
     {"tolerance_analyzer", "show everywhere that cameras and points may be",
@@ -79,6 +81,7 @@ constexpr char kExitCodes[] =
     "    6  out of memory or threads, or an error in KROT itself\n"
     "    7  no estimate below the error that a start may have\n"
     "    8  no better estimate: the model is written as it was read\n"
+    "    9  something is wrong with the model, and --fail_on wrong asked\n"
     "  130  interrupted by SIGINT or SIGTERM\n";
 
 const Command* FindCommand(const std::string& name) {

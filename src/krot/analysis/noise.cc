@@ -14,8 +14,8 @@
 namespace krot {
 namespace {
 
-constexpr int64_t kPointsPerChunk = 256;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr int64_t kTracksPerChunk = 256;
+constexpr double kNothingControlled = std::numeric_limits<double>::quiet_NaN();
 
 // The medians of chi^2 with one and two degrees of freedom.
 constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
@@ -24,7 +24,7 @@ constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
 // be exceeded, exp(-w^2 / 2).
 double StandardizedError(double chi2, int num_directions) {
   if (num_directions == 2) return std::sqrt(chi2);
-  if (num_directions == 0) return kNaN;
+  if (num_directions == 0) return kNothingControlled;
   const double probability = std::erfc(std::sqrt(chi2 / 2));
   if (probability > 1e-300) return std::sqrt(-2 * std::log(probability));
   // erfc(x) ~ exp(-x^2) / (x sqrt(pi))
@@ -34,6 +34,12 @@ double StandardizedError(double chi2, int num_directions) {
 void CheckOptions(const Model& model, const NoiseOptions& options) {
   CheckArgument(options.false_alarm > 0 && options.false_alarm < 1,
                 "false_alarm", options.false_alarm, "in (0, 1)");
+  CheckArgument(options.is_left_out.empty() ||
+                    options.is_left_out.size() == model.track_elements.size(),
+                "is_left_out.size()", options.is_left_out.size(),
+                "the number of track elements, or 0");
+  CheckArgument(!options.sigma_px || *options.sigma_px > 0, "sigma_px",
+                options.sigma_px.value_or(0), "> 0");
   if (options.relative_sigmas.empty()) return;
   CheckArgument(options.relative_sigmas.size() == model.track_elements.size(),
                 "relative_sigmas.size()", options.relative_sigmas.size(),
@@ -90,8 +96,11 @@ class Snooper {
       : model_(model),
         options_(options),
         context_(context),
-        given_sigma_(sigma_px),
+        given_sigma_(sigma_px ? sigma_px : options.sigma_px),
         tracks_(model, options.relative_sigmas) {
+    for (size_t e = 0; e < options.is_left_out.size(); ++e) {
+      if (options.is_left_out[e]) tracks_.Remove(e);
+    }
     std::vector<int64_t> all(model.points3D.size());
     std::iota(all.begin(), all.end(), int64_t{0});
     Fit(all);
@@ -128,7 +137,7 @@ class Snooper {
 };
 
 void Snooper::Fit(const std::vector<int64_t>& points) {
-  ParallelFor(static_cast<int64_t>(points.size()), kPointsPerChunk,
+  ParallelFor(static_cast<int64_t>(points.size()), kTracksPerChunk,
               context_.num_threads, [&](int64_t begin, int64_t end, int) {
                 for (int64_t n = begin; n < end; ++n) tracks_.Fit(points[n]);
               });
@@ -154,7 +163,9 @@ void Snooper::Measure() {
   const double nu = noise_.degrees_of_freedom;
   const double log_odds =
       std::log(static_cast<double>(noise_.num_tested) / options_.false_alarm);
-  noise_.critical_w = std::sqrt(nu * std::expm1(2 / nu * log_odds));
+  noise_.critical_w = given_sigma_
+                          ? std::sqrt(2 * log_odds)
+                          : std::sqrt(nu * std::expm1(2 / nu * log_odds));
   for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
     if (IsTested(e)) tracks_.SetW(e, StandardizedErrorOf(e));
     noise_.num_above += Of(e).w > noise_.critical_w;

@@ -37,6 +37,10 @@ struct NoiseOptions {
   // track element, as that of keypoints grows with their scale; > 0. Empty: all
   // have the same.
   std::vector<double> relative_sigmas;
+  // By track element, which ones have no say. Empty: all have.
+  std::vector<char> is_left_out = {};
+  // Pixels; > 0. None: it is measured.
+  std::optional<double> sigma_px = {};
 };
 
 // An observation at the least squares of its track.

@@ -1,5 +1,9 @@
 #include "krot/model/remove_observations.h"
 
+#include <algorithm>
+#include <unordered_set>
+#include <utility>
+
 #include "krot/base/check.h"
 #include "krot/model/image_geometry.h"
 
@@ -51,6 +55,40 @@ RemovedObservations RemoveObservations(const Model& model,
     }
     kept.track_end = result.model.track_elements.size();
     result.model.points3D.push_back(kept);
+  }
+  return result;
+}
+
+Model RemoveImages(const Model& model, const std::vector<char>& is_removed) {
+  CheckArgument(is_removed.size() == model.images.size(), "is_removed.size()",
+                is_removed.size(), "the number of images");
+  Model result = model;
+  result.images.clear();
+  std::unordered_set<uint64_t> gone;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    if (is_removed[n]) {
+      gone.insert(model.images[n].id);
+    } else {
+      result.images.push_back(model.images[n]);
+    }
+  }
+  result.frames.clear();
+  for (Frame frame : model.frames) {
+    const size_t num_data = frame.data.size();
+    frame.data.erase(std::remove_if(frame.data.begin(), frame.data.end(),
+                                    [&](const FrameData& data) {
+                                      return data.sensor_id.type ==
+                                                 kSensorTypeCamera &&
+                                             gone.count(data.data_id) > 0;
+                                    }),
+                     frame.data.end());
+    const bool has_image = std::any_of(
+        frame.data.begin(), frame.data.end(), [](const FrameData& data) {
+          return data.sensor_id.type == kSensorTypeCamera;
+        });
+    if (has_image || frame.data.size() == num_data) {
+      result.frames.push_back(std::move(frame));
+    }
   }
   return result;
 }

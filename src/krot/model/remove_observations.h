@@ -23,4 +23,10 @@ struct RemovedObservations {
 RemovedObservations RemoveObservations(const Model& model,
                                        const std::vector<char>& is_removed);
 
+// A copy without the images that `is_removed` marks, in the order of
+// Model::images, as if they had not been registered: frames go with their last
+// image, cameras and rigs stay. Tracks must not hold them any more; throws
+// std::invalid_argument unless there is one mark per image.
+Model RemoveImages(const Model& model, const std::vector<char>& is_removed);
+
 }  // namespace krot

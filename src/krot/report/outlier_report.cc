@@ -17,10 +17,6 @@ namespace {
 
 constexpr size_t kShownSuspects = 5;
 
-Json FiniteOrNull(double value) {
-  return std::isfinite(value) ? Json(value) : Json();
-}
-
 Json RemovedJson(const std::vector<RemovedObservation>& removed) {
   Json json = Json::array();
   for (const RemovedObservation& o : removed) {

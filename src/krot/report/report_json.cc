@@ -4,6 +4,10 @@
 
 namespace krot {
 
+Json FiniteOrNull(double value) {
+  return std::isfinite(value) ? Json(value) : Json();
+}
+
 Json NumberOrNull(const std::optional<double>& value) {
   return value ? Json(*value) : Json();
 }

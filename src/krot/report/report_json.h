@@ -19,6 +19,8 @@ namespace krot {
 using Json = nlohmann::ordered_json;
 
 Json NumberOrNull(const std::optional<double>& value);
+// Null for infinity and NaN.
+Json FiniteOrNull(double value);
 
 Json VectorJson(const Eigen::Vector3d& vector);
 

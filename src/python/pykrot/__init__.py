@@ -24,7 +24,7 @@ from pykrot.through_memory import from_pycolmap, to_pycolmap
 __version__ = _core.__version__
 __all__ = [
     "Model", "ModelError", "NoSolutionError", "OptionError", "Problem",
-    "Result", "Verdict", "WriteError", "bundle_adjust",
+    "Result", "Verdict", "WriteError", "bundle_adjust", "check",
     "check_certificate", "compare", "filter", "from_pycolmap", "solve",
     "to_pycolmap", "tolerances", "triangulate"
 ]
@@ -102,6 +102,15 @@ def solve(model, *, progress=None, options=None, **keywords):
 def triangulate(model, *, progress=None, options=None, **keywords):
     """Every point anew, its track's largest error the lowest; frames stay."""
     return _run(_core.triangulate, model, progress, options, keywords)
+
+
+def check(model, **keywords):
+    """What is wrong with a model, and the model without it.
+
+    report["verdict"] is a sentence; "images", "observations" and "tracks" have
+    the numbers that it rests on.
+    """
+    return _run(_core.check, model, None, None, keywords)
 
 
 def filter(model, max_error=None, *, progress=None, options=None, **keywords):

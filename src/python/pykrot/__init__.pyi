@@ -102,6 +102,7 @@ def triangulate(model: Union[Model, Problem], *,
                 progress: Optional[Progress] = ...,
                 options: Optional[Mapping[str, Any]] = ...,
                 **keywords: Any) -> Result: ...
+def check(model: Union[Model, Problem], **keywords: Any) -> Result: ...
 def filter(model: Union[Model, Problem], max_error: Optional[float] = ..., *,
            progress: Optional[Progress] = ...,
            options: Optional[Mapping[str, Any]] = ...,

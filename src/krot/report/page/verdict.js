@@ -55,6 +55,7 @@ function polishSentence(report) {
 
 // What came of it, in a sentence or two, without more than is known.
 export function verdict(report) {
+  if (report.command === 'model_checker') return report.verdict;
   const [before, after] = isMinimax(report) ?
     [report.pixel_error.before, report.pixel_error.after] :
     modelErrors(report);

@@ -1,0 +1,514 @@
+#include "krot/analysis/model_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+
+#include "krot/analysis/noise.h"
+#include "krot/analysis/pixel_errors.h"
+#include "krot/base/angle.h"
+#include "krot/camera/projection_row.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/remove_observations.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix26 = Eigen::Matrix<double, 2, 6>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
+// An image may be so many times as noisy as most and still be sound.
+constexpr double kNoisyImage = 3;
+// Of the squared errors: another pose halves their root mean square.
+constexpr double kExplained = 0.75;
+// Of the share of its 2D points that the median image keeps in tracks.
+constexpr double kFewKept = 1.0 / 3;
+// Of an image's median distance: nearer points, in the camera, would drown all
+// others in rounding.
+constexpr double kNearest = 1e-6;
+// Of the median image's standard deviation.
+constexpr double kWeaklyHeld = 10;
+// Of the largest eigenvalue: below is rounding.
+constexpr double kRounding = 1e-13;
+// Of a pose's system with ones on the diagonal: what nothing holds.
+constexpr double kSingularPose = 1e-9;
+
+// The exponent of Chernoff's bound on the probability that of n trials, each of
+// probability p, a share beyond s succeeds: exp(-n KL(s, p)).
+double Divergence(double s, double p) {
+  const double successes = s > 0 ? s * std::log(s / p) : 0;
+  const double failures = s < 1 ? (1 - s) * std::log((1 - s) / (1 - p)) : 0;
+  return successes + failures;
+}
+
+// An observation at the least squares of its track.
+struct Row {
+  int32_t image = 0;
+  Vector2d error;
+  Matrix26 F;  // by its camera's rotation, from the left, and its centre
+};
+
+// Of an image's observations, in the directions that others control. Points
+// that move along are eliminated: M is its diagonal block of the reduced camera
+// system, sigma^2 M^-1 its covariance while the other images stay, and -M^-1 g
+// the step that its errors ask for.
+struct Sums {
+  Matrix6 M = Matrix6::Zero();  // F' R_ii F, R_ii as in noise.h
+  Vector6 g = Vector6::Zero();  // F' e
+  double square = 0;            // e' R_ii^+ e
+  int64_t num_directions = 0;   // of these
+  // |R_ii^-1 e|^2 where both directions are controlled: the error to where the
+  // rest of the track leads.
+  std::vector<double> squares;
+  Vector6 step = Vector6::Zero();
+
+  void Add(const Row& row, const Eigen::Matrix2d& R) {
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
+    of_R.computeDirect(R);
+    double alone = 0;
+    int num = 0;
+    for (int j = 0; j < 2; ++j) {
+      const double r = of_R.eigenvalues()[j];
+      if (r < kControlled) continue;
+      const Vector2d direction = of_R.eigenvectors().col(j);
+      const Vector6 f = row.F.transpose() * direction;
+      const double along = direction.dot(row.error);
+      M.noalias() += r * f * f.transpose();
+      g.noalias() += along * f;
+      square += along * along / r;
+      alone += along * along / (r * r);
+      ++num;
+    }
+    num_directions += num;
+    if (num == 2) squares.push_back(alone);
+  }
+
+  // Rotations and centres have different units: the diagonal becomes 1.
+  void Solve() {
+    Vector6 scale = M.diagonal().cwiseSqrt();
+    for (double& s : scale) s = s > 0 ? 1 / s : 0;
+    const Eigen::SelfAdjointEigenSolver<Matrix6> of_M(scale.asDiagonal() * M *
+                                                      scale.asDiagonal());
+    Vector6 y = of_M.eigenvectors().transpose() * scale.cwiseProduct(g);
+    for (int j = 0; j < 6; ++j) {
+      const double value = of_M.eigenvalues()[j];
+      y[j] = value > kSingularPose ? -y[j] / value : 0;
+    }
+    step = scale.cwiseProduct(of_M.eigenvectors() * y);
+  }
+
+  // What the step takes away of `square`, to first order.
+  double Gain() const { return -g.dot(step); }
+  double MeanSquare() const {
+    return num_directions > 0 ? square / static_cast<double>(num_directions)
+                              : 0;
+  }
+};
+
+class Checker {
+ public:
+  Checker(const Model& model, const ModelCheckOptions& options,
+          const Context& context)
+      : model_(model), options_(options), context_(context) {
+    const auto indices = ImageIndices(model);
+    for (const TrackElement& element : model.track_elements) {
+      image_of_.push_back(indices.at(element.image_id));
+    }
+    noise_options_.false_alarm = options.false_alarm;
+    noise_options_.is_left_out.assign(image_of_.size(), 0);
+    for (const Image& image : model.images) {
+      check_.images.emplace_back();
+      check_.images.back().image_id = image.id;
+      check_.images.back().name = image.name;
+    }
+    for (const int32_t n : image_of_) ++check_.images[n].num_observations;
+  }
+
+  ModelCheck Run() {
+    do {
+      snooping_ = SnoopNoise(model_, noise_options_, context_);
+      if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
+      Count();
+      AddUp();
+    } while (CallWorstImage());
+    Describe();
+    FindSecondPoints();
+    HowFirmly();
+    return std::move(check_);
+  }
+
+ private:
+  bool IsWrong(int32_t n) const {
+    return check_.images[n].verdict == ImageVerdict::kWrong;
+  }
+
+  // Of every image that is not wrong, what others check and contradict.
+  void Count() {
+    for (ImageCheck& image : check_.images) {
+      if (image.verdict != ImageVerdict::kWrong) {
+        image.num_tested = image.num_wrong = 0;
+      }
+    }
+    for (const SnoopedObservation& one : snooping_.removed) {
+      ImageCheck& image = check_.images[image_of_[one.element]];
+      ++image.num_tested;
+      ++image.num_wrong;
+    }
+    for (size_t e = 0; e < image_of_.size(); ++e) {
+      if (snooping_.noise.observations[e].num_controlled == 0) continue;
+      ++check_.images[image_of_[e]].num_tested;
+    }
+  }
+
+  // Whether there is one. Contradictions come first, as they bend what the
+  // others see.
+  bool CallWorstImage() {
+    const int32_t worst = WorstImage();
+    if (worst < 0) return false;
+    check_.images[worst].verdict = ImageVerdict::kWrong;
+    for (size_t e = 0; e < image_of_.size(); ++e) {
+      if (image_of_[e] == worst) noise_options_.is_left_out[e] = 1;
+    }
+    return true;
+  }
+
+  // -1: none. Sets its fault.
+  int32_t WorstImage() {
+    int32_t worst = -1;
+    double most = 0;
+    const auto ask = [&](ImageFault fault, auto is, auto weight) {
+      if (worst >= 0 && check_.images[worst].fault != fault) return;
+      for (size_t n = 0; n < check_.images.size(); ++n) {
+        ImageCheck& image = check_.images[n];
+        if (image.verdict == ImageVerdict::kWrong || !is(n)) continue;
+        if (worst >= 0 && weight(n) <= most) continue;
+        if (worst >= 0) check_.images[worst].fault = ImageFault::kNone;
+        image.fault = fault;
+        worst = static_cast<int32_t>(n);
+        most = weight(n);
+      }
+    };
+    ask(
+        ImageFault::kContradicted, [&](size_t n) { return IsContradicted(n); },
+        [&](size_t n) {
+          const ImageCheck& image = check_.images[n];
+          return static_cast<double>(2 * image.num_wrong - image.num_tested);
+        });
+    ask(
+        ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
+        [&](size_t n) { return sums_[n].Gain(); });
+    median_square_ =
+        MedianOfSound([&](size_t n) { return sums_[n].MeanSquare(); });
+    median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
+    ask(
+        ImageFault::kChance, [&](size_t n) { return IsChance(n); },
+        [&](size_t n) { return sums_[n].square; });
+    return worst;
+  }
+
+  // log(number of images / false_alarm).
+  double LogOdds() const {
+    return std::log(static_cast<double>(model_.images.size()) /
+                    options_.false_alarm);
+  }
+
+  bool IsContradicted(size_t n) const {
+    const ImageCheck& image = check_.images[n];
+    if (2 * image.num_wrong <= image.num_tested) return false;
+    const double ratio = snooping_.noise.critical_w / kNoisyImage;
+    const double p = std::exp(-ratio * ratio / 2);
+    const auto num = static_cast<double>(image.num_tested);
+    const double share = static_cast<double>(image.num_wrong) / num;
+    return share > p && num * Divergence(share, p) > LogOdds();
+  }
+
+  // g'M^-1 g of noise is sigma^2 chi^2 with six degrees of freedom.
+  bool IsMisplaced(size_t n) const {
+    const double gain = sums_[n].Gain();
+    if (!(gain > kExplained * sums_[n].square)) return false;
+    const double sigma = kNoisyImage * *snooping_.noise.sigma_px;
+    const double x = gain / (2 * sigma * sigma);
+    return x - std::log1p(x + x * x / 2) > LogOdds();
+  }
+
+  // Errors that are larger than the median image's, by the bound of Chernoff on
+  // chi^2, and that either fill a disc evenly or are of few of its 2D points.
+  bool IsChance(size_t n) const {
+    const Sums& sums = sums_[n];
+    const double ratio = sums.MeanSquare() / median_square_;
+    if (!(ratio > 2)) return false;
+    const auto num = static_cast<double>(sums.num_directions);
+    if (!(num / 2 * (ratio - 1 - std::log(ratio)) > LogOdds())) return false;
+    return KeptShare(n) < kFewKept * median_kept_ || FillsADisc(sums.squares);
+  }
+
+  // Of Gaussian errors 1 - 20^(-1/4), a half, are below half of their 95 %
+  // quantile, and more if the tails are heavier; of a disc that is filled
+  // evenly a quarter. By the bound of Chernoff.
+  bool FillsADisc(std::vector<double> squares) const {
+    if (squares.empty()) return false;
+    std::sort(squares.begin(), squares.end());
+    const double quantile = squares[(95 * squares.size() - 1) / 100];
+    const auto num = static_cast<double>(squares.size());
+    const double share =
+        static_cast<double>(
+            std::lower_bound(squares.begin(), squares.end(), quantile / 4) -
+            squares.begin()) /
+        num;
+    const double gaussian = 1 - std::pow(20, -0.25);
+    return share < gaussian && num * Divergence(share, gaussian) > LogOdds();
+  }
+
+  // Of the image's 2D points, those in tracks.
+  double KeptShare(size_t n) const {
+    return static_cast<double>(check_.images[n].num_observations) /
+           static_cast<double>(
+               std::max<size_t>(1, model_.images[n].points2D.size()));
+  }
+
+  template <typename Value>
+  double MedianOfSound(const Value& value) const {
+    std::vector<double> values;
+    for (size_t n = 0; n < sums_.size(); ++n) {
+      if (!IsWrong(static_cast<int32_t>(n)) && sums_[n].num_directions > 0) {
+        values.push_back(value(n));
+      }
+    }
+    if (values.empty()) return 0;
+    const auto middle =
+        values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  }
+
+  void Describe() {
+    check_.sigma_px = snooping_.noise.sigma_px;
+    check_.critical_w = snooping_.noise.critical_w;
+    for (size_t n = 0; n < check_.images.size(); ++n) {
+      if (IsWrong(static_cast<int32_t>(n))) continue;
+      check_.num_tested += check_.images[n].num_tested;
+    }
+    std::vector<Point3DId> point_of;
+    for (const Point3D& point : model_.points3D) {
+      point_of.insert(point_of.end(), point.track_end - point.track_begin,
+                      point.id);
+    }
+    for (const SnoopedObservation& one : snooping_.removed) {
+      const TrackElement& element = model_.track_elements[one.element];
+      check_.observations.push_back({one.element, element.image_id,
+                                     model_.images[image_of_[one.element]].name,
+                                     element.point2D_idx, point_of[one.element],
+                                     one.w, one.error_px, one.is_of_two});
+    }
+    check_.points = snooping_.noise.points;
+  }
+
+  // Of every track, what was removed is snooped by itself.
+  void FindSecondPoints() {
+    NoiseOptions options = noise_options_;
+    options.sigma_px = check_.sigma_px;
+    options.is_left_out.assign(image_of_.size(), 1);
+    for (const WrongObservation& one : check_.observations) {
+      if (!one.is_of_two && std::isfinite(one.w)) {
+        options.is_left_out[one.element] = 0;
+      }
+    }
+    const ModelNoise others = SnoopNoise(model_, options, context_).noise;
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      const Point3D& point = model_.points3D[k];
+      TwoPointTrack track{point.id, 0, 0, others.points[k]};
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        track.num_first += snooping_.noise.observations[e].num_controlled > 0;
+        track.num_second += others.observations[e].num_controlled > 0;
+      }
+      if (track.num_first > 1 && track.num_second > 1) {
+        check_.tracks.push_back(track);
+      }
+    }
+  }
+
+  // Of the observations that noise explains.
+  void AddUp() {
+    const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
+    sums_.assign(model_.images.size(), {});
+    std::vector<std::vector<double>> distances(model_.images.size());
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      const Point3D& point = model_.points3D[k];
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        const int32_t n = image_of_[e];
+        if (!geometries[n].has_pose) continue;
+        distances[n].push_back(
+            (geometries[n].cam_from_world * snooping_.noise.points[k]).norm());
+      }
+    }
+    nearest_.assign(model_.images.size(), 0);
+    for (size_t n = 0; n < distances.size(); ++n) {
+      if (distances[n].empty()) continue;
+      const auto middle = distances[n].begin() +
+                          static_cast<std::ptrdiff_t>(distances[n].size() / 2);
+      std::nth_element(distances[n].begin(), middle, distances[n].end());
+      nearest_[n] = kNearest * *middle;
+    }
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      AddTrack(k, geometries);
+    }
+    for (Sums& sums : sums_) sums.Solve();
+  }
+
+  void HowFirmly() {
+    std::vector<double> sigmas;
+    for (size_t n = 0; n < sums_.size(); ++n) {
+      ImageCheck& image = check_.images[n];
+      if (IsWrong(static_cast<int32_t>(n))) continue;
+      const Matrix6& M = sums_[n].M;
+      const Matrix3d by_turn = M.topLeftCorner<3, 3>();
+      const Matrix3d by_center = M.bottomRightCorner<3, 3>();
+      const Matrix3d mixed = M.topRightCorner<3, 3>();
+      image.turn_deg = kDegreesPerRadian * sums_[n].step.head<3>().norm();
+      image.shift = sums_[n].step.tail<3>().norm();
+      image.center_sigma = LargestSigma(by_center, mixed.transpose(), by_turn);
+      image.turn_sigma_deg =
+          kDegreesPerRadian * LargestSigma(by_turn, mixed, by_center);
+      sigmas.push_back(image.center_sigma);
+    }
+    if (sigmas.empty()) return;
+    const auto middle =
+        sigmas.begin() + static_cast<std::ptrdiff_t>((sigmas.size() - 1) / 2);
+    std::nth_element(sigmas.begin(), middle, sigmas.end());
+    for (ImageCheck& image : check_.images) {
+      if (image.verdict == ImageVerdict::kWrong) continue;
+      image.relative_center_sigma = std::isfinite(image.center_sigma)
+                                        ? image.center_sigma / *middle
+                                        : kNothingHolds;
+      if (!(image.relative_center_sigma <= kWeaklyHeld)) {
+        image.verdict = ImageVerdict::kWeaklyHeld;
+      }
+    }
+  }
+
+  // sigma / sqrt of the smallest eigenvalue of A - B C^-1 B'.
+  double LargestSigma(const Matrix3d& A, const Matrix3d& B,
+                      const Matrix3d& C) const {
+    const Matrix3d S = A - B * C.ldlt().solve(B.transpose());
+    if (!S.allFinite()) return kNothingHolds;
+    const Vector3d values =
+        Eigen::SelfAdjointEigenSolver<Matrix3d>(S, Eigen::EigenvaluesOnly)
+            .eigenvalues();
+    if (!(values[0] > kRounding * A.trace())) return kNothingHolds;
+    return *check_.sigma_px / std::sqrt(values[0]);
+  }
+
+  void AddTrack(size_t k, const std::vector<ImageGeometry>& geometries) {
+    const Point3D& point = model_.points3D[k];
+    std::vector<Row> rows;
+    Matrix3d H = Matrix3d::Zero();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (snooping_.noise.observations[e].num_controlled == 0) continue;
+      const int32_t n = image_of_[e];
+      const RigidTransform& pose = geometries[n].cam_from_world;
+      const Camera& camera = model_.cameras[geometries[n].camera];
+      const Point2D& pixel =
+          model_.images[n].points2D[model_.track_elements[e].point2D_idx];
+      const Vector3d x_cam = pose * snooping_.noise.points[k];
+      if (!(x_cam.norm() > nearest_[n])) continue;
+      const auto E = RowAtProjection(camera.model_id, camera.params.data(),
+                                     {pixel.x, pixel.y}, x_cam);
+      if (!E) continue;
+      const double depth = E->row(0).dot(x_cam);
+      Row row;
+      row.image = n;
+      row.error = snooping_.noise.observations[e].error_px;
+      const Matrix23 by_cam = (E->bottomRows<2>() -
+                               E->bottomRows<2>() * x_cam / depth * E->row(0)) /
+                              depth;
+      Matrix3d cross;
+      cross << 0, -x_cam.z(), x_cam.y(), x_cam.z(), 0, -x_cam.x(), -x_cam.y(),
+          x_cam.x(), 0;
+      row.F << -by_cam * cross, -by_cam * pose.rotation;
+      if (!row.F.allFinite()) continue;
+      H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
+      rows.push_back(row);
+    }
+    if (rows.size() < 2) return;
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> of_H(H);
+    Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
+    for (int j = 0; j < 3; ++j) {
+      const double value = of_H.eigenvalues()[j];
+      root.col(j) *=
+          value > kRounding * of_H.eigenvalues()[2] ? 1 / std::sqrt(value) : 0;
+    }
+    for (const Row& row : rows) {
+      const Matrix23 B = row.F.rightCols<3>() * root;
+      const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
+      sums_[row.image].Add(row, R);
+    }
+  }
+
+  const Model& model_;
+  const ModelCheckOptions& options_;
+  const Context& context_;
+  std::vector<int32_t> image_of_;  // by track element
+  NoiseOptions noise_options_;
+  NoiseSnooping snooping_;
+  std::vector<Sums> sums_;       // as Model::images
+  std::vector<double> nearest_;  // of a point, likewise; scene units
+  double median_square_ = 0;     // of an image's errors, per direction
+  double median_kept_ = 0;
+  ModelCheck check_;
+};
+
+}  // namespace
+
+int64_t ModelCheck::NumImages(ImageVerdict verdict) const {
+  return std::count_if(
+      images.begin(), images.end(),
+      [&](const ImageCheck& image) { return image.verdict == verdict; });
+}
+
+ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
+                      const Context& context) {
+  return Checker(model, options, context).Run();
+}
+
+Model CureModel(const Model& model, const ModelCheck& check,
+                const Context& context) {
+  if (!check.IsAnythingWrong()) return model;
+  std::vector<char> is_wrong_image;
+  for (const ImageCheck& image : check.images) {
+    is_wrong_image.push_back(image.verdict == ImageVerdict::kWrong);
+  }
+  const auto image_of = ImageIndices(model);
+  std::vector<char> is_removed(model.track_elements.size(), 0);
+  for (const WrongObservation& one : check.observations) {
+    is_removed[one.element] = 1;
+  }
+  Model moved = model;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    const Point3D& point = model.points3D[k];
+    bool is_any = false;
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      is_removed[e] |=
+          is_wrong_image[image_of.at(model.track_elements[e].image_id)];
+      is_any |= is_removed[e];
+    }
+    if (is_any) moved.points3D[k].xyz = check.points[k];
+  }
+  Model cured =
+      RemoveImages(RemoveObservations(moved, is_removed).model, is_wrong_image);
+  UpdatePointErrors(PixelErrors(cured, context.num_threads), &cured);
+  return cured;
+}
+
+}  // namespace krot

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Which images and observations of a model are wrong, judged by the model
+// alone: its observations contradict each other by more than their noise.
+// Wrong matches that agree with the model, as of duplicate structures, are not
+// seen.
+
+enum class ImageVerdict {
+  kFine,
+  kWeaklyHeld,  // what is left holds it ten times as weakly as the median image
+  kWrong,
+};
+
+// Why an image is wrong. Each is asked such that noise three times as large as
+// the model's, as blur makes it in one photo, is none of them.
+enum class ImageFault {
+  kNone,
+  kContradicted,  // most of its observations are more than noise
+  kMisplaced,     // another pose halves its root mean square error
+  kChance,        // its errors are those of chance matches
+};
+
+struct ImageCheck {
+  ImageId image_id = 0;
+  std::string name;
+  ImageVerdict verdict = ImageVerdict::kFine;
+  ImageFault fault = ImageFault::kNone;
+  int64_t num_observations = 0;  // in tracks
+  // Of these, that others check, and that are more than noise: of an image that
+  // is not wrong, without those that are.
+  int64_t num_tested = 0;
+  int64_t num_wrong = 0;
+  // What its observations would turn and shift it by, other images as they
+  // stand; points move along.
+  double turn_deg = 0;
+  double shift = 0;  // scene units
+  // The standard deviation of its centre in the direction where that is
+  // largest, scene units, and of its rotation: the observations that are not
+  // wrong hold it, points move along, other images stay. Infinite if they do
+  // not hold it at all.
+  double center_sigma = 0;
+  double turn_sigma_deg = 0;
+  // center_sigma over the median image's; infinite likewise.
+  double relative_center_sigma = 0;
+};
+
+struct WrongObservation {
+  uint64_t element = 0;  // in Model::track_elements
+  ImageId image_id = 0;
+  std::string image_name;
+  uint32_t point2D_idx = 0;
+  Point3DId point3D_id = 0;
+  double w = 0;         // krot/analysis/noise.h; infinite: not in front
+  double error_px = 0;  // to where the rest of its track leads; or NaN
+  // Of a track of two: which is wrong cannot be told.
+  bool is_of_two = false;
+};
+
+// A track whose wrong observations agree on another point.
+struct TwoPointTrack {
+  Point3DId point3D_id = 0;
+  int64_t num_first = 0;   // observations of the point
+  int64_t num_second = 0;  // of the other one
+  Eigen::Vector3d second = Eigen::Vector3d::Zero();
+};
+
+struct ModelCheckOptions {
+  // The probability that a model of Gaussian noise has a wrong observation, and
+  // that one whose noise is three times as large in some images as in most has
+  // a wrong image; in (0, 1).
+  double false_alarm = 0.05;
+};
+
+struct ModelCheck {
+  // Of an axis, pixels. None: no observation is checked by another one, as
+  // without positions, and there is no verdict.
+  std::optional<double> sigma_px;
+  double critical_w = 0;
+  int64_t num_tested = 0;          // observations, of images that are not wrong
+  std::vector<ImageCheck> images;  // as Model::images
+  // Of images that are not wrong; largest w first.
+  std::vector<WrongObservation> observations;
+  std::vector<TwoPointTrack> tracks;
+  // Where the points lie without what is wrong, as Model::points3D.
+  std::vector<Eigen::Vector3d> points;
+
+  int64_t NumImages(ImageVerdict verdict) const;
+  bool IsAnythingWrong() const {
+    return !observations.empty() || NumImages(ImageVerdict::kWrong) > 0;
+  }
+};
+
+// Snoops (SnoopNoise) and calls the image wrong that most speaks against, if
+// one of ImageFault does with probability false_alarm over all images of a
+// sound model; docs/method/outliers.md has the tests. Then anew without it,
+// until there is none: so an image is not blamed for what its neighbour does.
+// Requires a valid model. The same bits at any number of threads.
+ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
+                      const Context& context);
+
+// A copy without wrong observations and images. Points that lose observations
+// move to the least squares of the others; stored errors are updated. Cameras
+// stay. A bitwise copy if nothing is wrong.
+Model CureModel(const Model& model, const ModelCheck& check,
+                const Context& context);
+
+}  // namespace krot

@@ -1,0 +1,330 @@
+#include "krot/report/check_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "krot/report/report_json.h"
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+const char* VerdictName(ImageVerdict verdict) {
+  switch (verdict) {
+    case ImageVerdict::kWrong:
+      return "wrong";
+    case ImageVerdict::kWeaklyHeld:
+      return "weakly held";
+    case ImageVerdict::kFine:
+      break;
+  }
+  return "fine";
+}
+
+// What an image is called wrong for.
+const char* FaultName(ImageFault fault) {
+  switch (fault) {
+    case ImageFault::kContradicted:
+      return "contradicted";
+    case ImageFault::kMisplaced:
+      return "misplaced";
+    case ImageFault::kChance:
+      return "chance";
+    case ImageFault::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string FaultWords(const ImageCheck& image) {
+  switch (image.fault) {
+    case ImageFault::kContradicted:
+      return "most of them contradict the others";
+    case ImageFault::kMisplaced:
+      return "another pose would halve its errors";
+    case ImageFault::kChance:
+      return "they fit no better than chance matches";
+    case ImageFault::kNone:
+      break;
+  }
+  return "";
+}
+
+std::string Are(int64_t count) { return count == 1 ? " is " : " are "; }
+
+// Of that verdict: wrong ones by what speaks against them, weakly held ones by
+// how weakly.
+std::vector<const ImageCheck*> ImagesOf(const ModelCheck& check,
+                                        ImageVerdict verdict) {
+  std::vector<const ImageCheck*> images;
+  for (const ImageCheck& image : check.images) {
+    if (image.verdict == verdict) images.push_back(&image);
+  }
+  std::stable_sort(images.begin(), images.end(),
+                   [&](const ImageCheck* a, const ImageCheck* b) {
+                     return verdict == ImageVerdict::kWeaklyHeld
+                                ? a->relative_center_sigma >
+                                      b->relative_center_sigma
+                                : a->num_wrong > b->num_wrong;
+                   });
+  return images;
+}
+
+// "0.0123", or that nothing holds it.
+std::string SigmaText(double sigma) {
+  if (!std::isfinite(sigma)) return "anywhere";
+  return sigma < 1e-3 ? Scientific(sigma) : FormatNumber(sigma, 3);
+}
+
+std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
+                       size_t max_rows) {
+  const std::vector<const ImageCheck*> images = ImagesOf(check, verdict);
+  if (images.empty()) return "";
+  const bool is_wrong = verdict == ImageVerdict::kWrong;
+  TextTable table;
+  if (is_wrong) {
+    table.AddRow({"image", "observations", "checked", "more than noise",
+                  "of its observations"});
+  } else {
+    table.AddRow({"image", "observations", "checked", "centre +-",
+                  "median image's x", "turn +-, degrees"});
+  }
+  for (size_t n = 0; n < std::min(images.size(), max_rows); ++n) {
+    const ImageCheck& image = *images[n];
+    std::vector<std::string> row = {image.name,
+                                    std::to_string(image.num_observations),
+                                    std::to_string(image.num_tested)};
+    if (is_wrong) {
+      row.push_back(std::to_string(image.num_wrong));
+      row.push_back(FaultWords(image));
+    } else {
+      row.push_back(SigmaText(image.center_sigma));
+      row.push_back(std::isfinite(image.relative_center_sigma)
+                        ? FormatNumber(image.relative_center_sigma, 1)
+                        : "-");
+      row.push_back(SigmaText(image.turn_sigma_deg));
+    }
+    table.AddRow(row);
+  }
+  std::string head =
+      is_wrong
+          ? "Wrong images"
+          : "Weakly held images: what holds them lets their centres move more "
+            "than ten times as far\nas the median image's (standard deviation, "
+            "scene units)";
+  if (images.size() > max_rows) {
+    head += "; " + std::to_string(max_rows) + " of " +
+            Thousands(static_cast<int64_t>(images.size()));
+  }
+  return "\n" + head + "\n" + table.ToString();
+}
+
+std::string ObservationTable(const ModelCheck& check, size_t max_rows) {
+  if (check.observations.empty() || max_rows == 0) return "";
+  TextTable table;
+  table.AddRow({"image", "2D point", "3D point", "w", "error, px", ""});
+  for (size_t n = 0; n < std::min(check.observations.size(), max_rows); ++n) {
+    const WrongObservation& one = check.observations[n];
+    table.AddRow({one.image_name, std::to_string(one.point2D_idx),
+                  std::to_string(one.point3D_id),
+                  std::isfinite(one.w) ? FormatNumber(one.w, 1) : "not seen",
+                  FormatNumber(one.error_px, 2),
+                  one.is_of_two ? "this or the other one" : ""});
+  }
+  return "\nWrong observations, of images that are not wrong: w, the error "
+         "over "
+         "what noise makes of it, is above " +
+         FormatNumber(check.critical_w, 2) + "\n" + table.ToString();
+}
+
+std::string TrackTable(const ModelCheck& check, size_t max_rows) {
+  if (check.tracks.empty() || max_rows == 0) return "";
+  TextTable table;
+  table.AddRow({"3D point", "observations that agree", "that agree on another",
+                "which is at"});
+  for (size_t n = 0; n < std::min(check.tracks.size(), max_rows); ++n) {
+    const TwoPointTrack& track = check.tracks[n];
+    table.AddRow({std::to_string(track.point3D_id),
+                  std::to_string(track.num_first),
+                  std::to_string(track.num_second),
+                  FormatNumber(track.second.x(), 3) + " " +
+                      FormatNumber(track.second.y(), 3) + " " +
+                      FormatNumber(track.second.z(), 3)});
+  }
+  return "\nTracks that are two points: " +
+         Thousands(static_cast<int64_t>(check.tracks.size())) + "\n" +
+         table.ToString();
+}
+
+// In COLMAP's own commands.
+std::string NextSteps(const CheckReport& report) {
+  const ModelCheck& check = report.check;
+  const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
+  const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
+  if (!check.IsAnythingWrong() && num_weak == 0) return "";
+  const std::string input =
+      report.input_path.empty() ? "MODEL" : report.input_path;
+  const std::string cured =
+      report.output_path.empty() ? "CURED" : report.output_path;
+  std::string text = "\nNext\n";
+  std::string model = check.IsAnythingWrong() ? cured : input;
+  if (check.IsAnythingWrong() && report.output_path.empty()) {
+    text +=
+        "  The model without what is wrong:\n    krot model_checker "
+        "--input_path " +
+        input + " --output_path " + cured + "\n";
+  }
+  if (num_wrong > 0) {
+    text +=
+        "  Place the wrong images anew, from their matches:\n    colmap "
+        "image_registrator --database_path DATABASE --input_path " +
+        model + " --output_path REGISTERED\n";
+    model = "REGISTERED";
+  }
+  if (num_weak > 0) {
+    text +=
+        "  More matches for the weakly held images, and their points:\n    "
+        "colmap exhaustive_matcher --database_path DATABASE "
+        "--SiftMatching.guided_matching 1\n    colmap point_triangulator "
+        "--database_path DATABASE --image_path IMAGES --input_path " +
+        model + " --output_path TRIANGULATED\n";
+    model = "TRIANGULATED";
+  }
+  return text + "  Then adjust all that is left:\n    colmap bundle_adjuster " +
+         "--input_path " + model + " --output_path ADJUSTED\n";
+}
+
+Json ImageJson(const ImageCheck& image) {
+  return {{"image_id", image.image_id},
+          {"image_name", image.name},
+          {"verdict", VerdictName(image.verdict)},
+          {"fault", image.fault == ImageFault::kNone
+                        ? Json()
+                        : Json(FaultName(image.fault))},
+          {"num_observations", image.num_observations},
+          {"num_tested", image.num_tested},
+          {"num_wrong", image.num_wrong},
+          {"center_sigma", FiniteOrNull(image.center_sigma)},
+          {"relative_center_sigma", FiniteOrNull(image.relative_center_sigma)},
+          {"turn_sigma_deg", FiniteOrNull(image.turn_sigma_deg)},
+          {"turn_deg", image.turn_deg},
+          {"shift", image.shift}};
+}
+
+}  // namespace
+
+std::string CheckSentence(const CheckReport& report) {
+  const ModelCheck& check = report.check;
+  if (!check.sigma_px) {
+    return "Nothing can be said: no observation is checked by another one.";
+  }
+  const auto num_images = static_cast<int64_t>(check.images.size());
+  const auto num_observations = static_cast<int64_t>(check.observations.size());
+  const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
+  const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
+  const std::string noise =
+      "noise of " + FormatNumber(*check.sigma_px, 3) + " px per axis";
+  const std::string images =
+      Thousands(num_wrong) + " of " + Counted(num_images, "image");
+  const std::string observations = Thousands(num_observations) + " of " +
+                                   Thousands(report.num_observations) +
+                                   " observations";
+  if (num_wrong > 0 && num_observations > 0) {
+    return images + " and " + observations +
+           " are wrong: they contradict the others by more than " + noise +
+           " explains.";
+  }
+  if (num_wrong > 0) {
+    return images + Are(num_wrong) + "wrong: the others contradict " +
+           (num_wrong == 1 ? "it" : "them") + " by more than " + noise +
+           " explains.";
+  }
+  if (num_observations > 0) {
+    return observations + Are(num_observations) + "wrong, and no image is: " +
+           (num_observations == 1 ? "it contradicts" : "they contradict") +
+           " the others by more than " + noise + " explains.";
+  }
+  return "Nothing is wrong: all " + Thousands(report.num_observations) +
+         " observations of " + Counted(num_images, "image") + " agree within " +
+         noise +
+         (num_weak > 0 ? "; " + Counted(num_weak, "image") + Are(num_weak) +
+                             "weakly held."
+                       : ".");
+}
+
+std::string CheckTable(const CheckReport& report, int max_rows) {
+  const ModelCheck& check = report.check;
+  const auto num_rows = static_cast<size_t>(max_rows);
+  std::string text = CheckSentence(report) + "\n";
+  text +=
+      "Images: " + Thousands(check.NumImages(ImageVerdict::kWrong)) +
+      " wrong, " + Thousands(check.NumImages(ImageVerdict::kWeaklyHeld)) +
+      " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
+      " fine. Observations that others check: " + Thousands(check.num_tested) +
+      ".\n";
+  return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
+         ImageTable(check, ImageVerdict::kWeaklyHeld, num_rows) +
+         ObservationTable(check, num_rows) + TrackTable(check, num_rows) +
+         NextSteps(report) + "\n" +
+         RunSentence(report.run,
+                     "checked " + FormatNumber(report.seconds_check, 2) + " s");
+}
+
+std::string CheckJson(const CheckReport& report) {
+  const ModelCheck& check = report.check;
+  Json images = Json::array();
+  for (const ImageCheck& image : check.images) {
+    images.push_back(ImageJson(image));
+  }
+  Json observations = Json::array();
+  for (const WrongObservation& one : check.observations) {
+    observations.push_back({{"image_id", one.image_id},
+                            {"image_name", one.image_name},
+                            {"point2D_idx", one.point2D_idx},
+                            {"point3D_id", one.point3D_id},
+                            {"w", FiniteOrNull(one.w)},
+                            {"error_px", FiniteOrNull(one.error_px)},
+                            {"is_of_two", one.is_of_two}});
+  }
+  Json tracks = Json::array();
+  for (const TwoPointTrack& track : check.tracks) {
+    tracks.push_back({{"point3D_id", track.point3D_id},
+                      {"num_first", track.num_first},
+                      {"num_second", track.num_second},
+                      {"second", VectorJson(track.second)}});
+  }
+  const Json json = {
+      {"version", report.run.version},
+      {"command", "model_checker"},
+      {"verdict", CheckSentence(report)},
+      {"is_anything_wrong", check.IsAnythingWrong()},
+      {"num_images", check.images.size()},
+      {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
+      {"num_weakly_held_images", check.NumImages(ImageVerdict::kWeaklyHeld)},
+      {"num_observations", report.num_observations},
+      {"num_tested", check.num_tested},
+      {"num_wrong_observations", check.observations.size()},
+      {"sigma_px", NumberOrNull(check.sigma_px)},
+      {"critical_w", check.critical_w},
+      {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"poses", PosesJson(report.run.poses)},
+      {"pixel_error",
+       {{"before", ErrorJson(report.pixel_error_before)},
+        {"after", ErrorJson(report.pixel_error_after)}}},
+      {"images", images},
+      {"observations", observations},
+      {"tracks", tracks},
+      {"seconds",
+       {{"read", report.run.seconds_read},
+        {"check", report.seconds_check},
+        {"write", report.run.seconds_write},
+        {"total", report.run.seconds_total}}},
+      {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"threads", report.run.threads},
+      {"seed", report.run.seed},
+  };
+  return ReportText(json);
+}
+
+}  // namespace krot

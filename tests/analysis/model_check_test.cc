@@ -1,0 +1,356 @@
+#include "krot/analysis/model_check.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/analysis/pixel_errors.h"
+#include "krot/camera/projection_row.h"
+#include "krot/model/image_geometry.h"
+#include "krot/model/validate.h"
+#include "krot/synthetic/scene.h"
+
+namespace krot {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+Model Scene(int seed, int num_frames = 12, double track_length = 4) {
+  SceneOptions options;
+  options.num_frames = num_frames;
+  options.num_points = 600;
+  options.track_length = track_length;
+  options.pixel_noise = 1;
+  options.random_seed = static_cast<uint64_t>(seed);
+  return SynthesizeScene(options).ground_truth;
+}
+
+Frame& FrameOf(Model* model, size_t image) {
+  return model->frames[ImageGeometries(*model)[image].frame];
+}
+
+// About its centre.
+void Turn(Model* model, size_t image, double degrees,
+          const Eigen::Vector3d& axis) {
+  Pose& pose = FrameOf(model, image).rig_from_world;
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(degrees / 180 * std::acos(-1.0), axis.normalized())
+          .toRotationMatrix();
+  pose = ToPose({turn * pose.Rotation(), turn * pose.translation});
+}
+
+Point2D& Pixel(Model* model, uint64_t e) {
+  const TrackElement& element = model->track_elements[e];
+  return model->images[ImageIndices(*model).at(element.image_id)]
+      .points2D[element.point2D_idx];
+}
+
+std::vector<ImageId> Images(const ModelCheck& check, ImageVerdict verdict) {
+  std::vector<ImageId> ids;
+  for (const ImageCheck& image : check.images) {
+    if (image.verdict == verdict) ids.push_back(image.image_id);
+  }
+  return ids;
+}
+
+TEST(CheckModel, FindsNothingWrongWhereThereIsNothingButNoise) {
+  int num_alarms = 0;
+  for (int seed = 1; seed <= 20; ++seed) {
+    const Model model = Scene(seed, 6 + seed, 2 + 0.2 * seed);
+    const ModelCheck check = CheckModel(model, {}, {});
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
+    num_alarms += check.IsAnythingWrong();
+  }
+  EXPECT_LE(num_alarms, 3);  // more by chance: once in 400
+}
+
+TEST(CheckModel, DoesNotCallAnImageWrongForNoiseThreeTimesAsLarge) {
+  for (int seed = 1; seed <= 20; ++seed) {
+    Model model = Scene(seed, 10, 3);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> noise;
+    for (size_t n = 0; n < 3; ++n) {
+      for (Point2D& point : model.images[n].points2D) {
+        point.x += std::sqrt(8.0) * noise(random);
+        point.y += std::sqrt(8.0) * noise(random);
+      }
+    }
+    EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+                IsEmpty());
+  }
+}
+
+TEST(CheckModel, FindsTurnedImagesAndBlamesNoNeighbour) {
+  for (int seed = 1; seed <= 10; ++seed) {
+    // Half of what sees a point of a short track is wrong.
+    Model model = Scene(seed, 12, 2.5);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (const size_t n : {3, 4}) {
+      Turn(&model, n, 1, {normal(random), normal(random), normal(random)});
+    }
+    const ModelCheck check = CheckModel(model, {}, {});
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+                ElementsAre(model.images[3].id, model.images[4].id));
+    EXPECT_LE(check.observations.size(), 2u);
+    EXPECT_NEAR(*check.sigma_px, 1, 0.2);
+    for (const WrongObservation& one : check.observations) {
+      EXPECT_NE(one.image_id, model.images[3].id);
+      EXPECT_NE(one.image_id, model.images[4].id);
+    }
+  }
+}
+
+// By a fifth of a degree: 3.6 pixels, of noise of one.
+TEST(CheckModel, FindsAnImageWhoseObservationsAgreeOnAnotherPose) {
+  for (int seed = 1; seed <= 10; ++seed) {
+    Model model = Scene(seed, 12, 6);
+    Turn(&model, 5, 0.2, {1, 2, 0});
+    const ModelCheck check = CheckModel(model, {}, {});
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+                ElementsAre(model.images[5].id));
+    EXPECT_EQ(check.images[5].fault, ImageFault::kMisplaced);
+  }
+}
+
+// What COLMAP keeps of an image with a wrong pose.
+TEST(CheckModel, FindsAnImageThatFitsByChanceWithinFourPixels) {
+  for (int seed = 1; seed <= 10; ++seed) {
+    Model model = Scene(seed, 12, 5);
+    const std::vector<ImageGeometry> images = ImageGeometries(model);
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> uniform(-4, 4);
+    for (const Point3D& point : model.points3D) {
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        if (model.track_elements[e].image_id != model.images[5].id) continue;
+        const Camera& camera = model.cameras[images[5].camera];
+        const auto pixel = ProjectPoint(camera.model_id, camera.params.data(),
+                                        images[5].cam_from_world * point.xyz);
+        Eigen::Vector2d error;
+        do {
+          error = {uniform(random), uniform(random)};
+        } while (error.norm() > 4);
+        Pixel(&model, e).x = pixel->x() + error.x();
+        Pixel(&model, e).y = pixel->y() + error.y();
+      }
+    }
+    const ModelCheck check = CheckModel(model, {}, {});
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+                ElementsAre(model.images[5].id));
+    EXPECT_EQ(check.images[5].fault, ImageFault::kChance);
+  }
+}
+
+TEST(CheckModel, SaysOfWrongObservationsWhoseTheyAreAndByHowMuch) {
+  Model model = Scene(1, 12, 6);
+  size_t k = 0;
+  while (model.points3D[k].track_end - model.points3D[k].track_begin < 5) ++k;
+  const uint64_t e = model.points3D[k].track_begin + 1;
+  Pixel(&model, e).x += 30;
+  const ModelCheck check = CheckModel(model, {}, {});
+  ASSERT_EQ(check.observations.size(), 1u);
+  const WrongObservation& one = check.observations[0];
+  EXPECT_EQ(one.element, e);
+  EXPECT_EQ(one.image_id, model.track_elements[e].image_id);
+  EXPECT_EQ(one.point2D_idx, model.track_elements[e].point2D_idx);
+  EXPECT_EQ(one.point3D_id, model.points3D[k].id);
+  EXPECT_NEAR(one.error_px, 30, 5);
+  EXPECT_GT(one.w, check.critical_w);
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
+}
+
+// The second half of a track sees where a point beside the first one projects.
+TEST(CheckModel, TellsATrackOfTwoPointsFromScatteredMistakes) {
+  Model model = Scene(2, 12, 9);
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  const auto indices = ImageIndices(model);
+  size_t k = 0;
+  while (model.points3D[k].track_end - model.points3D[k].track_begin < 8) ++k;
+  const Point3D& point = model.points3D[k];
+  const Eigen::Vector3d other = point.xyz + Eigen::Vector3d(0.03, -0.02, 0.02);
+  for (uint64_t e = point.track_end - 3; e < point.track_end; ++e) {
+    const int32_t n = indices.at(model.track_elements[e].image_id);
+    const Camera& camera = model.cameras[images[n].camera];
+    const auto pixel = ProjectPoint(camera.model_id, camera.params.data(),
+                                    images[n].cam_from_world * other);
+    Pixel(&model, e).x = pixel->x();
+    Pixel(&model, e).y = pixel->y();
+  }
+  const Point3D& scattered = model.points3D[k + 1];
+  Pixel(&model, scattered.track_begin).x += 40;
+  Pixel(&model, scattered.track_begin + 1).y += 40;
+  const ModelCheck check = CheckModel(model, {}, {});
+  ASSERT_EQ(check.tracks.size(), 1u);
+  EXPECT_EQ(check.tracks[0].point3D_id, point.id);
+  EXPECT_EQ(check.tracks[0].num_second, 3);
+  EXPECT_EQ(check.tracks[0].num_first + 3,
+            static_cast<int64_t>(point.track_end - point.track_begin));
+  EXPECT_LT((check.tracks[0].second - other).norm(), 0.005);
+}
+
+// The inverse of all normal equations of one image and of all points that it
+// sees, from central differences of the projection.
+TEST(CheckModel, KnowsHowFirmlyAnImageIsHeld) {
+  const Model model = Scene(3, 6, 3);
+  const ModelCheck check = CheckModel(model, {}, {});
+  ASSERT_FALSE(check.IsAnythingWrong());
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  const auto indices = ImageIndices(model);
+  const size_t image = 2;
+  std::vector<size_t> points;
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    for (uint64_t e = model.points3D[k].track_begin;
+         e < model.points3D[k].track_end; ++e) {
+      if (model.track_elements[e].image_id == model.images[image].id) {
+        points.push_back(k);
+      }
+    }
+  }
+  const auto size = static_cast<Eigen::Index>(6 + 3 * points.size());
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(size, size);
+  for (size_t j = 0; j < points.size(); ++j) {
+    const Point3D& point = model.points3D[points[j]];
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const int32_t n = indices.at(model.track_elements[e].image_id);
+      const Camera& camera = model.cameras[images[n].camera];
+      const RigidTransform pose = images[n].cam_from_world;
+      const auto pixel = [&](const Eigen::VectorXd& u) -> Eigen::Vector2d {
+        const Eigen::Vector3d turn = u.head<3>();
+        const Eigen::Vector3d x =
+            pose * Eigen::Vector3d(check.points[points[j]] + u.tail<3>() -
+                                   u.segment<3>(3));
+        const Eigen::Vector3d x_cam =
+            turn.norm() > 0
+                ? Eigen::Vector3d(
+                      Eigen::AngleAxisd(turn.norm(), turn.normalized()) * x)
+                : x;
+        return *ProjectPoint(camera.model_id, camera.params.data(), x_cam);
+      };
+      Eigen::MatrixXd J = Eigen::MatrixXd::Zero(2, size);
+      for (int c = 0; c < 9; ++c) {
+        if (c < 6 && n != static_cast<int32_t>(image)) continue;
+        constexpr double kStep = 1e-6;
+        const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(9, c);
+        const Eigen::Index column =
+            c < 6 ? c : static_cast<Eigen::Index>(6 + 3 * j) + c - 6;
+        J.col(column) = (pixel(step) - pixel(-step)) / (2 * kStep);
+      }
+      N += J.transpose() * J;
+    }
+  }
+  const Eigen::MatrixXd covariance =
+      *check.sigma_px * *check.sigma_px * N.inverse();
+  const auto largest = [&](Eigen::Index begin) {
+    return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(
+                         covariance.block<3, 3>(begin, begin))
+                         .eigenvalues()[2]);
+  };
+  const ImageCheck& one = check.images[image];
+  EXPECT_NEAR(one.center_sigma, largest(3), 1e-4 * largest(3));
+  EXPECT_NEAR(one.turn_sigma_deg, largest(0) * 180 / std::acos(-1.0),
+              1e-4 * one.turn_sigma_deg);
+}
+
+TEST(CheckModel, CallsAnImageOfFewObservationsWeaklyHeld) {
+  Model model = Scene(4, 10, 5);
+  const ImageId id = model.images[7].id;
+  int num_kept = 0;
+  std::vector<char> is_removed;
+  for (const TrackElement& element : model.track_elements) {
+    is_removed.push_back(element.image_id == id && ++num_kept > 4);
+  }
+  // Its tracks keep their other observations.
+  std::vector<TrackElement> elements;
+  for (Point3D& point : model.points3D) {
+    const uint64_t begin = elements.size();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (is_removed[e]) {
+        Pixel(&model, e).point3D_id = kInvalidPoint3DId;
+      } else {
+        elements.push_back(model.track_elements[e]);
+      }
+    }
+    point.track_begin = begin;
+    point.track_end = elements.size();
+  }
+  model.track_elements = elements;
+  ValidateModel(model);
+  const ModelCheck check = CheckModel(model, {}, {});
+  EXPECT_THAT(Images(check, ImageVerdict::kWeaklyHeld), ElementsAre(id));
+  EXPECT_FALSE(check.IsAnythingWrong());
+}
+
+TEST(CheckModel, HasNoVerdictWithoutPositions) {
+  Model model = Scene(1);
+  for (Frame& frame : model.frames) {
+    frame.rig_from_world.translation.setConstant(
+        std::numeric_limits<double>::quiet_NaN());
+  }
+  const ModelCheck check = CheckModel(model, {}, {});
+  EXPECT_FALSE(check.sigma_px);
+  EXPECT_FALSE(check.IsAnythingWrong());
+}
+
+TEST(CheckModel, HasTheSameBitsAtAnyNumberOfThreads) {
+  Model model = Scene(5);
+  Turn(&model, 2, 2, {1, 2, 3});
+  Context one, four;
+  one.num_threads = 1;
+  four.num_threads = 4;
+  const ModelCheck a = CheckModel(model, {}, one);
+  const ModelCheck b = CheckModel(model, {}, four);
+  EXPECT_EQ(*a.sigma_px, *b.sigma_px);
+  EXPECT_EQ(a.points, b.points);
+  for (size_t n = 0; n < a.images.size(); ++n) {
+    EXPECT_EQ(a.images[n].verdict, b.images[n].verdict);
+    EXPECT_EQ(a.images[n].center_sigma, b.images[n].center_sigma);
+  }
+}
+
+TEST(CureModel, LeavesOutWhatIsWrongAndFitsBetter) {
+  for (const bool is_legacy : {false, true}) {
+    Model model = Scene(6);
+    Turn(&model, 2, 3, {1, 2, 3});
+    Pixel(&model, model.points3D[7].track_begin).x += 50;
+    if (is_legacy) {
+      model.stores_rigs = false;
+      for (size_t n = 0; n < model.images.size(); ++n) {
+        model.images[n].cam_from_world =
+            ToPose(ImageGeometries(model)[n].cam_from_world);
+      }
+    }
+    const ModelCheck check = CheckModel(model, {}, {});
+    const Model cured = CureModel(model, check, {});
+    ValidateModel(cured);
+    EXPECT_EQ(cured.images.size() + 1, model.images.size());
+    EXPECT_EQ(cured.frames.size() + 1, model.frames.size());
+    for (const Image& image : cured.images) {
+      EXPECT_NE(image.id, model.images[2].id);
+    }
+    EXPECT_LT(Summarize(PixelErrors(cured)).max, 7);
+    EXPECT_FALSE(CheckModel(cured, {}, {}).IsAnythingWrong());
+  }
+}
+
+TEST(CureModel, CopiesAModelThatNothingIsWrongWith) {
+  const Model model = Scene(1);
+  const ModelCheck check = CheckModel(model, {}, {});
+  ASSERT_FALSE(check.IsAnythingWrong());
+  const Model cured = CureModel(model, check, {});
+  ASSERT_EQ(cured.points3D.size(), model.points3D.size());
+  for (size_t k = 0; k < model.points3D.size(); ++k) {
+    EXPECT_EQ(cured.points3D[k].xyz, model.points3D[k].xyz);
+    EXPECT_EQ(cured.points3D[k].error, model.points3D[k].error);
+  }
+}
+
+}  // namespace
+}  // namespace krot

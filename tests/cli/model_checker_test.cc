@@ -1,0 +1,90 @@
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+#include "krot/model/validate.h"
+#include "tests/cli/krot_process.h"
+#include "tests/cli/scenes.h"
+
+namespace krot {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using Json = nlohmann::json;
+
+class ModelCheckerCommand : public ::testing::Test {
+ protected:
+  ModelCheckerCommand() {
+    SceneOptions options;
+    options.num_frames = 8;
+    options.num_points = 400;
+    options.pixel_noise = 0.5;
+    options.random_seed = 3;
+    Model model = SynthesizeScene(options).ground_truth;
+    Save(model, folder_ / "sound");
+    Pose& pose = model.frames[2].rig_from_world;
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(0.03, Eigen::Vector3d(1, 2, 2) / 3).matrix();
+    pose = ToPose({turn * pose.Rotation(), turn * pose.translation});
+    model.images[0].points2D[0].x += 40;
+    Save(model, folder_ / "faulty");
+  }
+
+  KrotResult Check(const std::string& model,
+                   const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {"model_checker", "--input_path",
+                                          folder_ / model};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(ModelCheckerCommand, SaysFirstThatNothingIsWrong) {
+  const KrotResult result = Check("sound", {"--fail_on", "wrong"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
+}
+
+TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
+  const KrotResult result =
+      Check("faulty", {"--output_path", folder_ / "cured", "--report_path",
+                       folder_ / "r.json", "--html_path", folder_ / "r.html"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, StartsWith("1 of 8 images and 1 of "));
+  EXPECT_THAT(result.out, HasSubstr("colmap image_registrator"));
+  const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_TRUE(report["is_anything_wrong"]);
+  EXPECT_THAT(result.out, StartsWith(report["verdict"].get<std::string>()));
+  EXPECT_EQ(report["images"][2]["verdict"], "wrong");
+  EXPECT_EQ(report["num_wrong_images"], 1);
+  const Model cured = Load(folder_ / "cured");
+  ValidateModel(cured);
+  EXPECT_EQ(cured.images.size(), 7u);
+  EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+}
+
+TEST_F(ModelCheckerCommand, EndsWithCode9WhereAScriptAsks) {
+  EXPECT_EQ(Check("faulty").exit_code, 0);
+  EXPECT_EQ(Check("faulty", {"--fail_on", "wrong"}).exit_code, 9);
+}
+
+TEST_F(ModelCheckerCommand, RefusesWhatItCannotJudge) {
+  Save(WithoutTranslations(Load(folder_ / "sound")), folder_ / "nowhere");
+  const KrotResult result = Check("nowhere");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err,
+              IsOneSentence("krot model_checker", "nothing to check"));
+  EXPECT_EQ(Check("sound", {"--overwrite", "1"}).exit_code, 1);
+}
+
+}  // namespace
+}  // namespace krot

@@ -1,0 +1,335 @@
+#!/usr/bin/env python3
+"""How many planted faults `krot model_checker` finds, and what else it calls
+wrong, beside a look at mean errors and a threshold.
+
+    planted_faults.py KROT [MODEL] [SEEDS]
+
+MODEL is a COLMAP model of pinholes or SIMPLE_RADIAL, RADIAL, OPENCV cameras (read
+through `colmap model_converter`); without one, or with "-", scenes are made by
+`krot model_synthesizer`: 30 images, noise of one pixel. For each fault SEEDS (10)
+trials are counted together. The faults:
+
+turned: three images (one in models of fewer than ten) are turned about their
+    centres, by so many degrees and any axis. Their 2D points keep what COLMAP
+    would let them keep: `adjusted`: the points move to their least squares and
+    what is then 4 px and more off goes, twice (colmap bundle_adjuster with
+    cameras held, and point_filtering); `nearest`: each sees the 3D point that the
+    turned camera puts nearest to it, if that is within 4 px.
+moved: so many per cent of all observations are moved by so many pixels in any
+    direction, in scenes so many sigma, and everything is adjusted (krot
+    bundle_adjuster).
+
+Rivals call wrong: `mean`: an image whose mean error is more than twice the median
+image's; `2 px`: an observation of more than 2 px, an image with more than half of
+its observations above. A planted image that keeps fewer than ten observations is
+not counted: little says that it is wrong.
+"""
+
+import json
+import math
+import pathlib
+import random
+import statistics
+import subprocess
+import sys
+import tempfile
+
+TURNS = (0.2, 0.5, 1, 2, 5)
+MOVES = ((0.1, 10), (1, 5), (1, 10), (1, 50), (10, 10))
+LIMIT = 4.0
+FEWEST = 10
+
+
+def run(*command):
+    done = subprocess.run([str(word) for word in command], capture_output=True,
+                          text=True, check=False,
+                          env={"QT_QPA_PLATFORM": "offscreen", "PATH":
+                               "/usr/local/bin:/usr/bin:/bin"})
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))}: {done.stderr}")
+
+
+class Model:
+    """A COLMAP text model: lists of words, and numbers where they are needed."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        self.cameras = {}
+        for row in self.rows("cameras.txt"):
+            self.cameras[row[0]] = (row[1], [float(p) for p in row[4:]])
+        self.images = {}  # id: [pose of 7 numbers, camera, name]
+        self.points2D = {}  # id: [[x, y, point3D], ...]
+        rows = self.rows("images.txt", skip_empty=False)
+        for head, body in zip(rows[::2], rows[1::2]):
+            self.images[head[0]] = [[float(v) for v in head[1:8]], head[8],
+                                    " ".join(head[9:])]
+            self.points2D[head[0]] = [
+                [float(body[i]), float(body[i + 1]), body[i + 2]]
+                for i in range(0, len(body), 3)]
+        self.points3D = {row[0]: row[1:8] for row in self.rows("points3D.txt")}
+
+    def rows(self, name, skip_empty=True):
+        lines = (self.folder / name).read_text(errors="replace").split("\n")
+        rows = [line.split() for line in lines if not line.startswith("#")]
+        if skip_empty:
+            return [row for row in rows if row]
+        return rows[:len(rows) - len(rows) % 2]
+
+    def write(self, folder):
+        """Tracks are made of the images' 2D points; those of one go."""
+        folder.mkdir(parents=True)
+        (folder / "cameras.txt").write_bytes(
+            (self.folder / "cameras.txt").read_bytes())
+        tracks = {}
+        for image, points in self.points2D.items():
+            for index, (_, _, point) in enumerate(points):
+                if point != "-1":
+                    tracks.setdefault(point, []).append((image, index))
+        tracks = {p: t for p, t in tracks.items() if len(t) > 1}
+        with open(folder / "images.txt", "w", encoding="utf-8") as out:
+            for image, (pose, camera, name) in self.images.items():
+                out.write(f"{image} {' '.join(map(repr, pose))} {camera} {name}"
+                          "\n" + " ".join(
+                              f"{x!r} {y!r} {p if p in tracks else -1}"
+                              for x, y, p in self.points2D[image]) + "\n")
+        with open(folder / "points3D.txt", "w", encoding="utf-8") as out:
+            for point, track in tracks.items():
+                out.write(" ".join([point, *self.points3D[point], *(
+                    f"{image} {index}" for image, index in track)]) + "\n")
+
+    def project(self, image, xyz):
+        """The pixel, or None."""
+        (qw, qx, qy, qz, *t), camera, _ = self.images[image]
+        R = rotation(qw, qx, qy, qz)
+        x, y, z = (sum(R[r][c] * xyz[c] for c in range(3)) + t[r]
+                   for r in range(3))
+        if z <= 0:
+            return None
+        u, v = x / z, y / z
+        kind, p = self.cameras[camera]
+        two = kind in ("PINHOLE", "OPENCV")
+        fx, fy, cx, cy = p[:4] if two else (p[0], p[0], p[1], p[2])
+        k = p[4:] if two else p[3:]
+        r2 = u * u + v * v
+        radial = 1 + sum(a * r2 ** (i + 1) for i, a in enumerate(k[:2]))
+        du = dv = 0
+        if kind == "OPENCV":
+            du = 2 * k[2] * u * v + k[3] * (r2 + 2 * u * u)
+            dv = 2 * k[3] * u * v + k[2] * (r2 + 2 * v * v)
+        return fx * (u * radial + du) + cx, fy * (v * radial + dv) + cy
+
+    def errors(self, image):
+        result = {}
+        for index, (x, y, point) in enumerate(self.points2D[image]):
+            if point == "-1":
+                continue
+            xyz = [float(v) for v in self.points3D[point][:3]]
+            pixel = self.project(image, xyz)
+            result[index] = (math.hypot(pixel[0] - x, pixel[1] - y)
+                             if pixel else math.inf)
+        return result
+
+    def turn(self, image, degrees, rng):
+        """About its centre."""
+        pose = self.images[image][0]
+        q, t = pose[:4], pose[4:]
+        axis = [rng.gauss(0, 1) for _ in range(3)]
+        norm = math.sqrt(sum(a * a for a in axis))
+        half = math.radians(degrees) / 2
+        d = [math.cos(half), *(math.sin(half) * a / norm for a in axis)]
+        D = rotation(*d)
+        self.images[image][0] = multiply(d, q) + [
+            sum(D[r][c] * t[c] for c in range(3)) for r in range(3)]
+
+
+def rotation(w, x, y, z):
+    n = w * w + x * x + y * y + z * z
+    return [[(w * w + x * x - y * y - z * z) / n, 2 * (x * y - w * z) / n,
+             2 * (x * z + w * y) / n],
+            [2 * (x * y + w * z) / n, (w * w - x * x + y * y - z * z) / n,
+             2 * (y * z - w * x) / n],
+            [2 * (x * z - w * y) / n, 2 * (y * z + w * x) / n,
+             (w * w - x * x - y * y + z * z) / n]]
+
+
+def multiply(a, b):
+    w, x, y, z = a
+    W, X, Y, Z = b
+    return [w * W - x * X - y * Y - z * Z, w * X + x * W + y * Z - z * Y,
+            w * Y - x * Z + y * W + z * X, w * Z + x * Y - y * X + z * W]
+
+
+def see_nearest(model, image):
+    """2D points see what is projected nearest, within the limit."""
+    cells = {}
+    shown = {row[2] for points in model.points2D.values() for row in points}
+    for point in shown - {"-1"}:
+        xyz = [float(v) for v in model.points3D[point][:3]]
+        pixel = model.project(image, xyz)
+        if pixel:
+            cell = (int(pixel[0] // LIMIT), int(pixel[1] // LIMIT))
+            cells.setdefault(cell, []).append((pixel, point))
+    taken = set()
+    for row in model.points2D[image]:
+        a, b = int(row[0] // LIMIT), int(row[1] // LIMIT)
+        near = [(math.hypot(p[0] - row[0], p[1] - row[1]), point)
+                for i in (-1, 0, 1) for j in (-1, 0, 1)
+                for p, point in cells.get((a + i, b + j), [])]
+        row[2] = "-1"
+        if near and min(near)[0] < LIMIT and min(near)[1] not in taken:
+            row[2] = min(near)[1]
+            taken.add(row[2])
+
+
+def adjust_points_and_filter(folder):
+    """Into folder / "filtered"."""
+    source = folder / "planted"
+    for n in range(2):
+        moved, kept = folder / f"moved{n}", folder / f"kept{n}"
+        moved.mkdir()
+        kept.mkdir()
+        run("colmap", "bundle_adjuster", "--input_path", source,
+            "--output_path", moved,
+            *(word for name in ("extrinsics", "focal_length", "extra_params")
+              for word in (f"--BundleAdjustment.refine_{name}", 0)))
+        run("colmap", "point_filtering", "--input_path", moved, "--output_path",
+            kept, "--max_reproj_error", LIMIT, "--min_track_len", 2,
+            "--min_tri_angle", 0)
+        source = kept
+    to_text(source, folder / "filtered")
+
+
+def to_text(source, target):
+    target.mkdir()
+    run("colmap", "model_converter", "--input_path", source, "--output_path",
+        target, "--output_type", "TXT")
+
+
+def base_model(krot, path, folder, seed):
+    if path:
+        to_text(path, folder / "base")
+    else:
+        run(krot, "model_synthesizer", "--output_path", folder / "made",
+            "--Scene.num_frames", 30, "--Scene.num_points", 1500,
+            "--Scene.track_length", 5, "--Scene.pixel_noise", 1,
+            "--random_seed", seed)
+        run(krot, "bundle_adjuster", "--input_path", folder / "made",
+            "--output_path", folder / "base", "--output_type", "TXT")
+    return Model(folder / "base")
+
+
+def check(krot, path, folder):
+    run(krot, "model_checker", "--input_path", path, "--report_path",
+        folder / "report.json", "--num_threads", 1)
+    return json.loads((folder / "report.json").read_text())
+
+
+class Counts:
+    """Found of planted, and called of what is not."""
+
+    def __init__(self):
+        self.planted, self.found, self.called = 0, 0, 0
+
+    def add(self, planted, called):
+        self.planted += len(planted)
+        self.found += len(planted & called)
+        self.called += len(called)
+
+    def row(self):
+        recall = self.found / self.planted if self.planted else math.nan
+        precision = self.found / self.called if self.called else math.nan
+        return f"{recall:.3f} | {precision:.3f}"
+
+
+def turned_trial(krot, path, seed, degrees, how, counts):
+    """Adds to counts; returns how many planted ones keep too little."""
+    rng = random.Random(seed)
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        model = base_model(krot, path, folder, seed)
+        images = sorted(model.images)
+        planted = set(rng.sample(images, 3 if len(images) >= 10 else 1))
+        for image in sorted(planted):
+            model.turn(image, degrees, rng)
+        if how == "nearest":
+            for image in sorted(planted):
+                see_nearest(model, image)
+        model.write(folder / "planted")
+        final = folder / "planted"
+        if how == "adjusted":
+            adjust_points_and_filter(folder)
+            final = folder / "filtered"
+        report = check(krot, final, folder)
+        model = Model(final)
+    errors = {image: list(model.errors(image).values())
+              for image in model.images}
+    thin = {i for i in planted if len(errors.get(i, [])) < FEWEST}
+    planted -= thin
+    means = {i: statistics.fmean(e) for i, e in errors.items() if e}
+    middle = statistics.median(means.values())
+    called = {
+        "krot": {str(i["image_id"]) for i in report["images"]
+                 if i["verdict"] == "wrong"},
+        "mean": {i for i, m in means.items() if m > 2 * middle},
+        "2 px": {i for i, e in errors.items()
+                 if e and sum(v > 2 for v in e) > len(e) / 2}}
+    for rival, images in called.items():
+        counts[rival].add(planted, images - thin)
+    return len(thin)
+
+
+def moved_trial(krot, path, seed, percent, pixels, counts):
+    rng = random.Random(seed)
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        model = base_model(krot, path, folder, seed)
+        everything = [(image, index) for image in sorted(model.images)
+                      for index, row in enumerate(model.points2D[image])
+                      if row[2] != "-1"]
+        planted = set(rng.sample(everything, max(
+            1, round(percent / 100 * len(everything)))))
+        for image, index in sorted(planted):
+            angle = 2 * math.pi * rng.random()
+            model.points2D[image][index][0] += pixels * math.cos(angle)
+            model.points2D[image][index][1] += pixels * math.sin(angle)
+        model.write(folder / "planted")
+        run(krot, "bundle_adjuster", "--input_path", folder / "planted",
+            "--output_path", folder / "adjusted", "--output_type", "TXT")
+        report = check(krot, folder / "adjusted", folder)
+        model = Model(folder / "adjusted")
+    counts["krot"].add(planted, {
+        (str(o["image_id"]), o["point2D_idx"]) for o in report["observations"]})
+    counts["2 px"].add(planted, {
+        (image, index) for image in model.images
+        for index, error in model.errors(image).items() if error > 2})
+
+
+def main():
+    if len(sys.argv) < 2:
+        sys.exit(__doc__)
+    krot = pathlib.Path(sys.argv[1]).resolve()
+    path = sys.argv[2] if len(sys.argv) > 2 and sys.argv[2] != "-" else None
+    seeds = range(1, 1 + (int(sys.argv[3]) if len(sys.argv) > 3 else 10))
+    print("| fault | planted | too few left | krot: recall | precision | "
+          "mean: recall | precision | 2 px: recall | precision |\n"
+          "|---|---|---|---|---|---|---|---|---|")
+    for how in ("adjusted", "nearest"):
+        for degrees in TURNS:
+            counts = {rival: Counts() for rival in ("krot", "mean", "2 px")}
+            thin = sum(turned_trial(krot, path, seed, degrees, how, counts)
+                       for seed in seeds)
+            print(f"| turned by {degrees}°, {how} | {counts['krot'].planted} | "
+                  f"{thin} | " +
+                  " | ".join(c.row() for c in counts.values()) + " |",
+                  flush=True)
+    for percent, pixels in MOVES:
+        counts = {rival: Counts() for rival in ("krot", "2 px")}
+        for seed in seeds:
+            moved_trial(krot, path, seed, percent, pixels, counts)
+        print(f"| {percent} % moved by {pixels} px | {counts['krot'].planted} | "
+              f"| {counts['krot'].row()} | – | – | {counts['2 px'].row()} |",
+              flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,196 @@
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "krot/analysis/model_check.h"
+#include "krot/base/timer.h"
+#include "krot/outliers/suspect_colors.h"
+#include "krot/report/check_report.h"
+#include "tools/krot/command.h"
+#include "tools/krot/common_options.h"
+#include "tools/krot/interrupt.h"
+#include "tools/krot/model_files.h"
+#include "tools/krot/report_files.h"
+#include "tools/krot/same_path.h"
+#include "tools/krot/suspect_crops.h"
+
+namespace krot {
+namespace {
+
+struct CheckerCommand {
+  ModelPaths paths;
+  std::string image_path;
+  std::string suspects_path;
+  std::string fail_on = "never";
+  int num_worst = 10;
+  Context context;
+  CommonOptions common;
+};
+
+void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
+  ModelPaths* paths = &command->paths;
+  parser->AddPath("input_path", &paths->input_path, true, "a folder",
+                  "The COLMAP model to read, binary or text");
+  parser->AddPath("output_path", &paths->output_path, false, "a folder",
+                  "Where the model without wrong images and observations goes; "
+                  "created if need be");
+  parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
+                    "The format to write; auto: the input's");
+  AddOverwrite(&paths->overwrite, parser);
+  parser->AddOutputFile("report_path", &paths->report_path,
+                        "Where the report goes, as JSON");
+  AddHtmlPath(&paths->html_path, parser);
+  parser->AddPath("image_path", &command->image_path, false, "a folder",
+                  "The photos: the page then shows the worst observations in "
+                  "them");
+  parser->AddPath("suspects_path", &command->suspects_path, false, "a folder",
+                  "Where a copy of the input goes whose points are coloured by "
+                  "whether an observation of their track is wrong, for "
+                  "COLMAP's GUI; created if need be");
+  AddOnContradiction(&paths->on_contradiction, parser);
+  parser->AddChoice("fail_on", &command->fail_on, {"never", "wrong"},
+                    "When to end with code 9, for scripts: wrong: if an image "
+                    "or an observation is wrong");
+  parser->AddInteger("num_worst", &command->num_worst, AtLeast(0),
+                     "How many images of each verdict, observations and tracks "
+                     "to list");
+  parser->AddThreads("num_threads", &command->context.num_threads,
+                     "the result is the same, bit by bit");
+  AddCommonOptions(
+      "Recorded in the report; this command draws no random numbers",
+      &command->common, parser);
+}
+
+// What can be known before the model is read.
+WriteModelOptions CheckPaths(const CheckerCommand& command,
+                             const OptionParser& parser) {
+  const ModelPaths& paths = command.paths;
+  if (paths.html_path.empty()) {
+    parser.Refuse("image_path", "without --html_path");
+  }
+  WriteModelOptions write_options;
+  if (!paths.output_path.empty()) {
+    write_options = CheckModelPaths(paths, command.common.log);
+  } else {
+    parser.Refuse("output_type", "without --output_path");
+    if (command.suspects_path.empty()) {
+      parser.Refuse("overwrite", "without --output_path");
+    }
+    CheckSidePath("report_path", paths.report_path);
+    CheckSidePath("html_path", paths.html_path);
+    write_options.format = DetectModelFormat(paths.input_path);
+    write_options.overwrite = paths.overwrite;
+    write_options.copy_project_from = paths.input_path;
+    write_options.on_note = WarnOn(command.common.log);
+  }
+  if (command.suspects_path.empty()) return write_options;
+  for (const std::string& other : {paths.input_path, paths.output_path}) {
+    if (!IsSamePath(command.suspects_path, other)) continue;
+    throw OptionError("--suspects_path = " + command.suspects_path +
+                      ", must be a folder of its own");
+  }
+  CheckWritable(command.suspects_path, write_options);
+  return write_options;
+}
+
+// The wrong observations as those that a filter removed, to be shown like them.
+OutlierFilterSummary Suspects(const ModelCheck& check) {
+  OutlierFilterSummary summary;
+  for (const WrongObservation& one : check.observations) {
+    RemovedObservation& removed = summary.removed.emplace_back();
+    removed.image_id = one.image_id;
+    removed.image_name = one.image_name;
+    removed.point2D_idx = one.point2D_idx;
+    removed.point3D_id = one.point3D_id;
+  }
+  return summary;
+}
+
+void WriteViews(const CheckerCommand& command, const CheckReport& report,
+                const WriteModelOptions& write_options, const Model& model,
+                const Model& cured) {
+  const LogOptions& log = command.common.log;
+  const OutlierFilterSummary suspects = Suspects(report.check);
+  if (!command.suspects_path.empty()) {
+    BeginPhase(log, "writing " + command.suspects_path);
+    Model colored = model;
+    ColorSuspects(suspects, &colored);
+    WriteModel(colored, command.suspects_path, write_options);
+  }
+  std::string crops = "[]";
+  if (!command.image_path.empty()) {
+    Model moved = model;
+    for (size_t k = 0; k < moved.points3D.size(); ++k) {
+      moved.points3D[k].xyz = report.check.points[k];
+    }
+    crops = SuspectCropsJson(command.image_path, model, moved, suspects, log);
+  }
+  WriteReports(command.paths.report_path, command.paths.html_path,
+               CheckJson(report), model, cured, command.context.num_threads,
+               log, crops);
+}
+
+int Run(const CheckerCommand& command, const OptionParser& parser) {
+  const Timer total_timer;
+  const LogOptions& log = command.common.log;
+  const ModelPaths& paths = command.paths;
+  const WriteModelOptions write_options = CheckPaths(command, parser);
+  CheckReport report;
+  report.run.seed = command.common.random_seed;
+  report.input_path = paths.input_path;
+  report.output_path = paths.output_path;
+  const Model model = ReadInput(paths, log, &report.run);
+
+  BeginPhase(log, "checking its images and observations");
+  const Timer check_timer;
+  report.check = CheckModel(model, {}, command.context);
+  if (!report.check.sigma_px) {
+    throw CommandError(
+        kExitNothingToSolve,
+        "nothing to check: no observation is checked by another one, as there "
+        "are no positions or no tracks of two and more images; krot solver "
+        "makes positions from rotations and tracks");
+  }
+  const Model cured = CureModel(model, report.check, command.context);
+  report.num_observations = static_cast<int64_t>(model.track_elements.size());
+  const int num_threads = command.context.num_threads;
+  report.pixel_error_before = Summarize(PixelErrors(model, num_threads));
+  report.pixel_error_after = Summarize(PixelErrors(cured, num_threads));
+  report.seconds_check = check_timer.Seconds();
+  DeferInterrupts();
+  if (!paths.output_path.empty()) {
+    if (cured.track_elements.empty()) {
+      throw CommandError(kExitNothingToSolve,
+                         "nothing is left to write: every track contradicts "
+                         "itself; no model was written");
+    }
+    BeginPhase(log, "writing " + paths.output_path);
+    const Timer write_timer;
+    WriteModel(cured, paths.output_path, write_options);
+    report.run.seconds_write = write_timer.Seconds();
+  }
+  RecordEnd(total_timer, num_threads, &report.run);
+  WriteViews(command, report, write_options, model, cured);
+  PrintTable(log, CheckTable(report, command.num_worst));
+  const bool fails =
+      command.fail_on == "wrong" && report.check.IsAnythingWrong();
+  return fails ? kExitWrong : kExitDone;
+}
+
+}  // namespace
+
+int RunModelChecker(const std::vector<std::string>& arguments) {
+  CheckerCommand command;
+  OptionParser parser("model_checker",
+                      "says which images and observations of a COLMAP model "
+                      "are wrong, which images are weakly held, and what to do "
+                      "next; writes the model without what is wrong");
+  AddCheckerOptions(&command, &parser);
+  if (!parser.Parse(arguments)) {
+    PrintTable(command.common.log, parser.Help());
+    return kExitDone;
+  }
+  return Run(command, parser);
+}
+
+}  // namespace krot
