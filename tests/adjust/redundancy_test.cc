@@ -8,7 +8,7 @@
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/adjustment_columns.h"
-#include "krot/adjust/projected_errors.h"
+#include "krot/adjust/reprojection_errors.h"
 #include "krot/model/image_geometry.h"
 #include "krot/synthetic/scene.h"
 

@@ -12,7 +12,7 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/analysis/pixel_errors.h"
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
