@@ -1,10 +1,10 @@
-# cmake -DBUILD_DIR= -DSCRATCH_DIR= -DCONSUMER_DIR= -DMODEL= -DGENERATOR=
-#       -DCXX_COMPILER= -DCXX_FLAGS= -P install_test.cmake
+# cmake -DBUILD_DIR= -DSCRATCH_DIR= -DCONSUMER_DIR= -DREFERENCE= -DMODEL=
+#       -DGENERATOR= -DCXX_COMPILER= -DCXX_FLAGS= -P install_test.cmake
 #
 # Installs BUILD_DIR below SCRATCH_DIR, moves the prefix (packages are
 # relocatable), builds CONSUMER_DIR against it, once as find_package and once as
-# pkg-config says, and solves MODEL with both, then uninstalls and checks that
-# no file is left.
+# pkg-config says, and solves MODEL with both, compiles the examples of
+# REFERENCE, then uninstalls and checks that no file is left.
 
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status
@@ -48,6 +48,23 @@ separate_arguments(flags UNIX_COMMAND "${CXX_FLAGS} ${flags}")
 run(${CXX_COMPILER} ${CONSUMER_DIR}/lower_largest_error.cc
     -o ${SCRATCH_DIR}/by_pkg_config ${flags})
 run(${SCRATCH_DIR}/by_pkg_config ${MODEL} ${SCRATCH_DIR}/solved_again)
+
+# The reference's examples, one behind the other.
+file(READ ${REFERENCE} rest)
+set(examples "")
+string(FIND "${rest}" "```cpp\n" begin)
+while(NOT begin EQUAL -1)
+  math(EXPR begin "${begin} + 7")
+  string(SUBSTRING "${rest}" ${begin} -1 rest)
+  string(FIND "${rest}" "```" end)
+  string(SUBSTRING "${rest}" 0 ${end} example)
+  string(APPEND examples "${example}\n")
+  string(SUBSTRING "${rest}" ${end} -1 rest)
+  string(FIND "${rest}" "```cpp\n" begin)
+endwhile()
+file(WRITE ${SCRATCH_DIR}/examples.cc "${examples}")
+run(${CXX_COMPILER} -std=c++17 -fsyntax-only ${SCRATCH_DIR}/examples.cc
+    ${flags})
 
 # Uninstalling leaves no file behind.
 file(RENAME ${moved} ${prefix})
