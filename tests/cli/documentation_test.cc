@@ -44,19 +44,42 @@ OptionTable ParseHelp(const std::string& help) {
   return table;
 }
 
-// The rows "| `--name` | meaning | value | default |" below "## `command`".
-OptionTable ParseDocument(const std::string& document,
-                          const std::string& command) {
+// What stands below "## heading".
+std::string Section(const std::string& document, const std::string& heading) {
+  const size_t begin = document.find("\n## " + heading + "\n");
+  if (begin == std::string::npos) return "";
+  return document.substr(begin, document.find("\n## ", begin + 1) - begin);
+}
+
+// The rows "| `--name` | meaning | value | default |".
+OptionTable ParseRows(const std::string& section) {
   OptionTable table;
-  std::istringstream lines(document);
-  bool is_inside = false;
+  std::istringstream lines(section);
   const std::regex row(R"(\| `(--[^`]*)` \| (.*) \|)");
   for (std::string line; std::getline(lines, line);) {
-    if (line.rfind("## ", 0) == 0) is_inside = line == "## `" + command + "`";
     std::smatch match;
-    if (is_inside && std::regex_match(line, match, row)) {
-      table[match[1]] = match[2];
-    }
+    if (std::regex_match(line, match, row)) table[match[1]] = match[2];
+  }
+  return table;
+}
+
+// The rows below "## `command`", those of every command, and those of several
+// commands that a paragraph of the command's section names.
+OptionTable ParseDocument(const std::string& document,
+                          const std::string& command) {
+  const std::string section = Section(document, "`" + command + "`");
+  OptionTable table = ParseRows(section);
+  table.merge(ParseRows(Section(document, "Options of every command")));
+  const OptionTable shared =
+      ParseRows(Section(document, "Options of several commands"));
+  const size_t begin = section.find("\nOptions of [several commands]");
+  if (begin == std::string::npos) return table;
+  const std::string names =
+      section.substr(begin, section.find("\n\n", begin) - begin);
+  const std::regex name("`(--[^`]*)`");
+  for (std::sregex_iterator it(names.begin(), names.end(), name), end;
+       it != end; ++it) {
+    table[(*it)[1]] = shared.at((*it)[1]);
   }
   return table;
 }
@@ -73,8 +96,8 @@ TEST_P(Documentation, SaysWhatHelpSays) {
 INSTANTIATE_TEST_SUITE_P(
     Commands, Documentation,
     ::testing::Values("solver", "point_triangulator", "bundle_adjuster",
-                      "outlier_filter", "tolerance_analyzer", "model_analyzer",
-                      "model_comparer", "certificate_checker",
+                      "outlier_filter", "model_checker", "tolerance_analyzer",
+                      "model_analyzer", "model_comparer", "certificate_checker",
                       "model_synthesizer"),
     [](const auto& test) { return std::string(test.param); });
 
@@ -91,7 +114,7 @@ TEST(DocumentationOfKrot, ListsTheExitCodesOfHelp) {
               std::string::npos)
         << line;
   }
-  EXPECT_EQ(num_codes, 10);
+  EXPECT_EQ(num_codes, 11);
 }
 
 }  // namespace
