@@ -186,7 +186,10 @@ std::vector<SnoopedObservation> Snooper::RemoveWorst(
   // The others decide where the point is, and then whether it is seen.
   if (!(worst.w > noise_.critical_w)) return not_seen;
   if (seen.size() > 2) return {worst};
-  for (SnoopedObservation& one : seen) one.is_of_two = true;
+  for (SnoopedObservation& one : seen) {
+    one.is_of_two = true;
+    one.w = worst.w;  // the other one may be uncontrolled
+  }
   return seen;
 }
 

@@ -90,7 +90,8 @@ ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options,
 // An observation that is no noise.
 struct SnoopedObservation {
   uint64_t element = 0;  // in Model::track_elements
-  double w = 0;          // as it was removed; infinite: not in front
+  // As it was removed, of two the larger one; infinite: not in front.
+  double w = 0;
   // Where the rest of its track leads to, pixels; where nothing is left, where
   // its last two did. NaN if that is not in front of its camera.
   double error_px = 0;
