@@ -162,8 +162,8 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
 }
 
 // The cured model.
-Outcome CheckCommand(const ModelPointer& model, const Progress&,
-                     const py::dict& keywords) {
+Outcome CheckModelCommand(const ModelPointer& model, const Progress&,
+                          const py::dict& keywords) {
   const Timer timer;
   Context context;
   OptionTable table = TableOf("pykrot.check");
@@ -266,7 +266,7 @@ std::optional<std::string> CompareCommand(const ModelPointer& model1,
 }
 
 // (is accepted, refusal, proved pixels or None, proved removals or None).
-py::tuple CheckCommand(const ModelPointer& model, const std::string& json) {
+py::tuple CheckProof(const ModelPointer& model, const std::string& json) {
   if (HoldsConflicts(json)) {
     ConflictVerdict verdict;
     const ConflictFile file = ParseConflicts(json, "the conflicts");
@@ -298,12 +298,12 @@ void BindCommands(py::module_* module) {
   define("solve", &SolveCommand);
   define("triangulate", &TriangulateCommand);
   define("filter", &FilterCommand);
-  define("check", &CheckCommand);
+  define("check", &CheckModelCommand);
   define("bundle_adjust", &AdjustCommand);
   define("tolerances", &ToleranceCommand);
   module->def("compare", &CompareCommand, py::arg("model1"), py::arg("model2"),
               py::arg("alignment"), py::arg("num_worst"));
-  module->def("check_certificate", &CheckCommand, py::arg("model"),
+  module->def("check_certificate", &CheckProof, py::arg("model"),
               py::arg("certificate"));
 }
 
