@@ -8,12 +8,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 
+#include "krot/analysis/image_sums.h"
 #include "krot/analysis/noise.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/numbers.h"
-#include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
 
@@ -21,12 +20,7 @@ namespace krot {
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::Vector2d;
 using Eigen::Vector3d;
-using Matrix23 = Eigen::Matrix<double, 2, 3>;
-using Matrix26 = Eigen::Matrix<double, 2, 6>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 // An image may be so many times as noisy as most and still be sound.
@@ -35,15 +29,10 @@ constexpr double kNoisyImage = 3;
 constexpr double kExplained = 0.75;
 // Of the share of its 2D points that the median image keeps in tracks.
 constexpr double kFewKept = 1.0 / 3;
-// Of an image's median distance: nearer points, in the camera, would drown all
-// others in rounding.
-constexpr double kNearest = 1e-6;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 // Of the largest eigenvalue: below is rounding.
 constexpr double kRounding = 1e-13;
-// Of a pose's system with ones on the diagonal: what nothing holds.
-constexpr double kSingularPose = 1e-9;
 
 // The exponent of Chernoff's bound on the probability that of n trials, each of
 // probability p, a share beyond s succeeds: exp(-n KL(s, p)).
@@ -52,70 +41,6 @@ double Divergence(double s, double p) {
   const double failures = s < 1 ? (1 - s) * std::log((1 - s) / (1 - p)) : 0;
   return successes + failures;
 }
-
-// An observation at the least squares of its track.
-struct Row {
-  int32_t image = 0;
-  Vector2d error;
-  Matrix26 F;  // by its camera's rotation, from the left, and its centre
-};
-
-// Of an image's observations, in the directions that others control. Points
-// that move along are eliminated: M is its diagonal block of the reduced camera
-// system, sigma^2 M^-1 its covariance while the other images stay, and -M^-1 g
-// the step that its errors ask for.
-struct Sums {
-  Matrix6 M = Matrix6::Zero();  // F' R_ii F, R_ii as in noise.h
-  Vector6 g = Vector6::Zero();  // F' e
-  double square = 0;            // e' R_ii^+ e
-  int64_t num_directions = 0;   // of these
-  // |R_ii^-1 e|^2 where both directions are controlled: the error to where the
-  // rest of the track leads.
-  std::vector<double> squares;
-  Vector6 step = Vector6::Zero();
-
-  void Add(const Row& row, const Eigen::Matrix2d& R) {
-    Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
-    of_R.computeDirect(R);
-    double alone = 0;
-    int num = 0;
-    for (int j = 0; j < 2; ++j) {
-      const double r = of_R.eigenvalues()[j];
-      if (r < kControlled) continue;
-      const Vector2d direction = of_R.eigenvectors().col(j);
-      const Vector6 f = row.F.transpose() * direction;
-      const double along = direction.dot(row.error);
-      M.noalias() += r * f * f.transpose();
-      g.noalias() += along * f;
-      square += along * along / r;
-      alone += along * along / (r * r);
-      ++num;
-    }
-    num_directions += num;
-    if (num == 2) squares.push_back(alone);
-  }
-
-  // Rotations and centres have different units: the diagonal becomes 1.
-  void Solve() {
-    Vector6 scale = M.diagonal().cwiseSqrt();
-    for (double& s : scale) s = s > 0 ? 1 / s : 0;
-    const Eigen::SelfAdjointEigenSolver<Matrix6> of_M(scale.asDiagonal() * M *
-                                                      scale.asDiagonal());
-    Vector6 y = of_M.eigenvectors().transpose() * scale.cwiseProduct(g);
-    for (int j = 0; j < 6; ++j) {
-      const double value = of_M.eigenvalues()[j];
-      y[j] = value > kSingularPose ? -y[j] / value : 0;
-    }
-    step = scale.cwiseProduct(of_M.eigenvectors() * y);
-  }
-
-  // What the step takes away of `square`, to first order.
-  double Gain() const { return -g.dot(step); }
-  double MeanSquare() const {
-    return num_directions > 0 ? square / static_cast<double>(num_directions)
-                              : 0;
-  }
-};
 
 class Checker {
  public:
@@ -141,7 +66,7 @@ class Checker {
       snooping_ = SnoopNoise(model_, noise_options_, context_);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
       Count();
-      AddUp();
+      sums_ = AddUpImages(model_, snooping_.noise);
     } while (CallWorstImage());
     Describe();
     FindSecondPoints();
@@ -246,7 +171,7 @@ class Checker {
   // Errors that are larger than the median image's, by the bound of Chernoff on
   // chi^2, and that either fill a disc evenly or are of few of its 2D points.
   bool IsChance(size_t n) const {
-    const Sums& sums = sums_[n];
+    const ImageSums& sums = sums_[n];
     const double ratio = sums.MeanSquare() / median_square_;
     if (!(ratio > 2)) return false;
     const auto num = static_cast<double>(sums.num_directions);
@@ -339,40 +264,12 @@ class Checker {
     }
   }
 
-  // Of the observations that noise explains.
-  void AddUp() {
-    const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
-    sums_.assign(model_.images.size(), {});
-    std::vector<std::vector<double>> distances(model_.images.size());
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      const Point3D& point = model_.points3D[k];
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        const int32_t n = image_of_[e];
-        if (!geometries[n].has_pose) continue;
-        distances[n].push_back(
-            (geometries[n].cam_from_world * snooping_.noise.points[k]).norm());
-      }
-    }
-    nearest_.assign(model_.images.size(), 0);
-    for (size_t n = 0; n < distances.size(); ++n) {
-      if (distances[n].empty()) continue;
-      const auto middle = distances[n].begin() +
-                          static_cast<std::ptrdiff_t>(distances[n].size() / 2);
-      std::nth_element(distances[n].begin(), middle, distances[n].end());
-      nearest_[n] = kNearest * *middle;
-    }
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      AddTrack(k, geometries);
-    }
-    for (Sums& sums : sums_) sums.Solve();
-  }
-
   void HowFirmly() {
     std::vector<double> sigmas;
     for (size_t n = 0; n < sums_.size(); ++n) {
       ImageCheck& image = check_.images[n];
       if (IsWrong(static_cast<int32_t>(n))) continue;
-      const Matrix6& M = sums_[n].M;
+      const Eigen::Matrix<double, 6, 6>& M = sums_[n].M;
       const Matrix3d by_turn = M.topLeftCorner<3, 3>();
       const Matrix3d by_center = M.bottomRightCorner<3, 3>();
       const Matrix3d mixed = M.topRightCorner<3, 3>();
@@ -410,60 +307,13 @@ class Checker {
     return *check_.sigma_px / std::sqrt(values[0]);
   }
 
-  void AddTrack(size_t k, const std::vector<ImageGeometry>& geometries) {
-    const Point3D& point = model_.points3D[k];
-    std::vector<Row> rows;
-    Matrix3d H = Matrix3d::Zero();
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (snooping_.noise.observations[e].num_controlled == 0) continue;
-      const int32_t n = image_of_[e];
-      const RigidTransform& pose = geometries[n].cam_from_world;
-      const Camera& camera = model_.cameras[geometries[n].camera];
-      const Point2D& pixel =
-          model_.images[n].points2D[model_.track_elements[e].point2D_idx];
-      const Vector3d x_cam = pose * snooping_.noise.points[k];
-      if (!(x_cam.norm() > nearest_[n])) continue;
-      const auto E = RowAtProjection(camera.model_id, camera.params.data(),
-                                     {pixel.x, pixel.y}, x_cam);
-      if (!E) continue;
-      const double depth = E->row(0).dot(x_cam);
-      Row row;
-      row.image = n;
-      row.error = snooping_.noise.observations[e].error_px;
-      const Matrix23 by_cam = (E->bottomRows<2>() -
-                               E->bottomRows<2>() * x_cam / depth * E->row(0)) /
-                              depth;
-      Matrix3d cross;
-      cross << 0, -x_cam.z(), x_cam.y(), x_cam.z(), 0, -x_cam.x(), -x_cam.y(),
-          x_cam.x(), 0;
-      row.F << -by_cam * cross, -by_cam * pose.rotation;
-      if (!row.F.allFinite()) continue;
-      H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
-      rows.push_back(row);
-    }
-    if (rows.size() < 2) return;
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> of_H(H);
-    Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
-    for (int j = 0; j < 3; ++j) {
-      const double value = of_H.eigenvalues()[j];
-      root.col(j) *=
-          value > kRounding * of_H.eigenvalues()[2] ? 1 / std::sqrt(value) : 0;
-    }
-    for (const Row& row : rows) {
-      const Matrix23 B = row.F.rightCols<3>() * root;
-      const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
-      sums_[row.image].Add(row, R);
-    }
-  }
-
   const Model& model_;
   const ModelCheckOptions& options_;
   const Context& context_;
   std::vector<int32_t> image_of_;  // by track element
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
-  std::vector<Sums> sums_;       // as Model::images
-  std::vector<double> nearest_;  // of a point, likewise; scene units
+  std::vector<ImageSums> sums_;  // as Model::images
   double median_square_ = 0;     // of an image's errors, per direction
   double median_kept_ = 0;
   ModelCheck check_;

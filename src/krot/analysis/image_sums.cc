@@ -1,0 +1,173 @@
+#include "krot/analysis/image_sums.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+
+#include "krot/camera/projection_row.h"
+#include "krot/model/image_geometry.h"
+
+namespace krot {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Matrix23 = Eigen::Matrix<double, 2, 3>;
+using Matrix26 = Eigen::Matrix<double, 2, 6>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+// Of the largest eigenvalue: below is rounding.
+constexpr double kNoDirection = 1e-13;
+// Of a pose's system with ones on the diagonal: what nothing holds.
+constexpr double kSingularPose = 1e-9;
+// Of an image's median distance: nearer points, in the camera, would drown all
+// others in rounding.
+constexpr double kNearest = 1e-6;
+
+// An observation at the least squares of its track.
+struct PoseRow {
+  int32_t image = 0;
+  Vector2d error;
+  Matrix26 F;  // by its camera's rotation, from the left, and its centre
+};
+
+void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
+  of_R.computeDirect(R);
+  double alone = 0;
+  int num = 0;
+  for (int j = 0; j < 2; ++j) {
+    const double r = of_R.eigenvalues()[j];
+    if (r < kControlled) continue;
+    const Vector2d direction = of_R.eigenvectors().col(j);
+    const Vector6 f = row.F.transpose() * direction;
+    const double along = direction.dot(row.error);
+    sums->M.noalias() += r * f * f.transpose();
+    sums->g.noalias() += along * f;
+    sums->square += along * along / r;
+    alone += along * along / (r * r);
+    ++num;
+  }
+  sums->num_directions += num;
+  if (num == 2) sums->squares.push_back(alone);
+}
+
+// Rotations and centres have different units: the diagonal becomes 1.
+void Solve(ImageSums* sums) {
+  Vector6 scale = sums->M.diagonal().cwiseSqrt();
+  for (double& s : scale) s = s > 0 ? 1 / s : 0;
+  const Eigen::SelfAdjointEigenSolver<Matrix6> of_M(
+      scale.asDiagonal() * sums->M * scale.asDiagonal());
+  Vector6 y = of_M.eigenvectors().transpose() * scale.cwiseProduct(sums->g);
+  for (int j = 0; j < 6; ++j) {
+    const double value = of_M.eigenvalues()[j];
+    y[j] = value > kSingularPose ? -y[j] / value : 0;
+  }
+  sums->step = scale.cwiseProduct(of_M.eigenvectors() * y);
+}
+
+class ImageAdder {
+ public:
+  ImageAdder(const Model& model, const ModelNoise& noise)
+      : model_(model), noise_(noise) {
+    const auto indices = ImageIndices(model);
+    for (const TrackElement& element : model.track_elements) {
+      image_of_.push_back(indices.at(element.image_id));
+    }
+  }
+
+  std::vector<ImageSums> Run() {
+    const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
+    sums_.assign(model_.images.size(), {});
+    std::vector<std::vector<double>> distances(model_.images.size());
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      const Point3D& point = model_.points3D[k];
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        const int32_t n = image_of_[e];
+        if (!geometries[n].has_pose) continue;
+        distances[n].push_back(
+            (geometries[n].cam_from_world * noise_.points[k]).norm());
+      }
+    }
+    nearest_.assign(model_.images.size(), 0);
+    for (size_t n = 0; n < distances.size(); ++n) {
+      if (distances[n].empty()) continue;
+      const auto middle = distances[n].begin() +
+                          static_cast<std::ptrdiff_t>(distances[n].size() / 2);
+      std::nth_element(distances[n].begin(), middle, distances[n].end());
+      nearest_[n] = kNearest * *middle;
+    }
+    for (size_t k = 0; k < model_.points3D.size(); ++k) {
+      AddTrack(k, geometries);
+    }
+    for (ImageSums& sums : sums_) Solve(&sums);
+    return std::move(sums_);
+  }
+
+ private:
+  void AddTrack(size_t k, const std::vector<ImageGeometry>& geometries) {
+    const Point3D& point = model_.points3D[k];
+    std::vector<PoseRow> rows;
+    Matrix3d H = Matrix3d::Zero();
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      if (noise_.observations[e].num_controlled == 0) continue;
+      const int32_t n = image_of_[e];
+      const RigidTransform& pose = geometries[n].cam_from_world;
+      const Camera& camera = model_.cameras[geometries[n].camera];
+      const Point2D& pixel =
+          model_.images[n].points2D[model_.track_elements[e].point2D_idx];
+      const Vector3d x_cam = pose * noise_.points[k];
+      if (!(x_cam.norm() > nearest_[n])) continue;
+      const auto E = RowAtProjection(camera.model_id, camera.params.data(),
+                                     {pixel.x, pixel.y}, x_cam);
+      if (!E) continue;
+      const double depth = E->row(0).dot(x_cam);
+      PoseRow row;
+      row.image = n;
+      row.error = noise_.observations[e].error_px;
+      const Matrix23 by_cam = (E->bottomRows<2>() -
+                               E->bottomRows<2>() * x_cam / depth * E->row(0)) /
+                              depth;
+      Matrix3d cross;
+      cross << 0, -x_cam.z(), x_cam.y(), x_cam.z(), 0, -x_cam.x(), -x_cam.y(),
+          x_cam.x(), 0;
+      row.F << -by_cam * cross, -by_cam * pose.rotation;
+      if (!row.F.allFinite()) continue;
+      H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
+      rows.push_back(row);
+    }
+    if (rows.size() < 2) return;
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> of_H(H);
+    Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
+    for (int j = 0; j < 3; ++j) {
+      const double value = of_H.eigenvalues()[j];
+      root.col(j) *= value > kNoDirection * of_H.eigenvalues()[2]
+                         ? 1 / std::sqrt(value)
+                         : 0;
+    }
+    for (const PoseRow& row : rows) {
+      const Matrix23 B = row.F.rightCols<3>() * root;
+      const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();
+      Add(row, R, &sums_[row.image]);
+    }
+  }
+
+  const Model& model_;
+  const ModelNoise& noise_;
+  std::vector<int32_t> image_of_;  // by track element
+  std::vector<ImageSums> sums_;
+  std::vector<double> nearest_;  // of a point, by image; scene units
+};
+
+}  // namespace
+
+std::vector<ImageSums> AddUpImages(const Model& model,
+                                   const ModelNoise& noise) {
+  return ImageAdder(model, noise).Run();
+}
+
+}  // namespace krot

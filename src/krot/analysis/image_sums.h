@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/analysis/noise.h"
+#include "krot/model/model.h"
+
+namespace krot {
+
+// Of an image's observations, in the directions that others control. Points
+// that move along are eliminated: M is its diagonal block of the reduced camera
+// system, sigma^2 M^-1 its covariance while the other images stay, and -M^-1 g
+// the step that its errors ask for.
+struct ImageSums {
+  Eigen::Matrix<double, 6, 6> M =
+      Eigen::Matrix<double, 6, 6>::Zero();  // F' R_ii F, R_ii as in noise.h
+  Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();  // F' e
+  double square = 0;           // e' R_ii^+ e
+  int64_t num_directions = 0;  // of these
+  // |R_ii^-1 e|^2 where both directions are controlled: the error to where the
+  // rest of the track leads.
+  std::vector<double> squares;
+  Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
+
+  // What the step takes away of `square`, to first order.
+  double Gain() const { return -g.dot(step); }
+  double MeanSquare() const {
+    return num_directions > 0 ? square / static_cast<double>(num_directions)
+                              : 0;
+  }
+};
+
+// As Model::images; of the observations of which `noise` says that they are
+// tested. Requires a valid model. O(observations).
+std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
+
+}  // namespace krot
