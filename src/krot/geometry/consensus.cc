@@ -33,23 +33,6 @@ struct CommonMove {
   }
 };
 
-// The median distance of the cameras, before, from their median centre.
-double Spread(const std::vector<CameraMove>& cameras) {
-  Vector3d middle;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> values;
-    for (const CameraMove& camera : cameras) {
-      values.push_back(camera.before[axis]);
-    }
-    middle[axis] = LowerMedian(std::move(values));
-  }
-  std::vector<double> distances;
-  for (const CameraMove& camera : cameras) {
-    distances.push_back((camera.before - middle).norm());
-  }
-  return LowerMedian(std::move(distances));
-}
-
 CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
   CommonMove move;
   move.scale = scale;
@@ -92,6 +75,25 @@ CommonMove MoveOf(const std::vector<CameraMove>& cameras,
   return move;
 }
 
+// The RMS distance, before, of those that count from their centroid.
+double Radius(const std::vector<CameraMove>& cameras,
+              const std::vector<char>& counts) {
+  double count = 0;
+  Vector3d sum = Vector3d::Zero();
+  for (size_t n = 0; n < cameras.size(); ++n) {
+    if (counts[n] == 0) continue;
+    count += 1;
+    sum += cameras[n].before;
+  }
+  const Vector3d centroid = sum / count;
+  double square = 0;
+  for (size_t n = 0; n < cameras.size(); ++n) {
+    if (counts[n] == 0) continue;
+    square += (cameras[n].before - centroid).squaredNorm();
+  }
+  return std::sqrt(square / count);
+}
+
 }  // namespace
 
 std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
@@ -107,8 +109,7 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
   }
   if (cameras.size() < 3 || 2 * scales.size() < cameras.size()) return keeps;
 
-  const double far =
-      std::min(LowerMedian(std::move(distances)), Spread(cameras));
+  const double distance = LowerMedian(std::move(distances));
   CommonMove move =
       MedianMove(cameras, scale_is_free ? LowerMedian(std::move(scales)) : 1);
   for (int round = 0; round < kMaxRounds; ++round) {
@@ -116,6 +117,7 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
     for (const CameraMove& camera : cameras) {
       residuals.push_back(move.Residual(camera));
     }
+    const double far = std::min(distance, Radius(cameras, keeps));
     const double allowed =
         std::max(far, kTypicalMoves * LowerMedian(residuals));
     std::vector<char> now;

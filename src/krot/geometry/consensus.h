@@ -18,10 +18,10 @@ struct CameraMove {
 // Which cameras keep their place among the others, 1 or 0: what the models
 // differ by otherwise is one translation and, if `scale_is_free`, one scale. A
 // camera that leaves its place, a runaway, moves by more than cameras typically
-// are away from their middle or from what they see, whichever is less, and by
-// more than ten times as far as they typically move. Up to half of the cameras may be runaways. All keep their
-// place where there are fewer than three, or where the distances of fewer than
-// half of them are known.
+// are away from their centroid or from what they see, whichever is less, and by
+// more than ten times as far as they typically move. Up to half of the cameras
+// may be runaways. All keep their place where there are fewer than three, or
+// where the distances of fewer than half of them are known.
 // O(cameras).
 std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
                                 bool scale_is_free);
