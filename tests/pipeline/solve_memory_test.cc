@@ -79,7 +79,7 @@ TEST(EstimateSolveMemory, CountsEveryObservationOnTheWayToAStart) {
   const Model model = MakeModel(20000);
   EXPECT_GT(Estimate(model, SolveMethod::kResInt, SolveInit::kFeasible),
             Estimate(model, SolveMethod::kJoint));
-  EXPECT_GT(Estimate(model, SolveMethod::kJoint),
+  EXPECT_GE(Estimate(model, SolveMethod::kJoint),
             Estimate(model, SolveMethod::kResInt));
 }
 
