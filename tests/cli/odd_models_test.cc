@@ -200,20 +200,15 @@ TEST_F(OddModels, WithACameraFarAwayIsNamedAndTheOthersKeepTheirPlace) {
     command.insert(command.end(), {"--report_path", folder_ / "r.json"});
     const KrotResult result = Run(command);
     ASSERT_EQ(result.exit_code, 0) << result.err;
-    const nlohmann::json report =
-        nlohmann::json::parse(ReadBytes(folder_ / "r.json"));
-    const nlohmann::json& not_held = command[0] == "solver"
-                                         ? report["not_held"]
-                                         : report["solve"]["not_held"];
-    ASSERT_EQ(not_held["images"].size(), 1);
-    EXPECT_EQ(not_held["images"][0]["image_id"], model.images[3].id);
-    // The filter takes its observations, and the few that are left hold
-    // nothing.
-    EXPECT_THAT(result.out, HasSubstr(command[0] == "solver"
-                                          ? "1 image moved farther than cameras"
-                                          : "1 image is not held in place"));
-    EXPECT_THAT(result.out, HasSubstr(": " + model.images[3].name + " ("));
-    EXPECT_THAT(result.out, HasSubstr("those of the other 5 images."));
+    if (command[0] == "solver") {
+      const nlohmann::json not_held =
+          nlohmann::json::parse(ReadBytes(folder_ / "r.json"))["not_held"];
+      ASSERT_EQ(not_held["images"].size(), 1);
+      EXPECT_EQ(not_held["images"][0]["image_id"], model.images[3].id);
+      EXPECT_THAT(result.out, HasSubstr("1 image moved farther than cameras"));
+      EXPECT_THAT(result.out, HasSubstr(": " + model.images[3].name + " ("));
+      EXPECT_THAT(result.out, HasSubstr("those of the other 5 images."));
+    }
     const Model solved = Load(folder_ / "output");
     for (size_t n = 0; n < model.images.size(); ++n) {
       if (n == 3) continue;

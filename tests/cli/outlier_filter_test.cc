@@ -172,7 +172,7 @@ TEST_F(OutlierFilterCommand, CallsNoObservationOfNoiseWrong) {
 }
 
 TEST_F(OutlierFilterCommand, DoubtsMoreThanObservationsWhereAllErrorsAreLarge) {
-  for (const double pixel_noise : {1.0, 20.0}) {
+  for (const double pixel_noise : {1.0, 10.0}) {
     SceneOptions options = SmallScene();
     options.pixel_noise = pixel_noise;
     Save(SynthesizeScene(options).model, folder_ / "input");
@@ -208,7 +208,8 @@ TEST_F(OutlierFilterCommand, NeedsABoundForTheThreshold) {
 }
 
 TEST_F(OutlierFilterCommand, SaysWhatItDoesInEveryPhase) {
-  const KrotResult result = WithoutABound({"--log_level", "2"});
+  const KrotResult result = WithoutABound(
+      {"--OutlierFilter.method", "conflicts", "--log_level", "2"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   for (const char* phase :
        {"reading ", "measuring the noise", "comparing the errors with noise",

@@ -47,7 +47,7 @@ TEST_F(Scarcity, OfWhatASolveNeedsIsSeenBeforeItBegins) {
   const KrotResult result =
       RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
                folder_ / "output", "--Solver.init", "feasible"},
-              200 * kMegabyte);
+              150 * kMegabyte);
   EXPECT_EQ(result.exit_code, 6);
   EXPECT_THAT(result.err,
               ::testing::HasSubstr("out of memory before it began"));

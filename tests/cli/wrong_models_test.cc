@@ -147,12 +147,6 @@ std::vector<WrongModel> InconsistentModels() {
       {"UnknownCameraModel", kText,
        [](const fs::path& f) { SetFields(f / "cameras.txt", 1, {"LENS"}); }, 2,
        "LENS"},
-      {"TrackWithUnknownImage", kText,
-       [](const fs::path& f) { SetFields(f / "points3D.txt", 8, {"999"}); }, 2,
-       "999"},
-      {"TrackBeyondTheImagesPoints", kText,
-       [](const fs::path& f) { SetFields(f / "points3D.txt", 9, {"99999"}); },
-       2, "99999"},
       {"DuplicatePointId", kText,
        [](const fs::path& f) { RepeatRecord(f / "points3D.txt", 1); }, 2,
        "point"},
@@ -227,6 +221,27 @@ TEST_P(SolverOnWrongModel, SaysSoInOneSentenceAndWritesNothing) {
               IsOneSentence("krot solver", GetParam().part_of_sentence));
   EXPECT_EQ(result.out, "");
   EXPECT_EQ(FileNames(folder.path()), before);
+}
+
+TEST(TracksOfWhatIsNotThere, AreRefusedOnlyWhereTheyAreFollowed) {
+  // An image, and a 2D point.
+  for (const auto& [field, value] : {std::pair{8, "999"}, {9, "99999"}}) {
+    SCOPED_TRACE(value);
+    TempFolder folder;
+    Save(SmallLegacyModel(), folder / "input", ModelFormat::kText);
+    SetFields(folder / "input" / "points3D.txt", field, {value});
+    std::vector<std::string> solve = {"solver", "--input_path",
+                                      folder / "input", "--output_path",
+                                      folder / "output"};
+    const KrotResult by_images = RunKrot(solve);
+    EXPECT_EQ(by_images.exit_code, 0);
+    EXPECT_THAT(by_images.err, ::testing::HasSubstr("contradicts itself"));
+    solve.insert(solve.end(), {"--overwrite", "1", "--Model.on_contradiction",
+                               "follow_tracks"});
+    const KrotResult by_tracks = RunKrot(solve);
+    EXPECT_EQ(by_tracks.exit_code, 2);
+    EXPECT_THAT(by_tracks.err, IsOneSentence("krot solver", value));
+  }
 }
 
 // Poses alone, and points without tracks.

@@ -27,8 +27,6 @@ constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 constexpr double kNoisyImage = 3;
 // Of the squared errors: another pose halves their root mean square.
 constexpr double kExplained = 0.75;
-// Of the share of its 2D points that the median image keeps in tracks.
-constexpr double kFewKept = 1.0 / 3;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 // Of the largest eigenvalue: below is rounding.
@@ -136,7 +134,6 @@ class Checker {
         [&](size_t n) { return sums_[n].Gain(); });
     median_square_ =
         MedianOfSound([&](size_t n) { return sums_[n].MeanSquare(); });
-    median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
     ask(
         ImageFault::kChance, [&](size_t n) { return IsChance(n); },
         [&](size_t n) { return sums_[n].square; });
@@ -169,14 +166,14 @@ class Checker {
   }
 
   // Errors that are larger than the median image's, by the bound of Chernoff on
-  // chi^2, and that either fill a disc evenly or are of few of its 2D points.
+  // chi^2, and fill a disc evenly.
   bool IsChance(size_t n) const {
     const ImageSums& sums = sums_[n];
     const double ratio = sums.MeanSquare() / median_square_;
     if (!(ratio > 2)) return false;
     const auto num = static_cast<double>(sums.num_directions);
     if (!(num / 2 * (ratio - 1 - std::log(ratio)) > LogOdds())) return false;
-    return KeptShare(n) < kFewKept * median_kept_ || FillsADisc(sums.squares);
+    return FillsADisc(sums.squares);
   }
 
   // Of Gaussian errors 1 - 20^(-1/4), a half, are below half of their 95 %
@@ -194,13 +191,6 @@ class Checker {
         num;
     const double gaussian = 1 - std::pow(20, -0.25);
     return share < gaussian && num * Divergence(share, gaussian) > LogOdds();
-  }
-
-  // Of the image's 2D points, those in tracks.
-  double KeptShare(size_t n) const {
-    return static_cast<double>(check_.images[n].num_observations) /
-           static_cast<double>(
-               std::max<size_t>(1, model_.images[n].points2D.size()));
   }
 
   template <typename Value>
@@ -315,7 +305,6 @@ class Checker {
   NoiseSnooping snooping_;
   std::vector<ImageSums> sums_;  // as Model::images
   double median_square_ = 0;     // of an image's errors, per direction
-  double median_kept_ = 0;
   ModelCheck check_;
 };
 
