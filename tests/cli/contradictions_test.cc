@@ -236,8 +236,9 @@ TEST_F(OnContradiction, WhereNeitherSideFitsEveryCommandRefuses) {
       Solve("output"),
       {"bundle_adjuster", "--input_path", input_, "--output_path",
        folder_ / "output"},
-      {"model_analyzer", "--path", input_},
-      {"tolerance_analyzer", "--input_path", input_}};
+      {"model_checker", "--input_path", input_},
+      {"tolerance_analyzer", "--input_path", input_,
+       "--ToleranceAnalyzer.max_error", "9"}};
   for (const std::vector<std::string>& command : commands) {
     const KrotResult result = RunKrot(command);
     EXPECT_EQ(result.exit_code, 2) << command[0];

@@ -71,8 +71,11 @@ TEST(AnalyzeModel, CountsWhatTheNoiseDoesNotExplainAndWhatNothingChecks) {
   EXPECT_GE(num_half, 2 * TrackLengthHistogram(model).at(2));
   for (const NoiseFigures::Quantile& one : noise.quantiles) {
     const auto count = [&](const auto& is_counted) {
-      return static_cast<double>(std::count_if(
-          whole.observations.begin(), whole.observations.end(), is_counted));
+      return static_cast<double>(
+          std::count_if(whole.observations.begin(), whole.observations.end(),
+                        [&](const auto& o) {
+                          return o.num_controlled > 0 && is_counted(o);
+                        }));
     };
     const double share = one.share * static_cast<double>(noise.num_tested);
     EXPECT_GE(count([&](const auto& o) { return o.w <= one.w; }), share);
