@@ -45,7 +45,7 @@ class Injector:
         self.log.unlink(missing_ok=True)
         self.place.reset()
         kind = fault.split(":")[0]
-        result = self.place.run(2 if kind == "thread" else 1,
+        result = self.place.run(self.place.threads if kind == "thread" else 1,
                                 {"LD_PRELOAD": self.library,
                                  "KROT_FAULT": fault,
                                  "KROT_FAULT_LOG": str(self.log)})

@@ -262,6 +262,8 @@ class PageTest(unittest.TestCase):
     def test_click_beside_everything_closes_the_numbers(self):
         self.browser.click("#support tbody tr:first-child td:first-child")
         self.wait_until_it_stands()
+        self.browser.run("document.querySelector('#scene canvas')"
+                         ".scrollIntoView({block: 'center', behavior: 'instant'});")
         self.browser.click("#scene canvas", -500, -200)
         self.assertEqual(self.browser.texts(".info"), [])
 
