@@ -4,7 +4,7 @@ from browser import ENTER, TAB
 import krot_page
 from krot_page import KrotPage
 
-_ARROW_RIGHT = "\uE014"
+_ARROW_LEFT = "\uE012"
 
 # What can be used among some elements, and what has the focus.
 _CONTROLS = """
@@ -97,7 +97,7 @@ class Keyboard(KrotPage):
         self.wait_for_result()
         self.tab_to("#level")
         before = self.browser.text("#bound")
-        self.browser.press(_ARROW_RIGHT)
+        self.browser.press(_ARROW_LEFT)
         self.assertNotEqual(self.browser.text("#bound"), before)
         self.tab_to("#take")
         self.browser.press(" ")
