@@ -27,6 +27,8 @@ constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 constexpr double kNoisyImage = 3;
 // Of the squared errors: another pose halves their root mean square.
 constexpr double kExplained = 0.75;
+// Of the share of its 2D points that the median image keeps in tracks.
+constexpr double kFewKept = 1.0 / 3;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 // Of the largest eigenvalue: below is rounding.
@@ -134,6 +136,7 @@ class Checker {
         [&](size_t n) { return sums_[n].Gain(); });
     median_square_ =
         MedianOfSound([&](size_t n) { return sums_[n].MeanSquare(); });
+    median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
     ask(
         ImageFault::kChance, [&](size_t n) { return IsChance(n); },
         [&](size_t n) { return sums_[n].square; });
@@ -166,31 +169,42 @@ class Checker {
   }
 
   // Errors that are larger than the median image's, by the bound of Chernoff on
-  // chi^2, and fill a disc evenly.
+  // chi^2, and fill a disc evenly: by another such bound or, where few of the
+  // image's 2D points are in tracks, if that is likelier than Gaussian errors.
   bool IsChance(size_t n) const {
     const ImageSums& sums = sums_[n];
     const double ratio = sums.MeanSquare() / median_square_;
-    if (!(ratio > 2)) return false;
+    if (!(ratio > 2) || sums.squares.empty()) return false;
     const auto num = static_cast<double>(sums.num_directions);
     if (!(num / 2 * (ratio - 1 - std::log(ratio)) > LogOdds())) return false;
-    return FillsADisc(sums.squares);
+    // Of Gaussian errors 1 - 20^(-1/4), a half, are below half of their 95 %
+    // quantile, and more if the tails are heavier; of a disc a quarter.
+    const double gaussian = 1 - std::pow(20, -0.25);
+    const double disc = 0.95 / 4;
+    const double share = ShareBelowHalf(sums.squares);
+    const double odds =
+        static_cast<double>(sums.squares.size()) * Divergence(share, gaussian);
+    return share < gaussian &&
+           (odds > LogOdds() ||
+            (KeptShare(n) < kFewKept * median_kept_ &&
+             Divergence(share, disc) < Divergence(share, gaussian)));
   }
 
-  // Of Gaussian errors 1 - 20^(-1/4), a half, are below half of their 95 %
-  // quantile, and more if the tails are heavier; of a disc that is filled
-  // evenly a quarter. By the bound of Chernoff.
-  bool FillsADisc(std::vector<double> squares) const {
-    if (squares.empty()) return false;
+  // Of the errors, those below half of their 95 % quantile. Requires one.
+  static double ShareBelowHalf(std::vector<double> squares) {
     std::sort(squares.begin(), squares.end());
     const double quantile = squares[(95 * squares.size() - 1) / 100];
-    const auto num = static_cast<double>(squares.size());
-    const double share =
-        static_cast<double>(
-            std::lower_bound(squares.begin(), squares.end(), quantile / 4) -
-            squares.begin()) /
-        num;
-    const double gaussian = 1 - std::pow(20, -0.25);
-    return share < gaussian && num * Divergence(share, gaussian) > LogOdds();
+    const auto below =
+        std::lower_bound(squares.begin(), squares.end(), quantile / 4) -
+        squares.begin();
+    return static_cast<double>(below) / static_cast<double>(squares.size());
+  }
+
+  // Of the image's 2D points, those in tracks.
+  double KeptShare(size_t n) const {
+    return static_cast<double>(check_.images[n].num_observations) /
+           static_cast<double>(
+               std::max<size_t>(1, model_.images[n].points2D.size()));
   }
 
   template <typename Value>
@@ -305,6 +319,7 @@ class Checker {
   NoiseSnooping snooping_;
   std::vector<ImageSums> sums_;  // as Model::images
   double median_square_ = 0;     // of an image's errors, per direction
+  double median_kept_ = 0;
   ModelCheck check_;
 };
 
