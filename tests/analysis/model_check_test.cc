@@ -88,6 +88,22 @@ TEST(CheckModel, DoesNotCallAnImageWrongForNoiseThreeTimesAsLarge) {
   }
 }
 
+TEST(CheckModel, DoesNotCallANoisyImageWrongForKeepingFewOfIts2DPoints) {
+  for (int seed = 1; seed <= 20; ++seed) {
+    Model model = Scene(seed, 10, 3);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> noise;
+    std::vector<Point2D>& points = model.images[0].points2D;
+    for (Point2D& point : points) {
+      point.x += std::sqrt(3.0) * noise(random);
+      point.y += std::sqrt(3.0) * noise(random);
+    }
+    points.resize(10 * points.size(), Point2D{});
+    EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+                IsEmpty());
+  }
+}
+
 TEST(CheckModel, FindsTurnedImagesAndBlamesNoNeighbour) {
   for (int seed = 1; seed <= 10; ++seed) {
     // Half of what sees a point of a short track is wrong.
