@@ -28,18 +28,8 @@ struct CheckerCommand {
 };
 
 void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
-  ModelPaths* paths = &command->paths;
-  parser->AddPath("input_path", &paths->input_path, true, "a folder",
-                  "The COLMAP model to read, binary or text");
-  parser->AddPath("output_path", &paths->output_path, false, "a folder",
-                  "Where the model without wrong images and observations goes; "
-                  "created if need be");
-  parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
-                    "The format to write; auto: the input's");
-  AddOverwrite(&paths->overwrite, parser);
-  parser->AddOutputFile("report_path", &paths->report_path,
-                        "Where the report goes, as JSON");
-  AddHtmlPath(&paths->html_path, parser);
+  AddModelPaths(&command->paths, parser,
+                "Where the model without wrong images and observations goes");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst observations in "
                   "them");
@@ -47,7 +37,6 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                   "Where a copy of the input goes whose points are coloured by "
                   "whether an observation of their track is wrong, for "
                   "COLMAP's GUI; created if need be");
-  AddOnContradiction(&paths->on_contradiction, parser);
   parser->AddChoice("fail_on", &command->fail_on, {"never", "wrong"},
                     "When to end with code 9, for scripts: wrong: if an image "
                     "or an observation is wrong");

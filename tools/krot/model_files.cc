@@ -77,11 +77,15 @@ void CheckSideName(const std::string& option, const std::string& path) {
 
 }  // namespace
 
-void AddModelPaths(ModelPaths* paths, OptionParser* parser) {
+void AddModelPaths(ModelPaths* paths, OptionParser* parser,
+                   const char* output_meaning) {
   parser->AddPath("input_path", &paths->input_path, true, "a folder",
                   "The COLMAP model to read, binary or text");
-  parser->AddPath("output_path", &paths->output_path, true, "a folder",
-                  "Where the model goes; created if need be");
+  const bool is_required = output_meaning == nullptr;
+  parser->AddPath(
+      "output_path", &paths->output_path, is_required, "a folder",
+      std::string(is_required ? "Where the model goes" : output_meaning) +
+          "; created if need be");
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);

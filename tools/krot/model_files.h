@@ -34,7 +34,9 @@ struct ModelPaths {
   bool write_on_interrupt = false;
 };
 
-void AddModelPaths(ModelPaths* paths, OptionParser* parser);
+// The output is required unless its meaning is given: "Where ... goes".
+void AddModelPaths(ModelPaths* paths, OptionParser* parser,
+                   const char* output_meaning = nullptr);
 // Of a command that takes other rotations than the model's.
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
 // Of a command that may hold images and points.

@@ -1,11 +1,13 @@
 #include "krot/analysis/image_sums.h"
 
-#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 
@@ -70,6 +72,18 @@ void Solve(ImageSums* sums) {
   sums->step = scale.cwiseProduct(of_M.eigenvectors() * y);
 }
 
+// 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'.
+double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
+  constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
+  const Matrix3d S = A - B * C.ldlt().solve(B.transpose());
+  if (!S.allFinite()) return kNothingHolds;
+  const Vector3d values =
+      Eigen::SelfAdjointEigenSolver<Matrix3d>(S, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  const bool is_held = values[0] > kNoDirection * A.trace();
+  return is_held ? 1 / std::sqrt(values[0]) : kNothingHolds;
+}
+
 class ImageAdder {
  public:
   ImageAdder(const Model& model, const ModelNoise& noise)
@@ -96,10 +110,7 @@ class ImageAdder {
     nearest_.assign(model_.images.size(), 0);
     for (size_t n = 0; n < distances.size(); ++n) {
       if (distances[n].empty()) continue;
-      const auto middle = distances[n].begin() +
-                          static_cast<std::ptrdiff_t>(distances[n].size() / 2);
-      std::nth_element(distances[n].begin(), middle, distances[n].end());
-      nearest_[n] = kNearest * *middle;
+      nearest_[n] = kNearest * Median(std::move(distances[n]));
     }
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
       AddTrack(k, geometries);
@@ -164,6 +175,16 @@ class ImageAdder {
 };
 
 }  // namespace
+
+double ImageSums::CenterSpread() const {
+  return LargestSpread(M.bottomRightCorner<3, 3>(), M.bottomLeftCorner<3, 3>(),
+                       M.topLeftCorner<3, 3>());
+}
+
+double ImageSums::TurnSpread() const {
+  return LargestSpread(M.topLeftCorner<3, 3>(), M.topRightCorner<3, 3>(),
+                       M.bottomRightCorner<3, 3>());
+}
 
 std::vector<ImageSums> AddUpImages(const Model& model,
                                    const ModelNoise& noise) {

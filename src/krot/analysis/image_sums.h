@@ -25,6 +25,12 @@ struct ImageSums {
   std::vector<double> squares;
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
 
+  // The standard deviations of the centre, scene units, and of the rotation,
+  // radians, for noise of one pixel, in the direction where they are largest.
+  // Infinite where nothing holds them.
+  double CenterSpread() const;
+  double TurnSpread() const;
+
   // What the step takes away of `square`, to first order.
   double Gain() const { return -g.dot(step); }
   double MeanSquare() const {

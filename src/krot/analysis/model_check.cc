@@ -6,9 +6,6 @@
 #include <numeric>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-
 #include "krot/analysis/image_sums.h"
 #include "krot/analysis/noise.h"
 #include "krot/analysis/pixel_errors.h"
@@ -19,9 +16,6 @@
 namespace krot {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-
 constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 // An image may be so many times as noisy as most and still be sound.
 constexpr double kNoisyImage = 3;
@@ -31,8 +25,6 @@ constexpr double kExplained = 0.75;
 constexpr double kFewKept = 1.0 / 3;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
-// Of the largest eigenvalue: below is rounding.
-constexpr double kRounding = 1e-13;
 
 // The exponent of Chernoff's bound on the probability that of n trials, each of
 // probability p, a share beyond s succeeds: exp(-n KL(s, p)).
@@ -143,8 +135,9 @@ class Checker {
     return worst;
   }
 
-  // log(number of images / false_alarm).
-  double LogOdds() const {
+  // A bound exp(-x) on the probability of a test is low enough, over all
+  // images, from this x on.
+  double LeastExponent() const {
     return std::log(static_cast<double>(model_.images.size()) /
                     options_.false_alarm);
   }
@@ -156,7 +149,7 @@ class Checker {
     const double p = std::exp(-ratio * ratio / 2);
     const auto num = static_cast<double>(image.num_tested);
     const double share = static_cast<double>(image.num_wrong) / num;
-    return share > p && num * Divergence(share, p) > LogOdds();
+    return share > p && num * Divergence(share, p) > LeastExponent();
   }
 
   // g'M^-1 g of noise is sigma^2 chi^2 with six degrees of freedom.
@@ -165,7 +158,7 @@ class Checker {
     if (!(gain > kExplained * sums_[n].square)) return false;
     const double sigma = kNoisyImage * *snooping_.noise.sigma_px;
     const double x = gain / (2 * sigma * sigma);
-    return x - std::log1p(x + x * x / 2) > LogOdds();
+    return x - std::log1p(x + x * x / 2) > LeastExponent();
   }
 
   // Errors that are larger than the median image's, by the bound of Chernoff on
@@ -176,16 +169,17 @@ class Checker {
     const double ratio = sums.MeanSquare() / median_square_;
     if (!(ratio > 2) || sums.squares.empty()) return false;
     const auto num = static_cast<double>(sums.num_directions);
-    if (!(num / 2 * (ratio - 1 - std::log(ratio)) > LogOdds())) return false;
+    if (!(num / 2 * (ratio - 1 - std::log(ratio)) > LeastExponent()))
+      return false;
     // Of Gaussian errors 1 - 20^(-1/4), a half, are below half of their 95 %
     // quantile, and more if the tails are heavier; of a disc a quarter.
     const double gaussian = 1 - std::pow(20, -0.25);
     const double disc = 0.95 / 4;
     const double share = ShareBelowHalf(sums.squares);
-    const double odds =
+    const double exponent =
         static_cast<double>(sums.squares.size()) * Divergence(share, gaussian);
     return share < gaussian &&
-           (odds > LogOdds() ||
+           (exponent > LeastExponent() ||
             (KeptShare(n) < kFewKept * median_kept_ &&
              Divergence(share, disc) < Divergence(share, gaussian)));
   }
@@ -215,11 +209,7 @@ class Checker {
         values.push_back(value(n));
       }
     }
-    if (values.empty()) return 0;
-    const auto middle =
-        values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+    return values.empty() ? 0 : LowerMedian(std::move(values));
   }
 
   void Describe() {
@@ -273,42 +263,24 @@ class Checker {
     for (size_t n = 0; n < sums_.size(); ++n) {
       ImageCheck& image = check_.images[n];
       if (IsWrong(static_cast<int32_t>(n))) continue;
-      const Eigen::Matrix<double, 6, 6>& M = sums_[n].M;
-      const Matrix3d by_turn = M.topLeftCorner<3, 3>();
-      const Matrix3d by_center = M.bottomRightCorner<3, 3>();
-      const Matrix3d mixed = M.topRightCorner<3, 3>();
       image.turn_deg = kDegreesPerRadian * sums_[n].step.head<3>().norm();
       image.shift = sums_[n].step.tail<3>().norm();
-      image.center_sigma = LargestSigma(by_center, mixed.transpose(), by_turn);
+      image.center_sigma = *check_.sigma_px * sums_[n].CenterSpread();
       image.turn_sigma_deg =
-          kDegreesPerRadian * LargestSigma(by_turn, mixed, by_center);
+          kDegreesPerRadian * *check_.sigma_px * sums_[n].TurnSpread();
       sigmas.push_back(image.center_sigma);
     }
     if (sigmas.empty()) return;
-    const auto middle =
-        sigmas.begin() + static_cast<std::ptrdiff_t>((sigmas.size() - 1) / 2);
-    std::nth_element(sigmas.begin(), middle, sigmas.end());
+    const double median = LowerMedian(std::move(sigmas));
     for (ImageCheck& image : check_.images) {
       if (image.verdict == ImageVerdict::kWrong) continue;
       image.relative_center_sigma = std::isfinite(image.center_sigma)
-                                        ? image.center_sigma / *middle
+                                        ? image.center_sigma / median
                                         : kNothingHolds;
       if (!(image.relative_center_sigma <= kWeaklyHeld)) {
         image.verdict = ImageVerdict::kWeaklyHeld;
       }
     }
-  }
-
-  // sigma / sqrt of the smallest eigenvalue of A - B C^-1 B'.
-  double LargestSigma(const Matrix3d& A, const Matrix3d& B,
-                      const Matrix3d& C) const {
-    const Matrix3d S = A - B * C.ldlt().solve(B.transpose());
-    if (!S.allFinite()) return kNothingHolds;
-    const Vector3d values =
-        Eigen::SelfAdjointEigenSolver<Matrix3d>(S, Eigen::EigenvaluesOnly)
-            .eigenvalues();
-    if (!(values[0] > kRounding * A.trace())) return kNothingHolds;
-    return *check_.sigma_px / std::sqrt(values[0]);
   }
 
   const Model& model_;

@@ -25,6 +25,14 @@ inline double Median(std::vector<double> values) {
   return *middle;
 }
 
+// The same, but of an even number of values the smaller of the middle two.
+inline double LowerMedian(std::vector<double> values) {
+  const auto middle =
+      values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // std::from_chars and std::to_chars for doubles, by the C library, for standard
 // libraries that have them for integers alone.
 std::optional<double> ParseRealByC(std::string_view text);

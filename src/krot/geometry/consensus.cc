@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include "krot/base/numbers.h"
+
 namespace krot {
 namespace {
 
@@ -15,13 +17,6 @@ using Eigen::Vector3d;
 constexpr double kTypicalMoves = 10;
 // The common move is found from those that share it, which it decides on.
 constexpr int kMaxRounds = 3;
-
-double LowerMedian(std::vector<double> values) {
-  const auto middle =
-      values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // after -> before.
 struct CommonMove {
