@@ -26,6 +26,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 constexpr double kNoDirection = 1e-13;
 // Of a pose's system with ones on the diagonal: what nothing holds.
 constexpr double kSingularPose = 1e-9;
+// Below, the noise of the rest of the track is twice an error's.
+constexpr double kWellControlled = 0.25;
 // Of an image's median distance: nearer points, in the camera, would drown all
 // others in rounding.
 constexpr double kNearest = 1e-6;
@@ -41,7 +43,6 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
   of_R.computeDirect(R);
   double alone = 0;
-  int num = 0;
   for (int j = 0; j < 2; ++j) {
     const double r = of_R.eigenvalues()[j];
     if (r < kControlled) continue;
@@ -52,10 +53,9 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
     sums->g.noalias() += along * f;
     sums->square += along * along / r;
     alone += along * along / (r * r);
-    ++num;
+    ++sums->num_directions;
   }
-  sums->num_directions += num;
-  if (num == 2) sums->squares.push_back(alone);
+  if (of_R.eigenvalues()[0] > kWellControlled) sums->squares.push_back(alone);
 }
 
 // Rotations and centres have different units: the diagonal becomes 1.

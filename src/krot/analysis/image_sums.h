@@ -20,8 +20,8 @@ struct ImageSums {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();  // F' e
   double square = 0;           // e' R_ii^+ e
   int64_t num_directions = 0;  // of these
-  // |R_ii^-1 e|^2 where both directions are controlled: the error to where the
-  // rest of the track leads.
+  // |R_ii^-1 e|^2, the error to where the rest of the track leads, where that
+  // is known to less than twice the noise of an observation.
   std::vector<double> squares;
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
 

@@ -59,6 +59,7 @@ class Checker {
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
+      AddRemoved();
     } while (CallWorstImage());
     Describe();
     FindSecondPoints();
@@ -86,6 +87,15 @@ class Checker {
     for (size_t e = 0; e < image_of_.size(); ++e) {
       if (snooping_.noise.observations[e].num_controlled == 0) continue;
       ++check_.images[image_of_[e]].num_tested;
+    }
+  }
+
+  // Errors without their largest would have no tails.
+  void AddRemoved() {
+    for (const SnoopedObservation& one : snooping_.removed) {
+      if (one.is_of_two || !std::isfinite(one.error_px)) continue;
+      sums_[image_of_[one.element]].squares.push_back(one.error_px *
+                                                      one.error_px);
     }
   }
 
@@ -163,7 +173,8 @@ class Checker {
 
   // Errors that are larger than the median image's, by the bound of Chernoff on
   // chi^2, and fill a disc evenly: by another such bound or, where few of the
-  // image's 2D points are in tracks, if that is likelier than Gaussian errors.
+  // image's 2D points are in tracks, if that is as likely as Gaussian errors;
+  // the fewer, the less likely it may be.
   bool IsChance(size_t n) const {
     const ImageSums& sums = sums_[n];
     const double ratio = sums.MeanSquare() / median_square_;
@@ -176,12 +187,13 @@ class Checker {
     const double gaussian = 1 - std::pow(20, -0.25);
     const double disc = 0.95 / 4;
     const double share = ShareBelowHalf(sums.squares);
-    const double exponent =
-        static_cast<double>(sums.squares.size()) * Divergence(share, gaussian);
-    return share < gaussian &&
-           (exponent > LeastExponent() ||
-            (KeptShare(n) < kFewKept * median_kept_ &&
-             Divergence(share, disc) < Divergence(share, gaussian)));
+    if (!(share < gaussian)) return false;
+    const auto size = static_cast<double>(sums.squares.size());
+    const double exponent = size * Divergence(share, gaussian);
+    const double kept = KeptShare(n) / (kFewKept * median_kept_);
+    return exponent > LeastExponent() ||
+           (kept < 1 &&
+            exponent - size * Divergence(share, disc) > std::log(kept));
   }
 
   // Of the errors, those below half of their 95 % quantile. Requires one.
