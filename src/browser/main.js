@@ -5,7 +5,7 @@ import { count, pixels } from '../krot/report/page/format.js';
 import { modelFromDrop, modelFromFiles } from './input.js';
 import { showBounds, showResult, textOf } from './result.js';
 import { Runner } from './runner.js';
-import { analyze, check, compare, filter, solve } from './tasks.js';
+import { analyze, check, compare, filter, judge, solve } from './tasks.js';
 
 // Measured on sparse models from the web: docs/browser.md.
 const kSecondsPerObservation = 6e-5;
@@ -118,6 +118,7 @@ document.addEventListener('dragleave', () =>
   byId('drop').classList.remove('over'));
 document.addEventListener('drop', onDrop);
 byId('cancel').addEventListener('click', () => runner.cancel());
+onSubmit('judge', () => judge(model));
 onSubmit('solve', () => solve(model));
 onSubmit('filter', ({ bound }) =>
   filter(model, bound.value === '' ? null : Number(bound.value)));

@@ -32,6 +32,16 @@ export function analyze(model) {
   };
 }
 
+export function judge(model) {
+  return {
+    title: 'Looking for what is wrong',
+    verdict,
+    files: model,
+    args: ['model_checker', ...kModels, ...kPaths],
+    outputs: ['result', ...kReports],
+  };
+}
+
 export function solve(model) {
   return {
     title: 'Lowering the largest error',

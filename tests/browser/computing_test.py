@@ -75,6 +75,18 @@ class Computing(KrotPage):
                           self.download("certificate.json"))
         self.assertEqual(code, 0)
 
+    def test_says_what_is_wrong_as_the_command_line_does(self):
+        self.give(self.root / "scene")
+        sentence = self.submit("#judge")
+        krot("model_checker", "--input_path", self.root / "scene",
+             "--output_path", self.root / "cured", "--report_path",
+             self.root / "cured.json")
+        report = json.loads((self.root / "cured.json").read_text())
+        self.assertEqual(sentence, report["verdict"])
+        self.assertEqual(
+            (self.unpack(self.download("result.zip")) / "images.txt")
+            .read_text(), (self.root / "cured" / "images.txt").read_text())
+
     def test_finds_wrong_observations_and_offers_every_bound(self):
         self.give(self.root / "scene")
         sentence = self.submit("#filter")

@@ -9,7 +9,7 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 
-import { analyze, check, compare, filter, solve } from
+import { analyze, check, compare, filter, judge, solve } from
   '../../src/browser/tasks.js';
 
 const krot = path.resolve(process.argv[2]);
@@ -71,6 +71,9 @@ for (const [name, options] of Object.entries(scenes)) {
     assert.match(sentenceOf(folder, filter([], null)),
       /^No observation is called wrong, and the model is the one that was read/);
   }
+  assert.match(sentenceOf(folder, judge([])), name === 'noisy' ?
+    /^[\d,]+ of [\d,]+ observations (is|are) wrong, and no image is: / :
+    /^Nothing is wrong: all [\d,]+ observations of 8 images agree within noise/);
   fs.cpSync(path.join(folder, 'result'), path.join(folder, 'other'),
     { recursive: true });
   assert.match(sentenceOf(folder, compare([], [])),

@@ -580,6 +580,11 @@ class RotationSuspectTest(unittest.TestCase):
         cls.suspect = json.loads(
             (root / "report.json").read_text())["rotation_suspect"]
         cls.page = (root / "page.html").as_uri()
+        run_krot("model_checker", "--input_path", root / "input",
+                 "--report_path", root / "checked.json", "--html_path",
+                 root / "checked.html")
+        cls.checked = json.loads((root / "checked.json").read_text())
+        cls.checked_page = (root / "checked.html").as_uri()
         cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
 
     @staticmethod
@@ -613,6 +618,25 @@ class RotationSuspectTest(unittest.TestCase):
             "document.querySelector('#rotation-suspect button').click()")
         self.assertEqual(self.browser.texts(".info h3"),
                          [self.suspect["image_name"]])
+        self.assertEqual(self.browser.console(), [])
+
+    def test_model_checker_shows_its_verdicts_in_the_scene(self):
+        self.browser.open(self.checked_page)
+        self.assertEqual(self.browser.text("#verdict"), self.checked["verdict"])
+        wrong = [image for image in self.checked["images"]
+                 if image["verdict"] == "wrong"]
+        self.assertEqual([image["image_name"] for image in wrong],
+                         [self.suspect["image_name"]])
+        self.assertEqual(self.browser.texts("#bad-images tbody td"), [
+            wrong[0]["image_name"], "wrong", str(wrong[0]["num_observations"]),
+            str(wrong[0]["num_wrong"]), wrong[0]["reason"]])
+        self.assertGreater(len(self.browser.run(DRAWN, "--wrong")), 0)
+        self.browser.run("document.querySelector('input[value=rgb]').click()")
+        self.assertEqual(self.browser.run(DRAWN, "--wrong"), [])
+        self.browser.run(
+            "document.querySelector('#bad-images tbody tr').click()")
+        self.assertEqual(self.browser.texts(".info h3"),
+                         [wrong[0]["image_name"]])
         self.assertEqual(self.browser.console(), [])
 
 

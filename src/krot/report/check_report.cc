@@ -37,7 +37,12 @@ const char* FaultName(ImageFault fault) {
   return "none";
 }
 
-std::string FaultWords(const ImageCheck& image) {
+// Empty for what is fine.
+std::string Reason(const ImageCheck& image) {
+  if (image.verdict == ImageVerdict::kWeaklyHeld) {
+    return "its centre may move more than ten times as far as the median "
+           "image's";
+  }
   switch (image.fault) {
     case ImageFault::kContradicted:
       return "most of them contradict the others";
@@ -97,7 +102,7 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
                                     std::to_string(image.num_tested)};
     if (is_wrong) {
       row.push_back(std::to_string(image.num_wrong));
-      row.push_back(FaultWords(image));
+      row.push_back(Reason(image));
     } else {
       row.push_back(SigmaText(image.center_sigma));
       row.push_back(std::isfinite(image.relative_center_sigma)
@@ -202,6 +207,7 @@ Json ImageJson(const ImageCheck& image) {
           {"fault", image.fault == ImageFault::kNone
                         ? Json()
                         : Json(FaultName(image.fault))},
+          {"reason", Reason(image)},
           {"num_observations", image.num_observations},
           {"num_tested", image.num_tested},
           {"num_wrong", image.num_wrong},

@@ -72,8 +72,8 @@ export function viewerControls(viewer) {
     choice('model', [['before', viewer.labels[0]],
       ['after', viewer.labels[1]], ['both', 'Both']], viewer.shown,
     set('shown')),
-    choice('color', [['rgb', 'Colours'], ['error', 'Errors']], viewer.mode,
-      set('mode')),
+    choice('color', [...(viewer.verdicts ? [['verdict', 'Verdicts']] : []),
+      ['rgb', 'Colours'], ['error', 'Errors']], viewer.mode, set('mode')),
     slider('Points', [1, 8, 0.5], viewer.pointSize, set('pointSize')),
   ];
   if (viewer.support.length > 0) {

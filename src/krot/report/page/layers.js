@@ -5,6 +5,7 @@ import {
 } from './colors.js';
 import { allFrusta } from './framing.js';
 import { kVerticesPerImage, posedImages } from './frusta.js';
+import { verdictColor } from './verdicts.js';
 
 function repeated(colors, times) {
   const all = new Uint8Array(3 * colors.length * times);
@@ -15,29 +16,37 @@ function repeated(colors, times) {
 }
 
 export class Layer {
-  // `styleName`: the custom property with the model's own colour.
-  constructor(renderer, model, styleName, size) {
+  // `styleName`: the custom property with the model's own colour; `verdicts`: by
+  // image name.
+  constructor(renderer, model, styleName, size, verdicts) {
     this.renderer = renderer;
     this.model = model;
     this.styleName = styleName;
+    this.verdicts = verdicts;
     this.lines = allFrusta(model, size);
     this.points = renderer.createBatch(renderer.gl.POINTS, model.points.xyz);
     this.cameras = renderer.createBatch(renderer.gl.LINES, this.lines);
   }
 
-  // `mode`: rgb, error (as a share of `top`) or model.
+  // `mode`: rgb, error (as a share of `top`), verdict or model.
   paint(mode, top) {
     this.renderer.setColors(this.points, this.pointColors(mode, top));
-    const camera = (image) => mode === 'error' ?
-      errorColor((image.pixel_error.max ?? NaN) / top) :
-      styleColor(this.styleName);
     this.renderer.setColors(this.cameras, repeated(
-      posedImages(this.model).map(camera), kVerticesPerImage));
+      posedImages(this.model).map((image) => this.cameraColor(image, mode, top)),
+      kVerticesPerImage));
+  }
+
+  cameraColor(image, mode, top) {
+    if (mode === 'error') {
+      return errorColor((image.pixel_error.max ?? NaN) / top);
+    }
+    if (mode === 'verdict') return verdictColor(this.verdicts.get(image.name));
+    return styleColor(this.styleName);
   }
 
   pointColors(mode, top) {
     const { points } = this.model;
-    if (mode === 'rgb') return points.rgb;
+    if (mode === 'rgb' || mode === 'verdict') return points.rgb;
     if (mode === 'error') return errorColors(points.maxError, top);
     return uniformColors(styleColor(this.styleName), points.num);
   }

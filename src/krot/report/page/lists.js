@@ -1,11 +1,34 @@
 import { html, makeSelectable, table } from './dom.js';
 import { count, pixels, significant } from './format.js';
 
-const kShownImages = 12;
+const kShownRows = 12;
 
-// The observations that set the maximum; choosing one shows it in the scene.
+// The first rows, the others on demand. Choosing row i gives selections[i], which
+// the scene can show, to onSelect.
+export function longTable(head, rows, selections, onSelect) {
+  const element = table(head, rows);
+  const all = [...element.querySelectorAll('tbody tr')];
+  all.forEach((row, i) => {
+    row.firstChild.className = 'name';
+    makeSelectable(row, () => onSelect(selections[i]));
+    row.hidden = i >= kShownRows;
+  });
+  const container = html('div', {}, element);
+  if (all.length > kShownRows) {
+    const button = html('button', { type: 'button' },
+      `Show all ${count(all.length)}`);
+    button.addEventListener('click', () => {
+      all.forEach((row) => { row.hidden = false; });
+      button.remove();
+    });
+    container.append(html('p', {}, button));
+  }
+  return container;
+}
+
+// The observations that set the maximum.
 export function supportTable(support, onSelect) {
-  const element = table(
+  return longTable(
     ['Image', 'Point', '2D point', 'Multiplier', 'Error, px'],
     support.map((observation) => [
       observation.image_name,
@@ -13,12 +36,9 @@ export function supportTable(support, onSelect) {
       String(observation.point2D_idx),
       significant(observation.multiplier, 4),
       pixels(observation.error_px),
-    ]));
-  element.querySelectorAll('tbody tr').forEach((row, i) => {
-    row.firstChild.className = 'name';
-    makeSelectable(row, () => onSelect(support[i]));
-  });
-  return element;
+    ]),
+    support.map(({ image_name: imageName, point3D_id: pointId }) =>
+      ({ imageName, pointId })), onSelect);
 }
 
 // The images of both models by name, the largest error of the second first.
@@ -30,35 +50,14 @@ export function pairImages(models) {
     .sort((a, b) => largest(b) - largest(a));
 }
 
-function imageRows(pairs, onSelect) {
-  return pairs.map(({ before, after }) => {
-    const texts = [after.name, count(after.pixel_error.count),
-      pixels(before?.pixel_error.max), pixels(after.pixel_error.max),
-      pixels(before?.pixel_error.rms), pixels(after.pixel_error.rms)];
-    const row = html('tr', {}, ...texts.map((text) => html('td', {}, text)));
-    row.firstChild.className = 'name';
-    makeSelectable(row, () => onSelect(after.name));
-    return row;
-  });
-}
-
-// Largest errors by image, the worst first; the others on demand.
+// Largest errors by image, the worst first.
 export function imagesTable(models, labels, onSelect) {
-  const pairs = pairImages(models);
   const [first, second] = labels.map((label) => label.toLowerCase());
-  const element = table(['Image', 'Observations', `Max ${first}`,
-    `Max ${second}`, `RMS ${first}`, `RMS ${second}`], []);
-  const body = element.querySelector('tbody');
-  body.append(...imageRows(pairs.slice(0, kShownImages), onSelect));
-  const container = html('div', {}, element);
-  if (pairs.length > kShownImages) {
-    const button = html('button', { type: 'button' },
-      `Show all ${count(pairs.length)} images`);
-    button.addEventListener('click', () => {
-      body.append(...imageRows(pairs.slice(kShownImages), onSelect));
-      button.remove();
-    });
-    container.append(html('p', {}, button));
-  }
-  return container;
+  const pairs = pairImages(models);
+  return longTable(['Image', 'Observations', `Max ${first}`, `Max ${second}`,
+    `RMS ${first}`, `RMS ${second}`],
+  pairs.map(({ before, after }) => [after.name, count(after.pixel_error.count),
+    pixels(before?.pixel_error.max), pixels(after.pixel_error.max),
+    pixels(before?.pixel_error.rms), pixels(after.pixel_error.rms)]),
+  pairs.map(({ after }) => ({ imageName: after.name })), onSelect);
 }

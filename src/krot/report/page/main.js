@@ -13,6 +13,9 @@ import { imagesTable, pairImages, supportTable } from './lists.js';
 import { profileChart, profileTable } from './profile.js';
 import { rotationSentence, suspectRows } from './suspects.js';
 import { scope, verdict } from './verdict.js';
+import {
+  badImagesTable, verdictsByName, verdictsNote, wrongObservationsTable,
+} from './verdicts.js';
 import { Viewer } from './viewer.js';
 
 function showViewer(contents) {
@@ -38,9 +41,7 @@ function showSupport(support, show) {
   byId('support-note').textContent =
     `${counted(support.length, 'observation')} alone set the proved bound, ` +
     'worst first. Click one to see it in the 3D view.';
-  byId('support').append(supportTable(support, (observation) => show({
-    imageName: observation.image_name, pointId: observation.point3D_id,
-  })));
+  byId('support').append(supportTable(support, show));
 }
 
 function showSuspects({ rotation_suspect: rotation }, suspects, show) {
@@ -55,6 +56,15 @@ function showSuspects({ rotation_suspect: rotation }, suspects, show) {
   }
   byId('crops-note').hidden = suspects.length === 0;
   byId('suspects').append(...suspectRows(suspects, show));
+}
+
+function showVerdicts(report, show) {
+  const isChecked = report.command === 'model_checker';
+  byId('verdicts-section').hidden = !isChecked;
+  if (!isChecked) return;
+  byId('verdicts-note').textContent = verdictsNote(report);
+  byId('bad-images').append(badImagesTable(report, show));
+  byId('wrong-observations').append(wrongObservationsTable(report, show));
 }
 
 function showCourse(report) {
@@ -104,15 +114,17 @@ function showPage(report, models) {
     {
       models, labels, support, boxes: report.boxes ?? [],
       levels: report.profile?.levels ?? [],
+      verdicts: verdictsByName(report),
+      wrongPoints: (report.observations ?? []).map((one) => one.point3D_id),
       sharesPoints: !isComparison(report),
     });
+  showVerdicts(report, show);
   showBoxes(report, show);
   showSupport(support, show);
   showSuspects(report, readJson('krot-crops'), show);
-  const showImage = (imageName) => show({ imageName });
-  byId('image-chart').append(
-    imagesChart(pairImages(models), labels, showImage));
-  byId('images').append(imagesTable(models, labels, showImage));
+  byId('image-chart').append(imagesChart(pairImages(models), labels,
+    (imageName) => show({ imageName })));
+  byId('images').append(imagesTable(models, labels, show));
 }
 
 const { before, after } = readJson('krot-models');

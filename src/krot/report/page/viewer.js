@@ -23,9 +23,11 @@ function usualPointSize(numPoints) {
 export class Viewer {
   // `stage`: the element to fill; `support`: the report's, [] if none;
   // `boxes`: likewise, in the second model; `levels`: of the error profile, [] if
-  // none; `sharesPoints`: whether the models' point ids mean the same points.
+  // none; `verdicts`: by image name, null if there are none; `wrongPoints`: ids;
+  // `sharesPoints`: whether the models' point ids mean the same points.
   // Throws where the browser has no WebGL 2.
-  constructor(stage, { models, labels, support, boxes, levels, sharesPoints }) {
+  constructor(stage, { models, labels, support, boxes, levels, verdicts,
+    wrongPoints, sharesPoints }) {
     const canvas = html('canvas', {
       tabindex: 0, 'aria-label': '3D view of cameras and points',
     });
@@ -36,7 +38,8 @@ export class Viewer {
     this.panels = html('div', { class: 'panels' });
     stage.append(canvas, this.panels);
     Object.assign(this,
-      { stage, canvas, models, labels, support, boxes, levels, sharesPoints });
+      { stage, canvas, models, labels, support, boxes, levels, verdicts,
+        wrongPoints, sharesPoints });
     this.renderer = new Renderer(gl);
     const { target, radius, front } = frame(models[1]);
     this.size = cameraSize(models[1], radius);
@@ -44,9 +47,10 @@ export class Viewer {
       target, distance: 1.9 * radius, up: upDirection(models[1]), front,
     });
     this.layers = models.map((model, i) =>
-      new Layer(this.renderer, model, ['--before', '--after'][i], this.size));
-    this.shown = 'after';
-    this.mode = 'rgb';
+      new Layer(this.renderer, model, ['--before', '--after'][i], this.size,
+        verdicts));
+    this.shown = verdicts ? 'before' : 'after';  // what is wrong is in the first
+    this.mode = verdicts ? 'verdict' : 'rgb';
     this.pointSize = usualPointSize(models[1].points.num);
     this.hasSupport = support.length > 0;
     this.level = 0;
@@ -81,7 +85,7 @@ export class Viewer {
   }
 
   // Lines between the support's cameras and points, the points that lose
-  // observations at the level, and what is selected.
+  // observations at the level or to verdicts, and what is selected.
   updateMarks() {
     this.marks.forEach((batch) => this.renderer.deleteBatch(batch));
     this.marks = [];
@@ -134,7 +138,8 @@ export class Viewer {
   }
 
   suspectPlaces(model) {
-    const ids = this.levels[this.level]?.point3D_ids ?? [];
+    const ids = this.levels[this.level]?.point3D_ids ??
+      (this.mode === 'verdict' ? this.wrongPoints : []);
     return ids.map((id) => pointIndex(model, id)).filter((index) => index >= 0)
       .flatMap((index) => pointPlace(model, index));
   }
