@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 namespace krot {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using Json = nlohmann::json;
@@ -70,6 +72,30 @@ TEST_F(ModelCheckerCommand, NamesWhatIsWrongAndWritesTheModelWithout) {
   ValidateModel(cured);
   EXPECT_EQ(cured.images.size(), 7u);
   EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+}
+
+// The tails of the sample's errors are heavier than Gaussian ones.
+TEST_F(ModelCheckerCommand, SaysWhatToRunNextAndThatRuns) {
+  const KrotResult result =
+      RunKrot({"model_checker", "--input_path", KROT_SAMPLE "/model",
+               "--report_path", folder_ / "r.json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GT(Json::parse(ReadBytes(folder_ / "r.json"))["cauchy_scale_px"], 0);
+  std::istringstream lines(result.out);
+  std::vector<std::string> commands;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("    krot ", 0) != 0) continue;
+    std::vector<std::string> arguments;
+    std::istringstream words(line.substr(9));
+    for (std::string word; words >> word;) {
+      const bool is_folder = word == "CURED" || word == "ADJUSTED";
+      arguments.push_back(is_folder ? (folder_ / word).string() : word);
+    }
+    const KrotResult next = RunKrot(arguments);
+    EXPECT_EQ(next.exit_code, 0) << line << next.err;
+    commands.push_back(arguments[0]);
+  }
+  EXPECT_THAT(commands, ElementsAre("model_checker", "bundle_adjuster"));
 }
 
 TEST_F(ModelCheckerCommand, EndsWithCode9WhereAScriptAsks) {

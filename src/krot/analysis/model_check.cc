@@ -226,6 +226,7 @@ class Checker {
 
   void Describe() {
     check_.sigma_px = snooping_.noise.sigma_px;
+    check_.cauchy_scale_px = snooping_.noise.cauchy_scale_px;
     check_.critical_w = snooping_.noise.critical_w;
     for (size_t n = 0; n < check_.images.size(); ++n) {
       if (IsWrong(static_cast<int32_t>(n))) continue;

@@ -85,6 +85,9 @@ struct ModelCheck {
   // Of an axis, pixels. None: no observation is checked by another one, as
   // without positions, and there is no verdict.
   std::optional<double> sigma_px;
+  // Of the Cauchy loss for what is left; none if its tails are no heavier than
+  // Gaussian ones.
+  std::optional<double> cauchy_scale_px;
   double critical_w = 0;
   int64_t num_tested = 0;          // observations, of images that are not wrong
   std::vector<ImageCheck> images;  // as Model::images

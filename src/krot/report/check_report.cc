@@ -196,8 +196,19 @@ std::string NextSteps(const CheckReport& report) {
         model + " --output_path TRIANGULATED\n";
     model = "TRIANGULATED";
   }
-  return text + "  Then adjust all that is left:\n    colmap bundle_adjuster " +
-         "--input_path " + model + " --output_path ADJUSTED\n";
+  if (!check.cauchy_scale_px) {
+    return text +
+           "  Then adjust all that is left:\n    colmap bundle_adjuster " +
+           "--input_path " + model + " --output_path ADJUSTED\n";
+  }
+  return text +
+         "  Then adjust all that is left, with the loss that suits errors with "
+         "such tails\n  (colmap bundle_adjuster of COLMAP 4 has these options, "
+         "too):\n    krot bundle_adjuster --input_path " +
+         model +
+         " --output_path ADJUSTED --BundleAdjustmentCeres.loss_function_type "
+         "CAUCHY --BundleAdjustmentCeres.loss_function_scale " +
+         FormatLength(*check.cauchy_scale_px) + "\n";
 }
 
 Json ImageJson(const ImageCheck& image) {
@@ -312,6 +323,7 @@ std::string CheckJson(const CheckReport& report) {
       {"num_tested", check.num_tested},
       {"num_wrong_observations", check.observations.size()},
       {"sigma_px", NumberOrNull(check.sigma_px)},
+      {"cauchy_scale_px", NumberOrNull(check.cauchy_scale_px)},
       {"critical_w", check.critical_w},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"poses", PosesJson(report.run.poses)},
