@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -33,6 +34,10 @@ struct ImageSums {
 
   // What the step takes away of `square`, to first order.
   double Gain() const { return -g.dot(step); }
+  // In [0, 1).
+  double GainShare() const {
+    return square > 0 ? std::min(Gain() / square, 1 - 1e-12) : 0;
+  }
   double MeanSquare() const {
     return num_directions > 0 ? square / static_cast<double>(num_directions)
                               : 0;

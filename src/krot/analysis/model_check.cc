@@ -19,8 +19,8 @@ namespace {
 constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 // An image may be so many times as noisy as most and still be sound.
 constexpr double kNoisyImage = 3;
-// Of the squared errors: another pose halves their root mean square.
-constexpr double kExplained = 0.75;
+// Of the squared errors: another pose takes so much of them away.
+constexpr double kExplained = 0.5;
 // Of the share of its 2D points that the median image keeps in tracks.
 constexpr double kFewKept = 1.0 / 3;
 // Of the median image's standard deviation.
@@ -133,9 +133,14 @@ class Checker {
           const ImageCheck& image = check_.images[n];
           return static_cast<double>(2 * image.num_wrong - image.num_tested);
         });
-    ask(
-        ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
-        [&](size_t n) { return sums_[n].Gain(); });
+    check_.is_adjusted = MedianOfSound([&](size_t n) {
+                           return sums_[n].GainShare();
+                         }) < kExplained / 2;
+    if (check_.is_adjusted) {
+      ask(
+          ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
+          [&](size_t n) { return sums_[n].Gain(); });
+    }
     median_square_ =
         MedianOfSound([&](size_t n) { return sums_[n].MeanSquare(); });
     median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
@@ -162,13 +167,22 @@ class Checker {
     return share > p && num * Divergence(share, p) > LeastExponent();
   }
 
-  // g'M^-1 g of noise is sigma^2 chi^2 with six degrees of freedom.
+  // Of noise of one size, the model's or the image's own, the gain is sigma^2
+  // chi^2 with six degrees of freedom, and its share of all the image's n
+  // squared errors has the distribution Beta(3, (n - 6) / 2).
   bool IsMisplaced(size_t n) const {
-    const double gain = sums_[n].Gain();
-    if (!(gain > kExplained * sums_[n].square)) return false;
-    const double sigma = kNoisyImage * *snooping_.noise.sigma_px;
+    const ImageSums& sums = sums_[n];
+    const double gain = sums.Gain();
+    const double share = sums.GainShare();
+    const double m = (static_cast<double>(sums.num_directions) - 6) / 2;
+    if (!(share > kExplained) || !(m > 0)) return false;
+    const double sigma = *snooping_.noise.sigma_px;
     const double x = gain / (2 * sigma * sigma);
-    return x - std::log1p(x + x * x / 2) > LeastExponent();
+    const double by_model = x - std::log1p(x + x * x / 2);
+    const double by_own =
+        -m * std::log1p(-share) -
+        std::log1p(m * share + m * (m + 1) / 2 * share * share);
+    return std::min(by_model, by_own) > LeastExponent();
   }
 
   // Errors that are larger than the median image's, by the bound of Chernoff on

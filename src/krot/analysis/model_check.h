@@ -26,7 +26,7 @@ enum class ImageVerdict {
 enum class ImageFault {
   kNone,
   kContradicted,  // most of its observations are more than noise
-  kMisplaced,     // another pose halves its root mean square error
+  kMisplaced,     // another pose halves the sum of its squared errors
   kChance,        // its errors are those of chance matches
 };
 
@@ -89,6 +89,10 @@ struct ModelCheck {
   // Gaussian ones.
   std::optional<double> cauchy_scale_px;
   double critical_w = 0;
+  // Whether most images stand where their own errors would have them, to half
+  // of an image's noise. Otherwise none can be called misplaced: the model is
+  // to be adjusted first.
+  bool is_adjusted = true;
   int64_t num_tested = 0;          // observations, of images that are not wrong
   std::vector<ImageCheck> images;  // as Model::images
   // Of images that are not wrong; largest w first.

@@ -47,7 +47,7 @@ std::string Reason(const ImageCheck& image) {
     case ImageFault::kContradicted:
       return "most of them contradict the others";
     case ImageFault::kMisplaced:
-      return "another pose would halve its errors";
+      return "another pose would halve its squared errors";
     case ImageFault::kChance:
       return "they fit no better than chance matches";
     case ImageFault::kNone:
@@ -280,6 +280,11 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
       " fine. Observations that others check: " + Thousands(check.num_tested) +
       ".\n";
+  if (check.sigma_px && !check.is_adjusted) {
+    text +=
+        "Most images do not stand where their own errors would have them: "
+        "adjust the model\n(colmap bundle_adjuster), then check it again.\n";
+  }
   return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
          ImageTable(check, ImageVerdict::kWeaklyHeld, num_rows) +
          ObservationTable(check, num_rows) + TrackTable(check, num_rows) +
@@ -316,6 +321,7 @@ std::string CheckJson(const CheckReport& report) {
       {"command", "model_checker"},
       {"verdict", CheckSentence(report)},
       {"is_anything_wrong", check.IsAnythingWrong()},
+      {"is_adjusted", check.is_adjusted},
       {"num_images", check.images.size()},
       {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
       {"num_weakly_held_images", check.NumImages(ImageVerdict::kWeaklyHeld)},
