@@ -80,6 +80,18 @@ INSTANTIATE_TEST_SUITE_P(
                       Near("task41_rigs_frames", 3.5041)),
     [](const auto& test) { return std::string(test.param.folder); });
 
+TEST(TryOtherWays, ProvesRealModelsWhoseRoundsStall) {
+  const char* root = std::getenv("KROT_REAL_MODELS");
+  if (root == nullptr) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
+  for (const char* name : {"drone72_rig", "bandgap10"}) {
+    const std::filesystem::path folder = std::filesystem::path(root) / name;
+    const SolveSummary summary =
+        SolveModel(ReadModel(folder, DetectModelFormat(folder)), {}).summary;
+    ASSERT_TRUE(summary.is_certified) << name;
+    EXPECT_GE(*summary.lower_bound, 0.999 * summary.cost_final) << name;
+  }
+}
+
 // A strong lens, from a start that its errors are tens of pixels at.
 Model DisturbedModel(unsigned seed) {
   LensModelOptions options;

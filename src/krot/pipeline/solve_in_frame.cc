@@ -259,9 +259,14 @@ SolveModelResult SolveInFrame(const Model& model,
     result.model = model;
     return result;
   }
-  const std::optional<PixelCertificate> certificate =
+  std::optional<PixelCertificate> certificate =
       SolveInRounds(model, options, summary.method, context, solve_timer,
                     &start.built, &estimate, &summary);
+  if (summary.method == SolveMethod::kAuto && context.ranks == nullptr &&
+      options.problem.positions.empty() && HasJointSolver(options.norm)) {
+    TryOtherWays(model, options, context, solve_timer, &start, &estimate,
+                 &certificate, &summary);
+  }
   if (summary.termination == SolveTermination::kInfeasible) {
     Certify(model, start.built, estimate, options, context, certificate,
             &summary);
