@@ -181,9 +181,8 @@ bool Rounds::RunOne() {
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
   // Where a depth is rounding alone, so are rows and bounds that start from it.
   const double rows_cost = RowsCost(problem, estimate_);
-  if (!std::isfinite(rows_cost) ||
-      (is_bounded && !positions_.Any() &&
-       rows_cost > (1 + kRowsRounding) * cost_)) {
+  if (!std::isfinite(rows_cost) || (is_bounded && !positions_.Any() &&
+                                    rows_cost > (1 + kRowsRounding) * cost_)) {
     return false;
   }
   Estimate solved = estimate_;
@@ -335,8 +334,7 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
   for (const SolveInit init : {SolveInit::kModel, SolveInit::kFeasible}) {
     if (summary->termination != SolveTermination::kStalled ||
         IsWithin(kGapsOfAnswer * options.joint.relative_gap, *certificate,
-                 summary->cost_final) ||
-        context.IsCancelled()) {
+                 summary->cost_final)) {
       return;
     }
     other_options.init = init;
@@ -370,6 +368,9 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
                    summary->cost_final)) {
         summary->termination = SolveTermination::kGapReached;
       }
+    }
+    if (context.IsCancelled()) {
+      summary->termination = SolveTermination::kInterrupted;
     }
     Append(way.rounds, &summary->rounds);
     Append(way.sweeps, &summary->sweeps);
