@@ -137,10 +137,10 @@ bool CanBePositioned(const GlobalPositionerOptions& options,
     }
   }
   if (!unknown_focal_lengths.empty()) {
-    LOG(ERROR) << "KROT takes focal lengths as known, and "
-               << unknown_focal_lengths.size()
-               << " cameras have no prior focal length, the first of which is "
-               << *unknown_focal_lengths.begin() << kCure
+    LOG(ERROR) << "KROT takes focal lengths as known, and camera "
+               << *unknown_focal_lengths.begin()
+               << " has no prior focal length (cameras without: "
+               << unknown_focal_lengths.size() << ")" << kCure
                << ", or run the view_graph_calibrator first";
     return false;
   }
