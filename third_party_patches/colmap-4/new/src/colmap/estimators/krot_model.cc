@@ -34,7 +34,8 @@ void AppendRigs(const Reconstruction& reconstruction, krot::Model& model) {
     const Rig& rig = reconstruction.Rig(rig_id);
     krot::Rig added;
     added.id = rig_id;
-    if (rig.NumSensors() > 0) added.ref_sensor_id = ToSensorId(rig.RefSensorId());
+    if (rig.NumSensors() > 0)
+      added.ref_sensor_id = ToSensorId(rig.RefSensorId());
     for (const auto& [sensor, sensor_from_rig] : rig.NonRefSensors()) {
       added.sensors.push_back({ToSensorId(sensor), std::nullopt});
       if (sensor_from_rig) {
@@ -53,7 +54,8 @@ void AppendFramesAndImages(const Reconstruction& reconstruction,
   for (const frame_t frame_id :
        std::set<frame_t>(reg_frame_ids.begin(), reg_frame_ids.end())) {
     const Frame& frame = reconstruction.Frame(frame_id);
-    krot::Frame added{frame_id, frame.RigId(), ToPose(frame.RigFromWorld()), {}};
+    krot::Frame added{
+        frame_id, frame.RigId(), ToPose(frame.RigFromWorld()), {}};
     for (const data_t& data : frame.DataIds()) {
       added.data.push_back({ToSensorId(data.sensor_id), data.id});
       if (data.sensor_id.type == SensorType::CAMERA) {
@@ -70,18 +72,22 @@ void AppendFramesAndImages(const Reconstruction& reconstruction,
     added.camera_id = image.CameraId();
     added.name = image.Name();
     for (const Point2D& point2D : image.Points2D()) {
-      added.points2D.push_back(
-          {point2D.xy(0),
-           point2D.xy(1),
-           point2D.HasPoint3D() ? point2D.point3D_id : krot::kInvalidPoint3DId});
+      added.points2D.push_back({point2D.xy(0),
+                                point2D.xy(1),
+                                point2D.HasPoint3D()
+                                    ? point2D.point3D_id
+                                    : krot::kInvalidPoint3DId});
     }
     model.images.push_back(std::move(added));
   }
 }
 
-void AppendPoints3D(const Reconstruction& reconstruction, krot::Model& model) {
+void AppendPoints3D(const Reconstruction& reconstruction,
+                    const int min_track_length,
+                    krot::Model& model) {
   for (const point3D_t point3D_id : SortedIds(reconstruction.Points3D())) {
     const Point3D& point3D = reconstruction.Point3D(point3D_id);
+    if (static_cast<int>(point3D.track.Length()) < min_track_length) continue;
     krot::Point3D added;
     added.id = point3D_id;
     added.xyz = point3D.xyz;
@@ -119,7 +125,8 @@ void DeleteMissingObservations(const krot::Model& model,
 
 }  // namespace
 
-krot::Model ToKrotModel(const Reconstruction& reconstruction) {
+krot::Model ToKrotModel(const Reconstruction& reconstruction,
+                        const int min_track_length) {
   krot::Model model;
   model.stores_rigs = true;
   for (const camera_t camera_id : SortedIds(reconstruction.Cameras())) {
@@ -132,7 +139,7 @@ krot::Model ToKrotModel(const Reconstruction& reconstruction) {
   }
   AppendRigs(reconstruction, model);
   AppendFramesAndImages(reconstruction, model);
-  AppendPoints3D(reconstruction, model);
+  AppendPoints3D(reconstruction, min_track_length, model);
   krot::ValidateModel(model);
   return model;
 }

@@ -6,6 +6,7 @@
 namespace colmap {
 
 int RunKnownRotationSolver(int argc, char** argv);
+int RunModelChecker(int argc, char** argv);
 int RunOutlierFilter(int argc, char** argv);
 
 }  // namespace colmap
