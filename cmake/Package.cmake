@@ -36,5 +36,5 @@ set(CPACK_DEBIAN_LIBKROT-DEV_DESCRIPTION
 find_package and pkg-config need.")
 set(CPACK_DEBIAN_LIBKROT-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_LIBKROT-DEV_PACKAGE_DEPENDS
-  "libceres-dev, libeigen3-dev, nlohmann-json3-dev")
+  "libceres-dev, libeigen3-dev, libsqlite3-dev, nlohmann-json3-dev")
 include(CPack)

@@ -12,7 +12,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 # PROGRAM:PACKAGE is satisfied by any such program, PACKAGE only by the package.
 build_needs=(cmake:cmake ninja:ninja-build c++:g++ libeigen3-dev
   libboost-program-options-dev libceres-dev libjpeg-dev libpng-dev
-  nlohmann-json3-dev)
+  libsqlite3-dev nlohmann-json3-dev)
 
 say() { printf '\n== %s\n' "$*"; }
 

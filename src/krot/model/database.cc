@@ -1,0 +1,232 @@
+#include "krot/model/database.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "krot/model/sqlite_rows.h"
+
+namespace krot {
+namespace {
+
+// COLMAP's pair id is this times the smaller image id plus the larger one.
+constexpr int64_t kMaxNumImages = 2147483647;
+
+constexpr int kConfigWatermark = 7;
+constexpr int kMaxConfig = 9;
+
+// The database's images that the model has, by the database's ids.
+using Join = std::unordered_map<int64_t, int32_t>;
+
+Join JoinImages(const Model& model, SqliteDatabase* database) {
+  std::unordered_map<std::string_view, int32_t> image_of_name;
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const std::string& name = model.images[i].name;
+    if (image_of_name.emplace(name, static_cast<int32_t>(i)).second) continue;
+    database->Fail("found several images of the model with the name \"" + name +
+                   "\", expected different names: images of the database go "
+                   "by their names");
+  }
+  Join join;
+  std::vector<bool> is_taken(model.images.size());
+  SqliteRows rows(database, "images", "image_id, name");
+  while (rows.Next()) {
+    const int64_t id = rows.Integer(0);
+    const std::string name = rows.Text(1);
+    if (id < 0 || id >= kMaxNumImages) {
+      database->Fail("found image id " + std::to_string(id) +
+                     ", expected 0 to " + std::to_string(kMaxNumImages - 1));
+    }
+    const auto found = image_of_name.find(name);
+    if (found == image_of_name.end()) continue;
+    if (is_taken[found->second] || !join.emplace(id, found->second).second) {
+      database->Fail("found image \"" + name +
+                     "\" twice, expected unique names");
+    }
+    is_taken[found->second] = true;
+  }
+  if (join.empty()) {
+    database->Fail(
+        "found none of the model's images, such as \"" +
+        (model.images.empty() ? std::string() : model.images[0].name) +
+        "\", expected the database that the model was made from");
+  }
+  return join;
+}
+
+double Correlation(const std::vector<Eigen::Vector2d>& keypoints,
+                   const std::vector<Point2D>& points2D, int axis) {
+  const auto value = [&](size_t i) {
+    return axis == 0 ? points2D[i].x : points2D[i].y;
+  };
+  double mean_a = 0, mean_b = 0;
+  const auto n = static_cast<double>(keypoints.size());
+  for (size_t i = 0; i < keypoints.size(); ++i) {
+    mean_a += keypoints[i][axis] / n;
+    mean_b += value(i) / n;
+  }
+  double aa = 0, ab = 0, bb = 0;
+  for (size_t i = 0; i < keypoints.size(); ++i) {
+    const double a = keypoints[i][axis] - mean_a, b = value(i) - mean_b;
+    aa += a * a;
+    ab += a * b;
+    bb += b * b;
+  }
+  return ab / std::sqrt(aa * bb);
+}
+
+// Whether an image's 2D points are these keypoints, one by one, maybe of a
+// photo that was undistorted or resized since; of other features they would
+// lie anywhere.
+bool AreSameFeatures(const std::vector<Eigen::Vector2d>& keypoints,
+                     const std::vector<Point2D>& points2D) {
+  if (keypoints.size() != points2D.size()) return false;
+  bool are_equal = true;
+  for (size_t i = 0; i < keypoints.size() && are_equal; ++i) {
+    are_equal = keypoints[i] == Eigen::Vector2d(points2D[i].x, points2D[i].y);
+  }
+  if (are_equal) return true;
+  constexpr double kSameOrder = 0.9;
+  return Correlation(keypoints, points2D, 0) > kSameOrder &&
+         Correlation(keypoints, points2D, 1) > kSameOrder;
+}
+
+// Whether at least half of the 2D points that see something are among the
+// keypoints, where some of them were dropped.
+bool AreAmong(const std::vector<Eigen::Vector2d>& keypoints,
+              const std::vector<Point2D>& points2D) {
+  const auto key = [](double x, double y) {
+    return std::hash<double>()(x) * 31 + std::hash<double>()(y);
+  };
+  std::unordered_set<size_t> known;
+  for (const Eigen::Vector2d& x : keypoints) known.insert(key(x.x(), x.y()));
+  int64_t found = 0, of = 0;
+  for (const Point2D& point : points2D) {
+    if (point.point3D_id == kInvalidPoint3DId) continue;
+    ++of;
+    if (known.count(key(point.x, point.y)) > 0) ++found;
+  }
+  return 2 * found >= of;
+}
+
+void ReadKeypoints(const Model& model, const Join& join,
+                   SqliteDatabase* database, Database* read) {
+  read->keypoints.resize(model.images.size());
+  SqliteRows rows(database, "keypoints", "image_id, rows, cols, data");
+  std::vector<float> elements;
+  int64_t columns = 0;
+  while (rows.Next()) {
+    const auto joined = join.find(rows.Integer(0));
+    if (joined == join.end()) continue;
+    const Image& image = model.images[joined->second];
+    const std::string where = "keypoints of image \"" + image.name + "\"";
+    const int64_t count = rows.Matrix(1, where, 2, 6, &elements, &columns);
+    if (count > 0 && columns % 2 != 0) {
+      database->Fail(where + ": found " + std::to_string(columns) +
+                     " columns, expected 2, 4 or 6");
+    }
+    auto& keypoints = read->keypoints[joined->second];
+    keypoints.resize(count);
+    for (int64_t i = 0; i < count; ++i) {
+      keypoints[i] = {elements[i * columns], elements[i * columns + 1]};
+      if (keypoints[i].allFinite()) continue;
+      database->Fail(where + ": found a coordinate of keypoint " +
+                     std::to_string(i) +
+                     " that is not finite, expected a finite number");
+    }
+    if (image.points2D.empty() || keypoints.empty()) continue;
+    if (AreSameFeatures(keypoints, image.points2D)) {
+      for (int64_t i = 0; i < count; ++i) {
+        keypoints[i] = {image.points2D[i].x, image.points2D[i].y};
+      }
+    } else if (!AreAmong(keypoints, image.points2D)) {
+      database->Fail(where + ": found " + std::to_string(count) +
+                     " keypoints that are not the model's " +
+                     std::to_string(image.points2D.size()) +
+                     " 2D points, expected the database that the model was "
+                     "made from");
+    }
+  }
+}
+
+void RequireKeypoint(const Database& read, const Model& model, int32_t image,
+                     uint32_t keypoint, const SqliteDatabase& database) {
+  if (keypoint < read.keypoints[image].size()) return;
+  database.Fail("found keypoint " + std::to_string(keypoint) + " of image \"" +
+                model.images[image].name +
+                "\" in a verified match, but that image has only " +
+                std::to_string(read.keypoints[image].size()) + " keypoints");
+}
+
+void ReadPairs(const Model& model, const Join& join, SqliteDatabase* database,
+               Database* read) {
+  SqliteRows rows(database, "two_view_geometries",
+                  "pair_id, rows, cols, data, config");
+  std::vector<uint32_t> elements;
+  int64_t columns = 0;
+  while (rows.Next()) {
+    const int64_t pair_id = rows.Integer(0);
+    const int64_t config = rows.Integer(4);
+    const int64_t id1 = pair_id / kMaxNumImages, id2 = pair_id % kMaxNumImages;
+    if (pair_id < 0 || id1 >= id2) {
+      database->Fail("found pair id " + std::to_string(pair_id) +
+                     ", expected 2147483647 times an image id plus a larger "
+                     "one");
+    }
+    if (config < 0 || config > kMaxConfig) {
+      database->Fail("found configuration " + std::to_string(config) +
+                     " of a two-view geometry, expected 0 to 9");
+    }
+    const std::string where = "matches of images " + std::to_string(id1) +
+                              " and " + std::to_string(id2);
+    const int64_t count = rows.Matrix(1, where, 2, 2, &elements, &columns);
+    if (count == 0 || config < 2) continue;  // undefined or degenerate
+    const auto joined1 = join.find(id1), joined2 = join.find(id2);
+    if (joined1 == join.end() || joined2 == join.end()) {
+      ++read->num_other_pairs;
+      continue;
+    }
+    if (config == kConfigWatermark) {
+      ++read->num_watermarks;
+      continue;
+    }
+    VerifiedPair pair;
+    pair.image1 = joined1->second;
+    pair.image2 = joined2->second;
+    pair.config = static_cast<int>(config);
+    pair.matches.resize(count);
+    for (int64_t i = 0; i < count; ++i) {
+      pair.matches[i] = {elements[2 * i], elements[2 * i + 1]};
+      RequireKeypoint(*read, model, pair.image1, elements[2 * i], *database);
+      RequireKeypoint(*read, model, pair.image2, elements[2 * i + 1],
+                      *database);
+    }
+    read->pairs.push_back(std::move(pair));
+  }
+}
+
+}  // namespace
+
+Database ReadDatabase(const std::filesystem::path& path, const Model& model,
+                      const FileNote& note) {
+  SqliteDatabase database(path);
+  Database read;
+  const Join join = JoinImages(model, &database);
+  read.num_images = static_cast<int64_t>(join.size());
+  ReadKeypoints(model, join, &database, &read);
+  ReadPairs(model, join, &database, &read);
+  database.RequireUnchanged();
+  const auto num_images = static_cast<int64_t>(model.images.size());
+  if (note && read.num_images < num_images) {
+    note(path.string() + " has " + std::to_string(read.num_images) +
+         " of the model's " + std::to_string(num_images) +
+         " images; nothing is said of the others");
+  }
+  return read;
+}
+
+}  // namespace krot

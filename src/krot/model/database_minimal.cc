@@ -1,0 +1,14 @@
+// Where there is no SQLite: no database can be read.
+
+#include "krot/model/database.h"
+#include "krot/model/model_error.h"
+
+namespace krot {
+
+Database ReadDatabase(const std::filesystem::path& path, const Model&,
+                      const FileNote&) {
+  throw ModelError(path.string() +
+                   ": cannot be read by this build, which has no SQLite");
+}
+
+}  // namespace krot

@@ -1,0 +1,249 @@
+#include "krot/model/sqlite_rows.h"
+
+#include <sqlite3.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <system_error>
+
+#include "krot/model/model_error.h"
+
+namespace krot {
+namespace {
+
+// The beginning of the file, as far as it tells what the file is.
+std::string HeadOf(const std::filesystem::path& path) {
+  std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(path.c_str(), "rb"),
+                                             &std::fclose);
+  if (!file) {
+    throw ModelError(path.string() + ": cannot be opened: " +
+                     std::generic_category().message(errno));
+  }
+  std::string head(64, '\0');
+  head.resize(std::fread(head.data(), 1, head.size(), file.get()));
+  return head;
+}
+
+void RequireSqlite(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (std::filesystem::exists(path, ignored) &&
+      !std::filesystem::is_regular_file(path, ignored)) {
+    throw ModelError(path.string() +
+                     ": is no regular file, expected COLMAP's database");
+  }
+  const std::string head = HeadOf(path);
+  if (head.rfind("version https://git-lfs", 0) == 0) {
+    throw ModelError(path.string() +
+                     ": is a Git LFS pointer, not a database; run git lfs pull "
+                     "where it was cloned");
+  }
+  constexpr std::string_view kMagic("SQLite format 3\0", 16);
+  if (std::string_view(head).substr(0, kMagic.size()) != kMagic) {
+    throw ModelError(path.string() +
+                     ": is no SQLite database, expected COLMAP's, which is "
+                     "mostly called database.db");
+  }
+}
+
+// A path in which no character has a meaning of its own.
+std::string UriOf(const std::string& path) {
+  std::string uri = "file:";
+  for (const char c : path) {
+    switch (c) {
+      case '%':
+        uri += "%25";
+        break;
+      case '?':
+        uri += "%3f";
+        break;
+      case '#':
+        uri += "%23";
+        break;
+      default:
+        uri += c;
+    }
+  }
+  return uri;
+}
+
+}  // namespace
+
+SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
+    : name_(path.string()), database_(nullptr, &sqlite3_close_v2) {
+  RequireSqlite(path);
+  // SQLite looks for the log beside the file that a link stands for.
+  std::error_code error;
+  path_ = std::filesystem::canonical(path, error).string();
+  if (error) Fail("cannot be opened: " + error.message());
+  before_ = States();
+  // Without a log or a journal nobody is writing: no locks are needed, and
+  // SQLite need not create files of its own beside the database.
+  is_immutable_ = before_[1].size == 0 && !before_[2].exists;
+  const std::string uri =
+      UriOf(path_) + (is_immutable_ ? "?mode=ro&immutable=1" : "?mode=ro");
+  sqlite3* database = nullptr;
+  const int status = sqlite3_open_v2(
+      uri.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+  database_.reset(database);
+  Require(status);
+  sqlite3_busy_timeout(database, 5000);  // milliseconds
+  sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  // All that follows is of one state of the database.
+  Require(sqlite3_exec(database, "BEGIN", nullptr, nullptr, nullptr));
+  for (const FileState& file : before_) bytes_left_ += file.size;
+}
+
+SqliteDatabase::FileState SqliteDatabase::StateOf(const std::string& path) {
+  FileState state;
+  struct stat status = {};
+  if (::stat(path.c_str(), &status) != 0) return state;
+  state.exists = true;
+  state.size = status.st_size;
+  state.seconds = status.st_mtim.tv_sec;
+  state.nanoseconds = status.st_mtim.tv_nsec;
+  return state;
+}
+
+std::array<SqliteDatabase::FileState, 3> SqliteDatabase::States() const {
+  return {StateOf(path_), StateOf(path_ + "-wal"), StateOf(path_ + "-journal")};
+}
+
+void SqliteDatabase::RequireUnchanged() const {
+  if (!is_immutable_ || States() == before_) return;
+  Fail("was changed while it was read; wait until COLMAP has ended");
+}
+
+void SqliteDatabase::Fail(const std::string& what) const {
+  throw ModelError(name_ + ": " + what);
+}
+
+void SqliteDatabase::Account(int64_t bytes) {
+  bytes_left_ -= std::max<int64_t>(bytes, 1);
+  if (bytes_left_ >= 0) return;
+  Fail(
+      "found more data than a file of its size can hold: it is damaged; copy "
+      "it anew");
+}
+
+void SqliteDatabase::Require(int status) const {
+  if (status == SQLITE_OK || status == SQLITE_ROW || status == SQLITE_DONE) {
+    return;
+  }
+  // What is read without locks may be half of one state and half of the next.
+  RequireUnchanged();
+  const std::string reason =
+      database_ ? sqlite3_errmsg(database_.get()) : sqlite3_errstr(status);
+  if (status == SQLITE_BUSY || status == SQLITE_LOCKED) {
+    Fail("is locked by another program; wait until COLMAP has ended");
+  }
+  if (status == SQLITE_CANTOPEN || (status & 0xff) == SQLITE_READONLY) {
+    Fail("cannot be opened for reading alone (" + reason +
+         "): the program that wrote it did not end well; copy it, with its "
+         "-wal or -journal, into a folder that can be written to and open it "
+         "there with COLMAP once");
+  }
+  Fail("cannot be read (" + reason + "): it is damaged; copy it anew");
+}
+
+SqliteRows::SqliteRows(SqliteDatabase* database, const std::string& table,
+                       const std::string& columns)
+    : database_(*database),
+      table_(table),
+      statement_(nullptr, &sqlite3_finalize) {
+  Prepare("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '" +
+          table + "'");
+  if (!Next()) {
+    database_.Fail("found no table " + table +
+                   ", expected COLMAP's tables images, keypoints and "
+                   "two_view_geometries; is this COLMAP's database?");
+  }
+  Prepare("SELECT " + columns + " FROM " + table);
+}
+
+void SqliteRows::Prepare(const std::string& sql) {
+  sqlite3_stmt* statement = nullptr;
+  sqlite3* database = database_.database_.get();
+  const int status =
+      sqlite3_prepare_v2(database, sql.c_str(), -1, &statement, nullptr);
+  if (status == SQLITE_ERROR) {
+    database_.Fail("the table " + table_ + " is not COLMAP's (" +
+                   sqlite3_errmsg(database) +
+                   "), expected one of COLMAP 3.8 to 4.x");
+  }
+  database_.Require(status);
+  statement_.reset(statement);
+}
+
+bool SqliteRows::Next() {
+  const int status = sqlite3_step(statement_.get());
+  database_.Require(status);
+  if (status != SQLITE_ROW) return false;
+  int64_t bytes = 0;
+  for (int i = 0; i < sqlite3_column_count(statement_.get()); ++i) {
+    if (Type(i) == SQLITE_BLOB || Type(i) == SQLITE_TEXT) {
+      bytes += sqlite3_column_bytes(statement_.get(), i);
+    }
+  }
+  database_.Account(bytes);
+  return true;
+}
+
+int SqliteRows::Type(int column) const {
+  return sqlite3_column_type(statement_.get(), column);
+}
+
+void SqliteRows::FailType(int column, const std::string& type) const {
+  database_.Fail("table " + table_ + ": found no " + type + " in column " +
+                 sqlite3_column_name(statement_.get(), column) +
+                 ", expected one there");
+}
+
+int64_t SqliteRows::Integer(int column) const {
+  if (Type(column) != SQLITE_INTEGER) FailType(column, "integer");
+  return sqlite3_column_int64(statement_.get(), column);
+}
+
+std::string SqliteRows::Text(int column) const {
+  if (Type(column) != SQLITE_TEXT) FailType(column, "text");
+  const auto* text = sqlite3_column_text(statement_.get(), column);
+  if (text == nullptr) database_.Require(SQLITE_NOMEM);
+  return {reinterpret_cast<const char*>(text),
+          static_cast<size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+std::string_view SqliteRows::Blob(int column) const {
+  if (Type(column) == SQLITE_NULL) return {};
+  if (Type(column) != SQLITE_BLOB) FailType(column, "blob");
+  const void* bytes = sqlite3_column_blob(statement_.get(), column);
+  if (bytes == nullptr) return {};
+  return {static_cast<const char*>(bytes),
+          static_cast<size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+int64_t SqliteRows::CheckedRows(int rows_column, const std::string& where,
+                                int64_t min_columns, int64_t max_columns,
+                                int64_t element_bytes) const {
+  const int64_t rows = Integer(rows_column);
+  const int64_t columns = Integer(rows_column + 1);
+  const auto num_bytes = static_cast<int64_t>(Blob(rows_column + 2).size());
+  if (rows == 0 && num_bytes == 0) return 0;
+  if (columns < min_columns || columns > max_columns) {
+    const std::string up_to =
+        min_columns == max_columns ? "" : " to " + std::to_string(max_columns);
+    database_.Fail(where + ": found " + std::to_string(columns) +
+                   " columns, expected " + std::to_string(min_columns) + up_to);
+  }
+  const int64_t row_bytes = columns * element_bytes;
+  if (rows < 0 || rows > num_bytes / row_bytes ||
+      rows * row_bytes != num_bytes) {
+    database_.Fail(where + ": found " + std::to_string(num_bytes) +
+                   " bytes, expected " + std::to_string(rows) + " rows of " +
+                   std::to_string(row_bytes));
+  }
+  return rows;
+}
+
+}  // namespace krot

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace krot {
+
+// An SQLite database that is read in one state and never written to. All that
+// is wrong with it throws ModelError: a sentence that begins with its path.
+class SqliteDatabase {
+ public:
+  explicit SqliteDatabase(const std::filesystem::path& path);
+
+  // Throws if the file was written to since, while it was read without locks.
+  void RequireUnchanged() const;
+
+  [[noreturn]] void Fail(const std::string& what) const;
+
+ private:
+  friend class SqliteRows;
+
+  // What tells whether a file was written to meanwhile.
+  struct FileState {
+    bool exists = false;
+    int64_t size = 0;
+    int64_t seconds = 0;
+    int64_t nanoseconds = 0;
+    bool operator==(const FileState& other) const {
+      return exists == other.exists && size == other.size &&
+             seconds == other.seconds && nanoseconds == other.nanoseconds;
+    }
+  };
+  static FileState StateOf(const std::string& path);
+  // Of the file, its write-ahead log and its journal.
+  std::array<FileState, 3> States() const;
+
+  // Counts what was read against the size of the file, which may claim to hold
+  // more where it is damaged.
+  void Account(int64_t bytes);
+
+  // Throws unless SQLite's status is one of success.
+  void Require(int status) const;
+
+  const std::string name_;
+  std::string path_;
+  bool is_immutable_ = false;
+  std::array<FileState, 3> before_;
+  std::unique_ptr<sqlite3, int (*)(sqlite3*)> database_;
+  int64_t bytes_left_ = 0;
+};
+
+// The rows of a table, one after the other. Values of another type than asked
+// for throw ModelError.
+class SqliteRows {
+ public:
+  // Of the table's columns, separated by commas. Throws ModelError if there is
+  // no such table or column. Keeps a reference to the database.
+  SqliteRows(SqliteDatabase* database, const std::string& table,
+             const std::string& columns);
+
+  bool Next();
+
+  int64_t Integer(int column) const;
+  std::string Text(int column) const;
+  std::string_view Blob(int column) const;  // until Next; empty for NULL
+
+  // The elements of COLMAP's matrix blobs, row by row: `rows_column` and the
+  // two columns behind it are its rows, its columns and its data. Returns the
+  // number of rows. Throws ModelError, about `where`, if these do not agree.
+  template <typename T>
+  int64_t Matrix(int rows_column, const std::string& where, int64_t min_columns,
+                 int64_t max_columns, std::vector<T>* elements,
+                 int64_t* num_columns) const {
+    *num_columns = Integer(rows_column + 1);
+    const int64_t rows =
+        CheckedRows(rows_column, where, min_columns, max_columns, sizeof(T));
+    elements->resize(rows * *num_columns);
+    const std::string_view blob = Blob(rows_column + 2);
+    if (rows > 0) std::memcpy(elements->data(), blob.data(), blob.size());
+    return rows;
+  }
+
+ private:
+  void Prepare(const std::string& sql);
+  int Type(int column) const;
+  [[noreturn]] void FailType(int column, const std::string& type) const;
+  int64_t CheckedRows(int rows_column, const std::string& where,
+                      int64_t min_columns, int64_t max_columns,
+                      int64_t element_bytes) const;
+
+  SqliteDatabase& database_;
+  const std::string table_;
+  std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement_;
+};
+
+}  // namespace krot

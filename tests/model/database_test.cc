@@ -1,0 +1,264 @@
+#include "krot/model/database.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/testing/database_writer.h"
+#include "tests/testing/model_matchers.h"
+
+namespace krot {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+const std::vector<Eigen::Vector2d> kKeypoints = {{1.5, 2}, {30, 4}, {5, 60.25}};
+
+// Images a, b and c, whose 2D points are not in the model.
+Model ThreeImages() {
+  Model model;
+  for (const char* name : {"a.jpg", "b.jpg", "c.jpg"}) {
+    Image image;
+    image.id = static_cast<ImageId>(10 + model.images.size());
+    image.name = name;
+    model.images.push_back(image);
+  }
+  return model;
+}
+
+// Of b.jpg and a.jpg, with two matches, and of x.jpg, which is elsewhere.
+void WriteImages(DatabaseWriter* writer) {
+  writer->AddImage(1, "x.jpg", kKeypoints);
+  writer->AddImage(2, "b.jpg", kKeypoints, 2);
+  writer->AddImage(5, "a.jpg", kKeypoints, 6);
+  writer->AddPair(2, 5, {{0, 1}, {2, 0}}, 3);
+  writer->AddPair(1, 2, {{0, 0}});
+}
+
+std::string ErrorOf(const fs::path& path, const Model& model) {
+  return ModelErrorOf([&] { ReadDatabase(path, model); });
+}
+
+TEST(Database, JoinsImagesByNameWhateverTheirIds) {
+  for (const bool has_rigs : {false, true}) {
+    const TempFolder folder;
+    {
+      DatabaseWriter writer(folder / "database.db", has_rigs);
+      WriteImages(&writer);
+    }
+    std::string note;
+    const Database database =
+        ReadDatabase(folder / "database.db", ThreeImages(),
+                     [&](const std::string& sentence) { note = sentence; });
+    EXPECT_EQ(database.num_images, 2);
+    EXPECT_THAT(note, HasSubstr("has 2 of the model's 3 images"));
+    EXPECT_EQ(database.keypoints[0], kKeypoints);
+    EXPECT_EQ(database.keypoints[1], kKeypoints);
+    EXPECT_TRUE(database.keypoints[2].empty());
+    EXPECT_EQ(database.num_other_pairs, 1);
+    ASSERT_EQ(database.pairs.size(), 1);
+    const VerifiedPair& pair = database.pairs[0];
+    EXPECT_EQ(pair.image1, 1);
+    EXPECT_EQ(pair.image2, 0);
+    EXPECT_EQ(pair.config, 3);
+    EXPECT_THAT(pair.matches,
+                ElementsAre(ElementsAre(0u, 1u), ElementsAre(2u, 0u)));
+  }
+}
+
+TEST(Database, TakesNoPairsThatColmapDoesNotUse) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    writer.AddImage(1, "a.jpg", kKeypoints);
+    writer.AddImage(2, "b.jpg", kKeypoints);
+    writer.AddImage(3, "c.jpg", kKeypoints);
+    writer.AddPair(1, 2, {{0, 0}}, 1);  // degenerate
+    writer.AddPair(1, 3, {}, 2);
+    writer.AddPair(2, 3, {{0, 0}}, 7);  // a watermark
+  }
+  const Database database = ReadDatabase(folder / "database.db", ThreeImages());
+  EXPECT_TRUE(database.pairs.empty());
+  EXPECT_EQ(database.num_watermarks, 1);
+}
+
+TEST(Database, LeavesItsFolderAsItWas) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "a %20?#b.db");
+    WriteImages(&writer);
+  }
+  const std::string bytes = ReadBytes(folder / "a %20?#b.db");
+  ReadDatabase(folder / "a %20?#b.db", ThreeImages());
+  EXPECT_THAT(FileNames(folder.path()), ElementsAre("a %20?#b.db"));
+  EXPECT_EQ(ReadBytes(folder / "a %20?#b.db"), bytes);
+  // An empty log, of a program that ended badly, changes nothing.
+  WriteBytes(folder / "a %20?#b.db-wal", "");
+  ReadDatabase(folder / "a %20?#b.db", ThreeImages());
+  EXPECT_THAT(FileNames(folder.path()),
+              ElementsAre("a %20?#b.db", "a %20?#b.db-wal"));
+}
+
+TEST(Database, SeesWhatARunningProgramHasCommittedAndDoesNotBlockIt) {
+  const TempFolder folder;
+  DatabaseWriter writer(folder / "database.db");
+  WriteImages(&writer);
+  writer.Execute("BEGIN IMMEDIATE");
+  writer.AddImage(6, "c.jpg", kKeypoints);
+  EXPECT_EQ(ReadDatabase(folder / "database.db", ThreeImages()).num_images, 2);
+  writer.Execute("COMMIT");
+  EXPECT_EQ(ReadDatabase(folder / "database.db", ThreeImages()).num_images, 3);
+  writer.Execute("DELETE FROM two_view_geometries");
+  EXPECT_TRUE(
+      ReadDatabase(folder / "database.db", ThreeImages()).pairs.empty());
+}
+
+TEST(Database, TakesKeypointsFromTheModelWhosePhotosWereUndistortedSince) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    WriteImages(&writer);
+  }
+  Model model = ThreeImages();
+  model.images[0].points2D = {{2, 3, 7}, {28, 4, 7}, {5, 66, 7}};
+  const Database database = ReadDatabase(folder / "database.db", model);
+  EXPECT_EQ(database.keypoints[0][2], Eigen::Vector2d(5, 66));
+  EXPECT_EQ(database.keypoints[1], kKeypoints);
+}
+
+TEST(Database, IsRefusedIfTheModelWasMadeFromOtherFeatures) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    WriteImages(&writer);
+  }
+  Model model = ThreeImages();
+  model.images[0].points2D = {{28, 66, 7}, {2, 3, 7}, {5, 66, 7}};
+  EXPECT_THAT(ErrorOf(folder / "database.db", model),
+              HasSubstr("keypoints of image \"a.jpg\": found 3 keypoints that "
+                        "are not the model's 3 2D points"));
+  // Of fewer, those that see something must be among the keypoints.
+  model.images[0].points2D = {{30, 4, 7}};
+  EXPECT_EQ(ErrorOf(folder / "database.db", model), "");
+  model.images[0].points2D = {{30, 5, 7}};
+  EXPECT_THAT(ErrorOf(folder / "database.db", model),
+              HasSubstr("expected the database that the model was made from"));
+}
+
+TEST(Database, IsRefusedWithOneSentenceIfItIsNone) {
+  const TempFolder folder;
+  const fs::path path = folder / "database.db";
+  EXPECT_THAT(ErrorOf(path, ThreeImages()), HasSubstr("cannot be opened"));
+  EXPECT_THAT(ErrorOf(folder.path(), ThreeImages()),
+              HasSubstr("is no regular file, expected COLMAP's database"));
+  WriteBytes(path, "");
+  EXPECT_THAT(ErrorOf(path, ThreeImages()), HasSubstr("is no SQLite database"));
+  WriteBytes(path, "version https://git-lfs.github.com/spec/v1\noid sha256:4d");
+  EXPECT_THAT(ErrorOf(path, ThreeImages()), HasSubstr("is a Git LFS pointer"));
+}
+
+TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
+  struct Case {
+    std::string sql, sentence;
+  };
+  const std::vector<Case> cases = {
+      {"DROP TABLE keypoints", "found no table keypoints"},
+      {"ALTER TABLE keypoints RENAME TO k; CREATE VIEW keypoints AS SELECT * "
+       "FROM k",
+       "found no table keypoints"},
+      {"ALTER TABLE two_view_geometries DROP COLUMN config",
+       "the table two_view_geometries is not COLMAP's (no such column: "
+       "config)"},
+      {"DELETE FROM images", "found none of the model's images"},
+      {"UPDATE images SET image_id = -1 WHERE image_id = 2",
+       "found image id -1, expected 0 to 2147483646"},
+      {"UPDATE images SET name = x'00' WHERE image_id = 2",
+       "table images: found no text in column name, expected one there"},
+      {"UPDATE keypoints SET rows = 'many'",
+       "table keypoints: found no integer in column rows"},
+      {"UPDATE keypoints SET data = 7",
+       "table keypoints: found no blob in column data"},
+      {"UPDATE keypoints SET cols = 3, rows = 2 WHERE image_id = 2",
+       "keypoints of image \"b.jpg\": found 3 columns, expected 2, 4 or 6"},
+      {"UPDATE keypoints SET cols = 128 WHERE image_id = 2",
+       "found 128 columns, expected 2 to 6"},
+      {"UPDATE keypoints SET rows = 4 WHERE image_id = 2",
+       "found 24 bytes, expected 4 rows of 8"},
+      {"UPDATE keypoints SET rows = 9223372036854775807 WHERE image_id = 2",
+       "found 24 bytes, expected 9223372036854775807 rows of 8"},
+      {"UPDATE keypoints SET rows = -3 WHERE image_id = 2",
+       "found 24 bytes, expected -3 rows of 8"},
+      {"UPDATE keypoints SET data = NULL WHERE image_id = 2",
+       "found 0 bytes, expected 3 rows of 8"},
+      {"UPDATE keypoints SET rows = 1, data = x'0000c07f00000000' WHERE "
+       "image_id = 2",
+       "found a coordinate of keypoint 0 that is not finite"},
+      {"DELETE FROM keypoints WHERE image_id = 5",
+       "found keypoint 1 of image \"a.jpg\" in a verified match, but that "
+       "image has only 0 keypoints"},
+      {"UPDATE two_view_geometries SET config = 10",
+       "found configuration 10 of a two-view geometry, expected 0 to 9"},
+      {"UPDATE two_view_geometries SET cols = 3",
+       "found 3 columns, expected 2"},
+      {"UPDATE two_view_geometries SET pair_id = 12 WHERE pair_id > 4294967297",
+       ""},
+      {"UPDATE two_view_geometries SET pair_id = 2147483647 * 5 + 2 WHERE "
+       "pair_id > 4294967297",
+       "found pair id 10737418237"},
+  };
+  for (const Case& bad : cases) {
+    const TempFolder folder;
+    {
+      DatabaseWriter writer(folder / "database.db");
+      WriteImages(&writer);
+      writer.Execute(bad.sql);
+    }
+    const std::string error = ErrorOf(folder / "database.db", ThreeImages());
+    EXPECT_THAT(error, HasSubstr(bad.sentence)) << bad.sql;
+    if (bad.sentence.empty()) {
+      EXPECT_EQ(error, "") << bad.sql;
+    }
+  }
+  Model model = ThreeImages();
+  model.images[2].name = "a.jpg";
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    WriteImages(&writer);
+  }
+  EXPECT_THAT(ErrorOf(folder / "database.db", model),
+              HasSubstr("several images of the model with the name \"a.jpg\""));
+}
+
+// Whatever a byte is: the database is read, or refused with a sentence.
+TEST(Database, IsReadOrRefusedHoweverItIsDamaged) {
+  const TempFolder folder;
+  const fs::path path = folder / "database.db";
+  {
+    DatabaseWriter writer(path);
+    WriteImages(&writer);
+  }
+  const std::string bytes = ReadBytes(path);
+  int num_refused = 0;
+  for (size_t i = 0; i < bytes.size(); i += 97) {
+    for (const bool cut : {false, true}) {
+      std::string damaged = bytes.substr(0, cut ? i : bytes.size());
+      if (!cut) damaged[i] = static_cast<char>(damaged[i] ^ (1 + i % 255));
+      WriteBytes(path, damaged);
+      const std::string error = ErrorOf(path, ThreeImages());
+      num_refused += error.empty() ? 0 : 1;
+      if (!error.empty()) {
+        EXPECT_THAT(error, HasSubstr("database.db: "));
+      }
+    }
+  }
+  EXPECT_GT(num_refused, 20);
+}
+
+}  // namespace
+}  // namespace krot
