@@ -1,0 +1,162 @@
+#include "krot/analysis/explain_contradictions.h"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+
+namespace krot {
+namespace {
+
+enum class Choice : uint8_t { kOpen, kWrong, kRight };
+
+struct Edge {
+  int32_t neighbour;
+  int64_t num_matches;
+};
+
+class CoverSearch {
+ public:
+  CoverSearch(const std::vector<int64_t>& image_costs,
+              const std::vector<ContradictoryPair>& contradictions,
+              int64_t max_nodes)
+      : costs_(image_costs), edges_(image_costs.size()), max_nodes_(max_nodes) {
+    for (const ContradictoryPair& pair : contradictions) {
+      edges_[pair.image1].push_back({pair.image2, pair.num_matches});
+      edges_[pair.image2].push_back({pair.image1, pair.num_matches});
+    }
+  }
+
+  // The cheapest explanation; with `forced` that image is called so.
+  Explanation Run(std::optional<std::pair<int32_t, Choice>> forced) {
+    std::vector<Choice> choices(costs_.size(), Choice::kOpen);
+    for (size_t i = 0; i < edges_.size(); ++i) {
+      if (edges_[i].empty()) choices[i] = Choice::kRight;
+    }
+    if (forced) choices[forced->first] = forced->second;
+    best_ = {{}, std::numeric_limits<int64_t>::max()};
+    num_nodes_ = 0;
+    Branch(std::move(choices));
+    return best_;
+  }
+
+  bool is_proved() const { return is_proved_; }
+  const std::vector<Edge>& edges(int32_t image) const { return edges_[image]; }
+
+ private:
+  // The matches of an image's contradictions with images of this choice.
+  int64_t Against(size_t image, Choice choice,
+                  const std::vector<Choice>& choices) const {
+    int64_t matches = 0;
+    for (const Edge& edge : edges_[image]) {
+      if (choices[edge.neighbour] == choice) matches += edge.num_matches;
+    }
+    return matches;
+  }
+
+  // Settles the images for which one choice pays whatever the others are.
+  void Settle(std::vector<Choice>* choices) const {
+    for (bool has_changed = true; has_changed;) {
+      has_changed = false;
+      for (size_t i = 0; i < choices->size(); ++i) {
+        Choice& choice = (*choices)[i];
+        if (choice != Choice::kOpen) continue;
+        const int64_t sure = Against(i, Choice::kRight, *choices);
+        if (costs_[i] < sure) {
+          choice = Choice::kWrong;
+        } else if (costs_[i] >= sure + Against(i, Choice::kOpen, *choices)) {
+          choice = Choice::kRight;
+        }
+        has_changed = has_changed || choice != Choice::kOpen;
+      }
+    }
+  }
+
+  // What the choices cost at least, and whether and where one is open: at the
+  // image with the most matches against other open ones.
+  int64_t LowerBound(const std::vector<Choice>& choices,
+                     std::optional<size_t>* open) const {
+    int64_t bound = 0, twice_between_right = 0, most = -1;
+    for (size_t i = 0; i < choices.size(); ++i) {
+      const int64_t sure = Against(i, Choice::kRight, choices);
+      if (choices[i] == Choice::kWrong) bound += costs_[i];
+      if (choices[i] == Choice::kRight) twice_between_right += sure;
+      if (choices[i] != Choice::kOpen) continue;
+      bound += std::min(costs_[i], sure);
+      const int64_t undecided = Against(i, Choice::kOpen, choices);
+      if (undecided > most) {
+        most = undecided;
+        *open = i;
+      }
+    }
+    return bound + twice_between_right / 2;
+  }
+
+  void Branch(std::vector<Choice> choices) {
+    if (++num_nodes_ > max_nodes_) {
+      is_proved_ = false;
+      // Whatever is still open is called right: an explanation all the same.
+      if (best_.cost < std::numeric_limits<int64_t>::max()) return;
+      std::replace(choices.begin(), choices.end(), Choice::kOpen,
+                   Choice::kRight);
+    }
+    Settle(&choices);
+    std::optional<size_t> open;
+    const int64_t bound = LowerBound(choices, &open);
+    if (bound >= best_.cost) return;
+    if (!open) {
+      best_.cost = bound;
+      best_.images.clear();
+      for (size_t i = 0; i < choices.size(); ++i) {
+        if (choices[i] == Choice::kWrong) {
+          best_.images.push_back(static_cast<int32_t>(i));
+        }
+      }
+      return;
+    }
+    for (const Choice choice : {Choice::kRight, Choice::kWrong}) {
+      choices[*open] = choice;
+      Branch(choices);
+    }
+  }
+
+  const std::vector<int64_t>& costs_;
+  std::vector<std::vector<Edge>> edges_;
+  const int64_t max_nodes_;
+  int64_t num_nodes_ = 0;
+  bool is_proved_ = true;
+  Explanation best_;
+};
+
+}  // namespace
+
+Explanations ExplainContradictions(
+    const std::vector<int64_t>& image_costs,
+    const std::vector<ContradictoryPair>& contradictions, int64_t max_nodes) {
+  CoverSearch search(image_costs, contradictions, max_nodes);
+  Explanations explanations;
+  explanations.cheapest = search.Run(std::nullopt);
+  const std::vector<int32_t>& wrong = explanations.cheapest.images;
+  const auto is_wrong = [&](int32_t image) {
+    return std::binary_search(wrong.begin(), wrong.end(), image);
+  };
+  // Another explanation calls one of the wrong images right, or one image of
+  // a pair wrong whose matches are called wrong now.
+  for (int32_t i = 0; i < static_cast<int32_t>(image_costs.size()); ++i) {
+    const auto& edges = search.edges(i);
+    const bool counts =
+        is_wrong(i) || std::any_of(edges.begin(), edges.end(), [&](Edge edge) {
+          return !is_wrong(edge.neighbour);
+        });
+    if (!counts) continue;
+    Explanation other = search.Run(
+        std::make_pair(i, is_wrong(i) ? Choice::kRight : Choice::kWrong));
+    if (!explanations.runner_up || other.cost < explanations.runner_up->cost) {
+      explanations.runner_up = std::move(other);
+    }
+  }
+  explanations.is_proved = search.is_proved();
+  return explanations;
+}
+
+}  // namespace krot
