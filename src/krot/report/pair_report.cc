@@ -1,0 +1,235 @@
+#include "krot/report/pair_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+const char* PairStateName(PairState state) {
+  switch (state) {
+    case PairState::kKept:
+      return "kept";
+    case PairState::kContradictory:
+      return "contradictory";
+    case PairState::kUndecided:
+      return "undecided";
+    case PairState::kNotChecked:
+      break;
+  }
+  return "not checked";
+}
+
+const char* PoseFaultName(PoseFault fault) {
+  switch (fault) {
+    case PoseFault::kPosition:
+      return "position";
+    case PoseFault::kRotation:
+      return "rotation";
+    case PoseFault::kUnclear:
+      return "unclear";
+    case PoseFault::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string PercentOf(int64_t part, int64_t of) {
+  return of == 0 ? "-"
+                 : FormatNumber(100.0 * static_cast<double>(part) /
+                                    static_cast<double>(of),
+                                0) +
+                       " %";
+}
+
+std::string PoseFaultWords(const CheckedImage& image) {
+  switch (image.fault) {
+    case PoseFault::kPosition:
+      return "position: moved by " + FormatNumber(image.moved_by, 3);
+    case PoseFault::kRotation:
+      if (image.num_agreeing_turned > image.num_agreeing_moved) {
+        return "rotation: turned by " + FormatNumber(image.turned_by_deg, 2) +
+               " degrees";
+      }
+      return "rotation, and perhaps position";
+    case PoseFault::kUnclear:
+      return "position or rotation";
+    case PoseFault::kNone:
+      break;
+  }
+  return "";
+}
+
+std::vector<size_t> WronglyPosedImages(const PairCheck& check) {
+  std::vector<size_t> wrong;
+  for (size_t i = 0; i < check.images.size(); ++i) {
+    if (check.images[i].is_wrong) wrong.push_back(i);
+  }
+  return wrong;
+}
+
+// With the most matches first.
+std::vector<const CheckedPair*> WronglyMatchedPairs(const PairCheck& check) {
+  std::vector<const CheckedPair*> wrong;
+  for (const CheckedPair& pair : check.pairs) {
+    if (pair.has_wrong_matches) wrong.push_back(&pair);
+  }
+  std::stable_sort(wrong.begin(), wrong.end(),
+                   [](const CheckedPair* a, const CheckedPair* b) {
+                     return a->num_matches > b->num_matches;
+                   });
+  return wrong;
+}
+
+std::string WrongImageTable(const PairCheck& check, size_t max_rows) {
+  const std::vector<size_t> wrong = WronglyPosedImages(check);
+  if (wrong.empty() || max_rows == 0) return "";
+  TextTable table;
+  table.AddRow({"image", "pairs kept", "contradictory",
+                "what is wrong, to fit best", "matches that fit if moved",
+                "if turned"});
+  for (size_t n = 0; n < std::min(wrong.size(), max_rows); ++n) {
+    const CheckedImage& image = check.images[wrong[n]];
+    table.AddRow({image.name, std::to_string(image.num_kept),
+                  std::to_string(image.num_contradictory),
+                  PoseFaultWords(image),
+                  PercentOf(image.num_agreeing_moved, image.num_matches),
+                  PercentOf(image.num_agreeing_turned, image.num_matches)});
+  }
+  return "\nImages whose poses the matches contradict\n" + table.ToString();
+}
+
+std::string WrongPairTable(const PairCheck& check, size_t max_rows) {
+  const std::vector<const CheckedPair*> wrong = WronglyMatchedPairs(check);
+  if (wrong.empty() || max_rows == 0) return "";
+  TextTable table;
+  table.AddRow({"image", "and image", "matches", "agree with the poses"});
+  for (size_t n = 0; n < std::min(wrong.size(), max_rows); ++n) {
+    table.AddRow({check.images[wrong[n]->image1].name,
+                  check.images[wrong[n]->image2].name,
+                  std::to_string(wrong[n]->num_matches),
+                  std::to_string(wrong[n]->num_agreeing)});
+  }
+  return "\nPairs of right images with wrong matches: " +
+         std::to_string(wrong.size()) + "\n" + table.ToString();
+}
+
+Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
+  Json images = Json::array();
+  for (const int32_t i : explanation.images) {
+    images.push_back(check.images[i].name);
+  }
+  return {{"images", images}, {"cost_matches", explanation.cost}};
+}
+
+}  // namespace
+
+std::string PairSentence(const PairCheck& check) {
+  const int64_t num_checked =
+      check.num_kept + check.num_contradictory + check.num_undecided;
+  if (num_checked == 0) {
+    return "The matches say nothing of the poses: no pair of images that have "
+           "poses has 15 of them.";
+  }
+  const std::string pairs =
+      std::to_string(num_checked) + " pairs of images contradict";
+  const std::string tolerance =
+      " (tolerance " + FormatNumber(check.tolerance_px, 2) + " px)";
+  if (check.num_contradictory == 0) {
+    return "By the matches none of " + std::to_string(num_checked) +
+           " pairs of images contradicts the poses" + tolerance + ".";
+  }
+  const auto num_images =
+      static_cast<int64_t>(WronglyPosedImages(check).size());
+  const auto num_pairs =
+      static_cast<int64_t>(WronglyMatchedPairs(check).size());
+  std::string sentence = "By the matches " +
+                         std::to_string(check.num_contradictory) + " of " +
+                         pairs + " the poses" + tolerance + ": ";
+  if (num_images > 0) {
+    sentence += Counted(num_images, "image") +
+                (num_images == 1 ? " is wrong" : " are wrong");
+  } else {
+    sentence += "no image is wrong";
+  }
+  if (num_pairs > 0) {
+    sentence += ", and " + Counted(num_pairs, "pair") + " of right images " +
+                (num_pairs == 1 ? "has" : "have") + " wrong matches";
+  }
+  return sentence + ".";
+}
+
+std::string PairTable(const PairCheck& check, int max_rows) {
+  const auto num_rows = static_cast<size_t>(max_rows);
+  std::string text = PairSentence(check) + "\n";
+  if (check.runner_up) {
+    std::string names;
+    for (const int32_t i : check.runner_up->images) {
+      names += (names.empty() ? "" : ", ") + check.images[i].name;
+    }
+    text += "The matches cannot tell this from another explanation: " +
+            (names.empty() ? "no image is wrong, their matches are"
+                           : "wrong images are " + names) +
+            ".\n";
+  }
+  return text + WrongImageTable(check, num_rows) +
+         WrongPairTable(check, num_rows);
+}
+
+Json PairJson(const PairCheck& check) {
+  Json images = Json::array();
+  for (const CheckedImage& image : check.images) {
+    images.push_back(
+        {{"image_id", image.image_id},
+         {"image_name", image.name},
+         {"num_kept_pairs", image.num_kept},
+         {"num_contradictory_pairs", image.num_contradictory},
+         {"num_undecided_pairs", image.num_undecided},
+         {"kept_matches", image.kept_matches},
+         {"contradictory_matches", image.contradictory_matches},
+         {"is_wrong", image.is_wrong},
+         {"fault", image.is_wrong ? Json(PoseFaultName(image.fault)) : Json()},
+         {"num_matches", image.num_matches},
+         {"num_agreeing_moved", image.num_agreeing_moved},
+         {"num_agreeing_turned", image.num_agreeing_turned},
+         {"moved_by", image.moved_by},
+         {"turned_by_deg", image.turned_by_deg},
+         {"is_rotation_proved_wrong", image.is_rotation_proved_wrong}});
+  }
+  Json pairs = Json::array();
+  for (const CheckedPair& pair : check.pairs) {
+    const bool is_contradictory = pair.state == PairState::kContradictory;
+    pairs.push_back({{"image1", check.images[pair.image1].name},
+                     {"image2", check.images[pair.image2].name},
+                     {"state", PairStateName(pair.state)},
+                     {"num_matches", pair.num_matches},
+                     {"num_agreeing", pair.num_agreeing},
+                     {"median_error_px", std::isfinite(pair.median_error_px)
+                                             ? Json(pair.median_error_px)
+                                             : Json()},
+                     {"num_explained",
+                      is_contradictory ? Json(pair.num_explained) : Json()},
+                     {"most_explained",
+                      is_contradictory ? Json(pair.most_explained) : Json()},
+                     {"has_wrong_matches", pair.has_wrong_matches}});
+  }
+  return {{"verdict", PairSentence(check)},
+          {"noise_px", check.noise_px},
+          {"tolerance_px", check.tolerance_px},
+          {"num_kept_pairs", check.num_kept},
+          {"num_contradictory_pairs", check.num_contradictory},
+          {"num_undecided_pairs", check.num_undecided},
+          {"num_not_checked_pairs", check.num_not_checked},
+          {"num_without_ray", check.num_without_ray},
+          {"cheapest", ExplanationJson(check.cheapest, check)},
+          {"runner_up",
+           check.runner_up ? ExplanationJson(*check.runner_up, check) : Json()},
+          {"is_cheapest_proved", check.is_cheapest_proved},
+          {"images", images},
+          {"pairs", pairs}};
+}
+
+}  // namespace krot
