@@ -12,7 +12,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/analysis/explain_contradictions.h"
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "krot/analysis/epipolar_match.h"
-#include "krot/geometry/rigid_transform.h"
+#include "krot/geometry/transform.h"
 
 namespace krot {
 

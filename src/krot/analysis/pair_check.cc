@@ -11,7 +11,7 @@
 #include "krot/analysis/epipolar_pose.h"
 #include "krot/analysis/explain_contradictions.h"
 #include "krot/analysis/match_noise.h"
-#include "krot/base/angle.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/image_geometry.h"
 

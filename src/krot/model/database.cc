@@ -20,9 +20,9 @@ constexpr int kConfigWatermark = 7;
 constexpr int kMaxConfig = 9;
 
 // The database's images that the model has, by the database's ids.
-using Join = std::unordered_map<int64_t, int32_t>;
+using ImageOfId = std::unordered_map<int64_t, int32_t>;
 
-Join JoinImages(const Model& model, SqliteDatabase* database) {
+ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
   std::unordered_map<std::string_view, int32_t> image_of_name;
   for (size_t i = 0; i < model.images.size(); ++i) {
     const std::string& name = model.images[i].name;
@@ -31,7 +31,7 @@ Join JoinImages(const Model& model, SqliteDatabase* database) {
                    "\", expected different names: images of the database go "
                    "by their names");
   }
-  Join join;
+  ImageOfId join;
   std::vector<bool> is_taken(model.images.size());
   SqliteRows rows(database, "images", "image_id, name");
   while (rows.Next()) {
@@ -113,7 +113,7 @@ bool AreAmong(const std::vector<Eigen::Vector2d>& keypoints,
   return 2 * found >= of;
 }
 
-void ReadKeypoints(const Model& model, const Join& join,
+void ReadKeypoints(const Model& model, const ImageOfId& join,
                    SqliteDatabase* database, Database* read) {
   read->keypoints.resize(model.images.size());
   SqliteRows rows(database, "keypoints", "image_id, rows, cols, data");
@@ -162,8 +162,8 @@ void RequireKeypoint(const Database& read, const Model& model, int32_t image,
                 std::to_string(read.keypoints[image].size()) + " keypoints");
 }
 
-void ReadPairs(const Model& model, const Join& join, SqliteDatabase* database,
-               Database* read) {
+void ReadPairs(const Model& model, const ImageOfId& join,
+               SqliteDatabase* database, Database* read) {
   SqliteRows rows(database, "two_view_geometries",
                   "pair_id, rows, cols, data, config");
   std::vector<uint32_t> elements;
@@ -215,7 +215,7 @@ Database ReadDatabase(const std::filesystem::path& path, const Model& model,
                       const FileNote& note) {
   SqliteDatabase database(path);
   Database read;
-  const Join join = JoinImages(model, &database);
+  const ImageOfId join = JoinImages(model, &database);
   read.num_images = static_cast<int64_t>(join.size());
   ReadKeypoints(model, join, &database, &read);
   ReadPairs(model, join, &database, &read);
