@@ -176,7 +176,8 @@ Outcome CheckModelCommand(const ModelPointer& model, const Progress&,
   RunInterruptibly([&](const CancelFlag& cancel) {
     context.cancel = &cancel;
     report.check = CheckModel(*model, {}, context);
-    cured = CureModel(*model, report.check, context);
+    ModelCure cure = CureModel(*model, report.check, {}, context);
+    cured = std::move(cure.model);
   });
   report.seconds_check = timer.Seconds();
   report.pixel_error_before = Summarize(PixelErrors(*model));

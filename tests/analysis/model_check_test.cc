@@ -17,6 +17,7 @@
 #include "krot/model/remove_observations.h"
 #include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/database_writer.h"
 
 namespace krot {
 namespace {
@@ -376,7 +377,7 @@ TEST(CureModel, LeavesOutWhatIsWrongAndFitsBetter) {
       }
     }
     const ModelCheck check = CheckModel(model, {}, {});
-    const Model cured = CureModel(model, check, {});
+    const Model cured = CureModel(model, check, {}, {}).model;
     ValidateModel(cured);
     EXPECT_EQ(cured.images.size() + 1, model.images.size());
     EXPECT_EQ(cured.frames.size() + 1, model.frames.size());
@@ -392,12 +393,103 @@ TEST(CureModel, CopiesAModelThatNothingIsWrongWith) {
   const Model model = Scene(1);
   const ModelCheck check = CheckModel(model, {}, {});
   ASSERT_FALSE(check.IsAnythingWrong());
-  const Model cured = CureModel(model, check, {});
+  const Model cured = CureModel(model, check, {}, {}).model;
   ASSERT_EQ(cured.points3D.size(), model.points3D.size());
   for (size_t k = 0; k < model.points3D.size(); ++k) {
     EXPECT_EQ(cured.points3D[k].xyz, model.points3D[k].xyz);
     EXPECT_EQ(cured.points3D[k].error, model.points3D[k].error);
   }
+}
+
+// As COLMAP's mapper leaves an image whose pose is wrong: without what
+// contradicts that.
+Model WithoutObservationsOf(size_t image, const Model& model) {
+  std::vector<char> is_removed;
+  for (const TrackElement& element : model.track_elements) {
+    is_removed.push_back(element.image_id == model.images[image].id);
+  }
+  return RemoveObservations(model, is_removed).model;
+}
+
+TEST(CheckModel, AsksTheMatchesThatTheModelDoesNotHold) {
+  Model model = WithoutObservationsOf(5, Scene(7));
+  const Database database = DatabaseOf(Scene(7));
+  Turn(&model, 5, 3, {1, 2, 0});
+  EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+              IsEmpty());
+  ModelCheckOptions options;
+  options.database = &database;
+  const ModelCheck check = CheckModel(model, options, {});
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+              ElementsAre(model.images[5].id));
+  EXPECT_EQ(check.images[5].fault, ImageFault::kMatches);
+  EXPECT_EQ(check.pairs->images[5].fault, PoseFault::kRotation);
+  const ModelCure cure = CureModel(model, check, options, {});
+  EXPECT_EQ(cure.model.images.size(), model.images.size() - 1);
+  EXPECT_THAT(cure.moved, IsEmpty());
+}
+
+TEST(CureModel, MovesAnImageWhosePositionAloneIsWrong) {
+  const Model sound = Scene(7);
+  const Database database = DatabaseOf(sound);
+  ModelCheckOptions options;
+  options.database = &database;
+  Model model = sound;
+  Pose& pose = FrameOf(&model, 5).rig_from_world;
+  pose.translation += Eigen::Vector3d(0.1, -0.05, 0.1);
+  const ModelCheck check = CheckModel(model, options, {});
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+              ElementsAre(model.images[5].id));
+  const ModelCure cure = CureModel(model, check, options, {});
+  EXPECT_THAT(cure.moved, ElementsAre(model.images[5].name));
+  ASSERT_EQ(cure.model.images.size(), model.images.size());
+  const auto center_of = [](const Model& of) {
+    return Center(ImageGeometries(of)[5].cam_from_world);
+  };
+  EXPECT_LT((center_of(cure.model) - center_of(sound)).norm(), 0.01);
+  EXPECT_FALSE(CheckModel(cure.model, options, {}).pairs->IsAnythingWrong());
+  ValidateModel(cure.model);
+}
+
+TEST(CheckModel, TakesTheNoiseOfLargeKeypointsToBeLarger) {
+  Model model = Scene(7);
+  Database database = DatabaseOf(model);
+  database.scales.resize(model.images.size());
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise;
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    for (Point2D& point : model.images[n].points2D) {
+      // Every tenth has five times the noise, which the scene's own is small
+      // beside.
+      const bool is_large = database.scales[n].size() % 10 == 0;
+      database.scales[n].push_back(is_large ? 50 : 2);
+      point.x += (is_large ? 15 : 3) * noise(random);
+      point.y += (is_large ? 15 : 3) * noise(random);
+    }
+  }
+  ModelCheckOptions options;
+  options.database = &database;
+  EXPECT_GT(CheckModel(model, {}, {}).observations.size(), 30u);
+  const ModelCheck check = CheckModel(model, options, {});
+  EXPECT_LE(check.observations.size(), 2u);
+  EXPECT_EQ(check.median_scale_px, 2);
+  EXPECT_NEAR(*check.sigma_px, std::sqrt(10.0), 0.15);
+}
+
+TEST(CheckModel, OfPosesWithoutTracksAsksTheMatchesAlone) {
+  Model model = Scene(7);
+  const Database database = DatabaseOf(model);
+  Turn(&model, 5, 3, {1, 2, 0});
+  model = RemoveObservations(model,
+                             std::vector<char>(model.track_elements.size(), 1))
+              .model;
+  ModelCheckOptions options;
+  options.database = &database;
+  const ModelCheck check = CheckModel(model, options, {});
+  EXPECT_FALSE(check.sigma_px);
+  EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+              ElementsAre(model.images[5].id));
+  EXPECT_EQ(CureModel(model, check, options, {}).model.images.size(), 11u);
 }
 
 }  // namespace

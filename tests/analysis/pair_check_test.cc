@@ -174,6 +174,40 @@ TEST(CheckPairs, BlamesTheMatchesOfASinglePairThatContradicts) {
   EXPECT_EQ(check.cheapest.cost, static_cast<int64_t>(matches.size()));
 }
 
+TEST(CheckPairs, NamesGroupsThatAgreeInsideAndContradictEachOther) {
+  Model model = Scene();
+  Database database = DatabaseOf(model);
+  // Of the pairs between the two halves few are left, so that no image pays.
+  const auto is_between = [](const VerifiedPair& pair) {
+    return pair.image1 < 6 && pair.image2 >= 6;
+  };
+  int num_between = 0;
+  database.pairs.erase(
+      std::remove_if(database.pairs.begin(), database.pairs.end(),
+                     [&](const VerifiedPair& pair) {
+                       return is_between(pair) && ++num_between % 5 != 0;
+                     }),
+      database.pairs.end());
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(0.1, Eigen::Vector3d(0.3, 1, 0.2).normalized())
+          .toRotationMatrix();
+  for (int image = 6; image < 12; ++image) {
+    Pose& pose =
+        model.frames[ImageGeometries(model)[image].frame].rig_from_world;
+    pose = ToPose(pose.Transform() *
+                  RigidTransform{turn, Eigen::Vector3d(0.1, 0.2, 0)});
+  }
+  const PairCheck check = CheckPairs(model, database);
+  EXPECT_THAT(WrongImages(check), IsEmpty());
+  EXPECT_GT(check.num_contradictory, 0);
+  EXPECT_THAT(check.groups, ElementsAre(ElementsAre(0, 1, 2, 3, 4, 5),
+                                        ElementsAre(6, 7, 8, 9, 10, 11)));
+  EXPECT_TRUE(check.IsAnythingWrong());
+  for (const CheckedPair& pair : check.pairs) {
+    EXPECT_FALSE(pair.has_wrong_matches);
+  }
+}
+
 TEST(CheckPairs, ChecksNeitherFewMatchesNorImagesWithoutPoseOrBaseline) {
   Model model = Scene();
   Database database = DatabaseOf(model);

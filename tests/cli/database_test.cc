@@ -14,6 +14,8 @@ namespace krot {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
 using Json = nlohmann::json;
 
 class DatabaseOption : public ::testing::Test {
@@ -41,12 +43,20 @@ class DatabaseOption : public ::testing::Test {
         Eigen::AngleAxisd(0.03, Eigen::Vector3d(1, 2, 2) / 3).matrix();
     pose = ToPose({turn * pose.Rotation(), turn * pose.translation});
     Save(model, folder_ / "turned");
+    pose = ToPose(
+        {turn.transpose() * pose.Rotation(),
+         turn.transpose() * pose.translation + Eigen::Vector3d(0.1, 0, -0.1)});
+    Save(model, folder_ / "moved");
   }
 
-  KrotResult Analyze(const std::string& model) const {
-    return RunKrot({"model_analyzer", "--path", folder_ / model,
-                    "--database_path", folder_ / "database.db", "--report_path",
-                    folder_ / "r.json"});
+  KrotResult Check(const std::string& model,
+                   const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments = {
+        "model_checker",   "--input_path",          folder_ / model,
+        "--database_path", folder_ / "database.db", "--report_path",
+        folder_ / "r.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
   }
 
   TempFolder folder_;
@@ -54,12 +64,17 @@ class DatabaseOption : public ::testing::Test {
 
 TEST_F(DatabaseOption, HoldsMatchesAgainstPoses) {
   const std::string bytes = ReadBytes(folder_ / "database.db");
-  KrotResult result = Analyze("sound");
+  KrotResult result = Check("sound", {"--fail_on", "wrong"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, StartsWith("Nothing is wrong: all "));
   EXPECT_THAT(result.out, HasSubstr("By the matches none of "));
   EXPECT_EQ(ReadBytes(folder_ / "database.db"), bytes);
-  result = Analyze("turned");
-  EXPECT_EQ(result.exit_code, 0) << result.err;
+  result = Check("turned", {"--fail_on", "wrong"});
+  EXPECT_EQ(result.exit_code, 9) << result.err;
+  EXPECT_THAT(
+      result.out,
+      StartsWith("1 of 8 images is wrong: verified matches contradict 1 "
+                 "image.\n"));
   EXPECT_THAT(result.out, HasSubstr("1 image is wrong."));
   EXPECT_THAT(result.out, HasSubstr("rotation: turned by 1.7"));
   const Json json = Json::parse(ReadBytes(folder_ / "r.json"))["database"];
@@ -70,12 +85,37 @@ TEST_F(DatabaseOption, HoldsMatchesAgainstPoses) {
   EXPECT_THAT(result.out, HasSubstr(json["verdict"].get<std::string>()));
 }
 
+TEST_F(DatabaseOption, DeregistersATurnedImageAndNamesTheCommandThatPlacesIt) {
+  const KrotResult result =
+      Check("turned", {"--output_path", folder_ / "cured"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out,
+              HasSubstr("colmap image_registrator --database_path " +
+                        (folder_ / "database.db").string() + " --input_path " +
+                        (folder_ / "cured").string()));
+  EXPECT_EQ(Load(folder_ / "cured").images.size(), 7u);
+  EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+}
+
+TEST_F(DatabaseOption, MovesAnImageWhosePositionAloneIsWrong) {
+  const KrotResult result =
+      Check("moved", {"--output_path", folder_ / "cured"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("position: moved by 0.14"));
+  EXPECT_THAT(result.out, HasSubstr("1 wrong image has a new position"));
+  EXPECT_THAT(result.out, Not(HasSubstr("image_registrator")));
+  const Json json = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(json["moved_images"].size(), 1);
+  EXPECT_EQ(Load(folder_ / "cured").images.size(), 8u);
+  EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+}
+
 TEST_F(DatabaseOption, IsRefusedWithCode2IfItCannotBeRead) {
   WriteBytes(folder_ / "database.db", "no database");
-  const KrotResult result = Analyze("sound");
+  const KrotResult result = Check("sound");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err,
-              IsOneSentence("krot model_analyzer", "is no SQLite database"));
+              IsOneSentence("krot model_checker", "is no SQLite database"));
 }
 
 }  // namespace

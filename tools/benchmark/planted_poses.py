@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""How often krot model_analyzer --database_path finds images whose pose is wrong.
+"""How often krot model_checker --database_path finds images whose pose is wrong.
 
 Usage: planted_poses.py KROT MODEL DATABASE [SEEDS]
 
 MODEL, without rigs, is one whose poses are right. In copies of it 1, 3 or 5 images are turned
 about their centres by an angle, or moved by a share of the cameras' radius, in random directions.
-Prints for each kind how many were found of how many, how many others were called wrong, and of
-how many of those found it was said rightly whether they were turned or moved. Needs colmap.
+Prints for each kind how many the matches called wrong of how many, how many of the others are below
+what matches show (more of their matches are in pairs that agree than in pairs that contradict
+them), how many other images were called wrong by anything, and of how many of those found it was
+said rightly whether they were turned or moved. Needs colmap.
 """
 
 import json
@@ -61,10 +63,10 @@ def changed(line, kind, size, radius):
 
 def analyze(krot, model, database):
     report = model / "report.json"
-    subprocess.run([krot, "model_analyzer", "--path", model, "--database_path",
+    subprocess.run([krot, "model_checker", "--input_path", model, "--database_path",
                     database, "--report_path", report, "--log_level", "0"],
                    check=True, stdout=subprocess.DEVNULL)
-    return json.loads(report.read_text())["database"]
+    return json.loads(report.read_text())
 
 
 def main(krot, model, database, seeds=20):
@@ -79,11 +81,11 @@ def main(krot, model, database, seeds=20):
         mean = [sum(axis) / len(centers) for axis in zip(*centers)]
         radius = math.sqrt(sum(math.dist(c, mean) ** 2 for c in centers) / len(centers))
         clean = analyze(krot, text, database)
-        print(f"as it is: {clean['verdict']}")
-        print("planted | images | found | others called wrong | fault told")
+        print(f"as it is: {clean['verdict']} {clean['database']['verdict']}")
+        print("planted | images | found | below | others called wrong | fault told")
         for kind, size in KINDS:
             for count in (1, 3, 5):
-                planted = found = others = told = 0
+                planted = found = below = others = told = 0
                 for seed in range(int(seeds)):
                     random.seed(f"{kind} {size} {count} {seed}")
                     wrong = random.sample(poses, count)
@@ -93,16 +95,19 @@ def main(krot, model, database, seeds=20):
                     (text / "images.txt").write_text("\n".join(copy) + "\n")
                     names = {lines[i].split(maxsplit=9)[9] for i in wrong}
                     planted += count
-                    for image in analyze(krot, text, database)["images"]:
-                        if not image["is_wrong"]:
-                            continue
+                    report = analyze(krot, text, database)
+                    others += sum(image["verdict"] == "wrong" and image["image_name"] not in names
+                                  for image in report["images"])
+                    for image in report["database"]["images"]:
                         if image["image_name"] not in names:
-                            others += 1
+                            continue
+                        if not image["is_wrong"]:
+                            below += image["contradictory_matches"] < image["kept_matches"]
                             continue
                         found += 1
                         told += image["fault"] == (
                             "rotation" if kind.startswith("turned") else "position")
-                print(f"{size} {kind} | {count} | {found} of {planted} | {others} | "
+                print(f"{size} {kind} | {count} | {found} of {planted} | {below} | {others} | "
                       f"{told} of {found}", flush=True)
 
 

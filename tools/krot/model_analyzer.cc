@@ -2,15 +2,12 @@
 #include <vector>
 
 #include "krot/analysis/error_colors.h"
-#include "krot/analysis/pair_check.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
-#include "krot/model/database.h"
 #include "krot/model/model_error.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
-#include "krot/report/pair_report.h"
 #include "krot/report/problem_words.h"
 #include "krot/version.h"
 #include "tools/krot/command.h"
@@ -28,7 +25,6 @@ struct AnalyzerOptions {
   std::string report_path;
   std::string csv_path;
   std::string certificate_path;
-  std::string database_path;
   std::string error_colors_path;
   double error_colors_top = 4;
   bool overwrite = false;
@@ -54,9 +50,6 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "a file",
                   "A certificate of this model: show what it proves, and the "
                   "observations that set the maximum");
-  parser->AddPath("database_path", &options->database_path, false, "a file",
-                  "The database that the model was made from: hold its "
-                  "verified matches against the poses; it is only read");
   parser->AddPath("error_colors_path", &options->error_colors_path, false,
                   "a folder",
                   "Where a copy of the model goes whose points are coloured by "
@@ -167,13 +160,6 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   BeginPhase(options.common.log, "measuring its errors");
   const std::string certificate = CertificateText(options, model);
   ModelReport report = AnalyzeModel(model, options.num_worst);
-  if (!options.database_path.empty()) {
-    BeginPhase(options.common.log, "reading " + options.database_path);
-    const Database database =
-        ReadDatabase(options.database_path, model, WarnOn(options.common.log));
-    BeginPhase(options.common.log, "holding matches against the poses");
-    report.pairs = CheckPairs(model, database);
-  }
   report.contradictions = contradictions;
   report.poses = poses;
   DeferInterrupts();
@@ -186,11 +172,8 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   if (!options.csv_path.empty()) {
     WriteFileAtomically(options.csv_path, ModelCsv(report));
   }
-  PrintTable(
-      options.common.log,
-      ModelTable(report, options.num_worst) + certificate +
-          (report.pairs ? "\n" + PairTable(*report.pairs, options.num_worst)
-                        : ""));
+  PrintTable(options.common.log,
+             ModelTable(report, options.num_worst) + certificate);
   return kExitDone;
 }
 

@@ -1,9 +1,11 @@
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "krot/analysis/model_check.h"
 #include "krot/base/timer.h"
+#include "krot/model/database.h"
 #include "krot/outliers/suspect_colors.h"
 #include "krot/report/check_report.h"
 #include "tools/krot/command.h"
@@ -19,6 +21,7 @@ namespace {
 
 struct CheckerCommand {
   ModelPaths paths;
+  std::string database_path;
   std::string image_path;
   std::string suspects_path;
   std::string fail_on = "never";
@@ -30,6 +33,9 @@ struct CheckerCommand {
 void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
   AddModelPaths(&command->paths, parser,
                 "Where the model without wrong images and observations goes");
+  parser->AddPath("database_path", &command->database_path, false, "a file",
+                  "The database that the model was made from: hold its "
+                  "verified matches against the poses; it is only read");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst observations in "
                   "them");
@@ -119,6 +125,11 @@ void WriteViews(const CheckerCommand& command, const CheckReport& report,
                log, crops);
 }
 
+bool HasDecidedPair(const ModelCheck& check) {
+  return check.pairs &&
+         check.pairs->num_kept + check.pairs->num_contradictory > 0;
+}
+
 int Run(const CheckerCommand& command, const OptionParser& parser) {
   const Timer total_timer;
   const LogOptions& log = command.common.log;
@@ -128,19 +139,30 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   report.run.seed = command.common.random_seed;
   report.input_path = paths.input_path;
   report.output_path = paths.output_path;
+  report.database_path = command.database_path;
   const Model model = ReadInput(paths, log, &report.run);
 
+  std::optional<Database> database;
+  ModelCheckOptions options;
+  if (!command.database_path.empty()) {
+    BeginPhase(log, "reading " + command.database_path);
+    database = ReadDatabase(command.database_path, model, WarnOn(log));
+    options.database = &*database;
+  }
   BeginPhase(log, "checking its images and observations");
   const Timer check_timer;
-  report.check = CheckModel(model, {}, command.context);
-  if (!report.check.sigma_px) {
+  report.check = CheckModel(model, options, command.context);
+  if (!report.check.sigma_px && !HasDecidedPair(report.check)) {
     throw CommandError(
         kExitNothingToSolve,
         "nothing to check: no observation is checked by another one, as there "
         "are no positions or no tracks of two and more images; krot solver "
         "makes positions from rotations and tracks");
   }
-  const Model cured = CureModel(model, report.check, command.context);
+  const ModelCure cure =
+      CureModel(model, report.check, options, command.context);
+  const Model& cured = cure.model;
+  report.moved = cure.moved;
   report.num_observations = static_cast<int64_t>(model.track_elements.size());
   const int num_threads = command.context.num_threads;
   report.pixel_error_before = Summarize(PixelErrors(model, num_threads));
@@ -148,7 +170,7 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   report.seconds_check = check_timer.Seconds();
   DeferInterrupts();
   if (!paths.output_path.empty()) {
-    if (cured.track_elements.empty()) {
+    if (cured.track_elements.empty() && !model.track_elements.empty()) {
       throw CommandError(kExitNothingToSolve,
                          "nothing is left to write: every track contradicts "
                          "itself; no model was written");

@@ -54,6 +54,10 @@ class Checker {
   }
 
   ModelCheck Run() {
+    for (const Point3D& point : model_.points3D) {
+      check_.points.push_back(point.xyz);
+    }
+    if (options_.database != nullptr) AskMatches();
     do {
       snooping_ = SnoopNoise(model_, noise_options_, context_);
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
@@ -68,6 +72,40 @@ class Checker {
   }
 
  private:
+  void AskMatches() {
+    check_.pairs = CheckPairs(model_, *options_.database, context_);
+    for (size_t n = 0; n < check_.images.size(); ++n) {
+      if (!check_.pairs->images[n].is_wrong) continue;
+      check_.images[n].fault = ImageFault::kMatches;
+      CallWrong(static_cast<int32_t>(n));
+    }
+    // Keypoints without a scale count as median ones.
+    std::vector<double> known;
+    for (const std::vector<float>& scales : options_.database->scales) {
+      for (const float scale : scales) {
+        if (scale > 0 && std::isfinite(scale)) known.push_back(scale);
+      }
+    }
+    if (known.empty()) return;
+    check_.median_scale_px = LowerMedian(std::move(known));
+    for (size_t e = 0; e < image_of_.size(); ++e) {
+      const auto& scales = options_.database->scales[image_of_[e]];
+      const uint32_t k = model_.track_elements[e].point2D_idx;
+      const double scale = k < scales.size() ? scales[k] : 0;
+      noise_options_.relative_sigmas.push_back(
+          scale > 0 && std::isfinite(scale)
+              ? std::sqrt(scale / *check_.median_scale_px)
+              : 1);
+    }
+  }
+
+  void CallWrong(int32_t n) {
+    check_.images[n].verdict = ImageVerdict::kWrong;
+    for (size_t e = 0; e < image_of_.size(); ++e) {
+      if (image_of_[e] == n) noise_options_.is_left_out[e] = 1;
+    }
+  }
+
   bool IsWrong(int32_t n) const {
     return check_.images[n].verdict == ImageVerdict::kWrong;
   }
@@ -104,10 +142,7 @@ class Checker {
   bool CallWorstImage() {
     const int32_t worst = WorstImage();
     if (worst < 0) return false;
-    check_.images[worst].verdict = ImageVerdict::kWrong;
-    for (size_t e = 0; e < image_of_.size(); ++e) {
-      if (image_of_[e] == worst) noise_options_.is_left_out[e] = 1;
-    }
+    CallWrong(worst);
     return true;
   }
 
@@ -335,8 +370,35 @@ ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
   return Checker(model, options, context).Run();
 }
 
-Model CureModel(const Model& model, const ModelCheck& check,
-                const Context& context) {
+namespace {
+
+// Whether there is an image to be moved; `moved` gets its pose.
+bool MoveImages(const PairCheck& pairs, Model* moved) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(*moved);
+  std::vector<int> num_images(moved->frames.size(), 0);
+  for (const ImageGeometry& geometry : geometries) {
+    if (geometry.has_pose) ++num_images[geometry.frame];
+  }
+  bool is_any = false;
+  for (size_t n = 0; n < geometries.size(); ++n) {
+    const ImageGeometry& geometry = geometries[n];
+    if (pairs.images[n].fault != PoseFault::kPosition ||
+        num_images[geometry.frame] > 1) {
+      continue;
+    }
+    const RigidTransform rig_from_world =
+        Inverse(geometry.cam_from_rig) * pairs.images[n].moved_cam_from_world;
+    for (int i = 0; i < 3; ++i) {
+      moved->frames[geometry.frame].rig_from_world.translation[i] =
+          rig_from_world.translation[i];
+    }
+    is_any = true;
+  }
+  return is_any;
+}
+
+Model Removed(const Model& model, const ModelCheck& check,
+              const Context& context) {
   if (!check.IsAnythingWrong()) return model;
   std::vector<char> is_wrong_image;
   for (const ImageCheck& image : check.images) {
@@ -362,6 +424,25 @@ Model CureModel(const Model& model, const ModelCheck& check,
       RemoveImages(RemoveObservations(moved, is_removed).model, is_wrong_image);
   UpdatePointErrors(PixelErrors(cured, context.num_threads), &cured);
   return cured;
+}
+
+}  // namespace
+
+ModelCure CureModel(const Model& model, const ModelCheck& check,
+                    const ModelCheckOptions& options, const Context& context) {
+  Model moved = model;
+  if (!check.pairs || !MoveImages(*check.pairs, &moved)) {
+    return {Removed(model, check, context), {}};
+  }
+  const ModelCheck again = CheckModel(moved, options, context);
+  ModelCure cure = {Removed(moved, again, context), {}};
+  for (size_t n = 0; n < check.images.size(); ++n) {
+    if (check.pairs->images[n].is_wrong &&
+        again.images[n].verdict != ImageVerdict::kWrong) {
+      cure.moved.push_back(check.images[n].name);
+    }
+  }
+  return cure;
 }
 
 }  // namespace krot

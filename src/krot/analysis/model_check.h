@@ -5,15 +5,17 @@
 #include <string>
 #include <vector>
 
+#include "krot/analysis/pair_check.h"
 #include "krot/base/context.h"
+#include "krot/model/database.h"
 #include "krot/model/model.h"
 
 namespace krot {
 
-// Which images and observations of a model are wrong, judged by the model
-// alone: its observations contradict each other by more than their noise.
-// Wrong matches that agree with the model, as of duplicate structures, are not
-// seen.
+// Which images and observations of a model are wrong: its observations
+// contradict each other by more than their noise or, with a database, the
+// verified matches contradict its poses. Wrong matches that agree with the
+// model, as of duplicate structures, are not seen.
 
 enum class ImageVerdict {
   kFine,
@@ -21,10 +23,12 @@ enum class ImageVerdict {
   kWrong,
 };
 
-// Why an image is wrong. Each is asked such that noise three times as large as
-// the model's, as blur makes it in one photo, is none of them.
+// Why an image is wrong. What is judged by observations is asked such that
+// noise three times as large as the model's, as blur makes it in one photo, is
+// none of them.
 enum class ImageFault {
   kNone,
+  kMatches,       // the matches of its pairs contradict its pose (CheckPairs)
   kContradicted,  // most of its observations are more than noise
   kMisplaced,     // another pose halves the sum of its squared errors
   kChance,        // its errors are those of chance matches
@@ -75,6 +79,10 @@ struct TwoPointTrack {
 };
 
 struct ModelCheckOptions {
+  // Read for the model (ReadDatabase). None: the model alone is judged. With
+  // keypoint scales the noise of an observation is taken to grow with the
+  // square root of its keypoint's.
+  const Database* database = nullptr;
   // The probability that a model of Gaussian noise has a wrong observation, and
   // that one whose noise is three times as large in some images as in most has
   // a wrong image; in (0, 1).
@@ -82,12 +90,15 @@ struct ModelCheckOptions {
 };
 
 struct ModelCheck {
-  // Of an axis, pixels. None: no observation is checked by another one, as
-  // without positions, and there is no verdict.
+  std::optional<PairCheck> pairs;  // with a database
+  // Of an axis, pixels; with keypoint scales, at their median. None: no
+  // observation is checked by another one, as without positions or tracks, and
+  // only matches can tell what is wrong.
   std::optional<double> sigma_px;
   // Of the Cauchy loss for what is left; none if its tails are no heavier than
   // Gaussian ones.
   std::optional<double> cauchy_scale_px;
+  std::optional<double> median_scale_px;  // where keypoint scales are known
   double critical_w = 0;
   // Whether most images stand where their own errors would have them, to half
   // of an image's noise. Otherwise none can be called misplaced: the model is
@@ -103,22 +114,34 @@ struct ModelCheck {
 
   int64_t NumImages(ImageVerdict verdict) const;
   bool IsAnythingWrong() const {
-    return !observations.empty() || NumImages(ImageVerdict::kWrong) > 0;
+    return !observations.empty() || NumImages(ImageVerdict::kWrong) > 0 ||
+           (pairs && pairs->IsAnythingWrong());
   }
 };
 
-// Snoops (SnoopNoise) and calls the image wrong that most speaks against, if
-// one of ImageFault does with probability false_alarm over all images of a
-// sound model; docs/method/outliers.md has the tests. Then anew without it,
-// until there is none: so an image is not blamed for what its neighbour does.
-// Requires a valid model. The same bits at any number of threads.
+// First holds the database's matches against the poses. Then, without the
+// images that these call wrong, snoops (SnoopNoise) and calls the image wrong
+// that most speaks against, if one of ImageFault does with probability
+// false_alarm over all images of a sound model; docs/method/outliers.md has the
+// tests. Then anew without it, until there is none: so an image is not blamed
+// for what its neighbour does. Requires a valid model. The same bits at any
+// number of threads.
 ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
                       const Context& context);
 
-// A copy without wrong observations and images. Points that lose observations
-// move to the least squares of the others; stored errors are updated. Cameras
-// stay. A bitwise copy if nothing is wrong.
-Model CureModel(const Model& model, const ModelCheck& check,
-                const Context& context);
+struct ModelCure {
+  Model model;
+  std::vector<std::string> moved;  // names of images
+};
+
+// A copy without wrong observations and images. Images whose position alone is
+// wrong, by their matches, are moved to where these fit best
+// (CheckedImage::moved_cam_from_world), and are kept if nothing calls them
+// wrong there; not where they share their frame with other images, which would
+// move along. All other cameras stay. Points that lose observations move to the
+// least squares of the others; stored errors are updated. A bitwise copy if
+// nothing is wrong. `check` is CheckModel's with these options.
+ModelCure CureModel(const Model& model, const ModelCheck& check,
+                    const ModelCheckOptions& options, const Context& context);
 
 }  // namespace krot

@@ -11,6 +11,7 @@
 #include "krot/analysis/epipolar_pose.h"
 #include "krot/analysis/explain_contradictions.h"
 #include "krot/analysis/match_noise.h"
+#include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/image_geometry.h"
@@ -178,11 +179,7 @@ class PairChecker {
         10 * explanations.runner_up->cost <= 11 * check_.cheapest.cost) {
       check_.runner_up = std::move(explanations.runner_up);
     }
-    for (CheckedPair& pair : check_.pairs) {
-      pair.has_wrong_matches = pair.state == PairState::kContradictory &&
-                               !IsCalledWrong(pair.image1) &&
-                               !IsCalledWrong(pair.image2);
-    }
+    FindGroups();
     for (const int32_t i : check_.cheapest.images) {
       CheckedImage& image = check_.images[i];
       image.is_wrong =
@@ -195,6 +192,43 @@ class PairChecker {
                     if (check_.images[i].is_wrong) JudgeImage(i);
                   }
                 });
+  }
+
+  // What contradicts the poses between right images: groups of them, or their
+  // matches.
+  void FindGroups() {
+    const auto num_images = static_cast<int32_t>(check_.images.size());
+    DisjointSets joined(num_images);
+    for (const CheckedPair& pair : check_.pairs) {
+      if (pair.state == PairState::kKept && AreRight(pair)) {
+        joined.Unite(pair.image1, pair.image2);
+      }
+    }
+    std::vector<std::vector<int32_t>> groups(num_images);
+    for (int32_t i = 0; i < num_images; ++i) {
+      groups[joined.Find(i)].push_back(i);
+    }
+    std::vector<char> is_contradicted(num_images, 0);
+    for (CheckedPair& pair : check_.pairs) {
+      if (pair.state != PairState::kContradictory || !AreRight(pair)) continue;
+      const int64_t a = joined.Find(pair.image1);
+      const int64_t b = joined.Find(pair.image2);
+      if (a == b || groups[a].size() < 2 || groups[b].size() < 2) {
+        pair.has_wrong_matches = true;
+      } else {
+        is_contradicted[a] = is_contradicted[b] = 1;
+      }
+    }
+    for (int32_t i = 0; i < num_images; ++i) {
+      if (is_contradicted[i]) check_.groups.push_back(groups[i]);
+    }
+    std::stable_sort(
+        check_.groups.begin(), check_.groups.end(),
+        [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  }
+
+  bool AreRight(const CheckedPair& pair) const {
+    return !IsCalledWrong(pair.image1) && !IsCalledWrong(pair.image2);
   }
 
   bool IsCalledWrong(int32_t image) const {
@@ -251,6 +285,7 @@ class PairChecker {
     image.num_agreeing_moved = NumAgreeing(matches, moved, check_.tolerance_px);
     image.num_agreeing_turned =
         NumAgreeing(matches, turned, check_.tolerance_px);
+    image.moved_cam_from_world = moved;
     image.moved_by = (Center(moved) - Center(as_it_is)).norm();
     image.turned_by_deg =
         std::abs(
@@ -291,6 +326,12 @@ class PairChecker {
 };
 
 }  // namespace
+
+bool PairCheck::IsAnythingWrong() const {
+  return !groups.empty() ||
+         std::any_of(images.begin(), images.end(),
+                     [](const CheckedImage& image) { return image.is_wrong; });
+}
 
 PairCheck CheckPairs(const Model& model, const Database& database,
                      const Context& context) {

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "krot/base/context.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/database.h"
 #include "krot/model/model.h"
 
@@ -50,7 +51,8 @@ struct CheckedPair {
   int64_t num_explained = 0;
   int64_t most_explained = 0;
   Eigen::Vector3d best_baseline = Eigen::Vector3d::Zero();  // world axes
-  bool has_wrong_matches = false;  // neither image is wrong
+  // Neither image is wrong, and they are not of two groups.
+  bool has_wrong_matches = false;
 };
 
 struct CheckedImage {
@@ -73,6 +75,7 @@ struct CheckedImage {
   int64_t num_agreeing_turned = 0;
   double moved_by = 0;  // model's unit
   double turned_by_deg = 0;
+  RigidTransform moved_cam_from_world;  // the pose after the move
   // True if no baselines whatever would make a quarter of the matches of its
   // contradictory pairs agree: its rotation is wrong, whatever its position.
   bool is_rotation_proved_wrong = false;
@@ -105,6 +108,13 @@ struct PairCheck {
   std::optional<Explanation> runner_up;
   // False if the search for these ended early: cheaper ones may exist.
   bool is_cheapest_proved = true;
+  // Images that are not called wrong, in groups of two and more, largest first:
+  // kept pairs join the images of each, between the groups there are only
+  // contradictory and undecided ones. Empty if there are no two such groups
+  // with a contradictory pair between them.
+  std::vector<std::vector<int32_t>> groups;
+
+  bool IsAnythingWrong() const;
 };
 
 // Measures each match in true pixels, through the cameras' lenses, against the

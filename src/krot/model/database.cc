@@ -113,9 +113,19 @@ bool AreAmong(const std::vector<Eigen::Vector2d>& keypoints,
   return 2 * found >= of;
 }
 
+// Of a keypoint of 4 columns (x, y, scale, orientation) or 6 (x, y and an
+// affine shape), as COLMAP takes it: the mean of the shape's two scales.
+float ScaleOf(const float* keypoint, int64_t columns) {
+  if (columns == 4) return keypoint[2];
+  return (std::hypot(keypoint[2], keypoint[4]) +
+          std::hypot(keypoint[3], keypoint[5])) /
+         2;
+}
+
 void ReadKeypoints(const Model& model, const ImageOfId& join,
                    SqliteDatabase* database, Database* read) {
   read->keypoints.resize(model.images.size());
+  read->scales.resize(model.images.size());
   SqliteRows rows(database, "keypoints", "image_id, rows, cols, data");
   std::vector<float> elements;
   int64_t columns = 0;
@@ -142,6 +152,9 @@ void ReadKeypoints(const Model& model, const ImageOfId& join,
     if (AreSameFeatures(keypoints, image.points2D)) {
       for (int64_t i = 0; i < count; ++i) {
         keypoints[i] = {image.points2D[i].x, image.points2D[i].y};
+        if (columns < 4) continue;
+        read->scales[joined->second].push_back(
+            ScaleOf(&elements[i * columns], columns));
       }
     } else if (!AreAmong(keypoints, image.points2D)) {
       database->Fail(where + ": found " + std::to_string(count) +

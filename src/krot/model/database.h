@@ -29,6 +29,9 @@ struct Database {
   // Of each of Model::images, pixels as in Point2D; empty where the database
   // does not have the image, or no keypoints of it.
   std::vector<std::vector<Eigen::Vector2d>> keypoints;
+  // Of each of Model::images and of its 2D points, the keypoint's scale,
+  // pixels; empty where the database has none, or other keypoints than these.
+  std::vector<std::vector<float>> scales;
   // Of pairs that the model has both images of, in the order of COLMAP's pair
   // ids.
   std::vector<VerifiedPair> pairs;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
@@ -25,6 +26,8 @@ const char* VerdictName(ImageVerdict verdict) {
 // What an image is called wrong for.
 const char* FaultName(ImageFault fault) {
   switch (fault) {
+    case ImageFault::kMatches:
+      return "matches";
     case ImageFault::kContradicted:
       return "contradicted";
     case ImageFault::kMisplaced:
@@ -44,6 +47,8 @@ std::string Reason(const ImageCheck& image) {
            "image's";
   }
   switch (image.fault) {
+    case ImageFault::kMatches:
+      return "not asked: its matches contradict its pose";
     case ImageFault::kContradicted:
       return "most of them contradict the others";
     case ImageFault::kMisplaced:
@@ -54,6 +59,14 @@ std::string Reason(const ImageCheck& image) {
       break;
   }
   return "";
+}
+
+std::string NoiseWords(const ModelCheck& check) {
+  return check.sigma_px
+             ? "noise of " + FormatNumber(*check.sigma_px, 3) + " px per axis" +
+                   (check.median_scale_px ? " at the median keypoint scale"
+                                          : "")
+             : "noise";
 }
 
 std::string Are(int64_t count) { return count == 1 ? " is " : " are "; }
@@ -168,32 +181,43 @@ std::string NextSteps(const CheckReport& report) {
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
   const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
   if (!check.IsAnythingWrong() && num_weak == 0) return "";
-  const std::string input =
-      report.input_path.empty() ? "MODEL" : report.input_path;
-  const std::string cured =
-      report.output_path.empty() ? "CURED" : report.output_path;
+  const auto or_name = [](const std::string& path, const char* name) {
+    return path.empty() ? std::string(name) : path;
+  };
+  const std::string input = or_name(report.input_path, "MODEL");
+  const std::string cured = or_name(report.output_path, "CURED");
+  const std::string database = or_name(report.database_path, "DATABASE");
   std::string text = "\nNext\n";
   std::string model = check.IsAnythingWrong() ? cured : input;
   if (check.IsAnythingWrong() && report.output_path.empty()) {
     text +=
         "  The model without what is wrong:\n    krot model_checker "
         "--input_path " +
-        input + " --output_path " + cured + "\n";
+        input +
+        (report.database_path.empty() ? "" : " --database_path " + database) +
+        " --output_path " + cured + "\n";
   }
-  if (num_wrong > 0) {
-    text +=
-        "  Place the wrong images anew, from their matches:\n    colmap "
-        "image_registrator --database_path DATABASE --input_path " +
-        model + " --output_path REGISTERED\n";
+  if (!report.moved.empty()) {
+    text += "  In it " + Counted(report.moved.size(), "wrong image") +
+            (report.moved.size() == 1 ? " has" : " have") +
+            " a new position, where the matches fit.\n";
+  }
+  if (num_wrong > static_cast<int64_t>(report.moved.size())) {
+    text += "  Place the " + std::string(report.moved.empty() ? "" : "other ") +
+            "wrong images anew, from their matches:\n    colmap "
+            "image_registrator --database_path " +
+            database + " --input_path " + model + " --output_path REGISTERED\n";
     model = "REGISTERED";
   }
   if (num_weak > 0) {
     text +=
         "  More matches for the weakly held images, and their points:\n    "
-        "colmap exhaustive_matcher --database_path DATABASE "
-        "--SiftMatching.guided_matching 1\n    colmap point_triangulator "
-        "--database_path DATABASE --image_path IMAGES --input_path " +
-        model + " --output_path TRIANGULATED\n";
+        "colmap exhaustive_matcher --database_path " +
+        database +
+        " --SiftMatching.guided_matching 1\n    colmap point_triangulator "
+        "--database_path " +
+        database + " --image_path IMAGES --input_path " + model +
+        " --output_path TRIANGULATED\n";
     model = "TRIANGULATED";
   }
   if (!check.cauchy_scale_px) {
@@ -233,20 +257,33 @@ Json ImageJson(const ImageCheck& image) {
 
 std::string CheckSentence(const CheckReport& report) {
   const ModelCheck& check = report.check;
-  if (!check.sigma_px) {
+  if (!check.sigma_px && !check.pairs) {
     return "Nothing can be said: no observation is checked by another one.";
   }
   const auto num_images = static_cast<int64_t>(check.images.size());
   const auto num_observations = static_cast<int64_t>(check.observations.size());
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
   const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
-  const std::string noise =
-      "noise of " + FormatNumber(*check.sigma_px, 3) + " px per axis";
+  const int64_t num_by_matches = std::count_if(
+      check.images.begin(), check.images.end(), [](const ImageCheck& image) {
+        return image.fault == ImageFault::kMatches;
+      });
+  const std::string noise = NoiseWords(check);
   const std::string images =
       Thousands(num_wrong) + " of " + Counted(num_images, "image");
   const std::string observations = Thousands(num_observations) + " of " +
                                    Thousands(report.num_observations) +
                                    " observations";
+  if (num_by_matches > 0) {
+    const bool is_more = num_wrong > num_by_matches || num_observations > 0;
+    return images + (num_observations > 0 ? " and " + observations : "") +
+           (num_observations > 0 ? std::string(" are ") : Are(num_wrong)) +
+           "wrong: verified matches contradict " +
+           Counted(num_by_matches, "image") +
+           (is_more ? ", the rest contradicts the others by more than " +
+                          noise + " explains."
+                    : ".");
+  }
   if (num_wrong > 0 && num_observations > 0) {
     return images + " and " + observations +
            " are wrong: they contradict the others by more than " + noise +
@@ -261,6 +298,16 @@ std::string CheckSentence(const CheckReport& report) {
     return observations + Are(num_observations) + "wrong, and no image is: " +
            (num_observations == 1 ? "it contradicts" : "they contradict") +
            " the others by more than " + noise + " explains.";
+  }
+  if (check.pairs && !check.pairs->groups.empty()) {
+    return "The images fall into " +
+           Counted(static_cast<int64_t>(check.pairs->groups.size()), "group") +
+           " that contradict each other by their verified matches: the place "
+           "of a whole group is wrong, or those matches are.";
+  }
+  if (!check.sigma_px) {
+    return "No image is wrong by the matches, and no observation is checked by "
+           "another one.";
   }
   return "Nothing is wrong: all " + Thousands(report.num_observations) +
          " observations of " + Counted(num_images, "image") + " agree within " +
@@ -285,6 +332,7 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
         "Most images do not stand where their own errors would have them: "
         "adjust the model\n(colmap bundle_adjuster), then check it again.\n";
   }
+  if (check.pairs) text += PairTable(*check.pairs, max_rows);
   return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
          ImageTable(check, ImageVerdict::kWeaklyHeld, num_rows) +
          ObservationTable(check, num_rows) + TrackTable(check, num_rows) +
@@ -330,12 +378,15 @@ std::string CheckJson(const CheckReport& report) {
       {"num_wrong_observations", check.observations.size()},
       {"sigma_px", NumberOrNull(check.sigma_px)},
       {"cauchy_scale_px", NumberOrNull(check.cauchy_scale_px)},
+      {"median_scale_px", NumberOrNull(check.median_scale_px)},
       {"critical_w", check.critical_w},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"poses", PosesJson(report.run.poses)},
       {"pixel_error",
        {{"before", ErrorJson(report.pixel_error_before)},
         {"after", ErrorJson(report.pixel_error_after)}}},
+      {"database", check.pairs ? PairJson(*check.pairs) : Json()},
+      {"moved_images", report.moved},
       {"images", images},
       {"observations", observations},
       {"tracks", tracks},

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "krot/analysis/model_check.h"
 #include "krot/analysis/pixel_errors.h"
@@ -16,18 +17,21 @@ struct CheckReport {
   int64_t num_observations = 0;  // of the input
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;  // of the cured model
+  std::vector<std::string> moved;          // ModelCure
   double seconds_check = 0;                // wall clock
   // For the commands that come next; "": a name in capitals stands for it.
   std::string input_path;
   std::string output_path;
+  std::string database_path;
 };
 
 // "2 of 41 images and 37 of 20,785 observations are wrong", or "Nothing is
 // wrong", and why.
 std::string CheckSentence(const CheckReport& report);
 
-// For the terminal: the sentence, images by verdict, observations by w, tracks
-// of two points, what to do next. At most max_rows of each.
+// For the terminal: the sentence, what matches say (PairTable), images by
+// verdict, observations by w, tracks of two points, what to do next. At most
+// max_rows of each.
 std::string CheckTable(const CheckReport& report, int max_rows);
 
 // report.json; the keys are listed in docs/cli.md. What is not known is null.

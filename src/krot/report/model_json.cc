@@ -1,5 +1,4 @@
 #include "krot/report/model_report.h"
-#include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
 
 namespace krot {
@@ -108,7 +107,6 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
         {"min", angle.min_deg},
         {"median", angle.median_deg},
         {"max", angle.max_deg}}},
-      {"database", report.pairs ? PairJson(*report.pairs) : Json()},
   };
   return ReportText(json);
 }

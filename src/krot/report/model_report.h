@@ -9,7 +9,6 @@
 #include "krot/analysis/geometry_statistics.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
-#include "krot/analysis/pair_check.h"
 #include "krot/analysis/pixel_errors.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/model.h"
@@ -52,7 +51,6 @@ struct ModelReport {
   int64_t num_tracks_with_repeated_image = 0;
   DepthStatistics depth;
   TriangulationAngleStatistics triangulation_angle;
-  std::optional<PairCheck> pairs;  // none without a database
 };
 
 // Requires a valid model (ValidateModel) and num_worst >= 0.

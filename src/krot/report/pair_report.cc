@@ -117,6 +117,18 @@ std::string WrongPairTable(const PairCheck& check, size_t max_rows) {
          std::to_string(wrong.size()) + "\n" + table.ToString();
 }
 
+std::string GroupTable(const PairCheck& check, size_t max_rows) {
+  if (check.groups.empty() || max_rows == 0) return "";
+  TextTable table;
+  table.AddRow({"images", "such as"});
+  for (size_t n = 0; n < std::min(check.groups.size(), max_rows); ++n) {
+    table.AddRow({std::to_string(check.groups[n].size()),
+                  check.images[check.groups[n].front()].name});
+  }
+  return "\nGroups of images that agree inside and contradict each other\n" +
+         table.ToString();
+}
+
 Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
   Json images = Json::array();
   for (const int32_t i : explanation.images) {
@@ -146,6 +158,7 @@ std::string PairSentence(const PairCheck& check) {
       static_cast<int64_t>(WronglyPosedImages(check).size());
   const auto num_pairs =
       static_cast<int64_t>(WronglyMatchedPairs(check).size());
+  const auto num_groups = static_cast<int64_t>(check.groups.size());
   std::string sentence = "By the matches " +
                          std::to_string(check.num_contradictory) + " of " +
                          pairs + " the poses" + tolerance + ": ";
@@ -158,6 +171,10 @@ std::string PairSentence(const PairCheck& check) {
   if (num_pairs > 0) {
     sentence += ", and " + Counted(num_pairs, "pair") + " of right images " +
                 (num_pairs == 1 ? "has" : "have") + " wrong matches";
+  }
+  if (num_groups > 0) {
+    sentence += "; " + std::to_string(num_groups) +
+                " groups of images agree inside and contradict each other";
   }
   return sentence + ".";
 }
@@ -175,7 +192,11 @@ std::string PairTable(const PairCheck& check, int max_rows) {
                            : "wrong images are " + names) +
             ".\n";
   }
-  return text + WrongImageTable(check, num_rows) +
+  text +=
+      "What matches do not show: equal structures whose wrong matches agree "
+      "with the poses, motion\nalong an image's epipolar lines, and changes "
+      "within the tolerance.\n";
+  return text + GroupTable(check, num_rows) + WrongImageTable(check, num_rows) +
          WrongPairTable(check, num_rows);
 }
 
@@ -216,6 +237,12 @@ Json PairJson(const PairCheck& check) {
                       is_contradictory ? Json(pair.most_explained) : Json()},
                      {"has_wrong_matches", pair.has_wrong_matches}});
   }
+  Json groups = Json::array();
+  for (const std::vector<int32_t>& group : check.groups) {
+    Json names = Json::array();
+    for (const int32_t i : group) names.push_back(check.images[i].name);
+    groups.push_back(names);
+  }
   return {{"verdict", PairSentence(check)},
           {"noise_px", check.noise_px},
           {"tolerance_px", check.tolerance_px},
@@ -228,6 +255,7 @@ Json PairJson(const PairCheck& check) {
           {"runner_up",
            check.runner_up ? ExplanationJson(*check.runner_up, check) : Json()},
           {"is_cheapest_proved", check.is_cheapest_proved},
+          {"groups", groups},
           {"images", images},
           {"pairs", pairs}};
 }
