@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
+#include "krot/model/validate.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 #include "tests/testing/database_writer.h"
@@ -108,6 +109,47 @@ TEST_F(DatabaseOption, MovesAnImageWhosePositionAloneIsWrong) {
   EXPECT_EQ(json["moved_images"].size(), 1);
   EXPECT_EQ(Load(folder_ / "cured").images.size(), 8u);
   EXPECT_EQ(Check("cured", {"--fail_on", "wrong"}).exit_code, 0);
+}
+
+TEST_F(DatabaseOption, HoldsMatchesAgainstPosesThatHaveNoPoints) {
+  Save(WithShortTracks(Load(folder_ / "turned"), 0), folder_ / "poses");
+  const KrotResult result = Check("poses", {"--fail_on", "wrong"});
+  EXPECT_EQ(result.exit_code, 9) << result.err;
+  EXPECT_THAT(result.out, StartsWith("1 of 8 images is wrong: "));
+}
+
+// In COLMAP's words, which its FAQ has for known poses.
+TEST_F(DatabaseOption, MakesPointsForKnownPoses) {
+  Model poses = WithShortTracks(Load(folder_ / "sound"), 0);
+  for (Image& image : poses.images) image.points2D.clear();
+  Save(poses, folder_ / "poses");
+  const auto triangulate = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {
+        "point_triangulator", "--database_path", folder_ / "database.db",
+        "--image_path",       folder_.path(),    "--input_path",
+        folder_ / "poses",    "--output_path",   folder_ / "points",
+        "--report_path",      folder_ / "r.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  };
+  KrotResult result = triangulate({"--clear_points", "1"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Model made = Load(folder_ / "points");
+  ValidateModel(made);
+  const Model truth = Load(folder_ / "sound");
+  EXPECT_GT(100 * made.track_elements.size(), 95 * truth.track_elements.size());
+  EXPECT_THAT(made.frames.size(), truth.frames.size());
+  const Json json = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_EQ(json["num_points"], made.points3D.size());
+  EXPECT_THAT(result.out, StartsWith(json["verdict"].get<std::string>()));
+  EXPECT_THAT(result.err, HasSubstr("no colours from 8 photos in "));
+  EXPECT_EQ(triangulate({}).exit_code, 5);  // there is a model
+  result = triangulate(
+      {"--overwrite", "1", "--Mapper.filter_max_reproj_error", "1e-9"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err, IsOneSentence("krot point_triangulator",
+                                        "nothing to triangulate: no matches"));
+  EXPECT_THAT(Load(folder_ / "points").points3D.size(), made.points3D.size());
 }
 
 TEST_F(DatabaseOption, IsRefusedWithCode2IfItCannotBeRead) {

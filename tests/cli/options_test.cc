@@ -434,19 +434,13 @@ TEST_F(Options, ThatAreWordsMayBeInAnyCase) {
   EXPECT_EQ(loss.exit_code, 0) << loss.err;
 }
 
-// In COLMAP's order, which its FAQ has for known poses, and in any other.
-TEST_F(Options, ForNewPointsAreRefusedByThePointTriangulator) {
-  const std::string sentence =
-      "--database_path and --image_path: this command only re-estimates the "
-      "points that the model has; run colmap point_triangulator with the same "
-      "options, and this one on its output, without these two";
-  const Words database = {"--database_path", "database.db"};
-  const Words images = {"--image_path", "images"};
-  for (const Words& words :
-       {database + images + Paths(), images + database + Paths(),
-        Paths() + database, Paths() + images}) {
-    ExpectRefused("point_triangulator", words, sentence);
-  }
+TEST_F(Options, ForPointsFromMatchesAndFromTracksDoNotMix) {
+  ExpectRefused("point_triangulator", Words{"--clear_points", "1"} + Paths(),
+                "--clear_points has no effect without --database_path");
+  ExpectRefused(
+      "point_triangulator",
+      Words{"--database_path", "d.db", "--Solver.norm", "1"} + Paths(),
+      "--Solver.norm has no effect with --database_path");
 }
 
 }  // namespace

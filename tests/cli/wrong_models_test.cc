@@ -254,7 +254,7 @@ TEST(ModelsWithoutObservations, GetOneSentenceFromEveryCommand) {
   }
   Save(poses, folder / "points");
   const std::string sentence =
-      "the model has no observations (2D points that see 3D points); colmap "
+      "the model has no observations (2D points that see 3D points); krot "
       "point_triangulator makes them from its poses and a database of matches";
   for (const char* name : {"poses", "points"}) {
     for (const std::vector<std::string>& command :

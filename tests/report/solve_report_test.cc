@@ -378,7 +378,7 @@ TEST(NothingToSolve, SaysWhy) {
   SolveSummary summary;
   EXPECT_EQ(NothingToSolveSentence(summary),
             "nothing to solve: the model has no observations "
-            "(2D points that see 3D points); colmap point_triangulator makes "
+            "(2D points that see 3D points); krot point_triangulator makes "
             "them from its poses and a database of matches");
   summary.left_out = {0, 1, 0, 1000, 0};
   EXPECT_EQ(NothingToSolveSentence(summary),

@@ -140,7 +140,8 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   report.input_path = paths.input_path;
   report.output_path = paths.output_path;
   report.database_path = command.database_path;
-  const Model model = ReadInput(paths, log, &report.run);
+  const Model model =
+      ReadInput(paths, log, &report.run, command.database_path.empty());
 
   std::optional<Database> database;
   ModelCheckOptions options;

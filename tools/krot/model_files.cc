@@ -234,13 +234,13 @@ void WarnOfDegeneration(const Model& input, const Model& written,
   }
 }
 
-Model ReadInput(const ModelPaths& paths, const LogOptions& log,
-                RunRecord* run) {
+Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
+                bool needs_observations) {
   const Timer timer;
   ValidModel read =
       ReadValidModel(paths.input_path, paths.on_contradiction, log);
   run->contradictions = read.contradictions;
-  if (read.model.track_elements.empty()) {
+  if (needs_observations && read.model.track_elements.empty()) {
     throw CommandError(kExitNothingToSolve,
                        std::string("nothing to solve: ") + kNoObservations);
   }

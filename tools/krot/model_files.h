@@ -83,8 +83,10 @@ ValidModel ReadValidModel(const std::string& path,
 
 // The model to work on: read and validated, with the rotations of
 // paths.rotations_path, if there is one; fills in what `run` says of the
-// input. Throws ModelError, and CommandError for a model without observations.
-Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run);
+// input. Throws ModelError, and CommandError for a model without observations if
+// it needs some.
+Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
+                bool needs_observations = true);
 
 // Of a result that is not given back: points that fit only as they have
 // degenerated, and, of a model that contradicts itself, an images' side that

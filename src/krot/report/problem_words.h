@@ -14,7 +14,7 @@ namespace krot {
 
 // What a model of poses alone lacks, and where it comes from.
 inline constexpr char kNoObservations[] =
-    "the model has no observations (2D points that see 3D points); colmap "
+    "the model has no observations (2D points that see 3D points); krot "
     "point_triangulator makes them from its poses and a database of matches";
 
 // Observations left out, by reason.

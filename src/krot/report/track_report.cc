@@ -1,0 +1,89 @@
+#include "krot/report/track_report.h"
+
+#include "krot/report/report_json.h"
+#include "krot/report/text_table.h"
+
+namespace krot {
+namespace {
+
+double MeanTrackLength(const TrackReport& report) {
+  return report.num_points == 0 ? 0
+                                : static_cast<double>(report.num_observations) /
+                                      static_cast<double>(report.num_points);
+}
+
+}  // namespace
+
+std::string TrackSentence(const TrackReport& report) {
+  return Thousands(report.num_points) + " points with " +
+         Thousands(report.num_observations) + " observations: tracks of " +
+         FormatNumber(MeanTrackLength(report), 2) +
+         " images, root mean square error " +
+         FormatNumber(report.pixel_error.rms, 3) + " px.";
+}
+
+std::string TrackTable(const TrackReport& report) {
+  const MatchTracksSummary& summary = report.summary;
+  std::string text = TrackSentence(report) + "\n\n";
+  TextTable table;
+  const auto add = [&](const char* what, int64_t count) {
+    table.AddRow({what, Thousands(count)});
+  };
+  add("pairs of images whose matches are used", summary.num_pairs);
+  add("their matches", summary.num_matches);
+  add("of these, that contradict the poses", summary.num_disagreeing);
+  add("tracks that the others join", summary.num_components);
+  add("of these, with an image twice", summary.num_image_twice);
+  add("divided, as no point fits all", summary.num_in_conflict);
+  add("left out, as they are a single match", summary.num_two_views);
+  add("left out, as their rays are too narrow", summary.num_narrow);
+  add("observations left out that noise does not explain",
+      summary.num_more_than_noise);
+  text += table.ToString();
+  if (summary.num_contradictory_pairs > 0) {
+    text += "\nThe matches of " +
+            Counted(summary.num_contradictory_pairs, "other pair") +
+            " contradict the poses and are not used; krot model_checker "
+            "--database_path\nsays whether images are wrong or matches.\n";
+  }
+  return text + "\n" +
+         RunSentence(report.run,
+                     "triangulated " +
+                         FormatNumber(report.seconds_triangulate, 2) + " s");
+}
+
+std::string TrackJson(const TrackReport& report) {
+  const MatchTracksSummary& summary = report.summary;
+  const Json json = {
+      {"version", report.run.version},
+      {"command", "point_triangulator"},
+      {"verdict", TrackSentence(report)},
+      {"num_pairs", summary.num_pairs},
+      {"num_contradictory_pairs", summary.num_contradictory_pairs},
+      {"num_matches", summary.num_matches},
+      {"num_disagreeing_matches", summary.num_disagreeing},
+      {"num_components", summary.num_components},
+      {"num_image_twice", summary.num_image_twice},
+      {"num_in_conflict", summary.num_in_conflict},
+      {"num_two_views", summary.num_two_views},
+      {"num_narrow", summary.num_narrow},
+      {"num_more_than_noise", summary.num_more_than_noise},
+      {"num_points", report.num_points},
+      {"num_observations", report.num_observations},
+      {"mean_track_length", MeanTrackLength(report)},
+      {"pixel_error", ErrorJson(report.pixel_error)},
+      {"contradictions", ContradictionsJson(report.run.contradictions)},
+      {"poses", PosesJson(report.run.poses)},
+      {"seconds",
+       {{"read", report.run.seconds_read},
+        {"triangulate", report.seconds_triangulate},
+        {"write", report.run.seconds_write},
+        {"total", report.run.seconds_total}}},
+      {"peak_memory_bytes", report.run.peak_memory_bytes},
+      {"threads", report.run.threads},
+      {"seed", report.run.seed},
+  };
+  return ReportText(json);
+}
+
+}  // namespace krot
