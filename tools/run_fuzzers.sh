@@ -14,7 +14,7 @@ seconds=$1
 shift
 targets=("$@")
 ((${#targets[@]})) \
-  || targets=(binary text model certificate lists options solve)
+  || targets=(binary text model certificate lists options solve database)
 
 folder=$root/build-fuzz
 install_missing "${build_needs[@]}" clang:clang libclang-rt-dev python3:python3

@@ -17,7 +17,7 @@
 #include "krot/model/remove_observations.h"
 #include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
-#include "tests/testing/database_writer.h"
+#include "krot/synthetic/scene_database.h"
 
 namespace krot {
 namespace {
@@ -454,7 +454,7 @@ TEST(CureModel, MovesAnImageWhosePositionAloneIsWrong) {
 TEST(CheckModel, TakesTheNoiseOfLargeKeypointsToBeLarger) {
   Model model = Scene(7);
   Database database = DatabaseOf(model);
-  database.scales.resize(model.images.size());
+  database.scales.assign(model.images.size(), {});
   std::mt19937_64 random(3);
   std::normal_distribution<double> noise;
   for (size_t n = 0; n < model.images.size(); ++n) {

@@ -6,10 +6,12 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
+#include "krot/model/database.h"
 #include "krot/model/validate.h"
+#include "krot/synthetic/scene_database.h"
+#include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
-#include "tests/testing/database_writer.h"
 
 namespace krot {
 namespace {
@@ -28,17 +30,7 @@ class DatabaseOption : public ::testing::Test {
     options.pixel_noise = 0.5;
     Model model = SynthesizeScene(options).ground_truth;
     Save(model, folder_ / "sound");
-    {
-      DatabaseWriter writer(folder_ / "database.db", true);
-      const Database database = DatabaseOf(model);
-      for (size_t i = 0; i < model.images.size(); ++i) {
-        writer.AddImage(static_cast<int64_t>(i + 1), model.images[i].name,
-                        database.keypoints[i]);
-      }
-      for (const VerifiedPair& pair : database.pairs) {
-        writer.AddPair(pair.image1 + 1, pair.image2 + 1, pair.matches);
-      }
-    }
+    WriteDatabase(folder_ / "database.db", model, DatabaseOf(model));
     Pose& pose = model.frames[2].rig_from_world;
     const Eigen::Matrix3d turn =
         Eigen::AngleAxisd(0.03, Eigen::Vector3d(1, 2, 2) / 3).matrix();
@@ -150,6 +142,38 @@ TEST_F(DatabaseOption, MakesPointsForKnownPoses) {
   EXPECT_THAT(result.err, IsOneSentence("krot point_triangulator",
                                         "nothing to triangulate: no matches"));
   EXPECT_THAT(Load(folder_ / "points").points3D.size(), made.points3D.size());
+}
+
+TEST_F(DatabaseOption, OfASyntheticSceneGivesColmapAndKrotTheSamePoints) {
+  if (!HasColmap()) GTEST_SKIP() << "no colmap";
+  const std::string database = folder_ / "scene.db";
+  ASSERT_EQ(
+      RunKrot({"model_synthesizer", "--output_path", folder_ / "start",
+               "--ground_truth_path", folder_ / "truth", "--database_path",
+               database, "--Scene.has_rigs", "0", "--Scene.pixel_noise", "0.5"})
+          .exit_code,
+      0);
+  const auto call = [&](const std::string& output) {
+    std::filesystem::create_directory(folder_ / "photos");
+    return std::vector<std::string>{"point_triangulator",
+                                    "--database_path",
+                                    database,
+                                    "--image_path",
+                                    folder_ / "photos",
+                                    "--input_path",
+                                    folder_ / "truth",
+                                    "--output_path",
+                                    folder_ / output,
+                                    "--clear_points",
+                                    "1"};
+  };
+  ASSERT_EQ(RunKrot(call("krot")).exit_code, 0);
+  std::filesystem::create_directory(folder_ / "colmap");
+  ASSERT_TRUE(RunColmap(call("colmap"), folder_ / "log"));
+  const Model ours = Load(folder_ / "krot"), theirs = Load(folder_ / "colmap");
+  EXPECT_GT(ours.points3D.size(), 900u);
+  EXPECT_GE(ours.points3D.size(), theirs.points3D.size());
+  EXPECT_GE(ours.track_elements.size(), theirs.track_elements.size());
 }
 
 TEST_F(DatabaseOption, IsRefusedWithCode2IfItCannotBeRead) {

@@ -6,6 +6,7 @@ Usage: make_seeds.py KROT FOLDER   (FOLDER/TARGET/... for each *_fuzz.cc)
 import pathlib
 import random
 import re
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -106,6 +107,19 @@ class Seeds:
         self.add("options", b"\1--input_path=a\f[Solver]\nnorm=inf\n"
                             b"init = feasible\n# a comment\n")
 
+    def databases(self):
+        """In pages of 512 bytes, as inputs are short."""
+        file = self.scratch / "database.db"
+        self.run("model_synthesizer", "--output_path", self.scratch / "matched",
+                 "--database_path", file, *SCENE)
+        database = sqlite3.connect(file)
+        database.executescript("PRAGMA page_size = 512; VACUUM")
+        self.add("database", file.read_bytes())
+        database.executescript("DROP TABLE matches; DROP TABLE descriptors; "
+                               "DROP TABLE cameras; VACUUM")
+        self.add("database", file.read_bytes())
+        database.close()
+
     def changes(self):
         dice = random.Random(2)
         for kind in range(32):
@@ -121,6 +135,7 @@ def main():
         seeds.proofs()
         seeds.lists()
         seeds.options()
+        seeds.databases()
         seeds.changes()
 
 

@@ -1,6 +1,9 @@
 #include "krot/model/database.h"
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -235,7 +238,55 @@ TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
               HasSubstr("several images of the model with the name \"a.jpg\""));
 }
 
-// Whatever a byte is: the database is read, or refused with a sentence.
+TEST(Database, HoldsScalesOfKeypointsThatAreTheModels2DPoints) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    writer.AddImage(1, "a.jpg", kKeypoints, 2);
+    writer.AddImage(2, "b.jpg", kKeypoints, 4);
+    writer.AddImage(3, "c.jpg", kKeypoints, 6);
+  }
+  Model model = ThreeImages();
+  EXPECT_TRUE(ReadDatabase(folder / "database.db", model).scales[1].empty());
+  for (Image& image : model.images) {
+    for (const Eigen::Vector2d& x : kKeypoints) {
+      image.points2D.push_back({x.x(), x.y()});
+    }
+  }
+  const Database database = ReadDatabase(folder / "database.db", model);
+  EXPECT_TRUE(database.scales[0].empty());
+  EXPECT_THAT(database.scales[1], ElementsAre(9, 9, 9));
+  EXPECT_EQ(database.scales[2].size(), 3);
+  EXPECT_FLOAT_EQ(database.scales[2][0], 9 * std::sqrt(2.0F));
+}
+
+TEST(Database, IsReadAsItIsWritten) {
+  Model model = ThreeImages();
+  model.cameras.push_back({7, 1, 640, 480, {500, 510, 320, 240}});
+  for (Image& image : model.images) image.camera_id = 7;
+  model.images[2].name = "it's\nodd \xff.jpg";
+  Database written;
+  written.keypoints = {kKeypoints, {}, kKeypoints};
+  written.scales = {{1, 2, 3}, {}, {}};
+  written.pairs = {{2, 0, 3, {{1, 2}, {0, 1}}}};
+  const TempFolder folder;
+  const fs::path path = folder / "database.db";
+  for (int time = 0; time < 2; ++time) WriteDatabase(path, model, written);
+  EXPECT_THAT(FileNames(folder.path()), ElementsAre("database.db"));
+  const Database read = ReadDatabase(path, model);
+  EXPECT_EQ(read.keypoints, written.keypoints);
+  ASSERT_EQ(read.pairs.size(), 1);
+  EXPECT_EQ(read.pairs[0].image1, 0);
+  EXPECT_EQ(read.pairs[0].image2, 2);
+  EXPECT_EQ(read.pairs[0].config, 3);
+  EXPECT_THAT(read.pairs[0].matches,
+              ElementsAre(ElementsAre(2u, 1u), ElementsAre(1u, 0u)));
+  EXPECT_THROW(WriteDatabase(folder / "none" / "d.db", model, written),
+               WriteError);
+}
+
+// Whatever a byte is: the database is read, or refused with a sentence, and
+// neither it nor its folder changes.
 TEST(Database, IsReadOrRefusedHoweverItIsDamaged) {
   const TempFolder folder;
   const fs::path path = folder / "database.db";
@@ -258,6 +309,35 @@ TEST(Database, IsReadOrRefusedHoweverItIsDamaged) {
     }
   }
   EXPECT_GT(num_refused, 20);
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::string damaged = bytes;
+    // Changed alone, in a row, or copied from elsewhere.
+    for (uint32_t n = random() % 8 + 1; n > 0; --n) {
+      const size_t to = random() % damaged.size();
+      const size_t length =
+          std::min<size_t>(random() % 64 + 1, damaged.size() - to);
+      switch (random() % 3) {
+        case 0:
+          damaged[to] = static_cast<char>(random());
+          break;
+        case 1:
+          damaged.replace(to, length, length, static_cast<char>(random()));
+          break;
+        default:
+          damaged.replace(
+              to, length,
+              bytes.substr(random() % (bytes.size() - length), length));
+      }
+    }
+    WriteBytes(path, damaged);
+    const std::string error = ErrorOf(path, ThreeImages());
+    if (!error.empty()) {
+      EXPECT_THAT(error, HasSubstr("database.db: "));
+    }
+    ASSERT_EQ(ReadBytes(path), damaged);
+    ASSERT_THAT(FileNames(folder.path()), ElementsAre("database.db"));
+  }
 }
 
 }  // namespace

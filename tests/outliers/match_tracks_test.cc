@@ -16,7 +16,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
-#include "tests/testing/database_writer.h"
+#include "krot/synthetic/scene_database.h"
 #include "tests/testing/model_matchers.h"
 
 namespace krot {

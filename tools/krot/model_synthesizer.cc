@@ -2,8 +2,10 @@
 #include <vector>
 
 #include "krot/camera/camera_model.h"
+#include "krot/model/database.h"
 #include "krot/report/text_table.h"
 #include "krot/synthetic/scene.h"
+#include "krot/synthetic/scene_database.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
@@ -16,6 +18,7 @@ namespace {
 struct SynthesizerOptions {
   std::string output_path;
   std::string ground_truth_path;
+  std::string database_path;
   std::string output_type = "BIN";
   bool overwrite = false;
   std::string layout = "orbit";
@@ -97,6 +100,9 @@ void AddSynthesizerOptions(SynthesizerOptions* options, OptionParser* parser) {
   parser->AddPath("ground_truth_path", &options->ground_truth_path, false,
                   "a folder",
                   "Where the same model with exact poses and points goes");
+  parser->AddOutputFile("database_path", &options->database_path,
+                        "Where a database goes that the model could have been "
+                        "made from, with its tracks as matches");
   parser->AddChoice("output_type", &options->output_type, {"BIN", "TXT"},
                     "The format to write");
   AddOverwrite(&options->overwrite, parser);
@@ -175,12 +181,17 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   if (wants_ground_truth) {
     CheckWritable(options.ground_truth_path, write_options);
   }
+  CheckSidePath("database_path", options.database_path);
 
   const SyntheticScene scene = Synthesize(scene_options);
   DeferInterrupts();
   WriteModel(scene.model, options.output_path, write_options);
   if (wants_ground_truth) {
     WriteModel(scene.ground_truth, options.ground_truth_path, write_options);
+  }
+  if (!options.database_path.empty()) {
+    WriteDatabase(options.database_path, scene.ground_truth,
+                  DatabaseOf(scene.ground_truth));
   }
   PrintTable(options.common.log, SceneTable(scene));
   return kExitDone;

@@ -56,4 +56,11 @@ struct Database {
 Database ReadDatabase(const std::filesystem::path& path, const Model& model,
                       const FileNote& note = {});
 
+// Writes a database of COLMAP 3.8, which later versions read, too: the model's
+// cameras and images with these keypoints and pairs, without descriptors. An
+// existing file is replaced, once the new one is complete. Keypoints are 32-bit
+// floats there. Throws WriteError.
+void WriteDatabase(const std::filesystem::path& path, const Model& model,
+                   const Database& contents);
+
 }  // namespace krot

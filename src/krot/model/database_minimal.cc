@@ -1,5 +1,6 @@
 // Where there is no SQLite: no database can be read.
 
+#include "krot/base/write_file.h"
 #include "krot/model/database.h"
 #include "krot/model/model_error.h"
 
@@ -9,6 +10,12 @@ Database ReadDatabase(const std::filesystem::path& path, const Model&,
                       const FileNote&) {
   throw ModelError(path.string() +
                    ": cannot be read by this build, which has no SQLite");
+}
+
+void WriteDatabase(const std::filesystem::path& path, const Model&,
+                   const Database&) {
+  throw WriteError(path.string() +
+                   ": cannot be written by this build, which has no SQLite");
 }
 
 }  // namespace krot
