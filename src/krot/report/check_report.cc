@@ -41,14 +41,15 @@ const char* FaultName(ImageFault fault) {
 }
 
 // Empty for what is fine.
-std::string Reason(const ImageCheck& image) {
+std::string Reason(const ModelCheck& check, const ImageCheck& image) {
   if (image.verdict == ImageVerdict::kWeaklyHeld) {
     return "its centre may move more than ten times as far as the median "
            "image's";
   }
   switch (image.fault) {
     case ImageFault::kMatches:
-      return "not asked: its matches contradict its pose";
+      return "its matches contradict its " +
+             PoseFaultWords(check.pairs->images[&image - check.images.data()]);
     case ImageFault::kContradicted:
       return "most of them contradict the others";
     case ImageFault::kMisplaced:
@@ -102,8 +103,8 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
   const bool is_wrong = verdict == ImageVerdict::kWrong;
   TextTable table;
   if (is_wrong) {
-    table.AddRow({"image", "observations", "checked", "more than noise",
-                  "of its observations"});
+    table.AddRow(
+        {"image", "observations", "checked", "more than noise", "why"});
   } else {
     table.AddRow({"image", "observations", "checked", "centre +-",
                   "median image's x", "turn +-, degrees"});
@@ -115,7 +116,7 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
                                     std::to_string(image.num_tested)};
     if (is_wrong) {
       row.push_back(std::to_string(image.num_wrong));
-      row.push_back(Reason(image));
+      row.push_back(Reason(check, image));
     } else {
       row.push_back(SigmaText(image.center_sigma));
       row.push_back(std::isfinite(image.relative_center_sigma)
@@ -235,14 +236,14 @@ std::string NextSteps(const CheckReport& report) {
          FormatLength(*check.cauchy_scale_px) + "\n";
 }
 
-Json ImageJson(const ImageCheck& image) {
+Json ImageJson(const ModelCheck& check, const ImageCheck& image) {
   return {{"image_id", image.image_id},
           {"image_name", image.name},
           {"verdict", VerdictName(image.verdict)},
           {"fault", image.fault == ImageFault::kNone
                         ? Json()
                         : Json(FaultName(image.fault))},
-          {"reason", Reason(image)},
+          {"reason", Reason(check, image)},
           {"num_observations", image.num_observations},
           {"num_tested", image.num_tested},
           {"num_wrong", image.num_wrong},
@@ -345,7 +346,7 @@ std::string CheckJson(const CheckReport& report) {
   const ModelCheck& check = report.check;
   Json images = Json::array();
   for (const ImageCheck& image : check.images) {
-    images.push_back(ImageJson(image));
+    images.push_back(ImageJson(check, image));
   }
   Json observations = Json::array();
   for (const WrongObservation& one : check.observations) {

@@ -45,24 +45,6 @@ std::string PercentOf(int64_t part, int64_t of) {
                        " %";
 }
 
-std::string PoseFaultWords(const CheckedImage& image) {
-  switch (image.fault) {
-    case PoseFault::kPosition:
-      return "position: moved by " + FormatNumber(image.moved_by, 3);
-    case PoseFault::kRotation:
-      if (image.num_agreeing_turned > image.num_agreeing_moved) {
-        return "rotation: turned by " + FormatNumber(image.turned_by_deg, 2) +
-               " degrees";
-      }
-      return "rotation, and perhaps position";
-    case PoseFault::kUnclear:
-      return "position or rotation";
-    case PoseFault::kNone:
-      break;
-  }
-  return "";
-}
-
 std::vector<size_t> WronglyPosedImages(const PairCheck& check) {
   std::vector<size_t> wrong;
   for (size_t i = 0; i < check.images.size(); ++i) {
@@ -138,6 +120,24 @@ Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
 }
 
 }  // namespace
+
+std::string PoseFaultWords(const CheckedImage& image) {
+  switch (image.fault) {
+    case PoseFault::kPosition:
+      return "position: moved by " + FormatNumber(image.moved_by, 3);
+    case PoseFault::kRotation:
+      if (image.num_agreeing_turned > image.num_agreeing_moved) {
+        return "rotation: turned by " + FormatNumber(image.turned_by_deg, 2) +
+               " degrees";
+      }
+      return "rotation, and perhaps position";
+    case PoseFault::kUnclear:
+      return "position or rotation";
+    case PoseFault::kNone:
+      break;
+  }
+  return "";
+}
 
 std::string PairSentence(const PairCheck& check) {
   const int64_t num_checked =

@@ -13,6 +13,9 @@ namespace krot {
 // wrong."
 std::string PairSentence(const PairCheck& check);
 
+// Of a wrong image: "rotation: turned by 0.31 degrees".
+std::string PoseFaultWords(const CheckedImage& image);
+
 // For the terminal: the sentence, wrong images and pairs with wrong matches, at
 // most max_rows of each.
 std::string PairTable(const PairCheck& check, int max_rows);
