@@ -169,15 +169,21 @@ Outcome CheckModelCommand(const ModelPointer& model, const Progress&,
   OptionTable table = TableOf("pykrot.check");
   table.AddThreads("num_threads", &context.num_threads,
                    "the result is the same, bit by bit");
+  KnownFiles known;
+  known.AddDatabaseTo(&table);
   AssignKeywords(keywords, &table);
+  const std::optional<Database> database = known.Matches(*model);
+  ModelCheckOptions options;
+  if (database) options.database = &*database;
   CheckReport report;
   report.num_observations = static_cast<int64_t>(model->track_elements.size());
   Model cured;
   RunInterruptibly([&](const CancelFlag& cancel) {
     context.cancel = &cancel;
-    report.check = CheckModel(*model, {}, context);
-    ModelCure cure = CureModel(*model, report.check, {}, context);
+    report.check = CheckModel(*model, options, context);
+    ModelCure cure = CureModel(*model, report.check, options, context);
     cured = std::move(cure.model);
+    report.moved = std::move(cure.moved);
   });
   report.seconds_check = timer.Seconds();
   report.pixel_error_before = Summarize(PixelErrors(*model));

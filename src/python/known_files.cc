@@ -44,6 +44,10 @@ void KnownFiles::AddPositionsTo(OptionTable* table) {
               }});
 }
 
+void KnownFiles::AddDatabaseTo(OptionTable* table) {
+  AddFile("database_path", &database_path_, table);
+}
+
 std::shared_ptr<const Model> KnownFiles::WithRotations(
     const std::shared_ptr<Model>& model, RunRecord* run) const {
   run->poses = CheckPoses(*model);
@@ -52,6 +56,11 @@ std::shared_ptr<const Model> KnownFiles::WithRotations(
   run->rotations =
       TakeRotations(ReadFileBytes(rotations_path_), turned.get(), -1, &Warn);
   return turned;
+}
+
+std::optional<Database> KnownFiles::Matches(const Model& model) const {
+  if (database_path_.empty()) return std::nullopt;
+  return ReadDatabase(database_path_, model, &Warn);
 }
 
 FixedParts KnownFiles::Fixed(const Model& model) const {

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/model/database.h"
 #include "krot/model/fixed_parts.h"
 #include "krot/model/model.h"
 #include "krot/model/positions_file.h"
@@ -20,6 +21,7 @@ class KnownFiles {
   void AddRotationsTo(OptionTable* table);
   void AddFixedTo(OptionTable* table);
   void AddPositionsTo(OptionTable* table);
+  void AddDatabaseTo(OptionTable* table);
 
   // The model, or a copy with the file's rotations; records what they did, and
   // what is odd about the poses.
@@ -27,6 +29,8 @@ class KnownFiles {
       const std::shared_ptr<Model>& model, RunRecord* run) const;
   FixedParts Fixed(const Model& model) const;
   std::vector<KnownPosition> Positions(const Model& model) const;
+  // None without one.
+  std::optional<Database> Matches(const Model& model) const;
 
  private:
   std::string rotations_path_;
@@ -35,6 +39,7 @@ class KnownFiles {
   std::string positions_path_;
   std::string point_positions_path_;
   std::optional<double> position_radius_;
+  std::string database_path_;
 };
 
 }  // namespace krot

@@ -170,6 +170,20 @@ def test_a_check_says_what_is_wrong_and_gives_the_model_without(scene):
     assert len(sound.report["images"]) == len(model.centers)
 
 
+def test_a_check_asks_the_matches_of_a_database(tmp_path):
+    run_krot("model_synthesizer", "--output_path", tmp_path / "scene",
+             "--database_path", tmp_path / "database.db",
+             "--Scene.num_frames", "8", "--Scene.pixel_noise", "0.5")
+    model = pykrot.Model.read(tmp_path / "scene")
+    report = pykrot.check(model, database=tmp_path / "database.db").report
+    assert report["verdict"].startswith("Nothing is wrong")
+    assert report["database"]["num_kept_pairs"] > 20
+    assert report["database"]["num_contradictory_pairs"] == 0
+    assert pykrot.check(model).report["database"] is None
+    with pytest.raises(pykrot.ModelError, match="cannot be opened"):
+        pykrot.check(model, database=tmp_path / "none.db")
+
+
 def test_a_filter_without_a_bound_knows_the_noise(scene):
     model = pykrot.solve(pykrot.Model.read(scene)).model
     assert pykrot.filter(model).report["method"] == "snooping"

@@ -104,12 +104,15 @@ def triangulate(model, *, progress=None, options=None, **keywords):
     return _run(_core.triangulate, model, progress, options, keywords)
 
 
-def check(model, **keywords):
+def check(model, database=None, **keywords):
     """What is wrong with a model, and the model without it.
 
     report["verdict"] is a sentence; "images", "observations" and "tracks" have
-    the numbers that it rests on.
+    the numbers that it rests on. With `database`, the path of COLMAP's, its
+    verified matches are asked, too: report["database"].
     """
+    if database is not None:
+        keywords["database_path"] = database
     return _run(_core.check, model, None, None, keywords)
 
 

@@ -102,7 +102,9 @@ def triangulate(model: Union[Model, Problem], *,
                 progress: Optional[Progress] = ...,
                 options: Optional[Mapping[str, Any]] = ...,
                 **keywords: Any) -> Result: ...
-def check(model: Union[Model, Problem], **keywords: Any) -> Result: ...
+def check(model: Union[Model, Problem],
+          database: Optional[Union[str, PathLike[str]]] = ...,
+          **keywords: Any) -> Result: ...
 def filter(model: Union[Model, Problem], max_error: Optional[float] = ..., *,
            progress: Optional[Progress] = ...,
            options: Optional[Mapping[str, Any]] = ...,
