@@ -14,6 +14,7 @@
 #include "krot/analysis/pixel_errors.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
+#include "krot/model/pose_checks.h"
 #include "krot/model/remove_observations.h"
 #include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
@@ -448,6 +449,7 @@ TEST(CureModel, MovesAnImageWhosePositionAloneIsWrong) {
   };
   EXPECT_LT((center_of(cure.model) - center_of(sound)).norm(), 0.01);
   EXPECT_FALSE(CheckModel(cure.model, options, {}).pairs->IsAnythingWrong());
+  EXPECT_EQ(CheckPoses(cure.model).num_stale, 0);
   ValidateModel(cure.model);
 }
 

@@ -386,12 +386,10 @@ bool MoveImages(const PairCheck& pairs, Model* moved) {
         num_images[geometry.frame] > 1) {
       continue;
     }
-    const RigidTransform rig_from_world =
-        Inverse(geometry.cam_from_rig) * pairs.images[n].moved_cam_from_world;
-    for (int i = 0; i < 3; ++i) {
-      moved->frames[geometry.frame].rig_from_world.translation[i] =
-          rig_from_world.translation[i];
-    }
+    const RigidTransform& to = pairs.images[n].moved_cam_from_world;
+    moved->frames[geometry.frame].rig_from_world.translation =
+        (Inverse(geometry.cam_from_rig) * to).translation;
+    moved->images[n].cam_from_world.translation = to.translation;
     is_any = true;
   }
   return is_any;
