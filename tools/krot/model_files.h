@@ -83,8 +83,8 @@ ValidModel ReadValidModel(const std::string& path,
 
 // The model to work on: read and validated, with the rotations of
 // paths.rotations_path, if there is one; fills in what `run` says of the
-// input. Throws ModelError, and CommandError for a model without observations if
-// it needs some.
+// input. Throws ModelError, and CommandError for a model without observations
+// if it needs some.
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
                 bool needs_observations = true);
 
