@@ -9,6 +9,7 @@
 #include "krot/model/file_bytes.h"
 #include "krot/model/model_error.h"
 #include "krot/model/text_io.h"
+#include "krot/model/validate.h"
 #include "krot/model/trivial_rigs.h"
 
 namespace krot {
@@ -175,6 +176,12 @@ Model ReadModel(const fs::path& folder, ModelFormat format) {
   // one.
   model.stores_rigs = !model.rigs.empty() || !model.frames.empty();
   if (!model.stores_rigs) UseTrivialRigs(&model);
+  return model;
+}
+
+Model ReadModel(const fs::path& folder) {
+  Model model = ReadModel(folder, DetectModelFormat(folder));
+  ValidateModel(model);
   return model;
 }
 

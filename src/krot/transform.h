@@ -1,0 +1,94 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace krot {
+
+// Rotations, rigid transforms and similarities. Lengths are in scene units.
+
+// x -> rotation * x + translation; a_from_b takes coordinates in b to those
+// in a. The default is the identity.
+struct RigidTransform {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const {
+    return rotation * x + translation;
+  }
+};
+
+// a_from_c = a_from_b * b_from_c.
+inline RigidTransform operator*(const RigidTransform& a_from_b,
+                                const RigidTransform& b_from_c) {
+  return {a_from_b.rotation * b_from_c.rotation,
+          a_from_b * b_from_c.translation};
+}
+
+// a_from_b of b_from_a: x -> R' x - R' t.
+inline RigidTransform Inverse(const RigidTransform& b_from_a) {
+  const Eigen::Matrix3d rotation = b_from_a.rotation.transpose();
+  return {rotation, -rotation * b_from_a.translation};
+}
+
+// Where a camera of this cam_from_world stands in the world: the point that is
+// mapped to the origin, -R' t.
+inline Eigen::Vector3d Center(const RigidTransform& cam_from_world) {
+  return -cam_from_world.rotation.transpose() * cam_from_world.translation;
+}
+
+// x -> scale * rotation * x + translation; the default is the identity.
+struct Similarity {
+  double scale = 1;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const {
+    return scale * (rotation * x) + translation;
+  }
+};
+
+// A quaternion's coefficients in COLMAP's order.
+using QuaternionWxyz = std::array<double, 4>;
+
+// Of unit norm, whatever norm the coefficients have; they must not all be zero.
+// Normalising what has been normalised changes no bit.
+Eigen::Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz);
+
+// The coefficients, as they are.
+QuaternionWxyz ToWxyz(const Eigen::Quaterniond& q);
+
+// Whether it can be normalised: it is finite and not zero. Images that are not
+// registered are written with such as cannot.
+bool HasRotation(const QuaternionWxyz& wxyz);
+
+// The rotation of the normalised quaternion; NaN if it has none.
+Eigen::Matrix3d RotationOf(const QuaternionWxyz& wxyz);
+
+// The rotation nearest to M in the Frobenius norm: U diag(1, 1, det U V') V'
+// for M = U S V'. None if there are several, up to 1e-9 of M's norm.
+std::optional<Eigen::Matrix3d> NearestRotation(const Eigen::Matrix3d& M);
+
+// The points x with |UnitFromWorld() (x - centre)| <= 1.
+struct Ellipsoid {
+  Eigen::Vector3d centre;
+  Eigen::Vector3d semi_axes;  // > 0
+  Eigen::Quaterniond world_from_axes = Eigen::Quaterniond::Identity();
+
+  Eigen::Matrix3d UnitFromWorld() const {
+    return semi_axes.cwiseInverse().asDiagonal() *
+           world_from_axes.normalized().toRotationMatrix().transpose();
+  }
+  bool IsBall() const {
+    return semi_axes[0] == semi_axes[1] && semi_axes[1] == semi_axes[2];
+  }
+};
+
+inline Ellipsoid BallAround(const Eigen::Vector3d& centre, double radius) {
+  return {centre, Eigen::Vector3d::Constant(radius)};
+}
+
+}  // namespace krot
