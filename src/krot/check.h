@@ -92,7 +92,7 @@ struct ModelNoise {
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for
 // options out of range. The same bits at any number of threads.
 // O(observations), some microseconds each.
-ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options,
+ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options = {},
                          const Context& context = {});
 
 // ---- Verdicts ----
@@ -195,7 +195,7 @@ struct ModelCheck {
 // sound model; docs/method/outliers.md has the tests. Then anew without it,
 // until there is none: so an image is not blamed for what its neighbour does.
 // Requires a valid model. The same bits at any number of threads.
-ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options,
+ModelCheck CheckModel(const Model& model, const ModelCheckOptions& options = {},
                       const Context& context = {});
 
 // A copy without wrong observations and images. Points that lose observations

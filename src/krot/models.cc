@@ -44,7 +44,7 @@ SolveModelOptions PipelineOptions(const SolveOptions& options) {
   pipeline.finish.max_error = options.finish_max_error;
   pipeline.describe_certificate = options.write_certificate;
   if (options.on_progress) {
-    const auto tell = [told = std::make_shared<SolveProgress>(),
+    const auto tell = [told = std::make_shared<SolveState>(),
                        on_progress = options.on_progress](
                           std::optional<double> max_error,
                           std::optional<double> lower_bound) {

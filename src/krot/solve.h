@@ -104,7 +104,8 @@ struct LooseImage {
   double moved = 0;  // from where the input has it, scene units
 };
 
-struct SolveProgress {
+// How far a solve is; empty where nothing is known yet.
+struct SolveState {
   std::optional<double> max_error;    // the lowest so far, pixels
   std::optional<double> lower_bound;  // the highest proved so far, pixels
 };
@@ -134,8 +135,8 @@ struct SolveOptions {
   std::vector<KnownPosition> positions;  // of cameras and points; p = 2
 
   bool write_certificate = false;  // fill SolveResult::certificate
-  // Called from the calling thread while the solve goes on; may be empty.
-  std::function<void(const SolveProgress&)> on_progress;
+  // Called again and again while the solve goes on; may be empty.
+  std::function<void(const SolveState&)> on_progress;
 };
 
 struct SolveResult {
@@ -178,19 +179,18 @@ struct SolveResult {
 // Translations and points with the lowest largest error. Stored point errors
 // are updated (mean, true pixels); everything else keeps its bits. So do, per
 // connected component, the centroid of the camera centres and their RMS
-// distance to it, unless something is fixed. The result is never worse than the
-// input.
+// distance to it, unless something is fixed. The largest error is never above
+// the input's, unless known positions ask for more.
 //
 // Requires a valid model (ValidateModel). Throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range. Cancelled,
-// it returns the best so far. 1,000 images with a million observations take
-// about a minute and a gigabyte.
+// it returns the best so far. docs/scale.md has times and memory.
 SolveResult Solve(const Model& model, const SolveOptions& options = {},
                   const Context& context = {});
 
 // Moves the points alone, each to its lowest maximum, by the Fast Descent
 // Method; method, init and the finish are without effect. Otherwise as Solve,
-// without a bound; a second per million observations.
+// without a bound. O(observations).
 SolveResult Triangulate(const Model& model, const SolveOptions& options = {},
                         const Context& context = {});
 

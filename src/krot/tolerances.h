@@ -75,10 +75,11 @@ struct TolerancesResult {
   std::vector<ToleranceBox> boxes;        // images, then points, as asked for
 };
 
-// Both ends of a box are reached by an estimate and proved, up to `tolerance`.
-// Requires a valid model (ValidateModel). Throws std::invalid_argument for
-// options out of range, and for gauge images that are not connected. A box
-// takes about as long as a solve with the observations near to it.
+// Each end of a box is reached by an estimate and proved, and the two agree to
+// `tolerance` unless lenses prevent it. Requires a valid model (ValidateModel).
+// Throws std::invalid_argument for options out of range, and for gauge images
+// that are not connected. A box takes about as long as a solve with the
+// observations near to it.
 TolerancesResult FindTolerances(const Model& model,
                                 const TolerancesOptions& options,
                                 const Context& context = {});

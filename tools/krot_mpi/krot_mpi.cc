@@ -64,7 +64,7 @@ int RunSharedSolver(const std::vector<std::string>& arguments,
   ResolveCheckpoint(parser, &command.checkpoint);
   command.context.ranks = ranks;
   if (command.options.max_error) {
-    command.RequireOneRank(context, "Solver.max_error");
+    RequireOneRank(command.context, "Solver.max_error");
   }
   if (!ranks->IsFirst()) command.common.log.level = -1;
 
