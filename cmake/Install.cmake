@@ -11,6 +11,10 @@ install(TARGETS krot_public EXPORT krotTargets
 file(GLOB public_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/krot/*.h)
 install(FILES ${public_headers} ${PROJECT_BINARY_DIR}/src/krot/version.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/krot)
+if(KROT_INSTALL_FOLDERS)  # for third_party_patches
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/krot
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+endif()
 install(EXPORT krotTargets NAMESPACE krot:: DESTINATION ${package_dir})
 
 # What programs link besides.
