@@ -5,13 +5,12 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
-#include "krot/geometry/transform.h"
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
-#include "krot/model/validate.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/random.h"
 #include "krot/synthetic/scene.h"
+#include "krot/transform.h"
 
 // Scenes in which something that solvers like to take for granted is missing:
 // parallax, a baseline, noise, more than one point in common. The truth itself

@@ -7,8 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/analysis/alignment.h"
-#include "krot/analysis/pixel_errors.h"
-#include "krot/model/validate.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 

@@ -8,8 +8,8 @@
 
 #include "krot/adjust.h"
 #include "krot/base/context.h"
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model.h"
 
 namespace krot {
 

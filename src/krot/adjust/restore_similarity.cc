@@ -7,7 +7,7 @@
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/medians.h"
 #include "krot/geometry/consensus.h"
-#include "krot/geometry/transform.h"
+#include "krot/transform.h"
 
 namespace krot {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/geometry/consensus.h"
-#include "krot/geometry/transform.h"
+#include "krot/transform.h"
 
 namespace krot {
 namespace {

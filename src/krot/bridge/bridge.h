@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "krot/solve.h"
 #include "krot/base/ranks.h"
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model.h"
 #include "krot/model/positions_file.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/solve.h"
 
 namespace krot {
 

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "krot/solve.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/proof/certificate_check.h"
+#include "krot/solve.h"
 
 namespace krot {
 

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "krot/certificate.h"
 #include "krot/bridge/certificate_file.h"
 #include "krot/bridge/certificate_support.h"
-#include "krot/model/model.h"
+#include "krot/certificate.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "krot/certificate.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
+#include "krot/certificate.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

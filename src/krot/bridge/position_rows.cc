@@ -8,8 +8,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/geometry/transform.h"
 #include "krot/problem/cost.h"
+#include "krot/transform.h"
 
 namespace krot {
 namespace {

@@ -5,11 +5,11 @@
 
 #include "krot/base/folder_swap.h"
 #include "krot/base/write_file.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/binary_io.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model_error.h"
 #include "krot/model/text_io.h"
-#include "krot/model/validate.h"
 #include "krot/model/trivial_rigs.h"
 
 namespace krot {

@@ -7,8 +7,8 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/geometry/transform.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
+#include "krot/transform.h"
 
 namespace krot {
 

@@ -6,11 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "krot/outliers.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
 #include "krot/bridge/conflict_file.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
+#include "krot/outliers.h"
 #include "krot/outliers/error_profile.h"
 #include "krot/outliers/rotation_suspect.h"
 #include "krot/pipeline/solve_model.h"

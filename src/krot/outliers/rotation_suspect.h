@@ -7,10 +7,10 @@
 
 #include <Eigen/Core>
 
-#include "krot/outliers.h"
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
+#include "krot/outliers.h"
 #include "krot/outliers/conflict.h"
 #include "krot/outliers/decision.h"
 #include "krot/outliers/removal.h"

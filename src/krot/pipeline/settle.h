@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "krot/solve.h"
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
+#include "krot/solve.h"
 
 namespace krot {
 

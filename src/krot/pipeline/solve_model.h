@@ -8,18 +8,17 @@
 #include <utility>
 #include <vector>
 
-#include "krot/solve.h"
 #include "krot/analysis/collapse.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
 #include "krot/bridge/certificate_support.h"
 #include "krot/joint/joint.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/finish.h"
 #include "krot/pipeline/polish.h"
 #include "krot/pipeline/settle.h"
+#include "krot/solve.h"
 #include "krot/sweeps/res_int.h"
 
 namespace krot {

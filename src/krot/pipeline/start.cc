@@ -5,9 +5,9 @@
 
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
-#include "krot/geometry/transform.h"
 #include "krot/joint/initializer.h"
 #include "krot/joint/step_values.h"
+#include "krot/transform.h"
 
 namespace krot {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "krot/geometry/transform.h"
+#include "krot/transform.h"
 
 namespace krot {
 namespace {

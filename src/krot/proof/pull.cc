@@ -1,7 +1,7 @@
 #include "krot/proof/pull.h"
 
-#include "krot/geometry/transform.h"
 #include "krot/problem/cost.h"
+#include "krot/transform.h"
 
 namespace krot {
 

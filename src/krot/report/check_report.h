@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
-#include "krot/analysis/model_check.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/check.h"
+#include "krot/model.h"
 #include "krot/report/run_record.h"
 
 namespace krot {

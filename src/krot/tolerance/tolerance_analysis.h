@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "krot/tolerances.h"
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/tolerance/box_search.h"
+#include "krot/tolerances.h"
 
 namespace krot {
 

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include <krot/analysis/model_check.h>
+#include <krot/check.h>
 #include <krot/bridge/conflict_file.h>
 #include <krot/outliers/outlier_filter.h>
 #include <krot/outliers/tolerant_solve.h>

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include <krot/model/validate.h>
+#include <krot/model.h>
 
 namespace colmap {
 namespace {

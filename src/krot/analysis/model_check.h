@@ -1,3 +1,0 @@
-#pragma once
-
-#include "krot/check.h"
