@@ -1,44 +1,29 @@
-# Installs, as component libkrot-dev, the headers, the libraries as
-# krot::<folder>, and krot::krot, which stands for all of them; find_package(krot)
-# and pkg-config find them. Component krot is the command with its manual pages
-# and what shells complete.
+# Installs, as component libkrot-dev, the headers of src/krot itself and libkrot.a
+# as krot::krot; find_package(krot) and pkg-config find them. Component krot is the
+# command with its manual pages and what shells complete.
 include(CMakePackageConfigHelpers)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME libkrot-dev)
 
-get_property(krot_libraries GLOBAL PROPERTY KROT_LIBRARIES)
-add_library(krot_all INTERFACE)
-add_library(krot::krot ALIAS krot_all)
-set_target_properties(krot_all PROPERTIES EXPORT_NAME krot)
-target_link_libraries(krot_all INTERFACE ${krot_libraries})
-
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/krot)
-install(TARGETS ${krot_libraries} krot_all EXPORT krotTargets
+install(TARGETS krot_public EXPORT krotTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
   INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/krot
-  DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-  FILES_MATCHING PATTERN "*.h")
-install(FILES ${PROJECT_BINARY_DIR}/src/krot/version.h
+file(GLOB public_headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/krot/*.h)
+install(FILES ${public_headers} ${PROJECT_BINARY_DIR}/src/krot/version.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/krot)
+if(KROT_INSTALL_FOLDERS)  # for third_party_patches
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/src/krot
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+endif()
 install(EXPORT krotTargets NAMESPACE krot:: DESTINATION ${package_dir})
 
-# What the installed targets link to, directly or not.
-set(KROT_INSTALL_NEEDS_CERES OFF)
-set(KROT_INSTALL_NEEDS_JSON OFF)
-set(KROT_INSTALL_NEEDS_SQLITE OFF)
-foreach(library IN LISTS krot_libraries)
-  get_target_property(linked ${library} INTERFACE_LINK_LIBRARIES)
-  if(linked MATCHES "Ceres::")
-    set(KROT_INSTALL_NEEDS_CERES ON)
-  endif()
-  if(linked MATCHES "nlohmann_json::")
-    set(KROT_INSTALL_NEEDS_JSON ON)
-  endif()
-  if(linked MATCHES "SQLite::")
-    set(KROT_INSTALL_NEEDS_SQLITE ON)
-  endif()
-endforeach()
+# What programs link besides.
+set(KROT_INSTALL_NEEDS_CERES ON)
+set(KROT_PC_LIBS "-lceres -lglog -lsqlite3")
+if(KROT_MINIMAL)
+  set(KROT_INSTALL_NEEDS_CERES OFF)
+  set(KROT_PC_LIBS "")
+endif()
 configure_package_config_file(
   ${PROJECT_SOURCE_DIR}/cmake/krotConfig.cmake.in
   ${PROJECT_BINARY_DIR}/krotConfig.cmake
@@ -51,14 +36,6 @@ install(FILES
   ${PROJECT_BINARY_DIR}/krotConfigVersion.cmake
   DESTINATION ${package_dir})
 
-# For the linker, who looks from left to right: the highest folders first.
-set(KROT_PC_LIBRARIES)
-foreach(library IN LISTS krot_libraries)
-  get_target_property(type ${library} TYPE)
-  if(NOT type STREQUAL INTERFACE_LIBRARY)
-    string(PREPEND KROT_PC_LIBRARIES "-l${library} ")
-  endif()
-endforeach()
 set(pkgconfig_dir ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 file(RELATIVE_PATH KROT_PC_PREFIX /${pkgconfig_dir} /)
 configure_file(${PROJECT_SOURCE_DIR}/cmake/krot.pc.in

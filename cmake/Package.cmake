@@ -32,9 +32,9 @@ set(CPACK_DEBIAN_KROT_PACKAGE_RECOMMENDS colmap)
 
 set(CPACK_DEBIAN_LIBKROT-DEV_PACKAGE_NAME libkrot-dev)
 set(CPACK_DEBIAN_LIBKROT-DEV_DESCRIPTION
-  "The C++ library behind krot: static libraries, headers, and what CMake's
+  "The C++ library behind krot: a static library, headers, and what CMake's
 find_package and pkg-config need.")
 set(CPACK_DEBIAN_LIBKROT-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_LIBKROT-DEV_PACKAGE_DEPENDS
-  "libceres-dev, libeigen3-dev, libsqlite3-dev, nlohmann-json3-dev")
+  "libceres-dev, libeigen3-dev, libsqlite3-dev")
 include(CPack)

@@ -46,7 +46,7 @@ build() {
 }
 
 say "KROT into $work/krot"
-build "$root" "$work/krot-build" -DKROT_BUILD_TESTS=OFF
+build "$root" "$work/krot-build" -DKROT_BUILD_TESTS=OFF -DKROT_INSTALL_FOLDERS=ON
 cmake --install "$work/krot-build" --prefix "$work/krot"
 [[ -d $work/colmap ]] || get_sources
 say "COLMAP 3.8 with KROT into $work/colmap-build"

@@ -43,9 +43,9 @@ say "A program of one's own"
 inside apt-get -qq install --reinstall --no-install-recommends -y \
   ./libkrot-dev_*.deb \
   cmake g++ make ">/dev/null"
-inside cmake -S tests/architecture/consumer -B consumer ">/dev/null"
-inside cmake --build consumer
-inside consumer/lower_largest_error tools/sample/model by_library
+inside cmake -S tools/examples -B examples ">/dev/null"
+inside cmake --build examples
+inside examples/solve_folder tools/sample/model by_library
 
 say "pykrot"
 inside apt-get -qq install --no-install-recommends -y "${build_needs[@]#*:}" \
@@ -53,7 +53,7 @@ inside apt-get -qq install --no-install-recommends -y "${build_needs[@]#*:}" \
   python3-wheel ">/dev/null"
 inside CMAKE_ARGS=-DKROT_NATIVE=OFF pip install --quiet --break-system-packages --no-build-isolation \
   --no-deps ./src/python
-inside python3 src/python/examples/three_lines.py tools/sample/model by_python
+inside python3 tools/examples/solve_folder.py tools/sample/model by_python
 
 say "The same bits"
 for file in images points3D; do

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "krot/model/database.h"
+#include "krot/database.h"
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model.h"
 #include "krot/model/positions_file.h"
 #include "krot/options/option_table.h"
 #include "krot/report/run_record.h"

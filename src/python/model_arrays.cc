@@ -5,8 +5,8 @@
 
 #include "krot/base/check.h"
 #include "krot/camera/camera_model.h"
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
-#include "krot/model/validate.h"
 
 namespace krot {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <pybind11/numpy.h>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -12,13 +12,12 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "krot/analysis/noise.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/analysis/settle_contradictions.h"
-#include "krot/geometry/transform.h"
+#include "krot/context.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
 #include "krot/model/model_io.h"
-#include "krot/model/validate.h"
 #include "krot/options/option_error.h"
 #include "krot/report/problem_words.h"
 #include "python/bindings.h"
@@ -222,10 +221,11 @@ void BindModel(py::module_* module) {
       .def_property_readonly("translations", &Translations)
       .def_property_readonly("centers", &Centers)
       .def("observations", &Observations)
-      .def("pixel_errors", [](const Model& model) {
-        const std::vector<double> errors = PixelErrors(model);
-        return Collect(errors, [](double error) { return error; });
-      })
+      .def("pixel_errors",
+           [](const Model& model) {
+             const std::vector<double> errors = PixelErrors(model);
+             return Collect(errors, [](double error) { return error; });
+           })
       .def("noise", &Noise, py::kw_only(), py::arg("false_alarm") = 0.05,
            py::arg("relative_sigmas") = std::vector<double>());
 }

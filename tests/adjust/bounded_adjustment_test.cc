@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/multiplier_oracle.h"

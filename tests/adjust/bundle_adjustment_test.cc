@@ -13,10 +13,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
-#include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/adjust/reprojection_errors.h"
 #include "krot/camera/camera_model.h"
 #include "tests/adjust/small_blocks.h"
 

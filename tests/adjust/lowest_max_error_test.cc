@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/synthetic/scene.h"
 

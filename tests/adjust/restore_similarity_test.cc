@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot {

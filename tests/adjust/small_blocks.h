@@ -3,7 +3,7 @@
 #include <random>
 
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot {

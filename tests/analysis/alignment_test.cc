@@ -9,9 +9,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

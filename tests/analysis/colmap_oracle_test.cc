@@ -12,7 +12,7 @@
 #include <unordered_map>
 
 #include "krot/analysis/model_statistics.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/model_io.h"
 
 namespace krot {

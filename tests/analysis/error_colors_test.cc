@@ -8,7 +8,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

@@ -1,4 +1,4 @@
-#include "krot/analysis/model_check.h"
+#include "krot/check.h"
 
 #include <cmath>
 #include <limits>
@@ -11,12 +11,11 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/camera/projection_row.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/pose_checks.h"
 #include "krot/model/remove_observations.h"
-#include "krot/model/validate.h"
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/scene_database.h"
 

@@ -1,4 +1,4 @@
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
-#include "krot/model/validate.h"
+#include "krot/model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

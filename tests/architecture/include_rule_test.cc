@@ -67,7 +67,7 @@ std::string Occurrences(const std::string& folder, const std::string& pattern,
 
 TEST(IncludeRule, EveryFolderOfTheLibraryHasItsPlace) {
   for (const SourceLine& line : SourceLines("src/krot")) {
-    if (line.number > 1) continue;
+    if (line.number > 1 || LibraryFolder(line.file).empty()) continue;
     EXPECT_EQ(DirectDependencies().count(LibraryFolder(line.file)), 1u)
         << line.file << " stands in a folder that the rule does not know";
   }
@@ -81,10 +81,53 @@ TEST(IncludeRule, AFolderIncludesOnlyWhatStandsBelowIt) {
     if (!std::regex_search(line.text, match, own_include)) continue;
     ++num_includes;
     const std::string folder = LibraryFolder(line.file);
+    if (folder.empty()) continue;
     EXPECT_EQ(AllowedFolders(folder).count(match[1]), 1u)
         << line.Place() << ": " << folder << " must not include " << match[1];
   }
   EXPECT_GT(num_includes, 0);
+}
+
+bool IsPublicHeader(const std::filesystem::path& file) {
+  return LibraryFolder(file).empty() && file.extension() == ".h";
+}
+
+TEST(PublicFace, HasAtMostFourteenHeaders) {
+  int num_headers = 1;  // version.h, which is generated
+  for (const SourceLine& line : SourceLines("src/krot")) {
+    if (line.number == 1 && IsPublicHeader(line.file)) ++num_headers;
+  }
+  EXPECT_GT(num_headers, 1);
+  EXPECT_LE(num_headers, 14);
+}
+
+TEST(PublicFace, IncludesNoFolderAndOfOthersEigenAlone) {
+  const std::regex include(R"(^\s*#\s*include\s*([<"][^>"]*[>"]))");
+  const std::regex allowed(R"("krot/[a-z_]+\.h"|<Eigen/[A-Za-z]+>|<[a-z]+>)");
+  int num_includes = 0;
+  for (const SourceLine& line : SourceLines("src/krot")) {
+    std::smatch match;
+    if (!IsPublicHeader(line.file)) continue;
+    if (!std::regex_search(line.text, match, include)) continue;
+    ++num_includes;
+    EXPECT_TRUE(std::regex_match(match[1].str(), allowed))
+        << line.Place() << ": " << match[1];
+  }
+  EXPECT_GT(num_includes, 0);
+}
+
+// docs/cpp.md has a section for each.
+TEST(PublicFace, IsDocumentedHeaderByHeader) {
+  std::ifstream stream(std::filesystem::path(KROT_SOURCE_DIR) / "docs/cpp.md");
+  std::string headings;
+  for (std::string text; std::getline(stream, text);) {
+    if (text.rfind("## ", 0) == 0) headings += text + "\n";
+  }
+  for (const SourceLine& line : SourceLines("src/krot")) {
+    if (line.number > 1 || !IsPublicHeader(line.file)) continue;
+    const std::string header = "`krot/" + line.file.filename().string() + "`";
+    EXPECT_NE(headings.find(header), std::string::npos) << header;
+  }
 }
 
 // Adds the file and all that it includes of the library, directly or not.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <regex>
 #include <stdexcept>
 
@@ -66,7 +67,7 @@ std::vector<SourceLine> CodeLines(const std::string& folder) {
 std::string LibraryFolder(const fs::path& file) {
   auto part = file.begin();
   std::advance(part, 2);  // src, krot
-  return part->string();
+  return std::next(part) == file.end() ? "" : part->string();
 }
 
 std::vector<fs::path> ProjectFiles() {

@@ -4,9 +4,9 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/bridge.h"
 #include "krot/camera/camera_model.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"

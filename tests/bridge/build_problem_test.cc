@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
+#include "krot/model.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 

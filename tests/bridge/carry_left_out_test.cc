@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "tests/bridge/lens_model.h"
 
 namespace krot {

@@ -16,7 +16,7 @@
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/camera_model.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 #include "tests/bridge/pixel_optimum.h"

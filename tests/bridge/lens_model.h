@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/camera/projection_row.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
 
 namespace krot {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "krot/bridge/bridge.h"
+#include "krot/model.h"
 #include "krot/model/model_io.h"
-#include "krot/model/validate.h"
 #include "krot/problem/cost.h"
 #include "tests/bridge/model_difference.h"
 

@@ -6,8 +6,8 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
-#include "krot/model/database.h"
-#include "krot/model/validate.h"
+#include "krot/database.h"
+#include "krot/model.h"
 #include "krot/synthetic/scene_database.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"

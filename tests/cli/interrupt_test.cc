@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 

@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
 

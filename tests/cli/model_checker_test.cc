@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
-#include "krot/model/validate.h"
+#include "krot/model.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"

@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
-#include "krot/model/validate.h"
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
 #include "tests/testing/model_matchers.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
-#include "krot/model/validate.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 

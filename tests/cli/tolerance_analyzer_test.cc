@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 

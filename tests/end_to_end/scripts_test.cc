@@ -10,8 +10,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "krot/analysis/pixel_errors.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/synthetic/random.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"

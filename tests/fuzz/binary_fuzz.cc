@@ -2,8 +2,8 @@
 
 #include <iterator>
 
+#include "krot/context.h"
 #include "krot/model/binary_io.h"
-#include "krot/model/model_error.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot {

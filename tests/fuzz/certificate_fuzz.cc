@@ -5,7 +5,7 @@
 
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_file.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/pipeline/solve_model.h"
 #include "tests/fuzz/fuzz.h"
 

@@ -3,9 +3,8 @@
 
 #include <algorithm>
 
-#include "krot/analysis/pair_check.h"
-#include "krot/model/database.h"
-#include "krot/model/model_error.h"
+#include "krot/database.h"
+#include "krot/model.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/testing/temp_folder.h"
 

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot {

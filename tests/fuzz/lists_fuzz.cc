@@ -1,10 +1,10 @@
 // The lists beside a model: rotations, positions, and what must not move.
 
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model_error.h"
 #include "krot/model/positions_file.h"
 #include "krot/model/rotations_file.h"
-#include "krot/model/validate.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot {

@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <array>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/model_digest.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/binary_io.h"
 #include "krot/model/contradictions.h"
-#include "krot/model/model_error.h"
 #include "krot/model/trivial_rigs.h"
-#include "krot/model/validate.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot {

@@ -9,8 +9,8 @@
 #include <mutex>
 #include <thread>
 
-#include "krot/model/model_error.h"
-#include "krot/model/validate.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/pipeline/solve_model.h"

@@ -3,7 +3,7 @@
 #include <iterator>
 
 #include "krot/base/write_file.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/model/text_io.h"
 #include "tests/fuzz/fuzz.h"
 

@@ -1,4 +1,4 @@
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>

@@ -1,4 +1,4 @@
-#include "krot/math/min_enclosing_ball.h"
+#include "krot/minimax.h"
 
 #include <random>
 #include <vector>

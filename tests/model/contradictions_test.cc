@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/model.h"
 #include "krot/model/model_io.h"
-#include "krot/model/validate.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 

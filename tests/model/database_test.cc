@@ -1,4 +1,4 @@
-#include "krot/model/database.h"
+#include "krot/database.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/model.h"
 #include "krot/model/model_io.h"
-#include "krot/model/validate.h"
 #include "tests/testing/model_matchers.h"
 
 // Models from the wild, if KROT_REAL_MODELS names a folder of them.

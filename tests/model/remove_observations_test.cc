@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
-#include "krot/model/validate.h"
 
 namespace krot {
 namespace {

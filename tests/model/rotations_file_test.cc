@@ -7,8 +7,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/validate.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
 
 namespace krot {

@@ -1,4 +1,4 @@
-#include "krot/model/validate.h"
+#include "krot/model.h"
 
 #include <functional>
 #include <limits>

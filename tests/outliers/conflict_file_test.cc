@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/outliers/conflict.h"
 #include "tests/outliers/outlier_scenes.h"
 

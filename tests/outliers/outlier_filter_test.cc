@@ -8,9 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/conflict_file.h"
-#include "krot/model/validate.h"
+#include "krot/model.h"
 #include "tests/outliers/outlier_scenes.h"
 
 namespace krot {

@@ -5,10 +5,9 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
-#include "krot/model/validate.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/random.h"
 #include "krot/synthetic/scene.h"

@@ -65,7 +65,7 @@ struct Solved {
   CertificateFile certificate;
 };
 
-Solved Solve(const Model& model) {
+Solved RunSolve(const Model& model) {
   SolveModelOptions options;
   options.joint.relative_gap = kGap;
   options.finish.finish = Finish::kNone;
@@ -165,7 +165,7 @@ TEST(FalseCertificates, AreNeverAcceptedAndTrueOnesAre) {
   for (int n = 0; n < NumModels(); ++n) {
     const auto seed = static_cast<uint64_t>(n);
     const Model model = Scene(seed);
-    const Solved solved = Solve(model);
+    const Solved solved = RunSolve(model);
     ASSERT_FALSE(solved.certificate.observations.empty());
     whole.Add(model, solved.certificate, solved.cost);
     for (int k = 0; k < kTamperings; ++k) {
@@ -176,7 +176,7 @@ TEST(FalseCertificates, AreNeverAcceptedAndTrueOnesAre) {
     const Model other = Neighbour(model, seed, &dice);
     CertificateFile file = solved.certificate;
     file.model_sha256 = ModelSha256(other);
-    neighbours.Add(other, file, Solve(other).cost);
+    neighbours.Add(other, file, RunSolve(other).cost);
   }
   std::cout << "| certificates | tried | refused | false, and accepted |\n"
             << "|---|---|---|---|\n";

@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/camera/projection_row.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/bridge/lens_model.h"

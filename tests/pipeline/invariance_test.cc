@@ -7,8 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/analysis/alignment.h"
-#include "krot/analysis/pixel_errors.h"
-#include "krot/model/validate.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 
@@ -34,7 +33,7 @@ Model Scene() {
   return SynthesizeScene(options).model;
 }
 
-SolveModelResult Solve(const Model& model) {
+SolveModelResult RunSolve(const Model& model) {
   SolveModelOptions options;
   options.joint.relative_gap = kGap;
   options.finish.finish = Finish::kNone;
@@ -46,8 +45,8 @@ SolveModelResult Solve(const Model& model) {
 
 // That the two models have the same optimum, up to the unit of a pixel.
 void ExpectSameOptimum(const Model& a, const Model& b, double unit = 1) {
-  const SolveSummary first = Solve(a).summary;
-  const SolveSummary second = Solve(b).summary;
+  const SolveSummary first = RunSolve(a).summary;
+  const SolveSummary second = RunSolve(b).summary;
   EXPECT_NEAR(second.cost_final, unit * first.cost_final,
               kTolerance * unit * first.cost_final);
   EXPECT_NEAR(*second.lower_bound, unit * *first.lower_bound,

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/reprojection.h"
+#include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/problem/cost.h"
 #include "tests/bridge/lens_model.h"

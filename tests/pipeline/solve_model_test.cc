@@ -12,8 +12,8 @@
 
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/camera/projection_row.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/validate.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 #include "krot/synthetic/scene.h"

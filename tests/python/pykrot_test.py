@@ -6,7 +6,9 @@ import gc
 import os
 import signal
 import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pykrot
@@ -312,3 +314,32 @@ def test_goes_to_and_from_what_can_only_read_and_write_files(scene, tmp_path):
     back.write(tmp_path / "back")
     model.write(tmp_path / "model")
     assert_same_files(tmp_path / "back", tmp_path / "model")
+
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "tools" / "examples"
+
+
+def run_example(name, *arguments):
+    run = subprocess.run([sys.executable, str(EXAMPLES / name),
+                          *map(str, arguments)],
+                         capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+def test_the_examples_run(tmp_path):
+    certificate = tmp_path / "certificate.json"
+    by_command = tmp_path / "by_command"
+    run_krot("solver", "--input_path", SAMPLE, "--output_path", by_command,
+             "--certificate_path", certificate)
+
+    assert "none below" in run_example("solve_folder.py", SAMPLE,
+                                       tmp_path / "solved")
+    assert_same_files(tmp_path / "solved", by_command)
+    assert "none below" in run_example("arrays.py")
+    assert "px" in run_example("triangulate_point.py")
+    assert "proved" in run_example("check_certificate.py", SAMPLE, certificate)
+    assert "ended early" in run_example("progress.py", SAMPLE)
+    assert "noise of" in run_example("find_wrong.py", SAMPLE,
+                                     tmp_path / "cured")
+    assert (tmp_path / "cured" / "images.bin").exists()

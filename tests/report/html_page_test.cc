@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/analysis/model_statistics.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/report/html_model_view.h"
 #include "krot/synthetic/scene.h"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/model/validate.h"
+#include "krot/model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/synthetic/scene_geometry.h"
 

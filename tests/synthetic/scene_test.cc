@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "krot/camera/camera_model.h"
+#include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
-#include "krot/model/validate.h"
 #include "tests/synthetic/scene_geometry.h"
 #include "tests/testing/model_matchers.h"
 

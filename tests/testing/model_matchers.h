@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 
 #include "krot/base/write_file.h"
-#include "krot/model/model.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "tests/testing/temp_folder.h"
 
 namespace krot {

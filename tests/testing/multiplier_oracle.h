@@ -11,7 +11,7 @@
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/adjust/ceres_problem.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

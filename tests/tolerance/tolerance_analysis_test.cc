@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/lp_oracle.h"

@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
+#include "krot/model.h"
 #include "krot/model/model_io.h"
-#include "krot/model/validate.h"
 #include "tools/krot/command_error.h"
 
 namespace krot {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "krot/base/write_file.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/krot/command_error.h"
 

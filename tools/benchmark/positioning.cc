@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
+#include "krot/model.h"
 #include "krot/model/model_io.h"
-#include "krot/model/validate.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/rivals/bearing_positions.h"
 #include "tools/krot/command_error.h"

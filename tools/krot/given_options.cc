@@ -9,7 +9,7 @@
 
 #include <boost/program_options.hpp>
 
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/model/text_reader.h"
 #include "krot/options/option_error.h"
 

@@ -16,7 +16,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/checkpoint.h"
 #include "krot/base/write_file.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/options/option_error.h"
 #include "krot/options/option_value.h"
 #include "krot/version.h"

@@ -2,10 +2,10 @@
 #include <vector>
 
 #include "krot/analysis/error_colors.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/write_file.h"
 #include "krot/bridge/certificate_verdict.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/report/certificate_table.h"
 #include "krot/report/model_report.h"
 #include "krot/report/problem_words.h"

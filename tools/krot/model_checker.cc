@@ -3,9 +3,9 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/model_check.h"
 #include "krot/base/timer.h"
-#include "krot/model/database.h"
+#include "krot/check.h"
+#include "krot/database.h"
 #include "krot/outliers/suspect_colors.h"
 #include "krot/report/check_report.h"
 #include "tools/krot/command.h"

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "krot/model.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model.h"
 #include "krot/model/model_io.h"
 #include "krot/model/pose_checks.h"
 #include "krot/model/positions_file.h"

@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "krot/camera/camera_model.h"
-#include "krot/model/database.h"
+#include "krot/database.h"
 #include "krot/report/text_table.h"
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/scene_database.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "krot/base/timer.h"
-#include "krot/model/database.h"
+#include "krot/database.h"
 #include "krot/options/solve_options.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/report/text_table.h"

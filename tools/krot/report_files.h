@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 

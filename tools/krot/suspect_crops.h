@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 #include "tools/krot/log.h"
 

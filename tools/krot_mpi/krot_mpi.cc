@@ -12,7 +12,7 @@
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/write_file.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/options/solver_options.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"
@@ -64,7 +64,7 @@ int RunSharedSolver(const std::vector<std::string>& arguments,
   ResolveCheckpoint(parser, &command.checkpoint);
   command.context.ranks = ranks;
   if (command.options.max_error) {
-    command.context.RequireAlone("Solver.max_error");
+    RequireOneRank(command.context, "Solver.max_error");
   }
   if (!ranks->IsFirst()) command.common.log.level = -1;
 

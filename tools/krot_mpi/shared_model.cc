@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/bridge/model_digest.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 
 namespace krot {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "krot/camera/camera_model.h"
-#include "krot/geometry/transform.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
+#include "krot/geometry.h"
 
 namespace krot {
 namespace {

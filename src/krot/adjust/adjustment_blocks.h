@@ -7,9 +7,9 @@
 
 #include <Eigen/Core>
 
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model.h"
 
 namespace krot {
 

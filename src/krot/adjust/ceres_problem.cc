@@ -15,7 +15,7 @@
 #include "krot/adjust/reprojection_errors.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 namespace krot {
 namespace {

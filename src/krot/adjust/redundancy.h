@@ -6,7 +6,7 @@
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

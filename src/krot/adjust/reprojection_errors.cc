@@ -9,7 +9,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/models.h"
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 namespace krot {
 namespace {

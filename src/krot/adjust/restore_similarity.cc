@@ -6,8 +6,8 @@
 
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/medians.h"
+#include "krot/geometry.h"
 #include "krot/geometry/consensus.h"
-#include "krot/geometry/transform.h"
 
 namespace krot {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "krot/base/numbers.h"
+#include "krot/geometry.h"
 #include "krot/geometry/consensus.h"
-#include "krot/geometry/transform.h"
 
 namespace krot {
 namespace {

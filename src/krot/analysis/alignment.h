@@ -5,17 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "krot/geometry/transform.h"
-#include "krot/model/model.h"
+#include "krot/compare.h"
 
 namespace krot {
-
-// How the coordinates of a second model are taken to those of a first.
-enum class AlignmentKind {
-  kNone,       // as stored
-  kFrame,      // the frame that KROT keeps: see AlignFrames
-  kSimilarity  // least squares on the camera centres: see AlignCenters
-};
 
 // The angle between two rotations, in [0, 180] degrees; exact for small ones.
 double AngleDeg(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
@@ -59,10 +51,5 @@ std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses);
 // by bit, every kind gives the identity to the bit, if it gives anything.
 std::optional<Similarity> Align(AlignmentKind kind,
                                 const std::vector<PosePair>& poses);
-
-// The model in the coordinates world1_from_world2 leads to: poses of frames and
-// images, baselines of rigs, points. Pixels stay where they are. What is not
-// finite stays so; the identity leaves all bits. O(size of the model).
-Model TransformModel(const Model& model, const Similarity& world1_from_world2);
 
 }  // namespace krot

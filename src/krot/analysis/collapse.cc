@@ -82,9 +82,9 @@ class Extent {
   double Relative(const Context& context) const {
     Vector3d size;
     for (int i = 0; i < 3; ++i) {
-      size[i] = context.Max(high_[i]) + context.Max(-low_[i]);
+      size[i] = MaxOfRanks(context, high_[i]) + MaxOfRanks(context, -low_[i]);
     }
-    return size.norm() / -context.Max(-nearest_);
+    return size.norm() / -MaxOfRanks(context, -nearest_);
   }
 
  private:
@@ -122,7 +122,7 @@ Collapse FindCollapse(const Model& before, const Model& after,
     extent_before.Add(origin, then);
     extent_after.Add(point, now);
   }
-  collapse.num_points = context.Sum(collapse.num_points);
+  collapse.num_points = SumOfRanks(context, collapse.num_points);
   if (context.ranks != nullptr) {
     collapse.in_camera = context.ranks->Gather(collapse.in_camera);
     collapse.at_infinity = context.ranks->Gather(collapse.at_infinity);

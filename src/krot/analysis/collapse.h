@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -8,7 +8,7 @@
 #include <Eigen/LU>
 
 #include "krot/camera/camera_model.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "krot/analysis/epipolar_match.h"
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 namespace krot {
 

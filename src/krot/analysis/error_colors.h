@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

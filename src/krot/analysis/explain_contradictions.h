@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "krot/analysis/pair_check.h"
+#include "krot/database.h"
 
 namespace krot {
 

@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "krot/analysis/noise.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

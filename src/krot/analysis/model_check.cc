@@ -1,4 +1,4 @@
-#include "krot/analysis/model_check.h"
+#include "krot/check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include "krot/analysis/image_sums.h"
 #include "krot/analysis/noise.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/numbers.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/remove_observations.h"
 

@@ -214,4 +214,11 @@ std::optional<ComparisonSummary> CompareModels(
   return summary;
 }
 
+std::optional<ComparisonSummary> CompareModels(
+    const Model& model1, const Model& model2,
+    const CompareModelsOptions& options) {
+  return CompareModels(model1, model2, FindCorrespondence(model1, model2),
+                       options);
+}
+
 }  // namespace krot

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

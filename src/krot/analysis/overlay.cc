@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
 
 namespace krot {
 namespace {

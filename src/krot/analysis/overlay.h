@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -1,4 +1,4 @@
-#include "krot/analysis/pair_check.h"
+#include "krot/database.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/numbers.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
+#include "krot/model.h"
 
 namespace krot {
 namespace {

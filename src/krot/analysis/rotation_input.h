@@ -2,8 +2,8 @@
 
 #include <optional>
 
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 #include "krot/model/rotations_file.h"
 
 namespace krot {

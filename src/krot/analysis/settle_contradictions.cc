@@ -7,11 +7,10 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/validate.h"
 
 namespace krot {
 namespace {

@@ -149,13 +149,13 @@ void RunStep(Checkpoint* checkpoint, const Context& context,
              const Compute& compute, const Describe& describe) {
   if (checkpoint == nullptr) return compute();
   std::optional<std::string> record = checkpoint->Next();
-  if (context.Any(record.has_value())) {
+  if (AnyRank(context, record.has_value())) {
     StepValues values(std::move(record).value_or(""), context.ranks);
     describe(&values);
     return values.RequireEnd();
   }
   compute();
-  if (context.Any(context.IsCancelled())) return;
+  if (AnyRank(context, context.IsCancelled())) return;
   StepValues values(context.ranks);
   describe(&values);
   try {

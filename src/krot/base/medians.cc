@@ -43,7 +43,7 @@ std::vector<double> GroupMedians(const std::vector<double>& values,
       if (digits >> kBits != found[group]) continue;
       ++counts[group * kNumDigits + (digits & (kNumDigits - 1))];
     }
-    context.Reduce(std::plus<int64_t>(), &counts);
+    ReduceRanks(context, std::plus<int64_t>(), &counts);
     for (int32_t group = 0; group < num_groups; ++group) {
       const int64_t* count = &counts[group * kNumDigits];
       int64_t& before = num_before[group];

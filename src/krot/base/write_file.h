@@ -3,10 +3,11 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
+
+#include "krot/context.h"
 
 namespace krot {
 
@@ -31,12 +32,6 @@ class FileDescriptor {
 
  private:
   int value_;
-};
-
-// A file or folder that cannot be written; what() is one sentence.
-class WriteError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
 };
 
 // Why nothing can be created in `folder`; no error if something can. It is

@@ -5,29 +5,15 @@
 #include <vector>
 
 #include "krot/base/ranks.h"
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model.h"
 #include "krot/model/positions_file.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/solve.h"
 
 namespace krot {
 
 // Between a COLMAP model and the known rotation problem.
-
-// Why an observation takes no part in the optimisation. It stays in the model.
-enum class LeftOut {
-  kBehind,        // does not see its point, even after re-triangulation
-  kUndistortion,  // neither a projection nor a trustworthy ray
-  kOffAxis,       // never any more; reports keep the name
-  kShortTrack,    // fewer than min_track_length usable observations
-  kNoPose,        // the image has no frame or no finite translation
-  kSameImage,     // its track has a closer one of the same image
-  kFixed,         // neither its image nor its point may move
-};
-inline constexpr int kNumLeftOutReasons = 7;
-// "behind", "undistortion", "off_axis", "short_track", "no_pose", "same_image",
-// "fixed".
-const char* LeftOutName(LeftOut reason);
 
 // What becomes of several observations of one image in the same track, of
 // which one at most is right.

@@ -14,8 +14,8 @@
 #include "krot/bridge/position_rows.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
+#include "krot/context.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
 
 namespace krot {
 namespace {

@@ -8,7 +8,7 @@
 #include "krot/bridge/certificate_json.h"
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/position_rows.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 
 namespace krot {
 namespace {

@@ -3,7 +3,7 @@
 #include <limits>
 #include <utility>
 
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 
 namespace krot {
 namespace {

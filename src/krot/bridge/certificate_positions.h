@@ -6,7 +6,7 @@
 
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/model/positions_file.h"
 
 namespace krot {

@@ -12,7 +12,7 @@
 #include "krot/bridge/certificate_json.h"
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/pixel_certificate.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 #include "krot/problem/subset.h"
 
 namespace krot {

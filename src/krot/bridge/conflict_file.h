@@ -6,8 +6,9 @@
 
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
+#include "krot/certificate.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 
@@ -47,17 +48,6 @@ bool HoldsConflicts(const std::string& json);
 // says nothing about what is proved.
 ConflictFile ParseConflicts(const std::string& json,
                             const std::string& file_name);
-
-// What a file of conflicts proves about a model, judged from the two alone.
-struct ConflictVerdict {
-  bool is_accepted = false;
-  std::string refusal;  // one sentence; empty if accepted
-  // At least so many of the observations must go for all others to be within
-  // max_error; meaningful only if accepted.
-  int64_t num_conflicts = 0;
-  int64_t num_observations = 0;  // of all conflicts
-  double max_error = 0;          // true pixels
-};
 
 // Accepts if the digest of the model agrees, no observation is in two
 // conflicts, and CheckPixelCertificate accepts every one of them with a bound

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

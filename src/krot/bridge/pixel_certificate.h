@@ -9,7 +9,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/proof/certificate_check.h"
 
 namespace krot {

@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 #include "krot/problem/cost.h"
 
 namespace krot {

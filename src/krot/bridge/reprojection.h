@@ -6,7 +6,7 @@
 
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {

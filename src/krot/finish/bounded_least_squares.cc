@@ -168,7 +168,7 @@ class BoundedPath {
         static_cast<int32_t>(problem_.views.size()));
   }
   bool TakeRows(const Estimate& x) {
-    return !options_.take_rows || context_.All(options_.take_rows(x));
+    return !options_.take_rows || AllRanks(context_, options_.take_rows(x));
   }
   // Whether every error is below the cap.
   bool View(State* state) {
@@ -293,8 +293,8 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
   CheckPositive(options.gap_tolerance, "gap_tolerance");
   CheckPositive(options.stationarity_tolerance, "stationarity_tolerance");
   CheckAtLeast(1, options.max_iterations, "max_iterations");
-  const double cost =
-      context.Max(Cost(problem, *estimate, options.norm, context.num_threads));
+  const double cost = MaxOfRanks(
+      context, Cost(problem, *estimate, options.norm, context.num_threads));
   CheckArgument(cost < options.cap, "cost of the start", cost, "below the cap");
   return options.norm.p == 2
              ? Run<DiscCap>(problem, options, context, estimate)

@@ -1,4 +1,4 @@
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 #include <cmath>
 #include <limits>

@@ -90,7 +90,7 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
                                            const IterationReport& report) {
   JointOptions options = options_;
   if (!set_.IsAll()) options.relative_gap *= kShareOfGapForProof;
-  const Context here = context_.Alone();
+  const Context here = WithoutRanks(context_);
   const Estimate start = part.Restrict(place.best);
   const std::vector<int64_t> names = place.InWhole(part);
   CertifiedSolve solve(part.problem(), options, here, start, lower_bound_,
@@ -150,7 +150,7 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
                                                  Estimate* candidate) {
   std::vector<int64_t> observations = set_.Observations();
   num_working_observations_ =
-      context_.Sum(static_cast<int64_t>(observations.size()));
+      SumOfRanks(context_, static_cast<int64_t>(observations.size()));
   do_others_fit_ = true;
   if (context_.ranks != nullptr) return SolveGathered(report, candidate);
   return SolveParts({problem_, estimate_, candidate,
@@ -260,7 +260,7 @@ JointTermination ComponentSolve::SolveOrTake(const IterationReport& report,
 
 JointTermination ComponentSolve::Run(const IterationReport& report) {
   if (IsLowEnough()) return JointTermination::kGapReached;
-  if (context_.Sum(problem_.num_points) <
+  if (SumOfRanks(context_, problem_.num_points) <
       int64_t{kFewPointsPerFrame} * problem_.num_frames) {
     set_.AddAll();
   }

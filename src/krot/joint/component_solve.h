@@ -41,8 +41,8 @@ class ComponentSolve {
 
  private:
   double CostOf(const Estimate& estimate) const {
-    return context_.Max(
-        Cost(problem_, estimate, options_.norm, context_.num_threads));
+    return MaxOfRanks(context_, Cost(problem_, estimate, options_.norm,
+                                     context_.num_threads));
   }
   bool IsGapReached() const {
     return cost_ - lower_bound_ <= options_.relative_gap * cost_ ||

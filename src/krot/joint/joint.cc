@@ -31,14 +31,15 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
   const Timer timer;
   JointSummary summary;
   const auto cost_of = [&](const Estimate& x) {
-    return context.Max(Cost(problem, x, options.norm, context.num_threads));
+    return MaxOfRanks(context,
+                      Cost(problem, x, options.norm, context.num_threads));
   };
   summary.cost_initial = cost_of(*estimate);
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",
                 summary.cost_initial, "finite: all depths positive");
 
   if (context.ranks != nullptr && FindComponents(problem, context).count > 1) {
-    context.RequireAlone("a model in several components");
+    RequireOneRank(context, "a model in several components");
   }
   std::vector<std::vector<int64_t>> components =
       context.ranks == nullptr ? SplitIntoComponents(problem)

@@ -38,7 +38,7 @@ double CoarseMedianDepth(const KnownRotationProblem& problem,
     const double depth = ViewPoint(problem, observation, estimate).depth;
     if (std::isnormal(depth) && depth > 0) ++count[std::ilogb(depth) - kLowest];
   }
-  context.Reduce(std::plus<int64_t>(), &count);
+  ReduceRanks(context, std::plus<int64_t>(), &count);
   int64_t left = std::accumulate(count.begin(), count.end(), int64_t{0}) / 2;
   size_t n = 0;
   while (n + 1 < count.size() && left >= count[n]) left -= count[n++];
@@ -60,8 +60,8 @@ WorkingSet::WorkingSet(const KnownRotationProblem& problem,
       context_(context),
       contains_(problem.num_points, 0),
       takes_(problem.observations.size(), 0),
-      num_observations_of_whole_(
-          context.Sum(static_cast<int64_t>(problem.observations.size()))) {
+      num_observations_of_whole_(SumOfRanks(
+          context, static_cast<int64_t>(problem.observations.size()))) {
   if (context.ranks != nullptr) {
     first_point_ = context.ranks->SumBefore(problem.num_points);
   }
@@ -77,8 +77,8 @@ void WorkingSet::Take(int64_t observation) {
 }
 
 void WorkingSet::CountTaken() {
-  num_points_ = context_.Sum(num_points_here_);
-  num_observations_ = context_.Sum(num_observations_here_);
+  num_points_ = SumOfRanks(context_, num_points_here_);
+  num_observations_ = SumOfRanks(context_, num_observations_here_);
 }
 
 // 0 if there is none.
@@ -145,7 +145,7 @@ void WorkingSet::AddTies(int count) {
   for (const int64_t i : Observations()) {
     ++tied[problem_.views[problem_.observations[i].view].frame];
   }
-  context_.Reduce(std::plus<int64_t>(), &tied);
+  ReduceRanks(context_, std::plus<int64_t>(), &tied);
   std::vector<int32_t> others;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
     const auto begin = takes_.begin() + problem_.point_begin[k];
@@ -195,7 +195,7 @@ double WorkingSet::Cost(const Estimate& estimate, Norm norm) const {
                                                estimate.points[o.point]),
                                      norm));
   }
-  return context_.Max(cost);
+  return MaxOfRanks(context_, cost);
 }
 
 double ShareOfLevel(const KnownRotationProblem& problem,
@@ -251,7 +251,8 @@ bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
                     Estimate* estimate) {
   if (!PlacePoints(problem, norm, context, level, estimate)) return false;
   const auto excess = [&] {
-    return context.Max(Cost(problem, *estimate, norm, context.num_threads)) -
+    return MaxOfRanks(context,
+                      Cost(problem, *estimate, norm, context.num_threads)) -
            highest;
   };
   double left = excess();

@@ -24,7 +24,7 @@ class ObservationLoop {
   ObservationLoop(int64_t count, const Context& context)
       : ObservationLoop(count, context.num_threads) {
     ranks_ = context.ranks;
-    whole_count_ = context.Sum(count);
+    whole_count_ = SumOfRanks(context, count);
     if (ranks_ != nullptr) first_ = ranks_->SumBefore(count);
   }
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "krot/math/min_enclosing_ball.h"
+#include "krot/minimax.h"
 
 namespace krot {
 void FindDescentNormals(const ResidualSet& residuals, const Eigen::Vector3d& x,

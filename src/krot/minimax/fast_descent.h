@@ -2,28 +2,12 @@
 
 #include <vector>
 
+#include "krot/minimax.h"
 #include "krot/minimax/descent_step.h"
 #include "krot/minimax/newton_descent.h"
 #include "krot/minimax/residual_set.h"
 
 namespace krot {
-
-// Which means the Fast Descent Method uses; the optimum sought is the same.
-enum class FastDescentSettings {
-  kPaper,  // Algorithms 2-4 to the letter
-  kFast,   // Newton steps on the active residuals, see newton_descent.h
-};
-
-struct FastDescentOptions {
-  FastDescentSettings settings = FastDescentSettings::kFast;
-  int max_iterations = 100;  // >= 1
-  // The paper's thresholds; without effect on kFast.
-  double stationarity_tolerance = 1e-8;  // eps_0 >= 0, norm of the MEB centre
-  double step_tolerance = 1e-6;          // eps_1 > 0, units of x
-  double slope_probe = 1e-8;             // eps_2 > 0, units of x
-  double active_tolerance = 1e-2;        // in [0, 1), relative to the cost
-  double max_step = 10;                  // > 0, units of x
-};
 
 // Throws std::invalid_argument naming the first field out of range.
 void CheckOptions(const FastDescentOptions& options);

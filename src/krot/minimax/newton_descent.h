@@ -4,29 +4,12 @@
 
 #include <Eigen/Core>
 
+#include "krot/minimax.h"
 #include "krot/minimax/descent_constants.h"
 #include "krot/minimax/local_model.h"
 #include "krot/minimax/residual_set.h"
 
 namespace krot {
-
-enum class DescentTermination {
-  kNotRun,
-  kBehind,      // the start is not feasible: a depth there is not positive
-  kStationary,  // no direction lowers the maximum, up to the tolerance
-  kZeroCost,    // all residuals vanish
-  kLowEnough,   // the start is at the goal's level, or a step sufficed
-  kFarAway,     // a depth reached its limit: the infimum lies at infinity
-  kNoDecrease,  // the best step does not lower the cost: rounding
-  kMaxIterations,
-};
-
-struct DescentSummary {
-  DescentTermination termination = DescentTermination::kNotRun;
-  double cost_initial = 0;
-  double cost = 0;     // <= cost_initial
-  int iterations = 0;  // steps tried
-};
 
 // How far a descent goes. The default is as far as rounding allows.
 struct DescentGoal {

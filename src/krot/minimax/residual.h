@@ -3,26 +3,9 @@
 #include <Eigen/Core>
 
 #include "krot/math/norm.h"
+#include "krot/minimax.h"
 
 namespace krot {
-
-// One residual of problem (1):  r(x) = ||A x + b||_p / (c'x + d)
-// [Zhang18, (2), (3)], on the half-space of positive depth c'x + d.
-struct Residual {
-  Eigen::Matrix<double, 2, 3> A;
-  Eigen::Vector2d b;
-  Eigen::Vector3d c;
-  double d = 0;
-
-  Eigen::Vector2d Numerator(const Eigen::Vector3d& x) const {
-    return A * x + b;
-  }
-  double Depth(const Eigen::Vector3d& x) const { return c.dot(x) + d; }
-};
-
-// r(x); infinity unless the depth is positive.
-double ResidualValue(const Residual& residual, const Eigen::Vector3d& x,
-                     Norm norm);
 
 // A smooth function near x of which r is the maximum: its value, gradient and
 // curvature. For 1 < p < infinity there is one piece, r itself; for p = 1 and

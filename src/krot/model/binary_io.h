@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 
 namespace krot {
 

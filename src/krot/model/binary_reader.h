@@ -6,8 +6,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "krot/context.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model_error.h"
 
 namespace krot {
 

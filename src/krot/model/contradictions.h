@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

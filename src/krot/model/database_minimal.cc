@@ -1,8 +1,8 @@
 // Where there is no SQLite: no database can be read.
 
 #include "krot/base/write_file.h"
-#include "krot/model/database.h"
-#include "krot/model/model_error.h"
+#include "krot/database.h"
+#include "krot/model.h"
 
 namespace krot {
 

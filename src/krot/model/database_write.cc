@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "krot/base/write_file.h"
-#include "krot/model/database.h"
+#include "krot/database.h"
 
 namespace krot {
 namespace {

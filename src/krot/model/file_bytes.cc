@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "krot/base/write_file.h"
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 
 namespace krot {
 namespace {

@@ -1,25 +1,11 @@
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 
 namespace krot {
-
-// What of a model must not move, one mark per frame and per 3D point in the
-// order of its records; empty: nothing of the kind.
-struct FixedParts {
-  std::vector<char> frames;
-  std::vector<char> points3D;
-
-  bool Any() const { return !frames.empty() || !points3D.empty(); }
-  bool HasFrame(int32_t f) const { return !frames.empty() && frames[f] != 0; }
-  bool HasPoint(int32_t k) const {
-    return !points3D.empty() && points3D[k] != 0;
-  }
-};
 
 // The frames of the images that a text file lists, by name or, where no image
 // has such a name, by id; one per line, comments with #. An image may be listed

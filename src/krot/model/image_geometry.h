@@ -5,8 +5,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "krot/geometry/transform.h"
-#include "krot/model/model.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "krot/model.h"
 #include "krot/model/fixed_parts.h"
-#include "krot/model/model.h"
 #include "krot/model/positions_file.h"
 
 namespace krot {

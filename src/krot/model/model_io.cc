@@ -5,9 +5,10 @@
 
 #include "krot/base/folder_swap.h"
 #include "krot/base/write_file.h"
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/binary_io.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model_error.h"
 #include "krot/model/text_io.h"
 #include "krot/model/trivial_rigs.h"
 
@@ -175,6 +176,12 @@ Model ReadModel(const fs::path& folder, ModelFormat format) {
   // one.
   model.stores_rigs = !model.rigs.empty() || !model.frames.empty();
   if (!model.stores_rigs) UseTrivialRigs(&model);
+  return model;
+}
+
+Model ReadModel(const fs::path& folder) {
+  Model model = ReadModel(folder, DetectModelFormat(folder));
+  ValidateModel(model);
   return model;
 }
 

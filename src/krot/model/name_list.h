@@ -7,8 +7,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "krot/model.h"
 #include "krot/model/id_index.h"
-#include "krot/model/model.h"
 #include "krot/model/text_reader.h"
 
 namespace krot {

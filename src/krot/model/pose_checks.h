@@ -7,8 +7,8 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/geometry/transform.h"
-#include "krot/model/model.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "krot/base/numbers.h"
+#include "krot/context.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
 #include "krot/model/name_list.h"
 
 namespace krot {
@@ -33,7 +33,8 @@ Ellipsoid RegionOf(const std::vector<double>& v,
                 std::string(kExpected) +
                     "; --Problem.position_radius gives one to all such lines");
   }
-  Ellipsoid region = Ball({v[0], v[1], v[2]}, v.size() == 3 ? *radius : v[3]);
+  Ellipsoid region =
+      BallAround({v[0], v[1], v[2]}, v.size() == 3 ? *radius : v[3]);
   if (v.size() >= 6) region.semi_axes = {v[3], v[4], v[5]};
   if (v.size() == 10) region.world_from_axes = {v[6], v[7], v[8], v[9]};
   if (!(region.semi_axes.minCoeff() > 0)) {

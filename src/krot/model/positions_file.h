@@ -1,24 +1,12 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "krot/geometry/transform.h"
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 
 namespace krot {
-
-// What is known of where an image was taken, or of where a 3D point is: the
-// projection centre, or the point, is in `region`, in the model's frame and
-// unit.
-struct KnownPosition {
-  enum class Of { kImage, kPoint3D };
-  Of of = Of::kImage;
-  int32_t index = 0;  // in Model::images or Model::points3D
-  Ellipsoid region;
-};
 
 // Whether all is finite and the semi-axes are above zero and not too different
 // for the digits of what is computed with them.

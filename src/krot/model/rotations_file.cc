@@ -10,8 +10,8 @@
 #include <Eigen/Geometry>
 
 #include "krot/base/numbers.h"
+#include "krot/context.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
 #include "krot/model/name_list.h"
 #include "krot/model/pose_checks.h"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 
 namespace krot {
 

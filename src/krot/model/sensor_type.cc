@@ -1,6 +1,6 @@
 #include "krot/model/sensor_type.h"
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 namespace {

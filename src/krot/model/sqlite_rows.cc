@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <system_error>
 
-#include "krot/model/model_error.h"
+#include "krot/model.h"
 
 namespace krot {
 namespace {

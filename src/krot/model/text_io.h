@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "krot/model.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model.h"
 
 namespace krot {
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "krot/base/numbers.h"
+#include "krot/context.h"
 #include "krot/model/file_bytes.h"
-#include "krot/model/model_error.h"
 
 namespace krot {
 

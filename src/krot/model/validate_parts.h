@@ -4,9 +4,9 @@
 #include <sstream>
 #include <string>
 
+#include "krot/context.h"
+#include "krot/model.h"
 #include "krot/model/id_index.h"
-#include "krot/model/model.h"
-#include "krot/model/model_error.h"
 
 namespace krot {
 

@@ -7,7 +7,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/decision.h"
 
 namespace krot {

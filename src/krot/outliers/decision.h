@@ -9,7 +9,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "krot/bridge/bridge.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

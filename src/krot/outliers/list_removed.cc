@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
 namespace krot {

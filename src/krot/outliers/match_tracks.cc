@@ -11,7 +11,6 @@
 #include <Eigen/Geometry>
 
 #include "krot/analysis/epipolar_match.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/analysis/track_noise.h"
 #include "krot/base/check.h"
 #include "krot/base/disjoint_sets.h"
@@ -19,8 +18,8 @@
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/point_repair.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/model_error.h"
 #include "krot/model/remove_observations.h"
 #include "krot/outliers/robust_points.h"
 #include "krot/pipeline/solve_model.h"

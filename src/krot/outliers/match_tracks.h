@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "krot/base/context.h"
-#include "krot/model/database.h"
-#include "krot/model/model.h"
+#include "krot/database.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
 #include "krot/bridge/conflict_file.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
+#include "krot/outliers.h"
 #include "krot/outliers/error_profile.h"
 #include "krot/outliers/rotation_suspect.h"
 #include "krot/pipeline/solve_model.h"
@@ -19,12 +19,6 @@ namespace krot {
 // Removes observations until all others are within a bound, and proves how many
 // had to go: what `krot outlier_filter`, and `krot solver` where not everything
 // is to stay, do between reading and writing.
-
-enum class OutlierMethod {
-  kConflicts,  // few, and a proof of how many at least
-  kThreshold,  // what is above the bound, solve, again: to compare with
-  kSnooping,   // no bound: what noise does not explain (krot/analysis/noise.h)
-};
 
 struct OutlierFilterOptions {
   OutlierMethod method = OutlierMethod::kConflicts;
@@ -43,43 +37,6 @@ struct OutlierFilterOptions {
 
   // Called before the last solve, of what is left; may be empty.
   std::function<void(int64_t num_removed)> on_removed;
-};
-
-struct RemovedObservation {
-  ImageId image_id = 0;
-  std::string image_name;
-  uint32_t point2D_idx = 0;
-  Point3DId point3D_id = 0;
-  double error_before_px = 0;  // in the input; NaN where there is none
-  // Of the result's camera and point; NaN where there is none, as where the
-  // point went.
-  double error_after_px = 0;
-  std::optional<int64_t> conflict;  // that it is in, from 0
-  std::optional<double> w;  // kSnooping: as it was removed; infinite: not seen
-};
-
-// A track or an image that removed observations or conflicts gather in.
-struct Suspect {
-  uint64_t id = 0;
-  std::string name;  // of an image
-  int64_t num_observations = 0;
-  int64_t num_removed = 0;
-  int64_t num_conflicts = 0;  // that it takes part in
-};
-
-// error_profile.h, in numbers.
-struct ErrorProfileSummary {
-  struct Level {
-    int64_t num_removed = 0;
-    double max_error = 0;  // of all others, true pixels
-    std::optional<double> lower_bound;
-    int64_t num_proved = 0;
-    std::vector<uint64_t> point_ids;  // that lose observations; ascending
-  };
-
-  std::vector<Level> levels;
-  std::optional<size_t> elbow;
-  double seconds = 0;  // wall clock
 };
 
 // The noise of the model, and what it does not explain.

@@ -7,7 +7,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/decision.h"
 #include "krot/outliers/near_set.h"
 

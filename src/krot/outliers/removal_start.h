@@ -2,7 +2,7 @@
 
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
 namespace krot {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
 namespace krot {

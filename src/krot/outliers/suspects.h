@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
 namespace krot {

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/solve_model.h"
 

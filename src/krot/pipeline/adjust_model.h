@@ -3,9 +3,8 @@
 #include <optional>
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {

@@ -22,7 +22,7 @@ void CertifyShared(const Model& model, const BuiltProblem& built,
   if (!ranks.IsFirst()) return;
   certificate.rows = support.FromWhole(std::move(certificate.rows));
   Certify(support.model, support.built, support.estimate, options,
-          context.Alone(), std::move(certificate), summary);
+          WithoutRanks(context), std::move(certificate), summary);
 }
 
 }  // namespace

@@ -157,7 +157,7 @@ std::optional<PixelCertificate> ProveSharedRows(
     Norm norm, const RowsCertificate& rows, double sufficient,
     const Context& context) {
   Ranks& ranks = *context.ranks;
-  const Context here = context.Alone();
+  const Context here = WithoutRanks(context);
   const std::vector<int64_t>& observation_of = rows.observation_of;
   const auto num_rows = static_cast<int64_t>(
       observation_of.empty() ? built.problem.observations.size()

@@ -8,7 +8,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/round_bounds.h"
 #include "krot/pipeline/solve_model.h"
 

@@ -1,10 +1,9 @@
 #pragma once
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
 #include "krot/finish/bounded_least_squares.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -66,20 +66,21 @@ class Rounds {
 
  private:
   double TrueCost(const Estimate& estimate) const {
-    return context_.Max(
-        reprojection_.TrueCost(estimate, options_.norm, context_.num_threads));
+    return MaxOfRanks(context_, reprojection_.TrueCost(estimate, options_.norm,
+                                                       context_.num_threads));
   }
   double LevelledCost(const Estimate& estimate) const {
-    return context_.Max(reprojection_.LevelledCost(estimate, options_.norm,
-                                                   context_.num_threads));
+    return MaxOfRanks(context_,
+                      reprojection_.LevelledCost(estimate, options_.norm,
+                                                 context_.num_threads));
   }
   double PixelCost() const {
     return positions_.Any() ? TrueCost(estimate_) : cost_;
   }
   double RowsCost(const KnownRotationProblem& rows,
                   const Estimate& estimate) const {
-    return context_.Max(
-        Cost(rows, estimate, options_.norm, context_.num_threads));
+    return MaxOfRanks(
+        context_, Cost(rows, estimate, options_.norm, context_.num_threads));
   }
   // Of what would be the result.
   double ReachedCost() const {
@@ -174,7 +175,7 @@ bool Rounds::RunOne() {
   const KnownRotationProblem& rows = built_.problem;
   std::optional<KnownRotationProblem> bounded;
   std::vector<int64_t> observation_of;
-  const bool is_bounded = context_.Any(!trust_.IsEmpty());
+  const bool is_bounded = AnyRank(context_, !trust_.IsEmpty());
   if (is_bounded) {
     bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
   }
@@ -222,7 +223,8 @@ bool Rounds::RunOne() {
   cost_ = LevelledCost(estimate_);
   int64_t num_bounded = 0;
   if (round.step < 1) {
-    num_bounded = context_.Sum(
+    num_bounded = SumOfRanks(
+        context_,
         trust_.Shrink(reprojection_, rows, from, solved, options_.norm,
                       (1 + kKeptPromise) * round.linear_cost));
   } else {

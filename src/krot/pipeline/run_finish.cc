@@ -79,7 +79,8 @@ void FinishByLeastSquares(const Reprojection& reprojection,
         values->Value(&finish.solve);
         NameValues(values, &finished);
       });
-  const double cost = context.Max(
+  const double cost = MaxOfRanks(
+      context,
       reprojection.TrueCost(finished, options.norm, context.num_threads));
   if (cost <= finish.cap &&
       LargestPositionRatio(*built, finished) <= 1 + kKeptPosition) {
@@ -102,10 +103,12 @@ void FinishBySweeps(const Reprojection& reprojection,
                       options.norm, context);
     blocks.IntersectPoints(&swept);
     blocks.ResectFrames(&swept);
-    const double rows_cost = context.Max(
+    const double rows_cost = MaxOfRanks(
+        context,
         Cost(built->problem, swept, options.norm, context.num_threads));
     if (context.IsCancelled() || !(rows_cost <= highest)) return;
-    const double cost = context.Max(
+    const double cost = MaxOfRanks(
+        context,
         reprojection.TrueCost(swept, options.norm, context.num_threads));
     if (!(cost <= highest)) return;
     *estimate = std::move(swept);
@@ -143,7 +146,8 @@ double SumOfLosses(const Reprojection& reprojection,
                    const KnownRotationProblem& problem, const ErrorLoss& loss,
                    const Estimate& estimate, const Context& context) {
   std::vector<double> sum = {0};
-  context.InTurn(
+  InTurnOfRanks(
+      context,
       [&](std::vector<double>* of_whole) {
         for (size_t n = 0; n < problem.observations.size(); ++n) {
           const auto i = static_cast<int64_t>(n);

@@ -55,8 +55,8 @@ class Schedule {
         timer_(timer),
         estimate_(*estimate),
         summary_(*summary),
-        cost_(context.Max(
-            Cost(problem, *estimate, options.norm, context.num_threads))) {}
+        cost_(MaxOfRanks(context, Cost(problem, *estimate, options.norm,
+                                       context.num_threads))) {}
 
   void Sweeps(ResIntOptions res_int);
   void LeadingSweeps();

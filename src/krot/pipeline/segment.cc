@@ -20,8 +20,8 @@ Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
                        const Estimate& to, Norm norm, const Context& context,
                        double* step) {
   const auto cost_of = [&](const Estimate& estimate) {
-    return context.Max(
-        reprojection.LevelledCost(estimate, norm, context.num_threads));
+    return MaxOfRanks(context, reprojection.LevelledCost(estimate, norm,
+                                                         context.num_threads));
   };
   Estimate best = from;
   double best_cost = cost_of(from);

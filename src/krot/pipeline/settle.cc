@@ -45,8 +45,8 @@ double Settling::Squared(int64_t i, double level) const {
 // The noise's variance per axis: a Gaussian's median error is sqrt(2 ln 2)
 // times its deviation, and what is fitted to it takes its share.
 void Settling::Measure() {
-  level_ = context_.Max(
-      reprojection_.TrueCost(estimate_, options_.norm, context_.num_threads));
+  level_ = MaxOfRanks(context_, reprojection_.TrueCost(estimate_, options_.norm,
+                                                       context_.num_threads));
   squared_.assign(problem_.observations.size(), -1);
   ParallelFor(static_cast<int64_t>(squared_.size()), kObservationsAtATime,
               context_.num_threads, [&](int64_t begin, int64_t end, int) {
@@ -56,10 +56,10 @@ void Settling::Measure() {
                 }
               });
   const auto num_errors =
-      static_cast<double>(2 * context_.Sum(built_.NumPixels()));
+      static_cast<double>(2 * SumOfRanks(context_, built_.NumPixels()));
   const auto num_unknowns = static_cast<double>(
       3 * (static_cast<int64_t>(built_.frame_of.size()) +
-           context_.Sum(static_cast<int64_t>(built_.point_of.size()))));
+           SumOfRanks(context_, static_cast<int64_t>(built_.point_of.size()))));
   const double share_left =
       std::max(1.0, num_errors - num_unknowns) / num_errors;
   const double noise =
@@ -152,12 +152,13 @@ void Settling::SettlePoints() {
 
 LooseParts Settling::Describe() const {
   LooseParts parts;
-  parts.have_moved = context_.Any(
-      has_moved_frame_ || std::count(has_moved_point_.begin(),
-                                     has_moved_point_.end(), char{1}) > 0);
+  parts.have_moved =
+      AnyRank(context_, has_moved_frame_ ||
+                            std::count(has_moved_point_.begin(),
+                                       has_moved_point_.end(), char{1}) > 0);
   std::vector<int64_t> num_observations(problem_.views.size(), 0);
   for (const Observation& o : problem_.observations) ++num_observations[o.view];
-  context_.Reduce(std::plus<int64_t>(), &num_observations);
+  ReduceRanks(context_, std::plus<int64_t>(), &num_observations);
   for (size_t v = 0; v < built_.image_of.size(); ++v) {
     const int32_t f = problem_.views[v].frame;
     const bool is_loose = is_loose_frame_[f] != 0;

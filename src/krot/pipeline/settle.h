@@ -7,23 +7,13 @@
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
+#include "krot/solve.h"
 
 namespace krot {
 
 // Images and points that do not hold their place (docs/method/positions.md,
 // "What is not determined").
-
-struct LooseImage {
-  ImageId image_id = 0;
-  std::string image_name;
-  int64_t num_observations = 0;  // in the optimisation
-  // Whether its observations say where it stands: then it is a runaway, which
-  // has moved from among the others or to them. If not, it might as well stand
-  // farther off by the distance at which cameras typically see.
-  bool is_determined = false;
-  double moved = 0;  // from where the input has it, scene units
-};
 
 // A point of which its observations do not say whether it is in the scene or
 // infinitely far away.

@@ -113,7 +113,8 @@ template <typename Sum, typename AddTo>
 std::vector<Sum> Settling::SumsOf(const std::vector<int32_t>& frames,
                                   const Sum& zero, const AddTo& add_to) const {
   std::vector<Sum> sums(frames.size(), zero);
-  context_.InTurn(
+  InTurnOfRanks(
+      context_,
       [&](std::vector<Sum>* of_whole) {
         ParallelFor(static_cast<int64_t>(frames.size()), /*chunk_size=*/1,
                     context_.num_threads, [&](int64_t n, int64_t, int) {

@@ -37,13 +37,14 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kShareOfStart = 0.99;
 
 void CheckOptions(const SolveModelOptions& options, const Context& context) {
-  if (options.problem.fixed.Any()) context.RequireAlone("what must not move");
+  if (options.problem.fixed.Any())
+    RequireOneRank(context, "what must not move");
   if (!options.problem.positions.empty()) {
-    context.RequireAlone("what keeps positions");
+    RequireOneRank(context, "what keeps positions");
   }
-  if (options.polish != Polish::kNone) context.RequireAlone("a polish");
+  if (options.polish != Polish::kNone) RequireOneRank(context, "a polish");
   if (options.problem.same_image == SameImage::kClosest) {
-    context.RequireAlone("--Problem.same_image closest");
+    RequireOneRank(context, "--Problem.same_image closest");
   }
   CheckArgument(options.norm.p >= 1, "norm.p", options.norm.p, ">= 1");
   CheckArgument(options.init_max_error > 0, "init_max_error",
@@ -73,8 +74,8 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->num_frames = static_cast<int64_t>(built.frame_of.size());
   summary->num_images = static_cast<int64_t>(built.image_of.size());
   summary->num_points =
-      context.Sum(static_cast<int64_t>(built.point_of.size()));
-  summary->num_observations = context.Sum(built.NumPixels());
+      SumOfRanks(context, static_cast<int64_t>(built.point_of.size()));
+  summary->num_observations = SumOfRanks(context, built.NumPixels());
   summary->num_positions = static_cast<int64_t>(built.positions.size());
   summary->num_components = FindComponents(problem, context).count;
   for (int32_t f = 0; f < summary->num_frames; ++f) {
@@ -84,11 +85,12 @@ void CountProblem(const Model& model, const BuiltProblem& built,
     summary->num_fixed_points += problem.IsFixedPoint(static_cast<int32_t>(k));
   }
   for (size_t n = 0; n < built.left_out.size(); ++n) {
-    summary->left_out[n] = context.Sum(built.left_out[n]);
+    summary->left_out[n] = SumOfRanks(context, built.left_out[n]);
   }
   summary->num_retriangulated_points =
-      context.Sum(built.num_retriangulated_points);
-  summary->num_same_image_tracks = context.Sum(built.num_same_image_tracks);
+      SumOfRanks(context, built.num_retriangulated_points);
+  summary->num_same_image_tracks =
+      SumOfRanks(context, built.num_same_image_tracks);
   if (context.ranks != nullptr) return;
   summary->needed_bytes = EstimateSolveMemory(model, built, *summary, context);
 }
@@ -178,7 +180,7 @@ double LargestOf(Role role, const std::vector<Role>& roles,
     largest = std::max(largest,
                        std::isfinite(errors_px[e]) ? errors_px[e] : kInfinity);
   }
-  return context.Max(largest);
+  return MaxOfRanks(context, largest);
 }
 
 // The errors that count: twins that were left out are wrong by assumption.
@@ -201,13 +203,13 @@ bool IsWorse(const std::vector<double>& errors_before_px,
   for (const double error : errors_before_px) {
     if (std::isfinite(error)) largest = std::max(largest, error);
   }
-  largest = context.Max(largest) * (1 + kErrorRounding);
+  largest = MaxOfRanks(context, largest) * (1 + kErrorRounding);
   bool is_worse = false;
   for (size_t i = 0; i < errors_before_px.size(); ++i) {
     is_worse |=
         std::isfinite(errors_before_px[i]) && !(errors_after_px[i] <= largest);
   }
-  return context.Any(is_worse);
+  return AnyRank(context, is_worse);
 }
 
 // Whether the observations are no more numbers than those that they are to
@@ -296,8 +298,8 @@ SolveModelResult SolveInFrame(const Model& model,
                       estimate, context);
     }
   }
-  const double level =
-      context.Max(reprojection.TrueCost(estimate, options.norm, num_threads));
+  const double level = MaxOfRanks(
+      context, reprojection.TrueCost(estimate, options.norm, num_threads));
   result.model = ApplyEstimate(model, start.built, estimate);
   const std::vector<double> before_px =
       PixelErrors(model, num_threads, options.norm);

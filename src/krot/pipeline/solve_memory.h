@@ -4,7 +4,7 @@
 
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {

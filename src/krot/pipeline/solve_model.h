@@ -9,16 +9,16 @@
 #include <vector>
 
 #include "krot/analysis/collapse.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/certificate_file.h"
 #include "krot/bridge/certificate_support.h"
 #include "krot/joint/joint.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/finish.h"
 #include "krot/pipeline/polish.h"
 #include "krot/pipeline/settle.h"
+#include "krot/solve.h"
 #include "krot/sweeps/res_int.h"
 
 namespace krot {
@@ -26,35 +26,6 @@ namespace krot {
 // From a COLMAP model to a COLMAP model with a smaller largest reprojection
 // error: what `krot solver` and `krot point_triangulator` do between reading
 // and writing.
-
-enum class SolveMethod {
-  kAuto,    // sweeps while they pay, the joint solver, the finish
-  kResInt,  // sweeps alone: no bound
-  kJoint,   // the joint solver alone
-};
-
-enum class SolveInit {
-  kModel,     // the model's own translations and points
-  kFeasible,  // from nothing but rotations and rays
-};
-
-enum class SolveTermination {
-  kNotRun,
-  kNothingToSolve,  // every observation was left out
-  kGapReached,      // a certificate shows the relative gap asked for
-  kZeroCost,        // every residual is zero up to rounding: no gap is needed
-  // No further progress. Sweeps alone know no bound; of the joint solver's
-  // estimates one within 1 % is proved.
-  kStalled,
-  kUnproved,  // no further progress, and no bound within 1 %: a lower maximum
-              // may well exist
-  kMaxSweeps,
-  kMaxIterations,
-  kInfeasible,   // proved: no estimate below init_max_error
-  kNoStart,      // no estimate below init_max_error was found
-  kCollapsed,    // most points fell together (Collapse::IsWhole)
-  kInterrupted,  // the estimate is the best so far
-};
 
 // A solve of the linear rows, and the step that was taken from it.
 struct Round {

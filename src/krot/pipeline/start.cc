@@ -5,7 +5,7 @@
 
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 #include "krot/joint/initializer.h"
 #include "krot/joint/step_values.h"
 
@@ -15,7 +15,8 @@ namespace {
 constexpr char kStartFromNothing[] = "a start from nothing";
 
 int64_t NumObservations(const BuiltProblem& built, const Context& context) {
-  return context.Sum(static_cast<int64_t>(built.problem.observations.size()));
+  return SumOfRanks(context,
+                    static_cast<int64_t>(built.problem.observations.size()));
 }
 
 // Whether all frames see the points from the same place, as in a model whose
@@ -74,7 +75,7 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
                   SolveMethod method, const Context& context) {
   Start own = OwnStart(model, options, context);
   const auto count = [&](LeftOut reason) {
-    return context.Sum(own.built.left_out[static_cast<size_t>(reason)]);
+    return SumOfRanks(context, own.built.left_out[static_cast<size_t>(reason)]);
   };
   const bool coincide = CentresCoincide(own.built);
   const bool asked = options.init == SolveInit::kFeasible;
@@ -84,7 +85,7 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
       count(LeftOut::kNoPose) == 0) {
     return own;
   }
-  if (asked) context.RequireAlone(kStartFromNothing);
+  if (asked) RequireOneRank(context, kStartFromNothing);
 
   Start all{Build(model, options, context, /*ignore_translations=*/true),
             SolveInit::kFeasible};
@@ -108,7 +109,7 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
     }
     return own;
   }
-  context.RequireAlone(kStartFromNothing);
+  RequireOneRank(context, kStartFromNothing);
   context.Note(is_larger ? "the model's translations and points leave out " +
                                std::to_string(num_missing) +
                                " observations; looking for a start that has "
@@ -121,7 +122,7 @@ Start ChooseStart(const Model& model, const SolveModelOptions& options,
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
                              const SolveModelOptions& options,
                              const Context& context, const JointCallback& log) {
-  context.RequireAlone(kStartFromNothing);
+  RequireOneRank(context, kStartFromNothing);
   InitializerOptions initializer;
   initializer.norm = options.norm;
   initializer.max_error = options.init_max_error;

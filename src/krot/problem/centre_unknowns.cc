@@ -19,7 +19,7 @@ BlockStructure AnchoredStructure(const KnownRotationProblem& problem,
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     count.push_back(problem.frame_begin[f + 1] - problem.frame_begin[f]);
   }
-  context.Reduce(std::plus<int64_t>(), &count);
+  ReduceRanks(context, std::plus<int64_t>(), &count);
   const Components components = FindComponents(problem, context);
   std::vector<char> is_held(components.count, 0);
   if (!problem.fixed_points.empty()) {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 namespace krot {
 namespace {
@@ -12,7 +12,8 @@ namespace {
 std::vector<int32_t> SeenViews(const KnownRotationProblem& problem,
                                const Context& context) {
   std::vector<int32_t> seen;
-  context.InTurn(
+  InTurnOfRanks(
+      context,
       [&](std::vector<int32_t>* views) {
         std::vector<char> is_seen(problem.views.size(), 0);
         for (const int32_t view : *views) is_seen[view] = 1;

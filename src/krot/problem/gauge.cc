@@ -289,7 +289,7 @@ void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
   Estimate moved = *estimate;
   RestoreGauge(problem, reference, &moved, context, held);
   const auto cost = [&](const Estimate& x) {
-    return context.Max(Cost(problem, x, norm, context.num_threads));
+    return MaxOfRanks(context, Cost(problem, x, norm, context.num_threads));
   };
   if (cost(moved) <= (1 + kHarmless) * cost(*estimate)) {
     *estimate = std::move(moved);

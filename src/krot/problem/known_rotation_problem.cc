@@ -6,7 +6,7 @@
 #include <string>
 
 #include "krot/base/check.h"
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 
 namespace krot {
 namespace {

@@ -1,6 +1,6 @@
 #include "krot/proof/pull.h"
 
-#include "krot/geometry/transform.h"
+#include "krot/geometry.h"
 #include "krot/problem/cost.h"
 
 namespace krot {

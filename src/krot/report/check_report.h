@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/model_check.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/check.h"
+#include "krot/model.h"
 #include "krot/report/run_record.h"
 
 namespace krot {

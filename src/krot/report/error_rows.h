@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/report/text_table.h"
 
 namespace krot {

@@ -7,9 +7,9 @@
 #include <unordered_map>
 
 #include "krot/analysis/model_statistics.h"
-#include "krot/analysis/pixel_errors.h"
 #include "krot/base/check.h"
 #include "krot/camera/camera_model.h"
+#include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/report/html_base64.h"
 #include "krot/report/html_error_curves.h"

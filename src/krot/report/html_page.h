@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

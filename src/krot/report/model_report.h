@@ -9,9 +9,8 @@
 #include "krot/analysis/geometry_statistics.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/model/contradictions.h"
-#include "krot/model/model.h"
 #include "krot/model/pose_checks.h"
 
 namespace krot {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/analysis/pair_check.h"
+#include "krot/database.h"
 #include "krot/report/report_json.h"
 
 namespace krot {

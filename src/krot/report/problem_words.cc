@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "krot/model/model_error.h"
+#include "krot/context.h"
 
 namespace krot {
 namespace {

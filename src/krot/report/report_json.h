@@ -6,9 +6,9 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
-#include "krot/analysis/pixel_errors.h"
 #include "krot/analysis/rotation_input.h"
 #include "krot/bridge/certificate_verdict.h"
+#include "krot/model.h"
 #include "krot/model/contradictions.h"
 #include "krot/model/pose_checks.h"
 #include "krot/report/problem_words.h"

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/report/run_record.h"
 #include "krot/tolerance/tolerance_analysis.h"
 

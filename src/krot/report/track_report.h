@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "krot/analysis/pixel_errors.h"
+#include "krot/model.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/report/run_record.h"
 

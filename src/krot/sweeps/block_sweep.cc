@@ -139,11 +139,12 @@ BlockSweep::Worker* BlockSweep::WorkerOf(int worker) {
 
 double BlockSweep::IntersectPoints(Estimate* estimate) {
   cameras_ = CamerasFromWorld(problem_, estimate->translations);
-  return context_.Max(LargestOver(problem_.num_points, kPointsPerChunk,
-                                  [&](int64_t begin, int64_t end, int worker) {
-                                    return IntersectPoints(begin, end, worker,
-                                                           estimate);
-                                  }));
+  return MaxOfRanks(context_,
+                    LargestOver(problem_.num_points, kPointsPerChunk,
+                                [&](int64_t begin, int64_t end, int worker) {
+                                  return IntersectPoints(begin, end, worker,
+                                                         estimate);
+                                }));
 }
 
 double BlockSweep::ResectFrames(Estimate* estimate) {
@@ -164,13 +165,13 @@ double BlockSweep::ResectShare(Estimate* estimate) {
   if (!frame_share_) {
     frame_share_ = std::make_unique<FrameShare>(problem_, context_.ranks);
     frame_blocks_ = std::make_unique<BlockSweep>(
-        frame_share_->problem(), options_, norm_, context_.Alone());
+        frame_share_->problem(), options_, norm_, WithoutRanks(context_));
   }
   Estimate share = frame_share_->Receive(*estimate);
   frame_blocks_->SetGoal(goal_);
   const double cost = frame_blocks_->ResectFrames(&share);
   frame_share_->Publish(share, estimate);
-  return context_.Max(cost);
+  return MaxOfRanks(context_, cost);
 }
 
 // The largest of the values that `minimize` returns for the chunks of blocks.

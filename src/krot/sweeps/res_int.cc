@@ -54,8 +54,8 @@ class Momentum {
     double beta = improvements_ / (improvements_ + 3.0);
     for (int halving = 0; halving < kMaxHalvings; ++halving, beta /= 2) {
       Estimate start = Between(best_, previous_, -beta);
-      if (context_.All(
-              AllDepthsPositive(problem_, start, context_.num_threads))) {
+      if (AllRanks(context_,
+                   AllDepthsPositive(problem_, start, context_.num_threads))) {
         return start;
       }
     }
@@ -105,7 +105,8 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   const int patience = literal ? 1 : options.patience;
   ResIntSummary summary;
   const auto cost_of = [&](const Estimate& x) {
-    return context.Max(Cost(problem, x, options.norm, context.num_threads));
+    return MaxOfRanks(context,
+                      Cost(problem, x, options.norm, context.num_threads));
   };
   summary.cost_initial = cost_of(*estimate);
   CheckArgument(std::isfinite(summary.cost_initial), "cost of the start",

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 
 namespace krot {
 

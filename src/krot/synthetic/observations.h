@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/synthetic/random.h"
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/structure.h"

@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "krot/geometry/transform.h"
-#include "krot/model/model.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
 
 namespace krot {
 

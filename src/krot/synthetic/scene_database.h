@@ -1,7 +1,7 @@
 #pragma once
 
-#include "krot/model/database.h"
-#include "krot/model/model.h"
+#include "krot/database.h"
+#include "krot/model.h"
 
 namespace krot {
 

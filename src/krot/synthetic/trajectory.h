@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/synthetic/random.h"
 #include "krot/synthetic/scene.h"
 

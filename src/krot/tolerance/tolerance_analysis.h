@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/tolerance/box_search.h"
+#include "krot/tolerances.h"
 
 namespace krot {
 
@@ -36,26 +37,6 @@ struct ToleranceOptions {
   // with the number of boxes so far. May be empty; must be safe to call from
   // several threads.
   std::function<void(int64_t num_boxes)> on_box;
-};
-
-enum class ToleranceTermination {
-  kNotRun,
-  kNothingToSolve,  // every observation was left out
-  kNoEstimate,      // none was found whose errors are within the bound
-  kDone,
-  kInterrupted,
-};
-
-// The box in which an image's centre or a point may be.
-struct ToleranceBox {
-  bool is_image = false;
-  uint64_t id = 0;
-  std::string name;                                    // of an image
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in the resulting model
-  // It has no box: it takes no part in the optimisation, or is not connected to
-  // what holds place and scale.
-  bool is_free = false;
-  PositionBox box;
 };
 
 // How well the proved ends agree with the reached ones.

@@ -7,7 +7,7 @@
 #include "krot/base/context.h"
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
-#include "krot/model/model.h"
+#include "krot/model.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/tolerance/extent.h"

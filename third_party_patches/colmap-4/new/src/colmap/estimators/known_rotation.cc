@@ -16,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include <krot/analysis/model_check.h>
 #include <krot/bridge/conflict_file.h>
+#include <krot/check.h>
 #include <krot/outliers/outlier_filter.h>
 #include <krot/outliers/tolerant_solve.h>
 #include <krot/report/check_report.h>
@@ -147,10 +147,8 @@ bool CanBePositioned(const GlobalPositionerOptions& options,
   return true;
 }
 
-void LogImages(const krot::ModelCheck& check,
-               const krot::ImageVerdict verdict,
-               const char* what,
-               const int max_num) {
+void LogImages(const krot::ModelCheck& check, const krot::ImageVerdict verdict,
+               const char* what, const int max_num) {
   int num_logged = 0;
   for (const krot::ImageCheck& image : check.images) {
     if (image.verdict != verdict || num_logged == max_num) continue;
@@ -192,8 +190,7 @@ bool SolveKnownRotation(const KnownRotationOptions& options,
   solve_options.solve.finish.finish = ToKrotFinish(options.finish);
   if (options.max_error > 0) solve_options.max_error = options.max_error;
   krot::TolerantSolveResult result;
-  if (!RunStoppable(options.num_threads,
-                    options.check_if_stopped,
+  if (!RunStoppable(options.num_threads, options.check_if_stopped,
                     [&](const krot::Context& context) {
                       result = krot::SolveTolerantly(
                           ToKrotModel(reconstruction), solve_options, context);
@@ -218,11 +215,10 @@ bool FilterOutliers(const OutlierFilterOptions& options,
   filter_options.max_error = options.max_error;
   filter_options.find_conflicts = options.prove;
   krot::OutlierFilterResult result;
-  if (!RunStoppable(options.num_threads,
-                    options.check_if_stopped,
+  if (!RunStoppable(options.num_threads, options.check_if_stopped,
                     [&](const krot::Context& context) {
-                      result = krot::FilterOutliers(
-                          ToKrotModel(reconstruction), filter_options, context);
+                      result = krot::FilterOutliers(ToKrotModel(reconstruction),
+                                                    filter_options, context);
                     })) {
     return false;
   }
@@ -248,14 +244,14 @@ ModelCheckerSummary CheckReconstruction(const ModelCheckerOptions& options,
   krot::CheckReport report;
   krot::Model model;
   krot::Model cured;
-  if (!RunStoppable(
-          options.num_threads, nullptr, [&](const krot::Context& context) {
-            model = ToKrotModel(reconstruction);
-            report.check = krot::CheckModel(model, {}, context);
-            if (report.check.sigma_px) {
-              cured = krot::CureModel(model, report.check, context);
-            }
-          })) {
+  if (!RunStoppable(options.num_threads, nullptr,
+                    [&](const krot::Context& context) {
+                      model = ToKrotModel(reconstruction);
+                      report.check = krot::CheckModel(model, {}, context);
+                      if (report.check.sigma_px) {
+                        cured = krot::CureModel(model, report.check, context);
+                      }
+                    })) {
     return summary;
   }
   report.num_observations = static_cast<int64_t>(model.track_elements.size());
@@ -263,9 +259,7 @@ ModelCheckerSummary CheckReconstruction(const ModelCheckerOptions& options,
   LOG(INFO) << krot::CheckSentence(report);
   if (!check.sigma_px) return summary;
   LogImages(check, krot::ImageVerdict::kWrong, "Wrong", options.num_worst);
-  LogImages(check,
-            krot::ImageVerdict::kWeaklyHeld,
-            "Weakly determined",
+  LogImages(check, krot::ImageVerdict::kWeaklyHeld, "Weakly determined",
             options.num_worst);
   const size_t num_logged = std::min(check.observations.size(),
                                      static_cast<size_t>(options.num_worst));
@@ -295,15 +289,13 @@ bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
     filter_options.max_error = options.krot_max_error;
   }
   krot::OutlierFilterResult result;
-  if (!RunStoppable(options.solver_options.num_threads,
-                    options.check_if_stopped,
-                    [&](const krot::Context& context) {
-                      result = krot::FilterOutliers(
-                          ToKrotModel(reconstruction,
-                                      options.min_num_view_per_track),
-                          filter_options,
-                          context);
-                    })) {
+  if (!RunStoppable(
+          options.solver_options.num_threads, options.check_if_stopped,
+          [&](const krot::Context& context) {
+            result = krot::FilterOutliers(
+                ToKrotModel(reconstruction, options.min_num_view_per_track),
+                filter_options, context);
+          })) {
     return false;
   }
   if (result.model.track_elements.empty()) {

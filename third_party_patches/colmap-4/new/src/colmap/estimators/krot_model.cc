@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include <krot/model/validate.h>
+#include <krot/model.h>
 
 namespace colmap {
 namespace {
@@ -72,8 +72,7 @@ void AppendFramesAndImages(const Reconstruction& reconstruction,
     added.camera_id = image.CameraId();
     added.name = image.Name();
     for (const Point2D& point2D : image.Points2D()) {
-      added.points2D.push_back({point2D.xy(0),
-                                point2D.xy(1),
+      added.points2D.push_back({point2D.xy(0), point2D.xy(1),
                                 point2D.HasPoint3D()
                                     ? point2D.point3D_id
                                     : krot::kInvalidPoint3DId});
@@ -83,8 +82,7 @@ void AppendFramesAndImages(const Reconstruction& reconstruction,
 }
 
 void AppendPoints3D(const Reconstruction& reconstruction,
-                    const int min_track_length,
-                    krot::Model& model) {
+                    const int min_track_length, krot::Model& model) {
   for (const point3D_t point3D_id : SortedIds(reconstruction.Points3D())) {
     const Point3D& point3D = reconstruction.Point3D(point3D_id);
     if (static_cast<int>(point3D.track.Length()) < min_track_length) continue;
@@ -131,11 +129,8 @@ krot::Model ToKrotModel(const Reconstruction& reconstruction,
   model.stores_rigs = true;
   for (const camera_t camera_id : SortedIds(reconstruction.Cameras())) {
     const Camera& camera = reconstruction.Camera(camera_id);
-    model.cameras.push_back({camera_id,
-                             static_cast<int>(camera.model_id),
-                             camera.width,
-                             camera.height,
-                             camera.params});
+    model.cameras.push_back({camera_id, static_cast<int>(camera.model_id),
+                             camera.width, camera.height, camera.params});
   }
   AppendRigs(reconstruction, model);
   AppendFramesAndImages(reconstruction, model);

@@ -5,7 +5,7 @@
 
 #include "colmap/scene/reconstruction.h"
 
-#include <krot/model/model.h>
+#include <krot/model.h>
 
 namespace colmap {
 

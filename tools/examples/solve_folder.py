@@ -1,4 +1,4 @@
-"""three_lines.py INPUT_FOLDER OUTPUT_FOLDER: what `krot solver` does."""
+"""solve_folder.py INPUT_FOLDER OUTPUT_FOLDER: what `krot solver` does."""
 
 import sys
 

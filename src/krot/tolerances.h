@@ -1,0 +1,87 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/context.h"
+#include "krot/model.h"
+#include "krot/solve.h"
+
+namespace krot {
+
+// What the data allow: all positions that a camera or a point may have in an
+// estimate whose errors are within a bound, with rotations and intrinsics as
+// given.
+
+// One end of the interval in which a coordinate may be.
+struct BoxEnd {
+  double reached = 0;            // by an estimate that was found
+  std::optional<double> proved;  // no estimate is beyond it; none: no bound
+};
+
+// Smallest and largest value of each coordinate of a position, over all
+// estimates within the bound; scene units.
+struct PositionBox {
+  std::array<BoxEnd, 3> low;
+  std::array<BoxEnd, 3> high;
+  int64_t num_programmes = 0;  // that were solved
+};
+
+enum class ToleranceTermination {
+  kNotRun,
+  kNothingToSolve,  // every observation was left out
+  kNoEstimate,      // none was found whose errors are within the bound
+  kDone,
+  kInterrupted,
+};
+
+// The box in which an image's centre or a point may be.
+struct ToleranceBox {
+  bool is_image = false;
+  uint64_t id = 0;
+  std::string name;                                    // of an image
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in the resulting model
+  // It has no box: it takes no part in the optimisation, or is not connected to
+  // what holds place and scale.
+  bool is_free = false;
+  PositionBox box;
+};
+
+struct TolerancesOptions {
+  double max_error = 0;     // the bound, pixels; > 0
+  double tolerance = 0.01;  // of an end, relative to how far it is; > 0
+  // Indices in Model::images and Model::points3D whose boxes are wanted.
+  std::vector<int32_t> images;
+  std::vector<int32_t> points;
+  // The indices of two images that hold place and scale. Empty: what
+  // solve.fixed marks does or, if that is nothing, two images are chosen.
+  std::vector<int32_t> gauge_images;
+  // Of the solve that finds an estimate within the bound if the model is none.
+  SolveOptions solve;
+};
+
+struct TolerancesResult {
+  Model model;  // the input, or the solved one; the boxes are around it
+  ToleranceTermination termination = ToleranceTermination::kNotRun;
+  double max_error = 0;  // of the model, pixels
+  // kNoEstimate: no estimate is below this, proved; pixels.
+  std::optional<double> lower_bound;
+  std::vector<std::string> gauge_images;  // empty if the options fix something
+  std::vector<ToleranceBox> boxes;        // images, then points, as asked for
+};
+
+// Each end of a box is reached by an estimate and proved, and the two agree to
+// `tolerance` unless lenses prevent it. Requires a valid model (ValidateModel).
+// Throws std::invalid_argument for options out of range, and for gauge images
+// that are not connected. A box takes about as long as a solve with the
+// observations near to it.
+TolerancesResult FindTolerances(const Model& model,
+                                const TolerancesOptions& options,
+                                const Context& context = {});
+
+}  // namespace krot
