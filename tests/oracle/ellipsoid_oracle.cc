@@ -42,7 +42,7 @@ NormAndDual Differentiate(const Real2& v, double p) {
           {sign[0] * powers * scale, sign[1] * powers_b * scale}};
 }
 
-struct Ellipsoid {
+struct LoewnerEllipsoid {
   Real3 center;
   Real33 P;  // {z : (z - center)' P^-1 (z - center) <= 1}
 
@@ -92,7 +92,7 @@ struct Tangent {
   //
   //   norm - gamma depth + (gamma - delta) depth
   //     >= reach(A's - gamma c) + (gamma - delta) reach(c).
-  Real LowerBound(Real gamma, const Ellipsoid& ellipsoid) const {
+  Real LowerBound(Real gamma, const LoewnerEllipsoid& ellipsoid) const {
     const Real room = depth - ellipsoid.Reach(c);
     if (!(room > 0)) return 0;
     const Real slack =
@@ -106,8 +106,8 @@ struct Tangent {
 OracleOptimum MinimizeByEllipsoids(const std::vector<Residual>& residuals,
                                    Norm norm, const Eigen::Vector3d& center,
                                    double radius, double gap) {
-  Ellipsoid ellipsoid{center.cast<Real>(),
-                      Real33::Identity() * Real(radius) * Real(radius)};
+  LoewnerEllipsoid ellipsoid{center.cast<Real>(),
+                             Real33::Identity() * Real(radius) * Real(radius)};
   Real3 best_x = ellipsoid.center;
   Real best = kInfinity;
   Real bound = 0;
