@@ -67,6 +67,16 @@ struct Suspect {
   int64_t num_conflicts = 0;  // that it takes part in
 };
 
+// Images that hang on the rest of their component by few tracks, after a start
+// from nothing (weak_links.h).
+struct WeakPart {
+  std::vector<std::string> image_names;  // in the order of their ids
+  int64_t num_tracks = 0;                // of the input, that both sides see
+  int64_t num_agreeing = 0;              // of these, on one place and scale
+  double scale_factor = 1;               // that the scale is held to
+  bool is_held = true;                   // well enough to rely on it
+};
+
 // error_profile.h, in numbers.
 struct ErrorProfileSummary {
   struct Level {
@@ -112,6 +122,11 @@ struct OutlierFilterSummary {
   std::optional<NoiseSummary> noise;  // with a profile or without a bound
   Norm norm;
   SolveInit init = SolveInit::kModel;  // that was used
+  // From nothing: parts that few tracks join, and whether the bound was chosen
+  // although nothing fits within what a start may have
+  // (SolveModelOptions::init_max_error).
+  std::vector<WeakPart> weak_parts;
+  bool is_bound_beyond_reason = false;
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;

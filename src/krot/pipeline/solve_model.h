@@ -52,6 +52,8 @@ enum class SolveTermination {
   kMaxIterations,
   kInfeasible,   // proved: no estimate below init_max_error
   kNoStart,      // no estimate below init_max_error was found
+  kWithinBound,  // all errors are below finish.max_error, and no lower maximum
+                 // was looked for
   kCollapsed,    // most points fell together (Collapse::IsWhole)
   kInterrupted,  // the estimate is the best so far
 };
@@ -198,6 +200,10 @@ struct SolveModelOptions {
   JointOptions joint;
 
   FinishOptions finish;  // of kAuto
+  // kAuto with a finish by least squares below finish.max_error: whether the
+  // lowest maximum is looked for, and proved, first. If not, a start that is
+  // below that already goes straight to the finish.
+  bool find_lowest = true;
 
   // Takes the place of that in the stages' own options; null: of none.
   Checkpoint* checkpoint = nullptr;
