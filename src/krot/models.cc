@@ -144,6 +144,7 @@ OutlierResult RemoveOutliers(const Model& model, const OutlierOptions& options,
   result.images = std::move(summary.images);
   result.cameras = std::move(summary.cameras);
   result.rotation_suspect = std::move(summary.rotation_suspect);
+  result.weak_parts = std::move(summary.weak_parts);
   result.profile = std::move(summary.profile);
   if (summary.solve) {
     result.termination = summary.solve->termination;

@@ -43,6 +43,16 @@ struct Suspect {
   int64_t num_conflicts = 0;  // that it takes part in
 };
 
+// Images that hang on the rest of the model by few tracks, after a start from
+// nothing.
+struct WeakPart {
+  std::vector<std::string> image_names;  // in the order of their ids
+  int64_t num_tracks = 0;                // of the input, that both sides see
+  int64_t num_agreeing = 0;              // of these, on one place and scale
+  double scale_factor = 1;               // that the scale is held to
+  bool is_held = true;                   // well enough to rely on it
+};
+
 // How low the largest error can be without some of the observations.
 struct ErrorProfileSummary {
   struct Level {
@@ -107,6 +117,7 @@ struct OutlierResult {
   // What removed observations gather in, most first.
   std::vector<Suspect> tracks, images, cameras;
   std::optional<RotationSuspect> rotation_suspect;
+  std::vector<WeakPart> weak_parts;
   std::optional<ErrorProfileSummary> profile;
   // Of what is left; none if nothing is.
   std::optional<SolveTermination> termination;

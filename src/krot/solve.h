@@ -42,6 +42,8 @@ enum class SolveTermination {
   kMaxIterations,
   kInfeasible,   // proved: no estimate below init_max_error
   kNoStart,      // no estimate below init_max_error was found
+  kWithinBound,  // all errors are below the bound that was asked for, and no
+                 // lower maximum was looked for
   kCollapsed,    // most points fell together, into cameras or to infinity
   kInterrupted,  // the estimate is the best so far
 };

@@ -114,7 +114,7 @@ TEST(DocumentationOfKrot, ListsTheExitCodesOfHelp) {
               std::string::npos)
         << line;
   }
-  EXPECT_EQ(num_codes, 11);
+  EXPECT_EQ(num_codes, 12);
 }
 
 }  // namespace

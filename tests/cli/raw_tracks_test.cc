@@ -8,6 +8,7 @@
 #include "krot/model.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
+#include "tests/testing/weakly_tied.h"
 
 // `krot solver` on rotations and tracks alone, outliers among them.
 
@@ -69,6 +70,59 @@ TEST_F(RawTracks, AreSolvedWithABoundThatIsChosenAndSaid) {
   EXPECT_GT(report["outliers"]["max_error"], 0);
   EXPECT_TRUE(report["outliers"]["num_must_go"].is_null());
   EXPECT_GT(report["num_observations"], 0);
+}
+
+TEST_F(RawTracks, AreNotSearchedForALowestMaximumThatNobodyAskedFor) {
+  const std::vector<std::string> bound = {"--Solver.init", "feasible",
+                                          "--Solver.max_error", "3"};
+  ASSERT_EQ(Solve(bound).exit_code, 0);
+  const Json without = Report();
+  EXPECT_EQ(without["termination"], "within_bound");
+  EXPECT_TRUE(without["lower_bound"].is_null());
+  EXPECT_TRUE(without["rounds"].empty());
+  EXPECT_LE(without["cost_final"], 3);
+  std::vector<std::string> more = bound;
+  more.insert(more.end(), {"--certificate_path", folder_ / "certificate.json",
+                           "--overwrite", "1"});
+  ASSERT_EQ(Solve(more).exit_code, 0);
+  const Json with = Report();
+  EXPECT_EQ(with["certified"], true);
+  // Both end with the least squares below the same cap.
+  const double sum = without["finish"]["cost_final"];
+  EXPECT_NEAR(sum, with["finish"]["cost_final"], 1e-2 * sum);
+}
+
+TEST_F(RawTracks, WhoseBoundIsBeyondReasonAreNotToBeReliedOn) {
+  const KrotResult result = Solve({"--Problem.init_max_error", "0.1"});
+  EXPECT_EQ(result.exit_code, 10);
+  EXPECT_THAT(result.err, HasSubstr("not to be relied on: hardly anything"));
+  EXPECT_FALSE(Load(folder_ / "output").points3D.empty());
+}
+
+TEST(WeaklyTiedTracks, AreSaidNotToHoldTheScaleOfAPart) {
+  const TempFolder folder;
+  SceneOptions options = SmallScene();
+  options.layout = SceneLayout::kStreet;
+  options.num_frames = 24;
+  options.num_points = 1500;
+  const Model model = WeaklyTied(
+      WithoutTranslations(SynthesizeScene(options).model),
+      [](int n) { return n / 14; }, [](int, int) { return true; },
+      /*num_tracks=*/10, /*num_wrong=*/10);
+  Save(model, folder / "input");
+  const KrotResult result =
+      RunKrot({"solver", "--input_path", folder / "input", "--output_path",
+               folder / "output", "--report_path", folder / "r.json",
+               "--Solver.init", "feasible", "--Solver.max_error", "10"});
+  EXPECT_EQ(result.exit_code, 10) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("10 images ("));
+  EXPECT_THAT(result.err, HasSubstr("hang on the rest by 10 tracks"));
+  const Json report = Json::parse(ReadBytes(folder / "r.json"));
+  const Json& parts = report["outliers"]["weak_parts"];
+  ASSERT_EQ(parts.size(), 1u);
+  EXPECT_EQ(parts[0]["num_tracks"], 10);
+  EXPECT_EQ(parts[0]["image_names"].size(), 10u);
+  EXPECT_EQ(parts[0]["is_held"], false);
 }
 
 TEST_F(RawTracks, ThatAreNotToLoseAnythingEndWithAHint) {

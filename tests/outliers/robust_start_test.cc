@@ -1,6 +1,7 @@
 #include "krot/outliers/robust_start.h"
 
 #include <cmath>
+#include <functional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -8,7 +9,9 @@
 #include "krot/analysis/alignment.h"
 #include "krot/model/image_geometry.h"
 #include "krot/outliers/outlier_filter.h"
+#include "krot/outliers/weak_links.h"
 #include "krot/synthetic/scene.h"
+#include "tests/testing/weakly_tied.h"
 
 namespace krot {
 namespace {
@@ -96,6 +99,93 @@ TEST(FindRobustStart, KeepsTheBaselinesOfARig) {
     image.cam_from_world.translation.setZero();
   }
   EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(model)), 0.02);
+}
+
+// 24 cameras on a circle, or along a path, in parts.
+SceneOptions SceneInParts(SceneLayout layout) {
+  SceneOptions options = Scene(0.05, 0);
+  options.layout = layout;
+  options.num_frames = 24;
+  options.num_points = 1500;
+  options.track_length = layout == SceneLayout::kOrbit ? 12 : 6;
+  return options;
+}
+
+KnownRotationProblem ProblemOf(const Model& model) {
+  BuildProblemOptions build;
+  build.ignore_translations = true;
+  return BuildProblem(model, build).problem;
+}
+
+// Which part an image is of, and which parts are tied.
+struct Ties {
+  SceneLayout layout;
+  int num_parts;
+  std::function<int(int)> part_of;
+  std::function<bool(int, int)> are_tied;
+};
+
+const Ties kTwoParts = {SceneLayout::kStreet, 2, [](int n) { return n / 12; },
+                        [](int, int) { return true; }};
+const Ties kChain = {SceneLayout::kStreet, 3, [](int n) { return n / 8; },
+                     [](int a, int b) { return b == a + 1; }};
+const Ties kStar = {SceneLayout::kOrbit, 4, [](int n) { return n % 4; },
+                    [](int a, int) { return a == 0; }};
+
+TEST(FindParts, CutsWhereFewTracksCross) {
+  for (const Ties& ties : {kTwoParts, kChain, kStar}) {
+    const Model model = WeaklyTied(
+        SynthesizeScene(SceneInParts(ties.layout)).model, ties.part_of,
+        ties.are_tied, /*num_tracks=*/10, /*num_wrong=*/0);
+    const std::vector<int32_t> parts = FindParts(ProblemOf(model), {});
+    ASSERT_EQ(parts.size(), 24u);
+    for (int n = 0; n < 24; ++n) EXPECT_EQ(parts[n], ties.part_of(n)) << n;
+  }
+}
+
+TEST(FindParts, LeavesWholeWhatManyTracksHold) {
+  for (const SceneLayout layout : {SceneLayout::kOrbit, SceneLayout::kStreet}) {
+    const std::vector<int32_t> parts =
+        FindParts(ProblemOf(SynthesizeScene(SceneInParts(layout)).model), {});
+    EXPECT_EQ(parts, std::vector<int32_t>(24, 0));
+  }
+}
+
+TEST(FindRobustStart, HoldsTheScaleOfPartsThatTenTracksJoinHalfOfThemWrong) {
+  for (const Ties& ties : {kTwoParts, kChain, kStar}) {
+    for (const int num_wrong : {0, 5}) {
+      const SyntheticScene scene = SynthesizeScene(SceneInParts(ties.layout));
+      const Model model = WeaklyTied(Wiped(scene.model), ties.part_of,
+                                     ties.are_tied, 10, num_wrong);
+      EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(model)), 0.02)
+          << ties.num_parts << " parts, " << num_wrong << " wrong";
+    }
+  }
+}
+
+TEST(FilterOutliers, SaysHowWellFewTracksHoldTheScale) {
+  const auto scale_factors = [](int num_tracks, int num_wrong) {
+    const SyntheticScene scene =
+        SynthesizeScene(SceneInParts(kTwoParts.layout));
+    OutlierFilterOptions options;
+    options.max_error = 3;
+    options.find_conflicts = false;
+    const OutlierFilterResult result =
+        FilterOutliers(WeaklyTied(Wiped(scene.model), kTwoParts.part_of,
+                                  kTwoParts.are_tied, num_tracks, num_wrong),
+                       options, {});
+    EXPECT_EQ(result.summary.weak_parts.size(), 1u);
+    const WeakPart& part = result.summary.weak_parts.at(0);
+    EXPECT_EQ(part.image_names.size(), 12u);
+    EXPECT_EQ(part.num_tracks, num_tracks);
+    return part;
+  };
+  const WeakPart good = scale_factors(30, 0);
+  EXPECT_TRUE(good.is_held);
+  EXPECT_GE(good.num_agreeing, 25);
+  EXPECT_LT(good.scale_factor, 1.1);
+  EXPECT_FALSE(scale_factors(10, 10).is_held);
+  EXPECT_FALSE(scale_factors(1, 0).is_held);
 }
 
 TEST(FilterOutliers, PlacesAModelWithoutPositions) {

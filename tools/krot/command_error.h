@@ -19,6 +19,7 @@ enum ExitCode {
   kExitNoStart = 7,
   kExitGivenBack = 8,
   kExitWrong = 9,
+  kExitUnreliable = 10,
   kExitInterrupted = 130,
 };
 

@@ -82,6 +82,8 @@ constexpr char kExitCodes[] =
     "    7  no estimate below the error that a start may have\n"
     "    8  no better estimate: the model is written as it was read\n"
     "    9  something is wrong with the model, and --fail_on wrong asked\n"
+    "   10  positions from nothing that are not to be relied on: the model is "
+    "written\n"
     "  130  interrupted by SIGINT or SIGTERM\n";
 
 const Command* FindCommand(const std::string& name) {

@@ -204,7 +204,10 @@ int Run(const OutlierCommand& command) {
   if (!report.summary.is_within) {
     LogLine(log, 0, "warning: not all errors are within the bound");
   }
-  return kExitDone;
+  const std::string unreliable = UnreliableSentence(report.summary);
+  if (unreliable.empty()) return kExitDone;
+  LogLine(log, 0, "warning: " + unreliable);
+  return kExitUnreliable;
 }
 
 }  // namespace

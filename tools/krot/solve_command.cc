@@ -8,6 +8,7 @@
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
 #include "krot/problem/cost.h"
+#include "krot/report/outlier_report.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/free_memory.h"
@@ -213,6 +214,7 @@ void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
     return;
   }
   if (summary.termination != SolveTermination::kGapReached &&
+      summary.termination != SolveTermination::kWithinBound &&
       summary.termination != SolveTermination::kZeroCost) {
     LogLine(log, 0, "warning: " + MissedGapSentence(summary));
   }
@@ -308,6 +310,12 @@ int RunSolveCommand(const SolveCommand& command) {
   WarnOfEmptyFall(log, report.summary);
   WarnOfMissedGap(command, report.summary);
   PointToOutlierFilter(log, report);
+  const std::string unreliable =
+      report.outliers ? UnreliableSentence(*report.outliers) : "";
+  if (!unreliable.empty()) {
+    LogLine(log, 0, "warning: " + unreliable);
+    return kExitUnreliable;
+  }
   const bool is_copy = report.summary.is_given_back && !report.summary.polish;
   return is_copy ? kExitGivenBack : kExitDone;
 }

@@ -14,8 +14,10 @@
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/removal_start.h"
+#include "krot/outliers/robust_start.h"
 #include "krot/outliers/snooping_filter.h"
 #include "krot/outliers/suspects.h"
+#include "krot/outliers/weak_links.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
@@ -67,6 +69,7 @@ class OutlierFilter {
   void PlaceAt(const BuiltProblem& built, const Removal& removal, Model* moved);
   void Solve(Model moved);
   bool RemoveAbove();
+  void FindWeakParts(const BuiltProblem& built);
 
   const Model& model_;
   const OutlierFilterOptions& options_;
@@ -114,7 +117,12 @@ std::optional<Removal> OutlierFilter::RemoveFew(const BuiltProblem& built,
     bound_.max_error = summary_.noise->limit.max_error;
   }
   const Timer timer;
-  Removal removal = FindRemoval(model_, built, bound_, context_);
+  // Those of a robust start are few already: programmes take ten times as long
+  // to find a two-hundredth fewer, and hold no part's scale.
+  const bool is_enough =
+      summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
+  Removal removal = FindRemoval(model_, built, bound_, context_,
+                                is_enough ? 0 : kMaxProgrammes);
   summary_.seconds_removal = timer.Seconds();
   return removal;
 }
@@ -221,11 +229,38 @@ bool OutlierFilter::RemoveAbove() {
   return is_any;
 }
 
+// Of the model that was solved, by all tracks of the input.
+void OutlierFilter::FindWeakParts(const BuiltProblem& built) {
+  Estimate estimate = built.start;
+  for (size_t f = 0; f < built.frame_of.size(); ++f) {
+    estimate.translations[f] =
+        kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
+  }
+  for (const WeakLink& link :
+       FindWeakLinks(built.problem, estimate,
+                     kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
+                     context_)) {
+    WeakPart& part = summary_.weak_parts.emplace_back();
+    for (size_t v = 0; v < built.image_of.size(); ++v) {
+      if (std::binary_search(link.frames.begin(), link.frames.end(),
+                             built.problem.views[v].frame)) {
+        part.image_names.push_back(model_.images[built.image_of[v]].name);
+      }
+    }
+    part.num_tracks = link.num_tracks;
+    part.num_agreeing = link.num_agreeing;
+    part.scale_factor = link.scale_factor;
+    part.is_held = link.IsHeld();
+  }
+}
+
 void OutlierFilter::FilterByConflicts() {
   const RemovalStart start = FindRemovalStart(model_, options_, context_);
   const BuiltProblem& built = start.built;
   summary_.init = start.init;
   bound_.max_error = start.max_error;
+  summary_.is_bound_beyond_reason =
+      !options_.max_error && start.max_error > options_.solve.init_max_error;
   const std::vector<uint64_t> elements = ElementsOf(model_, built);
   std::vector<Conflict> found;
   const std::optional<Removal> removal = RemoveFew(built, &found);
@@ -246,6 +281,9 @@ void OutlierFilter::FilterByConflicts() {
   Model moved;
   PlaceAt(built, *removal, &moved);
   Solve(std::move(moved));
+  if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
+    FindWeakParts(built);
+  }
   // What took no part in all that.
   if (!RemoveAbove()) return;
   Model solved = std::move(kept_.model);

@@ -69,6 +69,11 @@ struct OutlierFilterSummary {
   std::optional<NoiseSummary> noise;  // with a profile or without a bound
   Norm norm;
   SolveInit init = SolveInit::kModel;  // that was used
+  // From nothing: parts that few tracks join, and whether the bound was chosen
+  // although nothing fits within what a start may have
+  // (SolveModelOptions::init_max_error).
+  std::vector<WeakPart> weak_parts;
+  bool is_bound_beyond_reason = false;
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;

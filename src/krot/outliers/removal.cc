@@ -15,7 +15,6 @@ namespace {
 
 // Of the bound: what the interior point leaves open.
 constexpr double kInside = 1e-3;
-constexpr int kMaxProgrammes = 16;
 // So many programmes in a row that remove no fewer are the last but one.
 constexpr int kPatience = 3;
 // Of the bound: what comes nearer is looked at from then on.
@@ -201,9 +200,10 @@ Removal RemovalSearch::Find(double max_error, int max_programmes) {
 }
 
 Removal FindRemoval(const Model& model, const BuiltProblem& built,
-                    const ErrorBound& bound, const Context& context) {
+                    const ErrorBound& bound, const Context& context,
+                    int max_programmes) {
   return RemovalSearch(model, built, bound.norm, context)
-      .Find(bound.max_error, kMaxProgrammes);
+      .Find(bound.max_error, max_programmes);
 }
 
 }  // namespace krot

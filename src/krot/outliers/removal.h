@@ -39,7 +39,8 @@ class RemovalSearch {
   RemovalSearch(const Model& model, const BuiltProblem& built, Norm norm,
                 const Context& context);
 
-  // max_error in true pixels, > 0; solves at most so many programmes, >= 1.
+  // max_error in true pixels, > 0; solves at most so many programmes. Of 0 it
+  // is what is above the bound at built.start, but for what points take back.
   Removal Find(double max_error, int max_programmes);
 
  private:
@@ -67,7 +68,9 @@ class RemovalSearch {
 };
 
 // With a bound alone.
+inline constexpr int kMaxProgrammes = 16;
 Removal FindRemoval(const Model& model, const BuiltProblem& built,
-                    const ErrorBound& bound, const Context& context);
+                    const ErrorBound& bound, const Context& context,
+                    int max_programmes = kMaxProgrammes);
 
 }  // namespace krot

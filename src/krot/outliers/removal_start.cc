@@ -4,6 +4,7 @@
 #include <sstream>
 #include <string>
 
+#include "krot/finish/robust_least_squares.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/start.h"
 
@@ -27,6 +28,7 @@ void PlaceFromTracks(Norm norm, double level, const Context& context,
   start->init = SolveInit::kFeasible;
   const KnownRotationProblem& problem = start->built.problem;
   start->built.start = FindRobustStart(problem, norm, level, context);
+  MinimizeRobustly(problem, context, &start->built.start);
   context.Note("positions from rotations and tracks: the median error is " +
                Pixels(MedianError(problem, start->built.start, norm)));
 }

@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <cstdint>
 #include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "krot/base/numbers.h"
 #include "krot/conic/slack_program.h"
+#include "krot/finish/robust_least_squares.h"
 #include "krot/outliers/reweighting.h"
 #include "krot/outliers/robust_points.h"
+#include "krot/outliers/weak_links.h"
 #include "krot/problem/components.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
@@ -19,19 +22,15 @@ namespace krot {
 namespace {
 
 // Doubled until the tracks hang together.
-constexpr int64_t kObservationsPerFrame = 100;
+constexpr int64_t kObservationsPerFrame = 60;
+// Parts whose programmes are solved on their own.
+constexpr double kStrongShare = 0.2;
 // Programmes after the first, with weights.
-constexpr int kStartReweightings = 2;
+constexpr int kStartReweightings = 1;
 // A start needs no more; of the level.
 constexpr double kStartMu = 1e-3;
 // In levels.
 constexpr double kDearExcess = 0.1;
-// In levels: what disagrees with a point is no farther off than that.
-constexpr double kCapOfPoints = 4;
-
-int32_t FrameOf(const KnownRotationProblem& problem, int64_t i) {
-  return problem.views[problem.observations[i].view].frame;
-}
 
 // The longest tracks first, each that sees a frame which has too few so far.
 // Ascending.
@@ -75,8 +74,9 @@ std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
   }
 }
 
-Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
-                          double level, const Context& context) {
+// Of what hangs together well.
+Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
+                     double level, const Context& context) {
   Estimate estimate;
   estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
   estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
@@ -101,6 +101,70 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
     if (!is_placed[k]) others.push_back(k);
   }
   PlacePointsRobustly(problem, others, norm, kCapOfPoints * level, context,
+                      &estimate);
+  if (!HasBaseline(problem)) NormalizeScale(problem, &estimate);
+  return estimate;
+}
+
+// The observations of every part that two or more see the points of.
+std::vector<std::vector<int64_t>> SplitIntoParts(
+    const KnownRotationProblem& problem, const std::vector<int32_t>& part_of) {
+  std::vector<std::vector<int64_t>> split(
+      *std::max_element(part_of.begin(), part_of.end()) + 1);
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      const int32_t own = part_of[FrameOf(problem, i)];
+      int num_own = 0;
+      for (int64_t j = problem.point_begin[k]; j < problem.point_begin[k + 1];
+           ++j) {
+        num_own += part_of[FrameOf(problem, j)] == own;
+      }
+      if (num_own >= 2) split[own].push_back(i);
+    }
+  }
+  return split;
+}
+
+Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
+                          double level, const Context& context) {
+  PartOptions options;
+  options.min_tracks = 1;
+  options.compares_scales = false;
+  options.min_share = kStrongShare;
+  const std::vector<int32_t> part_of = FindParts(problem, options);
+  const std::vector<std::vector<int64_t>> split =
+      SplitIntoParts(problem, part_of);
+  if (split.size() == 1) return StartOfPart(problem, norm, level, context);
+  Estimate estimate;
+  estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
+  estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
+  std::vector<int32_t> point_part(problem.num_points, -1);
+  for (size_t n = 0; n < split.size(); ++n) {
+    const ProblemSubset part(problem, split[n]);
+    const Context within =
+        context.Within("part " + std::to_string(n + 1) + " of " +
+                       std::to_string(split.size()));
+    Estimate own = StartOfPart(part.problem(), norm, level, within);
+    MinimizeRobustly(part.problem(), within, &own);
+    if (!HasBaseline(part.problem())) NormalizeScale(part.problem(), &own);
+    part.Replace(own, &estimate);
+    for (const int64_t i : split[n]) {
+      point_part[problem.observations[i].point] = static_cast<int32_t>(n);
+    }
+  }
+  JoinParts(problem, part_of, point_part, kCapOfPoints * level, context,
+            &estimate);
+  std::vector<int32_t> across;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+         ++i) {
+      if (part_of[FrameOf(problem, i)] == point_part[k]) continue;
+      across.push_back(k);
+      break;
+    }
+  }
+  PlacePointsRobustly(problem, across, norm, kCapOfPoints * level, context,
                       &estimate);
   if (!HasBaseline(problem)) NormalizeScale(problem, &estimate);
   return estimate;

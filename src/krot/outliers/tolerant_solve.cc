@@ -22,6 +22,7 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
   filter.find_conflicts = options.find_conflicts;
   filter.solve = options.solve;
   filter.solve.on_built = nullptr;
+  filter.solve.find_lowest = options.solve.describe_certificate;
   OutlierFilterResult filtered = FilterOutliers(model, filter, context);
   TolerantSolveResult result;
   if (filtered.summary.solve) {

@@ -15,8 +15,6 @@
 namespace krot {
 namespace {
 
-// An estimate that is nearer to the cap, relative, leaves no room.
-constexpr double kLeastRoom = 1e-6;
 // Of the slack, a gap that still leaves room.
 constexpr double kShareOfSlack = 0.5;
 // What rounding may add to the largest error, relative.

@@ -8,6 +8,9 @@
 
 namespace krot {
 
+// An estimate that is nearer to the cap, relative, leaves no room for a finish.
+inline constexpr double kLeastRoom = 1e-6;
+
 // Takes an estimate whose largest true error is as low as it gets to the end
 // that the options ask for:
 //

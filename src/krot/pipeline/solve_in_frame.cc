@@ -170,6 +170,26 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
+// Whether the finish can do without a lower maximum, and nobody asks for one.
+// Then the rows are those at the estimate.
+bool IsFinishEnough(const Model& model, const SolveModelOptions& options,
+                    const Context& context, const Estimate& estimate,
+                    BuiltProblem* built, SolveSummary* summary) {
+  if (options.find_lowest || summary->method != SolveMethod::kAuto ||
+      options.finish.finish != Finish::kLeastSquares ||
+      !options.finish.max_error || !built->positions.empty()) {
+    return false;
+  }
+  const Reprojection reprojection(model, *built);
+  const double cost = context.Max(
+      reprojection.TrueCost(estimate, options.norm, context.num_threads));
+  if (!(cost < (1 - kLeastRoom) * *options.finish.max_error)) return false;
+  reprojection.TakeRows(estimate, context.num_threads, &built->problem);
+  summary->cost_initial = summary->cost_final = cost;
+  summary->termination = SolveTermination::kWithinBound;
+  return true;
+}
+
 // The largest of the track elements in this role; infinite where a point does
 // not project.
 double LargestOf(Role role, const std::vector<Role>& roles,
@@ -261,13 +281,16 @@ SolveModelResult SolveInFrame(const Model& model,
     result.model = model;
     return result;
   }
-  std::optional<PixelCertificate> certificate =
-      SolveInRounds(model, options, summary.method, context, solve_timer,
-                    &start.built, &estimate, &summary);
-  if (summary.method == SolveMethod::kAuto && context.ranks == nullptr &&
-      options.problem.positions.empty() && HasJointSolver(options.norm)) {
-    TryOtherWays(model, options, context, solve_timer, &start, &estimate,
-                 &certificate, &summary);
+  std::optional<PixelCertificate> certificate;
+  if (!IsFinishEnough(model, options, context, estimate, &start.built,
+                      &summary)) {
+    certificate = SolveInRounds(model, options, summary.method, context,
+                                solve_timer, &start.built, &estimate, &summary);
+    if (summary.method == SolveMethod::kAuto && context.ranks == nullptr &&
+        options.problem.positions.empty() && HasJointSolver(options.norm)) {
+      TryOtherWays(model, options, context, solve_timer, &start, &estimate,
+                   &certificate, &summary);
+    }
   }
   if (summary.termination == SolveTermination::kInfeasible) {
     Certify(model, start.built, estimate, options, context, certificate,

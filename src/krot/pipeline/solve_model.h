@@ -169,6 +169,10 @@ struct SolveModelOptions {
   JointOptions joint;
 
   FinishOptions finish;  // of kAuto
+  // kAuto with a finish by least squares below finish.max_error: whether the
+  // lowest maximum is looked for, and proved, first. If not, a start that is
+  // below that already goes straight to the finish.
+  bool find_lowest = true;
 
   // Takes the place of that in the stages' own options; null: of none.
   Checkpoint* checkpoint = nullptr;

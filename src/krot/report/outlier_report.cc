@@ -326,6 +326,7 @@ std::string OutlierJson(const OutlierReport& report) {
       {"snooping", SnoopingJson(summary.snooping)},
       {"solve", SolveOfRestJson(summary.solve)},
       {"num_solves", summary.num_solves},
+      {"weak_parts", WeakPartsJson(summary)},
       {"removed", RemovedJson(summary.removed)},
       {"suspects",
        {{"tracks", SuspectsJson(summary.tracks, "point3D_id", summary)},

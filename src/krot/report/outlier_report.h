@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "krot/bridge/conflict_file.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/run_record.h"
@@ -17,6 +19,15 @@ struct OutlierReport {
 // "removed 74 of 26,268; at least 61 must go (61 disjoint conflicts,
 // certificate)".
 std::string BracketSentence(const OutlierFilterSummary& summary);
+
+// Why positions from nothing are not to be relied on, and what to do next:
+// parts whose scale hardly anything holds, a bound beyond reason, or more
+// observations that do not fit than do. Empty if they are, or have not been
+// found from nothing.
+std::string UnreliableSentence(const OutlierFilterSummary& summary);
+
+// [{"image_names": ..}], of OutlierFilterSummary::weak_parts.
+nlohmann::ordered_json WeakPartsJson(const OutlierFilterSummary& summary);
 
 // For the terminal: the bracket, errors before and after, who is to blame.
 std::string OutlierTable(const OutlierReport& report);

@@ -30,6 +30,8 @@ const char* TerminationName(SolveTermination termination) {
       return "interrupted";
     case SolveTermination::kNothingToSolve:
       return "nothing_to_solve";
+    case SolveTermination::kWithinBound:
+      return "within_bound";
     case SolveTermination::kCollapsed:
       return "collapsed";
     case SolveTermination::kNotRun:
@@ -166,6 +168,7 @@ Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
           {"num_must_go",
            outliers->conflicts ? Json(outliers->num_proved) : Json()},
           {"is_search_complete", outliers->is_search_complete},
+          {"weak_parts", WeakPartsJson(*outliers)},
           {"seconds",
            {{"removal", outliers->seconds_removal},
             {"conflicts", outliers->seconds_conflicts},

@@ -62,8 +62,10 @@ std::string FinishSentence(const SolveSummary& summary) {
                    : "the least robust loss: root mean ") +
          rms(solve.cost_final) + " px after " +
          Counted(solve.iterations, "iteration") +
-         ", where the lowest maximum alone left " + rms(solve.cost_initial) +
-         " px" +
+         (summary.termination == SolveTermination::kWithinBound
+              ? ", where the start had "
+              : ", where the lowest maximum alone left ") +
+         rms(solve.cost_initial) + " px" +
          (solve.termination == InteriorPointTermination::kConverged
               ? "."
               : "; a little less might be possible.");
@@ -124,6 +126,10 @@ std::string SolveEndSentence(const SolveSummary& summary) {
              "maximum is proved; a lower one may exist.";
     case SolveTermination::kZeroCost:
       return "Ended" + after + " with nothing left to lower.";
+    case SolveTermination::kWithinBound:
+      return "Every error is within the bound that was asked for. The lowest "
+             "maximum was not looked for; --certificate_path, or leaving "
+             "--Solver.max_error out, does that.";
     case SolveTermination::kCollapsed:
       return "Ended" + after + " in a collapse of the scene.";
     case SolveTermination::kMaxSweeps:
@@ -247,7 +253,11 @@ std::string VerdictSentence(const SolveSummary& summary) {
            ? ""
            : " over the observations in the optimisation");
   if (!summary.is_certified) {
-    return maximum + ", not proved optimal." + FinishSentence(summary);
+    return maximum +
+           (summary.termination == SolveTermination::kWithinBound
+                ? "."
+                : ", not proved optimal.") +
+           FinishSentence(summary);
   }
   return maximum + ", " + GapWords(*summary.relative_gap) + ": " +
          BoundWords(summary) + "." + LinearGapSentence(summary) +
