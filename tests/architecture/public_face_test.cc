@@ -299,7 +299,7 @@ TEST(CompareModels, OfAModelAndItselfMovedIsNothing) {
 TEST(CureModel, RemovesWhatCheckModelCallsWrong) {
   const ModelCheck check = CheckModel(Sample());
   ASSERT_TRUE(check.sigma_px);
-  const Model cured = CureModel(Sample(), check);
+  const Model cured = CureModel(Sample(), check).model;
   EXPECT_LE(cured.track_elements.size(),
             Sample().track_elements.size() - check.observations.size());
   EXPECT_NO_THROW(ValidateModel(cured));

@@ -27,7 +27,7 @@ int main(int argc, char** argv) {
                   image.name.c_str(), static_cast<long long>(image.num_wrong),
                   static_cast<long long>(image.num_tested));
     }
-    krot::WriteModel(krot::CureModel(model, check), argv[2]);
+    krot::WriteModel(krot::CureModel(model, check).model, argv[2]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

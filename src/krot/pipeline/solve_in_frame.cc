@@ -181,7 +181,8 @@ bool IsFinishEnough(const Model& model, const SolveModelOptions& options,
     return false;
   }
   const Reprojection reprojection(model, *built);
-  const double cost = context.Max(
+  const double cost = MaxOfRanks(
+      context,
       reprojection.TrueCost(estimate, options.norm, context.num_threads));
   if (!(cost < (1 - kLeastRoom) * *options.finish.max_error)) return false;
   reprojection.TakeRows(estimate, context.num_threads, &built->problem);
