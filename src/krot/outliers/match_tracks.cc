@@ -2,26 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #include "krot/analysis/epipolar_match.h"
-#include "krot/analysis/track_noise.h"
 #include "krot/base/check.h"
-#include "krot/base/disjoint_sets.h"
-#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/point_repair.h"
 #include "krot/model.h"
 #include "krot/model/image_geometry.h"
-#include "krot/model/remove_observations.h"
-#include "krot/outliers/robust_points.h"
+#include "krot/outliers/track_fit.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot {
@@ -31,7 +23,6 @@ using Eigen::Vector3d;
 
 // COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).
 constexpr int64_t kMinMatchesOfPair = 15;
-constexpr int64_t kTracksPerTask = 64;
 
 // Keypoints of all images, numbered one image after the other, and where their
 // point is.
@@ -203,27 +194,10 @@ class MatchTriangulator {
     return agreeing;
   }
 
-  // What matches join of the keypoints that are open, in the order of their
-  // first ones; those that nothing joins are closed.
   std::vector<MatchTrack> Components() {
-    DisjointSets joined(begin_.back());
-    std::vector<char> is_joined(begin_.back(), 0);
-    for (const auto& [a, b] : edges_) {
-      if (!is_open_[a] || !is_open_[b]) continue;
-      joined.Unite(a, b);
-      is_joined[a] = is_joined[b] = 1;
-    }
     std::vector<MatchTrack> components;
-    std::vector<int64_t> of_root(begin_.back(), -1);
-    for (int64_t k = 0; k < begin_.back(); ++k) {
-      is_open_[k] = is_joined[k];
-      if (!is_joined[k]) continue;
-      int64_t& component = of_root[joined.Find(k)];
-      if (component < 0) {
-        component = static_cast<int64_t>(components.size());
-        components.emplace_back();
-      }
-      components[component].keypoints.push_back(k);
+    for (std::vector<int64_t>& keypoints : JoinMatches(edges_, &is_open_)) {
+      components.push_back({std::move(keypoints)});
     }
     return components;
   }
@@ -327,18 +301,23 @@ class MatchTriangulator {
 
   void PlaceRobustly(std::vector<MatchTrack>* tracks) const {
     if (tracks->empty()) return;
+    const std::vector<Vector3d> places =
+        RobustPlaces(ModelWith(*tracks), options_.max_error_px, context_);
+    for (size_t n = 0; n < places.size(); ++n) (*tracks)[n].xyz = places[n];
+  }
+
+  void LeastSquares(std::vector<MatchTrack>* tracks) const {
     const Model model = ModelWith(*tracks);
-    BuildProblemOptions options;
-    options.num_threads = context_.num_threads;
-    options.ignore_translations = true;
-    const BuiltProblem built = BuildProblem(model, options);
-    Estimate estimate = OwnEstimate(model, built);
-    std::vector<int32_t> all(built.problem.num_points);
-    std::iota(all.begin(), all.end(), 0);
-    PlacePointsRobustly(built.problem, all, Norm::L2(), options_.max_error_px,
-                        context_, &estimate);
-    for (const int32_t k : all) {
-      (*tracks)[built.point_of[k]].xyz = estimate.points[k];
+    const std::vector<FittedTrack> fitted =
+        FitTracks(model, options_.max_error_px, context_);
+    for (size_t n = 0; n < fitted.size(); ++n) {
+      MatchTrack& track = (*tracks)[n];
+      std::vector<int64_t> kept;
+      for (const uint64_t e : fitted[n].elements) {
+        kept.push_back(track.keypoints[e - model.points3D[n].track_begin]);
+      }
+      track.keypoints = std::move(kept);
+      track.xyz = fitted[n].xyz;
     }
   }
 
@@ -369,95 +348,6 @@ class MatchTriangulator {
     return tracks;
   }
 
-  // Moves the points; observations that are then above the bound go, the worst
-  // first.
-  void LeastSquares(std::vector<MatchTrack>* tracks) const {
-    const Model model = ModelWith(*tracks);
-    const std::vector<double> no_weights;
-    TrackNoise fit(model, no_weights);
-    ParallelFor(
-        static_cast<int64_t>(tracks->size()), kTracksPerTask,
-        context_.num_threads, [&](int64_t begin, int64_t end, int /*worker*/) {
-          for (int64_t n = begin; n < end; ++n) {
-            const Point3D& point = model.points3D[n];
-            MatchTrack& track = (*tracks)[n];
-            for (bool has_changed = true; has_changed;) {
-              fit.Fit(n);
-              has_changed = RemoveWorst(point, &fit);
-            }
-            std::vector<int64_t> kept;
-            for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-              if (!fit.TakesPart(e)) continue;
-              kept.push_back(track.keypoints[e - point.track_begin]);
-            }
-            track.keypoints = std::move(kept);
-            track.xyz = fit.Point(n);
-          }
-        });
-  }
-
-  // Whether there was one above the bound, or behind its camera, in a track of
-  // more than one.
-  bool RemoveWorst(const Point3D& point, TrackNoise* fit) const {
-    std::optional<uint64_t> worst;
-    double largest = options_.max_error_px;
-    int64_t num = 0;
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (!fit->TakesPart(e)) continue;
-      ++num;
-      const double error = fit->ErrorOf(e).norm();
-      if (error <= largest) continue;
-      worst = e;
-      if (!std::isfinite(error)) break;
-      largest = error;
-    }
-    if (num < 2 || !worst) return false;
-    fit->Remove(*worst);
-    return true;
-  }
-
-  // Not of two, of which it cannot be told which one is wrong.
-  void RemoveMoreThanNoise() {
-    const NoiseSnooping snooping = SnoopNoise(model_, {}, context_);
-    std::vector<char> is_removed(model_.track_elements.size(), 0);
-    for (const SnoopedObservation& one : snooping.removed) {
-      if (!one.is_of_two) is_removed[one.element] = 1;
-    }
-    for (size_t k = 0; k < model_.points3D.size(); ++k) {
-      const Point3D& point = model_.points3D[k];
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        if (!is_removed[e]) continue;
-        model_.points3D[k].xyz = snooping.noise.points[k];
-        ++summary_.num_more_than_noise;
-      }
-    }
-    model_ = RemoveObservations(model_, is_removed).model;
-  }
-
-  void RemoveNarrow() {
-    const double least = std::cos(options_.min_angle_deg / kDegreesPerRadian);
-    const auto indices = ImageIndices(model_);
-    std::vector<char> is_removed(model_.track_elements.size(), 0);
-    for (const Point3D& point : model_.points3D) {
-      std::vector<Vector3d> rays;
-      bool is_narrow = true;
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        const int32_t image = indices.at(model_.track_elements[e].image_id);
-        const Vector3d center = Center(geometries_[image].cam_from_world);
-        rays.push_back((point.xyz - center).normalized());
-        for (const Vector3d& other : rays) {
-          is_narrow = is_narrow && other.dot(rays.back()) > least;
-        }
-      }
-      if (!is_narrow) continue;
-      ++summary_.num_narrow;
-      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-        is_removed[e] = 1;
-      }
-    }
-    model_ = RemoveObservations(model_, is_removed).model;
-  }
-
   void Finish() {
     LeastSquares(&accepted_);
     accepted_.erase(std::remove_if(accepted_.begin(), accepted_.end(),
@@ -470,8 +360,8 @@ class MatchTriangulator {
                 return a.keypoints < b.keypoints;
               });
     model_ = ModelWith(accepted_);
-    RemoveMoreThanNoise();
-    RemoveNarrow();
+    summary_.num_more_than_noise = RemoveMoreThanNoise(context_, &model_);
+    summary_.num_narrow = RemoveNarrow(options_.min_angle_deg, &model_);
     UpdatePointErrors(PixelErrors(model_, context_.num_threads), &model_);
   }
 

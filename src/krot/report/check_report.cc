@@ -12,15 +12,8 @@ namespace krot {
 namespace {
 
 const char* VerdictName(ImageVerdict verdict) {
-  switch (verdict) {
-    case ImageVerdict::kWrong:
-      return "wrong";
-    case ImageVerdict::kWeaklyHeld:
-      return "weakly held";
-    case ImageVerdict::kFine:
-      break;
-  }
-  return "fine";
+  constexpr const char* kNames[] = {"fine", "weakly held", "wrong"};
+  return kNames[static_cast<size_t>(verdict)];
 }
 
 // What an image is called wrong for.
