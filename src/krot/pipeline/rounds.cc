@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "krot/bridge/reprojection.h"
-#include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/kept_positions.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/round_bounds.h"
@@ -292,92 +291,6 @@ std::optional<PixelCertificate> SolveInRounds(
                 summary);
   rounds.Run();
   return rounds.certificate();
-}
-
-namespace {
-
-// A stall with a bound within so many times the gap asked for is left alone.
-constexpr double kGapsOfAnswer = 10;
-constexpr size_t kFewIterations = 100;
-
-bool IsWithin(double relative_gap,
-              const std::optional<PixelCertificate>& certificate, double cost) {
-  return certificate && cost - certificate->lower_bound <= relative_gap * cost;
-}
-
-// None without a start.
-std::optional<Estimate> OtherStart(const Start& other,
-                                   const SolveModelOptions& options,
-                                   const Context& context, const Timer& timer,
-                                   SolveSummary* summary) {
-  if (other.init == SolveInit::kModel) return other.built.start;
-  return FindFeasibleStart(
-             other.built.problem, options, context,
-             LogIterations(options.joint.callback, timer, summary))
-      .estimate;
-}
-
-template <typename Value>
-void Append(const std::vector<Value>& from, std::vector<Value>* to) {
-  to->insert(to->end(), from.begin(), from.end());
-}
-
-}  // namespace
-
-void TryOtherWays(const Model& model, const SolveModelOptions& options,
-                  const Context& context, const Timer& timer, Start* start,
-                  Estimate* estimate,
-                  std::optional<PixelCertificate>* certificate,
-                  SolveSummary* summary) {
-  SolveModelOptions other_options = options;
-  other_options.joint.max_iterations = std::min(
-      options.joint.max_iterations,
-      static_cast<int>(std::max(kFewIterations, summary->iterations.size())));
-  for (const SolveInit init : {SolveInit::kModel, SolveInit::kFeasible}) {
-    if (summary->termination != SolveTermination::kStalled ||
-        IsWithin(kGapsOfAnswer * options.joint.relative_gap, *certificate,
-                 summary->cost_final)) {
-      return;
-    }
-    other_options.init = init;
-    const bool is_own = init == SolveInit::kModel;
-    context.Stage(is_own ? "that stalled; joint iterations from the model"
-                         : "that stalled; from a start from nothing");
-    Start other =
-        is_own ? OwnStart(model, other_options, context)
-               : ChooseStart(model, other_options, summary->method, context);
-    if (other.built.NumPixels() != start->built.NumPixels()) continue;
-    SolveSummary way;
-    way.method = summary->method;
-    way.norm = summary->norm;
-    std::optional<Estimate> found =
-        OtherStart(other, other_options, context, timer, &way);
-    if (found) {
-      std::optional<PixelCertificate> proof = SolveInRounds(
-          model, other_options, is_own ? SolveMethod::kJoint : summary->method,
-          context, timer, &other.built, &*found, &way);
-      const bool is_better = way.cost_final < summary->cost_final;
-      if (is_better) {
-        *start = std::move(other);
-        *estimate = *std::move(found);
-        summary->cost_final = way.cost_final;
-      }
-      if (proof &&
-          (!*certificate || proof->lower_bound > (*certificate)->lower_bound)) {
-        *certificate = std::move(proof);
-      }
-      if (IsWithin(options.joint.relative_gap, *certificate,
-                   summary->cost_final)) {
-        summary->termination = SolveTermination::kGapReached;
-      }
-    }
-    if (context.IsCancelled()) {
-      summary->termination = SolveTermination::kInterrupted;
-    }
-    Append(way.rounds, &summary->rounds);
-    Append(way.sweeps, &summary->sweeps);
-    Append(way.iterations, &summary->iterations);
-  }
 }
 
 }  // namespace krot

@@ -16,6 +16,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/pipeline/certify.h"
 #include "krot/pipeline/iteration_log.h"
+#include "krot/pipeline/other_ways.h"
 #include "krot/pipeline/rounds.h"
 #include "krot/pipeline/run_finish.h"
 #include "krot/pipeline/settle.h"
@@ -32,7 +33,6 @@ namespace {
 constexpr double kGapOfAnswer = 1e-2;
 // What rounding may add to the largest error, relative.
 constexpr double kErrorRounding = 1e-9;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // Of the bound of a start, the level at which it keeps positions.
 constexpr double kShareOfStart = 0.99;
 
@@ -198,8 +198,9 @@ double LargestOf(Role role, const std::vector<Role>& roles,
   double largest = 0;
   for (size_t e = 0; e < roles.size(); ++e) {
     if (roles[e] != role) continue;
-    largest = std::max(largest,
-                       std::isfinite(errors_px[e]) ? errors_px[e] : kInfinity);
+    largest = std::max(largest, std::isfinite(errors_px[e])
+                                    ? errors_px[e]
+                                    : std::numeric_limits<double>::infinity());
   }
   return MaxOfRanks(context, largest);
 }

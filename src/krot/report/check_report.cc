@@ -5,55 +5,10 @@
 #include <vector>
 
 #include "krot/report/pair_report.h"
-#include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
 namespace krot {
 namespace {
-
-const char* VerdictName(ImageVerdict verdict) {
-  constexpr const char* kNames[] = {"fine", "weakly held", "wrong"};
-  return kNames[static_cast<size_t>(verdict)];
-}
-
-// What an image is called wrong for.
-const char* FaultName(ImageFault fault) {
-  switch (fault) {
-    case ImageFault::kMatches:
-      return "matches";
-    case ImageFault::kContradicted:
-      return "contradicted";
-    case ImageFault::kMisplaced:
-      return "misplaced";
-    case ImageFault::kChance:
-      return "chance";
-    case ImageFault::kNone:
-      break;
-  }
-  return "none";
-}
-
-// Empty for what is fine.
-std::string Reason(const ModelCheck& check, const ImageCheck& image) {
-  if (image.verdict == ImageVerdict::kWeaklyHeld) {
-    return "its centre may move more than ten times as far as the median "
-           "image's";
-  }
-  switch (image.fault) {
-    case ImageFault::kMatches:
-      return "its matches contradict its " +
-             PoseFaultWords(check.pairs->images[&image - check.images.data()]);
-    case ImageFault::kContradicted:
-      return "most of them contradict the others";
-    case ImageFault::kMisplaced:
-      return "another pose would halve its squared errors";
-    case ImageFault::kChance:
-      return "they fit no better than chance matches";
-    case ImageFault::kNone:
-      break;
-  }
-  return "";
-}
 
 std::string NoiseWords(const ModelCheck& check) {
   return check.sigma_px
@@ -109,7 +64,7 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
                                     std::to_string(image.num_tested)};
     if (is_wrong) {
       row.push_back(std::to_string(image.num_wrong));
-      row.push_back(Reason(check, image));
+      row.push_back(ReasonOf(check, image));
     } else {
       row.push_back(SigmaText(image.center_sigma));
       row.push_back(std::isfinite(image.relative_center_sigma)
@@ -229,25 +184,28 @@ std::string NextSteps(const CheckReport& report) {
          FormatLength(*check.cauchy_scale_px) + "\n";
 }
 
-Json ImageJson(const ModelCheck& check, const ImageCheck& image) {
-  return {{"image_id", image.image_id},
-          {"image_name", image.name},
-          {"verdict", VerdictName(image.verdict)},
-          {"fault", image.fault == ImageFault::kNone
-                        ? Json()
-                        : Json(FaultName(image.fault))},
-          {"reason", Reason(check, image)},
-          {"num_observations", image.num_observations},
-          {"num_tested", image.num_tested},
-          {"num_wrong", image.num_wrong},
-          {"center_sigma", FiniteOrNull(image.center_sigma)},
-          {"relative_center_sigma", FiniteOrNull(image.relative_center_sigma)},
-          {"turn_sigma_deg", FiniteOrNull(image.turn_sigma_deg)},
-          {"turn_deg", image.turn_deg},
-          {"shift", image.shift}};
-}
-
 }  // namespace
+
+std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
+  if (image.verdict == ImageVerdict::kWeaklyHeld) {
+    return "its centre may move more than ten times as far as the median "
+           "image's";
+  }
+  switch (image.fault) {
+    case ImageFault::kMatches:
+      return "its matches contradict its " +
+             PoseFaultWords(check.pairs->images[&image - check.images.data()]);
+    case ImageFault::kContradicted:
+      return "most of them contradict the others";
+    case ImageFault::kMisplaced:
+      return "another pose would halve its squared errors";
+    case ImageFault::kChance:
+      return "they fit no better than chance matches";
+    case ImageFault::kNone:
+      break;
+  }
+  return "";
+}
 
 std::string CheckSentence(const CheckReport& report) {
   const ModelCheck& check = report.check;
@@ -333,67 +291,6 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
          NextSteps(report) + "\n" +
          RunSentence(report.run,
                      "checked " + FormatNumber(report.seconds_check, 2) + " s");
-}
-
-std::string CheckJson(const CheckReport& report) {
-  const ModelCheck& check = report.check;
-  Json images = Json::array();
-  for (const ImageCheck& image : check.images) {
-    images.push_back(ImageJson(check, image));
-  }
-  Json observations = Json::array();
-  for (const WrongObservation& one : check.observations) {
-    observations.push_back({{"image_id", one.image_id},
-                            {"image_name", one.image_name},
-                            {"point2D_idx", one.point2D_idx},
-                            {"point3D_id", one.point3D_id},
-                            {"w", FiniteOrNull(one.w)},
-                            {"error_px", FiniteOrNull(one.error_px)},
-                            {"is_of_two", one.is_of_two}});
-  }
-  Json tracks = Json::array();
-  for (const TwoPointTrack& track : check.tracks) {
-    tracks.push_back({{"point3D_id", track.point3D_id},
-                      {"num_first", track.num_first},
-                      {"num_second", track.num_second},
-                      {"second", VectorJson(track.second)}});
-  }
-  const Json json = {
-      {"version", report.run.version},
-      {"command", "model_checker"},
-      {"verdict", CheckSentence(report)},
-      {"is_anything_wrong", check.IsAnythingWrong()},
-      {"is_adjusted", check.is_adjusted},
-      {"num_images", check.images.size()},
-      {"num_wrong_images", check.NumImages(ImageVerdict::kWrong)},
-      {"num_weakly_held_images", check.NumImages(ImageVerdict::kWeaklyHeld)},
-      {"num_observations", report.num_observations},
-      {"num_tested", check.num_tested},
-      {"num_wrong_observations", check.observations.size()},
-      {"sigma_px", NumberOrNull(check.sigma_px)},
-      {"cauchy_scale_px", NumberOrNull(check.cauchy_scale_px)},
-      {"median_scale_px", NumberOrNull(check.median_scale_px)},
-      {"critical_w", check.critical_w},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
-      {"pixel_error",
-       {{"before", ErrorJson(report.pixel_error_before)},
-        {"after", ErrorJson(report.pixel_error_after)}}},
-      {"database", check.pairs ? PairJson(*check.pairs) : Json()},
-      {"moved_images", report.moved},
-      {"images", images},
-      {"observations", observations},
-      {"tracks", tracks},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"check", report.seconds_check},
-        {"write", report.run.seconds_write},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
-  };
-  return ReportText(json);
 }
 
 }  // namespace krot

@@ -25,6 +25,9 @@ struct CheckReport {
   std::string database_path;
 };
 
+// Why an image has its verdict; empty for one that is fine.
+std::string ReasonOf(const ModelCheck& check, const ImageCheck& image);
+
 // "2 of 41 images and 37 of 20,785 observations are wrong", or "Nothing is
 // wrong", and why.
 std::string CheckSentence(const CheckReport& report);

@@ -249,7 +249,9 @@ ModelCheckerSummary CheckReconstruction(const ModelCheckerOptions& options,
                       model = ToKrotModel(reconstruction);
                       report.check = krot::CheckModel(model, {}, context);
                       if (report.check.sigma_px) {
-                        cured = krot::CureModel(model, report.check, {}, context).model;
+                        cured =
+                            krot::CureModel(model, report.check, {}, context)
+                                .model;
                       }
                     })) {
     return summary;
