@@ -17,6 +17,7 @@ _ARGUMENTS = [
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage",
     "--hide-scrollbars", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--force-prefers-reduced-motion",  # where it scrolls to, it is at once
 ]
 _ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
 

@@ -48,6 +48,7 @@ class Firefox(Browser):
             "browser.download.alwaysOpenPanel": False,
             "layout.css.prefers-color-scheme.content-override":
                 0 if dark else 1,
+            "ui.prefersReducedMotion": 1,  # where it scrolls to, it is at once
             "dom.w3c_touch_events.enabled": int(touch),
         }
         pathlib.Path(self._profile.name, "user.js").write_text("".join(

@@ -250,18 +250,8 @@ class PageTest(unittest.TestCase):
             self.browser.texts(".info h3"),
             [worst["image_name"], "Point %d" % worst["point3D_id"]])
 
-    def wait_until_it_stands(self):
-        """The page scrolls to its view smoothly."""
-        self.browser.run("""
-            const top = () => document.querySelector('#scene canvas')
-                .getBoundingClientRect().top;
-            const pause = () => new Promise((done) => setTimeout(done, 300));
-            for (let last = NaN; last !== top(); await pause()) last = top();
-            """)
-
     def test_click_beside_everything_closes_the_numbers(self):
         self.browser.click("#support tbody tr:first-child td:first-child")
-        self.wait_until_it_stands()
         self.browser.run("document.querySelector('#scene canvas')"
                          ".scrollIntoView({block: 'center', behavior: 'instant'});")
         self.browser.click("#scene canvas", -500, -200)

@@ -206,9 +206,10 @@ export class Viewer {
     this.redraw();
   }
 
-  // The same, and the page scrolls to it.
+  // The same, and the page scrolls to it: at once for those who want no motion.
   show(selected) {
     this.select(selected);
-    byId('scene').scrollIntoView({ behavior: 'smooth' });
+    const { matches } = matchMedia('(prefers-reduced-motion: reduce)');
+    byId('scene').scrollIntoView({ behavior: matches ? 'instant' : 'smooth' });
   }
 }
