@@ -297,23 +297,41 @@ def test_compares_two_models(scene):
     assert report["num_shared_poses"] == len(model.image_names)
 
 
+class Reconstruction:
+    """As much of pycolmap's as is needed."""
+    def __init__(self, path=None):
+        self.model = pykrot.Model.read(path) if path else None
+
+    def read(self, path):
+        self.model = pykrot.Model.read(path)
+
+    def write(self, path):
+        self.model.write(path, overwrite=True)
+
+
 def test_goes_to_and_from_what_can_only_read_and_write_files(scene, tmp_path):
-    class Reconstruction:
-        """As much of pycolmap's as is needed."""
-        def __init__(self, path=None):
-            self.model = pykrot.Model.read(path) if path else None
-
-        def read(self, path):
-            self.model = pykrot.Model.read(path)
-
-        def write(self, path):
-            self.model.write(path, overwrite=True)
-
     model = pykrot.from_pycolmap(Reconstruction(scene))
     back = pykrot.to_pycolmap(model, Reconstruction())
     back.write(tmp_path / "back")
     model.write(tmp_path / "model")
     assert_same_files(tmp_path / "back", tmp_path / "model")
+
+
+def test_takes_a_reconstruction_and_gives_one_back(scene, tmp_path):
+    given = Reconstruction(scene)
+    solved = pykrot.solve(given)
+    solved.reconstruction.write(tmp_path / "back")
+    pykrot.solve(pykrot.Model.read(scene)).model.write(tmp_path / "model")
+    assert_same_files(tmp_path / "back", tmp_path / "model")
+    given.write(tmp_path / "given")
+    assert_same_files(tmp_path / "given", scene)
+    assert isinstance(pykrot.check(given).reconstruction, Reconstruction)
+    assert pykrot.compare(given, solved.reconstruction)["num_shared_poses"] > 0
+
+
+def test_names_what_it_takes():
+    with pytest.raises(TypeError, match="expected a pykrot.Model"):
+        pykrot.solve("sparse/0")
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "tools" / "examples"

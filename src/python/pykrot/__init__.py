@@ -1,7 +1,7 @@
 """KROT for Python: the known rotation problem on COLMAP models.
 
-Every function takes a Model (or a Problem of numpy arrays) and the options of
-the krot command of the same purpose, under the command line's names without
+Every function takes a Model (or a Problem of numpy arrays, or a
+pycolmap.Reconstruction) and the options of the krot command of the same purpose, under the command line's names without
 their group: --Solver.relative_gap is relative_gap=1e-4. A name that two groups
 share is spelled out: options={"Solver.num_threads": 2}. docs/cli.md lists all.
 
@@ -14,12 +14,13 @@ share is spelled out: options={"Solver.num_threads": 2}. docs/cli.md lists all.
 
 import json
 from dataclasses import dataclass
-from typing import Optional
+from typing import Any, Optional
 
 from pykrot import _core
 from pykrot._core import Model, ModelError, OptionError, WriteError
 from pykrot.problem import Problem
-from pykrot.through_memory import from_pycolmap, to_pycolmap
+from pykrot.through_memory import (from_pycolmap, is_reconstruction,
+                                   to_pycolmap)
 
 __version__ = _core.__version__
 __all__ = [
@@ -48,6 +49,8 @@ class Result:
     model: Model
     report: dict
     certificate: Optional[str]  # JSON: of the bound, or the conflicts
+    # The new model as a pycolmap.Reconstruction, where one was given.
+    reconstruction: Optional[Any] = None
 
     @property
     def max_error(self):
@@ -79,14 +82,25 @@ class Verdict:
     num_conflicts: Optional[int]  # so many observations at least must go
 
 
+def _as_model(scene):
+    if isinstance(scene, Model):
+        return scene
+    if isinstance(scene, Problem):
+        return scene.to_model()
+    if is_reconstruction(scene):
+        return from_pycolmap(scene)
+    raise TypeError(f"found a {type(scene).__name__}, expected a pykrot.Model, "
+                    "a pykrot.Problem or a pycolmap.Reconstruction")
+
+
 def _run(command, model, progress, options, keywords):
-    if isinstance(model, Problem):
-        model = model.to_model()
-    outcome = command(model, progress, {**(options or {}), **keywords})
+    outcome = command(_as_model(model), progress, {**(options or {}), **keywords})
     result = Result(outcome.model, json.loads(outcome.report),
                     outcome.certificate)
     if result.report.get("termination") in _WITHOUT_RESULT:
         raise NoSolutionError(result)
+    if is_reconstruction(model):
+        result.reconstruction = to_pycolmap(result.model, type(model)())
     return result
 
 
@@ -148,7 +162,8 @@ def tolerances(model, max_error, *, images=(), points=(), progress=None,
 
 def compare(model1, model2, *, alignment="frame", num_worst=10):
     """How two models of the same images differ: model_comparer's JSON."""
-    report = _core.compare(model1, model2, alignment, num_worst)
+    report = _core.compare(_as_model(model1), _as_model(model2), alignment,
+                           num_worst)
     if report is None:
         raise ValueError("the models share too few images to be aligned")
     return json.loads(report)
@@ -156,6 +171,4 @@ def compare(model1, model2, *, alignment="frame", num_worst=10):
 
 def check_certificate(model, certificate):
     """Judges a certificate's or conflicts' JSON from the model alone."""
-    if isinstance(model, Problem):
-        model = model.to_model()
-    return Verdict(*_core.check_certificate(model, certificate))
+    return Verdict(*_core.check_certificate(_as_model(model), certificate))

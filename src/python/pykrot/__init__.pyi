@@ -78,6 +78,7 @@ class Result:
     model: Model
     report: Dict[str, Any]
     certificate: Optional[str]
+    reconstruction: Optional[Any] = ...
     @property
     def max_error(self) -> float: ...
     @property
@@ -94,34 +95,37 @@ class Verdict:
     lower_bound: float
     num_conflicts: Optional[int]
 
-def solve(model: Union[Model, Problem], *,
+# Or a pycolmap.Reconstruction.
+Scene = Union[Model, Problem, Any]
+
+def solve(model: Scene, *,
           progress: Optional[Progress] = ...,
           options: Optional[Mapping[str, Any]] = ...,
           **keywords: Any) -> Result: ...
-def triangulate(model: Union[Model, Problem], *,
+def triangulate(model: Scene, *,
                 progress: Optional[Progress] = ...,
                 options: Optional[Mapping[str, Any]] = ...,
                 **keywords: Any) -> Result: ...
-def check(model: Union[Model, Problem],
+def check(model: Scene,
           database: Optional[Union[str, PathLike[str]]] = ...,
           **keywords: Any) -> Result: ...
-def filter(model: Union[Model, Problem], max_error: Optional[float] = ..., *,
+def filter(model: Scene, max_error: Optional[float] = ..., *,
            progress: Optional[Progress] = ...,
            options: Optional[Mapping[str, Any]] = ...,
            **keywords: Any) -> Result: ...
-def bundle_adjust(model: Union[Model, Problem], *,
+def bundle_adjust(model: Scene, *,
                   progress: Optional[Progress] = ...,
                   options: Optional[Mapping[str, Any]] = ...,
                   **keywords: Any) -> Result: ...
-def tolerances(model: Union[Model, Problem], max_error: float, *,
+def tolerances(model: Scene, max_error: float, *,
                images: Sequence[Union[str, int]] = ...,
                points: Sequence[int] = ...,
                progress: Optional[Progress] = ...,
                options: Optional[Mapping[str, Any]] = ...,
                **keywords: Any) -> Result: ...
-def compare(model1: Model, model2: Model, *, alignment: str = "frame",
+def compare(model1: Scene, model2: Scene, *, alignment: str = "frame",
             num_worst: int = 10) -> Dict[str, Any]: ...
-def check_certificate(model: Union[Model, Problem],
+def check_certificate(model: Scene,
                       certificate: str) -> Verdict: ...
 def from_pycolmap(reconstruction: Any) -> Model: ...
 def to_pycolmap(model: Model, reconstruction: Any) -> Any: ...

@@ -12,6 +12,13 @@ def _folder():
         dir="/dev/shm" if os.path.isdir("/dev/shm") else None)
 
 
+def is_reconstruction(scene):
+    """Whether it is a pycolmap.Reconstruction, as far as is needed here."""
+    return (not isinstance(scene, Model) and
+            callable(getattr(scene, "read", None)) and
+            callable(getattr(scene, "write", None)))
+
+
 def from_pycolmap(reconstruction):
     """A Model of a pycolmap.Reconstruction."""
     with _folder() as folder:
