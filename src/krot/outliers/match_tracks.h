@@ -60,4 +60,29 @@ MatchTracksResult TriangulateMatches(const Model& model,
                                      const MatchTracksOptions& options,
                                      const Context& context);
 
+// Tracks of a model whose rotations and rigs alone are known; its positions
+// only have to be finite. A match counts if it agrees with the baseline that
+// most matches of its pair agree with (SearchBaseline). Keypoints of an image
+// that a track has twice are left out; points have no place. Otherwise as
+// TriangulateMatches.
+Model TracksFromRotations(const Model& model, const Database& database,
+                          double max_error_px, const Context& context);
+
+struct PlacedMatches {
+  Model model;  // without points where there is nothing to make them from
+  MatchTracksSummary summary;  // of its tracks
+  int64_t num_unplaced = 0;    // images with rotations, but without a track
+};
+
+// Positions and points from rotations and matches, nothing else: the tracks of
+// the rotations alone, their robust start (FindRobustStart), then twice
+// TriangulateMatches and robust least squares of its tracks, since it divides
+// tracks and drops wrong matches better the better the positions are. Place and
+// scale are the model's where it has positions. Images without a track stay
+// where they are. Requires and throws what TriangulateMatches does, with
+// keeps_tracks false. The same bits at any number of threads.
+PlacedMatches PlaceMatches(const Model& model, const Database& database,
+                           const MatchTracksOptions& options,
+                           const Context& context);
+
 }  // namespace krot
