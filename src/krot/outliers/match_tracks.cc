@@ -323,7 +323,6 @@ class MatchTriangulator {
                 return a.keypoints < b.keypoints;
               });
     model_ = ModelWith(accepted_);
-    summary_.num_more_than_noise = RemoveMoreThanNoise(context_, &model_);
     summary_.num_narrow = RemoveNarrow(options_.min_angle_deg, &model_);
     UpdatePointErrors(PixelErrors(model_, context_.num_threads), &model_);
   }

@@ -29,8 +29,6 @@ struct MatchTracksSummary {
   int64_t num_in_conflict = 0;  // of these, no point is within max_error_px
   int64_t num_two_views = 0;    // points left out, seen by one match alone
   int64_t num_narrow = 0;       // points left out, below min_angle_deg
-  // Observations within max_error_px that noise does not explain, left out.
-  int64_t num_more_than_noise = 0;
 };
 
 struct MatchTracksResult {
@@ -47,9 +45,8 @@ struct MatchTracksResult {
 // it agrees with is found (PlacePointsRobustly); what is within max_error_px of
 // that, of every image the nearest, is a track, and the rest is joined anew.
 // Each point then moves to the least squares of its track; observations that
-// are above max_error_px there, or that noise does not explain (SnoopNoise),
-// go. Two keypoints that have no match but each other are left out, since
-// nothing checks them.
+// are above max_error_px there go. Two keypoints that have no match but each
+// other are left out, since nothing checks them.
 //
 // Throws std::invalid_argument for options out of range, ModelError for cameras
 // without an image plane. Requires a valid model; ids of points are

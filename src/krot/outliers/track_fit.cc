@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "krot/analysis/noise.h"
 #include "krot/analysis/track_noise.h"
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
@@ -192,25 +191,6 @@ std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
         }
       });
   return fitted;
-}
-
-int64_t RemoveMoreThanNoise(const Context& context, Model* model) {
-  const NoiseSnooping snooping = SnoopNoise(*model, {}, context);
-  std::vector<char> is_removed(model->track_elements.size(), 0);
-  for (const SnoopedObservation& one : snooping.removed) {
-    if (!one.is_of_two) is_removed[one.element] = 1;
-  }
-  int64_t num_removed = 0;
-  for (size_t k = 0; k < model->points3D.size(); ++k) {
-    const Point3D& point = model->points3D[k];
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (!is_removed[e]) continue;
-      model->points3D[k].xyz = snooping.noise.points[k];
-      ++num_removed;
-    }
-  }
-  *model = RemoveObservations(*model, is_removed).model;
-  return num_removed;
 }
 
 int64_t RemoveNarrow(double min_angle_deg, Model* model) {

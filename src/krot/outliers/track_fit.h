@@ -68,10 +68,6 @@ struct FittedTrack {
 std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
                                    const Context& context);
 
-// Removes what is more than noise (SnoopNoise), but not of a track of two, of
-// which it cannot be told which one is wrong. Returns the number.
-int64_t RemoveMoreThanNoise(const Context& context, Model* model);
-
 // Removes points all of whose rays are within the angle. Returns the number.
 int64_t RemoveNarrow(double min_angle_deg, Model* model);
 

@@ -37,8 +37,6 @@ std::string TrackTable(const TrackReport& report) {
   add("divided, as no point fits all", summary.num_in_conflict);
   add("left out, as they are a single match", summary.num_two_views);
   add("left out, as their rays are too narrow", summary.num_narrow);
-  add("observations left out that noise does not explain",
-      summary.num_more_than_noise);
   text += table.ToString();
   if (summary.num_contradictory_pairs > 0) {
     text += "\nThe matches of " +
@@ -61,8 +59,7 @@ Json MatchesJson(const MatchTracksSummary& summary) {
           {"num_image_twice", summary.num_image_twice},
           {"num_in_conflict", summary.num_in_conflict},
           {"num_two_views", summary.num_two_views},
-          {"num_narrow", summary.num_narrow},
-          {"num_more_than_noise", summary.num_more_than_noise}};
+          {"num_narrow", summary.num_narrow}};
 }
 
 std::string MatchesSentence(const MatchTracksSummary& summary) {
