@@ -106,6 +106,9 @@ struct CheckedPair {
   int64_t num_explained = 0;
   int64_t most_explained = 0;
   Eigen::Vector3d best_baseline = Eigen::Vector3d::Zero();  // world axes
+  // The proof of most_explained: the cells of directions that it takes
+  // (docs/formats.md, "Baselines").
+  std::string cells;
   // Neither image is wrong, and they are not of two groups.
   bool has_wrong_matches = false;
 };
@@ -158,8 +161,8 @@ struct PairCheck {
   // Matches of which a pixel has no ray less than 90 degrees off the axis.
   int64_t num_without_ray = 0;
   Explanation cheapest;
-  // Another explanation that costs at most a tenth more: the two cannot be
-  // told apart by the matches.
+  // Another explanation that costs at most a tenth more, what both give up left
+  // out: the two cannot be told apart by the matches.
   std::optional<Explanation> runner_up;
   // False if the search for these ended early: cheaper ones may exist.
   bool is_cheapest_proved = true;

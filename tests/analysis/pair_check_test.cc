@@ -74,7 +74,22 @@ TEST(ExplainContradictions, BlamesTheImageThatAllOthersContradict) {
       {10, 500, 500, 500}, {{0, 1, 100}, {0, 2, 90}, {0, 3, 80}, {2, 3, 20}});
   EXPECT_THAT(found.cheapest.images, ElementsAre(0));
   EXPECT_EQ(found.cheapest.cost, 10 + 20);
-  EXPECT_THAT(found.runner_up->images, IsEmpty());
+  EXPECT_FALSE(found.runner_up);
+}
+
+// Whatever else is contradicted.
+TEST(ExplainContradictions, TellsOfAnotherThatGivesUpAboutAsMuch) {
+  const std::vector<int64_t> costs = {100, 500, 500, 5000, 5000};
+  const ContradictoryPair elsewhere = {3, 4, 3000};
+  const Explanations near =
+      ExplainContradictions(costs, {{0, 1, 85}, {0, 2, 20}, elsewhere});
+  EXPECT_THAT(near.cheapest.images, ElementsAre(0));
+  ASSERT_TRUE(near.runner_up);
+  EXPECT_THAT(near.runner_up->images, IsEmpty());
+  const Explanations far =
+      ExplainContradictions(costs, {{0, 1, 30}, {0, 2, 20}, elsewhere});
+  EXPECT_THAT(far.cheapest.images, IsEmpty());
+  EXPECT_FALSE(far.runner_up);
 }
 
 // Exact poses, noise of half a pixel, cameras with a lens.

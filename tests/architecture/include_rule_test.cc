@@ -154,6 +154,13 @@ TEST(IncludeRule, TheCertificatesCheckerSeesNothingOfTheSolvers) {
     }
   }
   EXPECT_EQ(included.count("krot/problem/known_rotation_problem.h"), 1u);
+  std::set<std::string> of_baselines;
+  AddIncluded("krot/bridge/baseline_certificate.h", &of_baselines);
+  AddIncluded("krot/bridge/baseline_certificate.cc", &of_baselines);
+  for (const std::string& file : of_baselines) {
+    EXPECT_NE(file.rfind("krot/analysis/", 0), 0u)
+        << "the checker of baselines must not include " << file;
+  }
   for (const std::string& file : included) {
     for (const char* folder : {"linear", "conic", "joint", "sweeps"}) {
       EXPECT_NE(file.rfind(std::string("krot/") + folder + "/", 0), 0u)

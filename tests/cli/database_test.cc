@@ -144,6 +144,106 @@ TEST_F(DatabaseOption, MakesPointsForKnownPoses) {
   EXPECT_THAT(Load(folder_ / "points").points3D.size(), made.points3D.size());
 }
 
+TEST_F(DatabaseOption, GivesPositionsAndPointsToRotationsAlone) {
+  Model rotations = WithShortTracks(Load(folder_ / "sound"), 0);
+  for (Image& image : rotations.images) image.points2D.clear();
+  for (Frame& frame : rotations.frames) {
+    frame.rig_from_world.translation.setZero();
+  }
+  Save(rotations, folder_ / "rotations");
+  const auto solve = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {
+        "solver",       "--database_path",     folder_ / "database.db",
+        "--input_path", folder_ / "rotations", "--output_path",
+        folder_ / "s",  "--report_path",       folder_ / "r.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunKrot(arguments);
+  };
+  KrotResult result = solve({});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err,
+              IsOneSentence("krot solver",
+                            "--database_path needs --Solver.init feasible"));
+  result = solve({"--Solver.init", "feasible"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("The points come from the matches of "));
+  ValidateModel(Load(folder_ / "s"));
+  const Json json = Json::parse(ReadBytes(folder_ / "r.json"));
+  EXPECT_GT(json["matches"]["num_pairs"], 20);
+  EXPECT_LT(json["pixel_error"]["after"]["max"], 4);
+  ASSERT_EQ(RunKrot({"model_comparer", "--input_path1", folder_ / "sound",
+                     "--input_path2", folder_ / "s", "--alignment",
+                     "similarity", "--report_path", folder_ / "c.json"})
+                .exit_code,
+            0);
+  const Json compared = Json::parse(ReadBytes(folder_ / "c.json"));
+  EXPECT_LT(compared["center"]["rms"].get<double>(),
+            0.005 * compared["scene_radius"].get<double>());
+  result = solve({"--Solver.init", "feasible", "--overwrite", "1",
+                  "--Solver.max_error", "1e-9", "--log_level", "0"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_THAT(result.err,
+              IsOneSentence("krot solver", "nothing to solve: no matches of"));
+}
+
+TEST_F(DatabaseOption, ProvesWhatNoBaselinesExplain) {
+  const std::string certificate = folder_ / "baselines.json";
+  ASSERT_EQ(Check("turned", {"--certificate_path", certificate}).exit_code, 0);
+  const auto judge = [&](const Json& json, const std::string& model) {
+    WriteBytes(folder_ / "judged.json", json.dump());
+    return RunKrot({"certificate_checker", "--input_path", folder_ / model,
+                    "--database_path", folder_ / "database.db",
+                    "--certificate_path", folder_ / "judged.json",
+                    "--report_path", folder_ / "v.json"});
+  };
+  const Json json = Json::parse(ReadBytes(certificate));
+  const Json database = Json::parse(ReadBytes(folder_ / "r.json"))["database"];
+  ASSERT_EQ(json["baselines"].size(), database["num_contradictory"]);
+  ASSERT_GT(json["baselines"].size(), 3);
+  KrotResult result = judge(json, "turned");
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, StartsWith("The certificate holds: with the "));
+  const Json verdict = Json::parse(ReadBytes(folder_ / "v.json"));
+  EXPECT_EQ(verdict["baselines"]["pairs"].size(), json["baselines"].size());
+  // Other rotations.
+  EXPECT_EQ(judge(json, "sound").exit_code, 4);
+  for (size_t n = 0; n < json["baselines"].size(); ++n) {
+    const auto is_refused = [&](const auto& falsify) {
+      Json other = json;
+      falsify(&other["baselines"][n]);
+      return judge(other, "turned").exit_code == 4;
+    };
+    EXPECT_TRUE(is_refused([](Json* pair) {
+      (*pair)["most_explained"] = (*pair)["most_explained"].get<int>() - 1;
+    }));
+    EXPECT_TRUE(is_refused([](Json* pair) {
+      (*pair)["num_explained"] = (*pair)["num_explained"].get<int>() + 1;
+    }));
+    EXPECT_TRUE(is_refused([](Json* pair) {
+      (*pair)["num_matches"] = (*pair)["num_matches"].get<int>() + 1;
+    }));
+    EXPECT_TRUE(is_refused([](Json* pair) { (*pair)["cells"] = "000"; }));
+    EXPECT_TRUE(is_refused([](Json* pair) { (*pair)["cells"] = ""; }));
+    EXPECT_TRUE(is_refused([](Json* pair) {
+      (*pair)["cells"] = (*pair)["cells"].get<std::string>() + "0";
+    }));
+    EXPECT_TRUE(is_refused(
+        [](Json* pair) { (*pair)["cells"] = std::string(1000, '1'); }));
+    EXPECT_TRUE(is_refused([](Json* pair) { (*pair)["image_id2"] = 4711; }));
+  }
+  Json twice = json;
+  twice["baselines"].push_back(json["baselines"][0]);
+  EXPECT_EQ(judge(twice, "turned").exit_code, 4);
+  Json wide = json;
+  wide["tolerance_px"] = 2 * json["tolerance_px"].get<double>();
+  EXPECT_EQ(judge(wide, "turned").exit_code, 4);
+  result = RunKrot({"certificate_checker", "--input_path", folder_ / "turned",
+                    "--certificate_path", certificate});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, IsOneSentence("krot certificate_checker",
+                                        "--database_path is required"));
+}
+
 TEST_F(DatabaseOption, OfASyntheticSceneGivesColmapAndKrotTheSamePoints) {
   if (!HasColmap()) GTEST_SKIP() << "no colmap";
   const std::string database = folder_ / "scene.db";

@@ -91,6 +91,68 @@ TEST(TriangulateMatches, MakesTheTracksThatMatchesWereMadeFrom) {
   }
 }
 
+TEST(PlaceMatches, FindsPositionsAndPointsFromRotationsAndMatchesAlone) {
+  const Model truth = Scene(0.3);
+  Database database = DatabaseOf(truth);
+  std::mt19937 random(3);
+  for (VerifiedPair& pair : database.pairs) {
+    const size_t num_matches = pair.matches.size();
+    for (size_t n = 0; n < num_matches / 4; ++n) {
+      pair.matches.push_back({pair.matches[random() % num_matches][0],
+                              pair.matches[random() % num_matches][1]});
+    }
+  }
+  Model poses = PosesOf(truth);
+  for (Frame& frame : poses.frames) {
+    frame.rig_from_world.translation.setConstant(NAN);
+  }
+  const PlacedMatches placed = PlaceMatches(poses, database, {}, {});
+  ValidateModel(placed.model);
+  EXPECT_EQ(placed.num_unplaced, 0);
+  EXPECT_GT(10 * TracksOf(placed.model, 3).size(),
+            9 * TracksOf(truth, 3).size());
+  const auto centers = [](const Model& model) {
+    std::vector<Eigen::Vector3d> all;
+    for (const ImageGeometry& image : ImageGeometries(model)) {
+      all.push_back(Center(image.cam_from_world));
+    }
+    return all;
+  };
+  const auto found = centers(placed.model), expected = centers(truth);
+  const double scale =
+      (found[1] - found[0]).norm() / (expected[1] - expected[0]).norm();
+  for (size_t i = 1; i < found.size(); ++i) {
+    const Eigen::Vector3d a = (found[i] - found[0]) / scale;
+    EXPECT_LT((a - (expected[i] - expected[0])).norm(), 0.02 * a.norm());
+  }
+}
+
+TEST(PlaceMatches, TakesNothingButPlaceAndScaleFromTheModelsPositions) {
+  const Model truth = Scene(0.3);
+  const Database database = DatabaseOf(truth);
+  Model poses = PosesOf(truth);
+  const PlacedMatches placed = PlaceMatches(poses, database, {}, {});
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.3);
+  for (Frame& frame : poses.frames) {
+    for (double& t : frame.rig_from_world.translation) t += noise(random);
+  }
+  const PlacedMatches other = PlaceMatches(poses, database, {}, {});
+  EXPECT_EQ(TracksOf(placed.model), TracksOf(other.model));
+}
+
+TEST(PlaceMatches, CountsImagesThatNoMatchesHold) {
+  const Model truth = Scene();
+  Database database = DatabaseOf(truth);
+  for (VerifiedPair& pair : database.pairs) {
+    if (pair.image1 == 3 || pair.image2 == 3) pair.matches.resize(1);
+  }
+  const PlacedMatches placed = PlaceMatches(truth, database, {}, {});
+  EXPECT_EQ(placed.num_unplaced, 1);
+  EXPECT_EQ(placed.model.frames[3].rig_from_world.translation,
+            truth.frames[3].rig_from_world.translation);
+}
+
 // Joins tracks by matches that their epipolar lines agree with.
 TEST(TriangulateMatches, DividesTracksThatWrongMatchesJoinByTheirResiduals) {
   const Model truth = Scene(0.3);

@@ -630,6 +630,109 @@ class RotationSuspectTest(unittest.TestCase):
         self.assertEqual(self.browser.console(), [])
 
 
+class PairsTest(unittest.TestCase):
+    """A scene in which one camera is turned, with its database, and photos of
+    all images but one."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        root = pathlib.Path(folder.name)
+        run_krot("model_synthesizer", "--output_path", root / "input",
+                 "--database_path", root / "database.db",
+                 "--Scene.num_frames", 6, "--Scene.num_points", 300,
+                 "--Scene.pixel_noise", 0.5, "--output_type", "TXT")
+        for name, row, first in (("images.txt", 4, 1), ("frames.txt", 2, 2)):
+            path = root / "input" / name
+            path.write_text(
+                RotationSuspectTest.turned(path.read_text(), row, first))
+        run_krot("model_checker", "--input_path", root / "input",
+                 "--database_path", root / "database.db", "--report_path",
+                 root / "bare.json", "--html_path", root / "bare.html")
+        cls.database = json.loads(
+            (root / "bare.json").read_text())["database"]
+        cls.bare = (root / "bare.html").as_uri()
+        names = [image["image_name"] for image in cls.database["images"]]
+        cls.missing = names[0]
+        for name in names[1:]:
+            photo = root / "photos" / name
+            photo.parent.mkdir(parents=True, exist_ok=True)
+            write_png(photo, 64, 48, lambda x, y: (4 * x, 4 * y, 128))
+        run_krot("model_checker", "--input_path", root / "input",
+                 "--database_path", root / "database.db", "--image_path",
+                 root / "photos", "--html_path", root / "page.html")
+        cls.page = (root / "page.html").as_uri()
+        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
+
+    def tearDown(self):
+        self.assertEqual(self.browser.console(), [])
+
+    def choose(self, pair):
+        """Clicks on the pair's square."""
+        names = [image["image_name"] for image in self.database["images"]]
+        self.browser.run("""
+            const [x, y, size] = arguments;
+            const matrix = document.querySelector('svg.matrix');
+            const box = matrix.getBoundingClientRect();
+            matrix.dispatchEvent(new MouseEvent('click', {
+              clientX: box.left + (x + 0.5) / size * box.width,
+              clientY: box.top + (y + 0.5) / size * box.height,
+              bubbles: true,
+            }));""", names.index(pair["image1"]), names.index(pair["image2"]),
+                         len(names))
+
+    def lines(self, kind):
+        return len(self.browser.run(
+            "return [...document.querySelectorAll("
+            "`svg.pair line.${arguments[0]}`)].map(() => 1);", kind))
+
+    def test_matrix_has_a_square_for_each_pair_on_both_sides(self):
+        self.browser.open(self.bare)
+        for state in ("kept", "undecided", "contradictory"):
+            squares = self.browser.run(
+                "return document.querySelector(`svg.matrix "
+                "path.${arguments[0]}`).getAttribute('d').split('z').length;",
+                state)
+            number = self.database[f"num_{state}_pairs"]
+            self.assertEqual(squares - 1, 2 * number)
+        self.assertGreater(self.database["num_contradictory_pairs"], 2)
+
+    def test_choice_of_a_square_shows_the_matches_of_the_pair(self):
+        self.browser.open(self.bare)
+        for state in ("kept", "contradictory"):
+            pair = next(pair for pair in self.database["pairs"]
+                        if pair["state"] == state)
+            self.choose(pair)
+            self.assertEqual(self.browser.texts("#pairs figcaption button"),
+                             [pair["image1"], pair["image2"]])
+            shown = min(pair["num_matches"], 30 if state == "kept" else 100)
+            self.assertEqual(
+                self.lines("kept") + self.lines("contradictory"), shown)
+            if shown == pair["num_matches"]:
+                self.assertEqual(self.lines("kept"), pair["num_agreeing"])
+
+    def test_choice_of_a_row_shows_the_pair(self):
+        self.browser.open(self.bare)
+        rows = [pair for pair in self.database["pairs"]
+                if pair["state"] == "contradictory"]
+        rows.sort(key=lambda pair: -pair["num_matches"])
+        self.browser.run(
+            "document.querySelector('#pairs tbody tr').click();")
+        self.assertEqual(self.browser.texts("#pairs figcaption button"),
+                         [rows[0]["image1"], rows[0]["image2"]])
+
+    def test_photos_are_shown_where_they_are_given(self):
+        self.browser.open(self.page)
+        for pair in self.database["pairs"]:
+            self.choose(pair)
+            num_photos = len(self.browser.run(
+                "return [...document.querySelectorAll('svg.pair image')]"
+                ".map(() => 1);"))
+            names = (pair["image1"], pair["image2"])
+            self.assertEqual(num_photos, 2 - (self.missing in names))
+
+
 class ToleranceTest(unittest.TestCase):
     def test_boxes_are_listed_and_shown(self):
         folder = tempfile.TemporaryDirectory()

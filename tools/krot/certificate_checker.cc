@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "krot/base/write_file.h"
+#include "krot/bridge/baseline_certificate.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_file.h"
 #include "krot/report/certificate_table.h"
@@ -18,6 +19,7 @@ namespace {
 struct CheckerOptions {
   std::string input_path;
   std::string certificate_path;
+  std::string database_path;
   std::string on_contradiction = "auto";
   std::string report_path;
   int num_worst = 10;
@@ -28,7 +30,10 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
   parser->AddPath("input_path", &options->input_path, true, "a folder",
                   "The COLMAP model that the certificate speaks of");
   parser->AddPath("certificate_path", &options->certificate_path, true,
-                  "a file", "The certificate, or conflicts, as JSON");
+                  "a file", "The certificate, conflicts or baselines, as JSON");
+  parser->AddPath("database_path", &options->database_path, false, "a file",
+                  "With baselines: the database whose verified matches they "
+                  "speak of; it is only read");
   parser->AddOutputFile("report_path", &options->report_path,
                         "Where the report goes, as JSON");
   AddOnContradiction(&options->on_contradiction, parser);
@@ -48,10 +53,11 @@ Model ReadSubject(const CheckerOptions& options) {
 
 void WriteReport(const CheckerOptions& options,
                  const std::optional<CertificateVerdict>& certificate,
-                 const std::optional<ConflictVerdict>& conflicts) {
+                 const std::optional<ConflictVerdict>& conflicts,
+                 const std::optional<BaselineCertificate>& baselines) {
   if (options.report_path.empty()) return;
-  WriteFileAtomically(options.report_path,
-                      CheckJson(certificate, conflicts, KROT_VERSION));
+  WriteFileAtomically(options.report_path, CheckJson(certificate, conflicts,
+                                                     baselines, KROT_VERSION));
 }
 
 template <typename Verdict>
@@ -65,7 +71,7 @@ int CheckCertificate(const CheckerOptions& options, const std::string& json) {
   const CertificateVerdict verdict =
       VerifyCertificateFile(ReadSubject(options), file);
   RequireAccepted(verdict);
-  WriteReport(options, verdict, std::nullopt);
+  WriteReport(options, verdict, std::nullopt, std::nullopt);
   PrintTable(options.common.log, CertificateTable(verdict, options.num_worst));
   return kExitDone;
 }
@@ -75,8 +81,25 @@ int CheckConflicts(const CheckerOptions& options, const std::string& json) {
   const ConflictVerdict verdict =
       VerifyConflictFile(ReadSubject(options), file);
   RequireAccepted(verdict);
-  WriteReport(options, std::nullopt, verdict);
+  WriteReport(options, std::nullopt, verdict, std::nullopt);
   PrintTable(options.common.log, ConflictTable(verdict));
+  return kExitDone;
+}
+
+int CheckBaselines(const CheckerOptions& options, const std::string& json) {
+  const BaselineCertificate file =
+      ParseBaselines(json, options.certificate_path);
+  if (options.database_path.empty()) {
+    throw OptionError(
+        "--database_path is required with a certificate of "
+        "baselines: it speaks of verified matches");
+  }
+  const Model model = ReadSubject(options);
+  const Database database =
+      ReadDatabase(options.database_path, model, WarnOn(options.common.log));
+  RequireAccepted(VerifyBaselines(model, database, file));
+  WriteReport(options, std::nullopt, std::nullopt, file);
+  PrintTable(options.common.log, BaselineTable(model, file, options.num_worst));
   return kExitDone;
 }
 
@@ -87,8 +110,9 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
   OptionParser parser("certificate_checker",
                       "re-checks the proof that no translations and points "
                       "have a smaller largest error, or that so many "
-                      "observations must go, from a COLMAP model and the "
-                      "certificate's file alone");
+                      "observations must go, or that no baselines explain "
+                      "more matches, from a COLMAP model and the certificate's "
+                      "file alone");
   AddCheckerOptions(&options, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(options.common.log, parser.Help());
@@ -96,6 +120,8 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
   }
   CheckSidePath("report_path", options.report_path);
   const std::string json = ReadCertificateText(options.certificate_path);
+  if (HoldsBaselines(json)) return CheckBaselines(options, json);
+  parser.Refuse("database_path", "without a certificate of baselines");
   return HoldsConflicts(json) ? CheckConflicts(options, json)
                               : CheckCertificate(options, json);
 }

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "krot/base/timer.h"
+#include "krot/base/write_file.h"
+#include "krot/bridge/baseline_certificate.h"
 #include "krot/check.h"
 #include "krot/database.h"
 #include "krot/outliers/suspect_colors.h"
@@ -24,6 +26,7 @@ struct CheckerCommand {
   std::string database_path;
   std::string image_path;
   std::string suspects_path;
+  std::string certificate_path;
   std::string fail_on = "never";
   int num_worst = 10;
   Context context;
@@ -38,11 +41,15 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                   "verified matches against the poses; it is only read");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst observations in "
-                  "them");
+                  "them and, with database_path, the matches of pairs");
   parser->AddPath("suspects_path", &command->suspects_path, false, "a folder",
                   "Where a copy of the input goes whose points are coloured by "
                   "whether an observation of their track is wrong, for "
                   "COLMAP's GUI; created if need be");
+  parser->AddOutputFile("certificate_path", &command->certificate_path,
+                        "With database_path: where the proof goes, as JSON, of "
+                        "how many matches of each contradictory pair any "
+                        "baselines explain; see certificate_checker");
   parser->AddChoice("fail_on", &command->fail_on, {"never", "wrong"},
                     "When to end with code 9, for scripts: wrong: if an image "
                     "or an observation is wrong");
@@ -63,6 +70,11 @@ WriteModelOptions CheckPaths(const CheckerCommand& command,
   if (paths.html_path.empty()) {
     parser.Refuse("image_path", "without --html_path");
   }
+  if (command.database_path.empty()) {
+    parser.Refuse("certificate_path", "without --database_path");
+  }
+  CheckSidePath("certificate_path", command.certificate_path,
+                paths.output_path);
   WriteModelOptions write_options;
   if (!paths.output_path.empty()) {
     write_options = CheckModelPaths(paths, command.common.log);
@@ -103,7 +115,7 @@ OutlierFilterSummary Suspects(const ModelCheck& check) {
 
 void WriteViews(const CheckerCommand& command, const CheckReport& report,
                 const WriteModelOptions& write_options, const Model& model,
-                const Model& cured) {
+                const Model& cured, const std::optional<Database>& database) {
   const LogOptions& log = command.common.log;
   const OutlierFilterSummary suspects = Suspects(report.check);
   if (!command.suspects_path.empty()) {
@@ -120,9 +132,15 @@ void WriteViews(const CheckerCommand& command, const CheckReport& report,
     }
     crops = SuspectCropsJson(command.image_path, model, moved, suspects, log);
   }
+  std::string pairs = "null";
+  if (database && !command.paths.html_path.empty()) {
+    BeginPhase(log, "taking the page's photos");
+    pairs = PairViewWithPhotos(command.image_path, model, *database,
+                               *report.check.pairs, log);
+  }
   WriteReports(command.paths.report_path, command.paths.html_path,
                CheckJson(report), model, cured, command.context.num_threads,
-               log, crops);
+               log, crops, pairs);
 }
 
 bool HasDecidedPair(const ModelCheck& check) {
@@ -181,8 +199,14 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
     WriteModel(cured, paths.output_path, write_options);
     report.run.seconds_write = write_timer.Seconds();
   }
+  if (!command.certificate_path.empty()) {
+    BeginPhase(log, "writing " + command.certificate_path);
+    WriteFileAtomically(
+        command.certificate_path,
+        BaselineJson(DescribeBaselines(model, *report.check.pairs)));
+  }
   RecordEnd(total_timer, num_threads, &report.run);
-  WriteViews(command, report, write_options, model, cured);
+  WriteViews(command, report, write_options, model, cured, database);
   PrintTable(log, CheckTable(report, command.num_worst));
   const bool fails =
       command.fail_on == "wrong" && report.check.IsAnythingWrong();

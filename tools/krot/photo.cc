@@ -1,5 +1,6 @@
 #include "tools/krot/photo.h"
 
+#include <algorithm>
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
@@ -110,6 +111,32 @@ Photo CropPhoto(const Photo& photo, int left, int top, int size) {
     }
   }
   return crop;
+}
+
+Photo ShrinkPhoto(const Photo& photo, int width, int height) {
+  Photo small{width, height, std::vector<uint8_t>(size_t{3} * width * height)};
+  const auto first = [](int n, int of, int whole) {
+    return static_cast<int>(int64_t{n} * whole / of);
+  };
+  for (int y = 0; y < height; ++y) {
+    const int top = first(y, height, photo.height);
+    const int bottom = first(y + 1, height, photo.height);
+    for (int x = 0; x < width; ++x) {
+      const int left = first(x, width, photo.width);
+      const int right = first(x + 1, width, photo.width);
+      for (int c = 0; c < 3; ++c) {
+        int64_t sum = 0;
+        for (int v = top; v < bottom; ++v) {
+          for (int u = left; u < right; ++u) {
+            sum += photo.rgb[3 * (size_t{1} * v * photo.width + u) + c];
+          }
+        }
+        small.rgb[3 * (size_t{1} * y * width + x) + c] = static_cast<uint8_t>(
+            sum / std::max<int64_t>(1, int64_t{bottom - top} * (right - left)));
+      }
+    }
+  }
+  return small;
 }
 
 std::vector<uint8_t> EncodeJpeg(const Photo& photo) {

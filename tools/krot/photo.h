@@ -22,6 +22,10 @@ std::optional<Photo> ReadPhoto(const std::string& path);
 // top); what lies outside of the photo is grey.
 Photo CropPhoto(const Photo& photo, int left, int top, int size);
 
+// The same in so many pixels, at most as many as it has; each the mean of those
+// that it takes the place of.
+Photo ShrinkPhoto(const Photo& photo, int width, int height);
+
 // As the bytes of a JPEG file.
 std::vector<uint8_t> EncodeJpeg(const Photo& photo);
 

@@ -15,15 +15,17 @@ void AddHtmlPath(std::string* html_path, OptionParser* parser) {
 void WriteReports(const std::string& report_path, const std::string& html_path,
                   const std::string& report_json, const Model& before,
                   const Model& after, int num_threads, const LogOptions& log,
-                  const std::string& crops_json) {
+                  const std::string& crops_json,
+                  const std::string& pairs_json) {
   if (!report_path.empty()) {
     BeginPhase(log, "writing " + report_path);
     WriteFileAtomically(report_path, report_json);
   }
   if (!html_path.empty()) {
     BeginPhase(log, "writing " + html_path);
-    WriteFileAtomically(html_path, HtmlPage(report_json, before, after,
-                                            num_threads, crops_json));
+    WriteFileAtomically(
+        html_path, HtmlPage(report_json, before, after, num_threads, crops_json,
+                            pairs_json));
   }
 }
 

@@ -16,6 +16,7 @@ void AddHtmlPath(std::string* html_path, OptionParser* parser);
 void WriteReports(const std::string& report_path, const std::string& html_path,
                   const std::string& report_json, const Model& before,
                   const Model& after, int num_threads, const LogOptions& log,
-                  const std::string& crops_json = "[]");
+                  const std::string& crops_json = "[]",
+                  const std::string& pairs_json = "null");
 
 }  // namespace krot

@@ -7,6 +7,8 @@
 
 #include "krot/base/timer.h"
 #include "krot/base/write_file.h"
+#include "krot/database.h"
+#include "krot/outliers/match_tracks.h"
 #include "krot/problem/cost.h"
 #include "krot/report/outlier_report.h"
 #include "krot/report/solve_report.h"
@@ -98,6 +100,46 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
   report->summary = std::move(result.summary);
   report->outliers = std::move(result.outliers);
   return std::move(result.model);
+}
+
+// Positions and points from the matches of a database. Throws CommandError
+// where there is nothing to make them from.
+Model PlaceByMatches(const SolveCommand& command, const Model& model,
+                     SolveReport* report, double* seconds) {
+  const LogOptions& log = command.common.log;
+  BeginPhase(log, "reading " + command.database_path);
+  const Database database =
+      ReadDatabase(command.database_path, model, WarnOn(log));
+  const Timer timer;
+  SolveModelOptions unused;
+  Context context = command.context;
+  SolveProgress progress(log, SolveProgress::GoalsOf(unused));
+  progress.Follow(&unused, &context);
+  MatchTracksOptions options;
+  options.max_error_px =
+      command.options.max_error.value_or(options.max_error_px);
+  PlacedMatches placed = PlaceMatches(model, database, options, context);
+  EndProgress();
+  *seconds = timer.Seconds();
+  if (placed.model.points3D.empty()) {
+    throw CommandError(kExitNothingToSolve,
+                       "nothing to solve: no matches of " +
+                           command.database_path +
+                           " agree with the rotations; krot model_checker "
+                           "--database_path says which pairs do not");
+  }
+  report->matches = placed.summary;
+  if (placed.num_unplaced > 0) {
+    LogLine(log, 0,
+            "warning: no matches hold " +
+                Counted(placed.num_unplaced, "image") + ", which " +
+                (placed.num_unplaced == 1 ? "stays" : "stay") +
+                " where the input has " +
+                (placed.num_unplaced == 1 ? "it" : "them") +
+                "; leave out what the input does not place, or match more "
+                "pairs of images");
+  }
+  return std::move(placed.model);
 }
 
 void WriteConflicts(const SolveCommand& command, const SolveReport& report) {
@@ -272,7 +314,12 @@ int RunSolveCommand(const SolveCommand& command) {
   CheckSidePath("conflicts_path", command.conflicts_path, paths.output_path);
   SolveReport report = DescribeRun(command);
 
-  Model model = ReadInput(paths, log, &report.run);
+  const bool has_database = !command.database_path.empty();
+  Model model = ReadInput(paths, log, &report.run, !has_database);
+  double seconds_placed = 0;
+  if (has_database) {
+    model = PlaceByMatches(command, model, &report, &seconds_placed);
+  }
   const std::unique_ptr<Checkpoint> checkpoint =
       OpenCheckpoint(command.checkpoint, paths, model, command.context, log);
   if (command.take_share) model = command.take_share(model);
@@ -282,6 +329,7 @@ int RunSolveCommand(const SolveCommand& command) {
     context.cancel = &DeferInterrupts();
   }
   Model solved = Solve(command, model, context, checkpoint.get(), &report);
+  report.summary.seconds_solve += seconds_placed;
   DeferInterrupts();
   if (command.method_name.empty()) {
     report.method = MethodName(report.summary.method);

@@ -19,6 +19,9 @@ struct SolveCommand {
   std::string certificate_path;         // "": not wanted
   std::string conflicts_path;           // "": not wanted
   std::string factor_certificate_path;  // "": not wanted
+  // "": the model's tracks. Else positions and points come from this database's
+  // matches and the model's rotations, and the solve starts there.
+  std::string database_path;
   CheckpointOptions checkpoint;
   CommonOptions common;
   TolerantSolveOptions options;  // its callbacks are set by the run

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "krot/options/solver_options.h"
+#include "krot/outliers/match_tracks.h"
 #include "tools/krot/command.h"
 #include "tools/krot/solve_command.h"
 
@@ -21,6 +22,33 @@ void ExplainMethod(const SolveCommand& command) {
                      "bound");
 }
 
+// From rotations and matches alone: nothing of the model's places takes part,
+// and everything moves.
+void ResolveDatabase(const OptionParser& parser, SolveCommand* command) {
+  if (command->database_path.empty()) return;
+  TolerantSolveOptions& options = command->options;
+  if (options.solve.init != SolveInit::kFeasible) {
+    throw OptionError(
+        "--database_path needs --Solver.init feasible: points for the model's "
+        "own positions are what krot point_triangulator --database_path makes");
+  }
+  if (EffectiveMethod(options.solve) != SolveMethod::kAuto ||
+      options.solve.norm.p != 2) {
+    throw OptionError(
+        "--database_path needs --Solver.method auto and --Solver.norm 2");
+  }
+  for (const char* name : {"fixed_images_path", "fixed_points_path",
+                           "positions_path", "point_positions_path",
+                           "Problem.init_max_error", "Solver.finish_slack"}) {
+    parser.Refuse(name, "with --database_path, which starts from nothing");
+  }
+  if (!options.max_error) {
+    options.max_error = MatchTracksOptions().max_error_px;
+  }
+  options.solve.init = SolveInit::kModel;
+  options.has_start_from_nothing = true;
+}
+
 }  // namespace
 
 int RunSolver(const std::vector<std::string>& arguments) {
@@ -37,6 +65,10 @@ int RunSolver(const std::vector<std::string>& arguments) {
   AddRotationsPath(&command.paths, &parser);
   AddFixedPaths(&command.paths, &parser);
   AddPositionsPath(&command.paths, &parser);
+  parser.AddPath("database_path", &command.database_path, false, "a file",
+                 "With Solver.init feasible: positions and points from the "
+                 "rotations and this database's verified matches alone; it is "
+                 "only read");
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
@@ -58,6 +90,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
     return kExitDone;
   }
   ResolveSolverOptions(parser, &command.options.solve);
+  ResolveDatabase(parser, &command);
   ResolveCheckpoint(parser, &command.checkpoint);
   ExplainMethod(command);
   return RunSolveCommand(command);

@@ -15,6 +15,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 #include "krot/report/html_base64.h"
+#include "krot/report/pair_view.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/photo.h"
 
@@ -168,6 +169,14 @@ int64_t SuspectCrops::AddCrops(const std::string& image_path) {
   return num_missing;
 }
 
+void WarnOfMissing(int64_t num_missing, const std::string& image_path,
+                   const LogOptions& log) {
+  if (num_missing == 0) return;
+  LogLine(log, 1,
+          "warning: " + Counted(num_missing, "photo") +
+              " that the page would show cannot be read in " + image_path);
+}
+
 }  // namespace
 
 std::string SuspectCropsJson(const std::string& image_path, const Model& input,
@@ -175,13 +184,35 @@ std::string SuspectCropsJson(const std::string& image_path, const Model& input,
                              const OutlierFilterSummary& summary,
                              const LogOptions& log) {
   SuspectCrops crops(input, result, summary);
-  const int64_t num_missing = crops.AddCrops(image_path);
-  if (num_missing > 0) {
-    LogLine(log, 1,
-            "warning: " + Counted(num_missing, "photo") +
-                " that the page would show cannot be read in " + image_path);
-  }
+  WarnOfMissing(crops.AddCrops(image_path), image_path, log);
   return crops.Text();
+}
+
+std::string PairViewWithPhotos(const std::string& image_path,
+                               const Model& model, const Database& database,
+                               const PairCheck& check, const LogOptions& log) {
+  Json view = PairViewJson(model, database, check);
+  if (image_path.empty()) return view.dump();
+  std::set<int32_t> seen;
+  for (const CheckedPair& pair : check.pairs) {
+    seen.insert({pair.image1, pair.image2});
+  }
+  int64_t num_missing = 0;
+  for (const int32_t i : seen) {
+    const std::optional<Photo> photo = ReadPhoto(
+        (std::filesystem::path(image_path) / model.images[i].name).string());
+    Json& image = view["images"][i];
+    if (!photo) {
+      ++num_missing;
+      continue;
+    }
+    const Photo small =
+        ShrinkPhoto(*photo, std::min(photo->width, image["width"].get<int>()),
+                    std::min(photo->height, image["height"].get<int>()));
+    image["jpeg"] = Base64(EncodeJpeg(small));
+  }
+  WarnOfMissing(num_missing, image_path, log);
+  return view.dump();
 }
 
 }  // namespace krot

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "krot/database.h"
 #include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 #include "tools/krot/log.h"
@@ -17,5 +18,10 @@ std::string SuspectCropsJson(const std::string& image_path, const Model& input,
                              const Model& result,
                              const OutlierFilterSummary& summary,
                              const LogOptions& log);
+
+// PairViewJson's text with the photos of all images that have pairs.
+std::string PairViewWithPhotos(const std::string& image_path,
+                               const Model& model, const Database& database,
+                               const PairCheck& check, const LogOptions& log);
 
 }  // namespace krot

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Remakes the sample: renders the views, reconstructs them with COLMAP, checks
-# the result against the ground truth and installs it in tools/sample/model and
-# docs/images. All else, the images included, stays in the folder WORK.
+# the result against the ground truth and installs it in tools/sample/model,
+# tools/sample/database.db and docs/images. All else, the images included,
+# stays in the folder WORK.
 #
 # Usage: tools/sample/make.sh WORK
 set -euo pipefail
@@ -26,6 +27,7 @@ if ((bytes > max_bytes)); then
   echo "$0: the model has $bytes bytes, must be <= $max_bytes" >&2
   exit 1
 fi
+"$sample/slim_database.py" "$work/sparse/database.db" "$sample/database.db"
 mkdir -p "$sample/model" "$sample/../../docs/images"
 (cd "$model" && cp "${files[@]}" "$sample/model")
 cp "$work/sample_view.jpg" "$sample/../../docs/images/sample_view.jpg"

@@ -34,6 +34,9 @@ struct IsLessPromising {
   }
 };
 
+// So that interval arithmetic, which rounds outwards, gives up no less.
+constexpr double kMoreThanRounding = 1 + 1e-10;
+
 class CellSearch {
  public:
   CellSearch(const std::vector<EpipolarMatch>& matches, double tolerance_px,
@@ -61,6 +64,7 @@ class CellSearch {
            cells_.top().upper_bound() > best_.num_explained) {
       const Cell cell = cells_.top();
       cells_.pop();
+      first_part_[cell.order] = best_.num_cells;
       const double half = cell.half_width / 2;
       for (const double ds : {-half, half}) {
         for (const double dt : {-half, half}) {
@@ -78,10 +82,19 @@ class CellSearch {
       best_.upper_bound =
           std::max(best_.upper_bound, cells_.top().upper_bound());
     }
+    for (int64_t face = 0; face < 3; ++face) DescribeCell(face);
     return best_;
   }
 
  private:
+  // As BaselineCertificate has them. No deeper than kSmallest is small.
+  void DescribeCell(int64_t order) {
+    const int64_t first = first_part_[order];
+    best_.cells += first < 0 ? '0' : '1';
+    if (first < 0) return;
+    for (int64_t part = first; part < first + 4; ++part) DescribeCell(part);
+  }
+
   // A match in the coordinates (1, s, t) of a face.
   struct Condition {
     Eigen::Vector3d normal;
@@ -106,9 +119,9 @@ class CellSearch {
   // Sorts the matches that the surrounding cell left open, counts what the
   // centre explains, and keeps the cell if it may hold a better direction.
   void Look(Cell cell, int64_t num_sure, const std::vector<int32_t>& open) {
-    ++best_.num_cells;
     cell.num_sure = num_sure;
-    cell.order = best_.num_cells;
+    cell.order = best_.num_cells++;
+    first_part_.push_back(-1);
     cell.open.reserve(open.size());
     int64_t num_at_centre = num_sure;
     const Eigen::Vector3d b(1, cell.s, cell.t);
@@ -122,7 +135,7 @@ class CellSearch {
       if (distance <= allowed) ++num_at_centre;
       if (distance + change <= allowed) {
         ++cell.num_sure;
-      } else if (distance - change <= allowed) {
+      } else if (distance - change <= kMoreThanRounding * allowed) {
         cell.open.push_back(k);
       }
     }
@@ -147,6 +160,7 @@ class CellSearch {
   std::priority_queue<Cell, std::vector<Cell>, IsLessPromising> cells_;
   BaselineSearch best_;
   int64_t unresolved_ = 0;
+  std::vector<int64_t> first_part_;  // of each cell, -1: it is not divided
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -17,6 +18,9 @@ struct BaselineSearch {
   int64_t upper_bound = 0;
   Eigen::Vector3d baseline = Eigen::Vector3d::UnitZ();  // of length 1
   int64_t num_cells = 0;                                // that were looked at
+  // The proof of upper_bound, for BaselineCertificate: which cells were
+  // divided.
+  std::string cells;
 };
 
 // Branch and bound over the half sphere of all directions, exact up to

@@ -1,6 +1,7 @@
 #include "krot/analysis/explain_contradictions.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -128,6 +129,27 @@ class CoverSearch {
   Explanation best_;
 };
 
+// What both give up: images that both call wrong, and pairs of which neither
+// calls an image wrong.
+int64_t CommonCost(const Explanation& a, const Explanation& b,
+                   const std::vector<int64_t>& image_costs,
+                   const std::vector<ContradictoryPair>& contradictions) {
+  std::vector<int32_t> both, any;
+  std::set_intersection(a.images.begin(), a.images.end(), b.images.begin(),
+                        b.images.end(), std::back_inserter(both));
+  std::set_union(a.images.begin(), a.images.end(), b.images.begin(),
+                 b.images.end(), std::back_inserter(any));
+  int64_t cost = 0;
+  for (const int32_t i : both) cost += image_costs[i];
+  const auto is_any = [&](int32_t image) {
+    return std::binary_search(any.begin(), any.end(), image);
+  };
+  for (const ContradictoryPair& pair : contradictions) {
+    if (!is_any(pair.image1) && !is_any(pair.image2)) cost += pair.num_matches;
+  }
+  return cost;
+}
+
 }  // namespace
 
 Explanations ExplainContradictions(
@@ -151,6 +173,12 @@ Explanations ExplainContradictions(
     if (!counts) continue;
     Explanation other = search.Run(
         std::make_pair(i, is_wrong(i) ? Choice::kRight : Choice::kWrong));
+    const int64_t common =
+        CommonCost(explanations.cheapest, other, image_costs, contradictions);
+    if (10 * (other.cost - common) >
+        11 * (explanations.cheapest.cost - common)) {
+      continue;
+    }
     if (!explanations.runner_up || other.cost < explanations.runner_up->cost) {
       explanations.runner_up = std::move(other);
     }

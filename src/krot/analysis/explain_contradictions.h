@@ -19,7 +19,8 @@ struct ContradictoryPair {
 struct Explanations {
   Explanation cheapest;
   // The cheapest of those that call one of its images right, or an image wrong
-  // that is in a contradiction between two right ones; none if there is none.
+  // that is in a contradiction between two right ones, and that give up at most
+  // a tenth more than it, where the two differ; none if there is none.
   std::optional<Explanation> runner_up;
   bool is_proved = true;
 };

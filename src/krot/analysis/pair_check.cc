@@ -154,11 +154,12 @@ class PairChecker {
     ForEachPair([&](int64_t p) {
       CheckedPair& pair = check_.pairs[p];
       if (pair.state != PairState::kContradictory) return;
-      const BaselineSearch search =
+      BaselineSearch search =
           SearchBaseline(MatchesOf(database_.pairs[p]), check_.tolerance_px);
       pair.num_explained = search.num_explained;
       pair.most_explained = search.upper_bound;
       pair.best_baseline = search.baseline;
+      pair.cells = std::move(search.cells);
     });
   }
 
@@ -175,10 +176,7 @@ class PairChecker {
     Explanations explanations = ExplainContradictions(costs, contradictions);
     check_.cheapest = std::move(explanations.cheapest);
     check_.is_cheapest_proved = explanations.is_proved;
-    if (explanations.runner_up &&
-        10 * explanations.runner_up->cost <= 11 * check_.cheapest.cost) {
-      check_.runner_up = std::move(explanations.runner_up);
-    }
+    check_.runner_up = std::move(explanations.runner_up);
     FindGroups();
     for (const int32_t i : check_.cheapest.images) {
       CheckedImage& image = check_.images[i];

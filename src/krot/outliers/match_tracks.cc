@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/analysis/baseline_search.h"
 #include "krot/analysis/epipolar_match.h"
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
@@ -23,13 +24,8 @@ using Eigen::Vector3d;
 
 // COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).
 constexpr int64_t kMinMatchesOfPair = 15;
-
-// Keypoints of all images, numbered one image after the other, and where their
-// point is.
-struct MatchTrack {
-  std::vector<int64_t> keypoints;  // ascending
-  Vector3d xyz = Vector3d::Zero();
-};
+// Of a search for a baseline whose proof nobody asks for.
+constexpr int64_t kCellsOfPair = 1000;
 
 class MatchTriangulator {
  public:
@@ -41,6 +37,21 @@ class MatchTriangulator {
         model_(model),
         geometries_(ImageGeometries(model)) {}
 
+  // Where no positions are known.
+  Model RunOnRotations() {
+    has_positions_ = false;
+    TakeKeypoints();
+    AddMatches();
+    std::vector<MatchTrack> tracks = Components();
+    for (MatchTrack& track : tracks) numbers_.LeaveOutTwins(&track);
+    tracks.erase(std::remove_if(tracks.begin(), tracks.end(),
+                                [](const MatchTrack& track) {
+                                  return track.keypoints.size() < 2;
+                                }),
+                 tracks.end());
+    return ModelWith(tracks);
+  }
+
   MatchTracksResult Run() {
     TakeKeypoints();
     JoinTracks();
@@ -48,7 +59,7 @@ class MatchTriangulator {
     std::vector<MatchTrack> open = Components();
     summary_.num_components = static_cast<int64_t>(open.size());
     for (const MatchTrack& track : open) {
-      if (HasImageTwice(track)) ++summary_.num_image_twice;
+      if (numbers_.HasImageTwice(track)) ++summary_.num_image_twice;
     }
     LeaveOutSingleMatches(&open);
     context_.Stage("intersecting " + std::to_string(open.size()) + " tracks");
@@ -61,51 +72,15 @@ class MatchTriangulator {
   }
 
  private:
-  int32_t ImageOf(int64_t keypoint) const {
-    return static_cast<int32_t>(
-        std::upper_bound(begin_.begin(), begin_.end(), keypoint) -
-        begin_.begin() - 1);
-  }
-  uint32_t IndexOf(int64_t keypoint) const {
-    return static_cast<uint32_t>(keypoint - begin_[ImageOf(keypoint)]);
-  }
-
   // Moves the tracks out of the model.
   void TakeKeypoints() {
     points3D_ = std::move(model_.points3D);
     elements_ = std::move(model_.track_elements);
-    model_.points3D.clear();
-    model_.track_elements.clear();
-    begin_ = {0};
-    for (size_t i = 0; i < model_.images.size(); ++i) {
-      Image& image = model_.images[i];
-      const auto& keypoints = database_.keypoints[i];
-      bool is_same = keypoints.size() == image.points2D.size();
-      bool has_track = false;
-      for (size_t k = 0; k < image.points2D.size(); ++k) {
-        Point2D& point = image.points2D[k];
-        is_same = is_same && keypoints[k] == Eigen::Vector2d(point.x, point.y);
-        has_track = has_track || point.point3D_id != kInvalidPoint3DId;
-        point.point3D_id = kInvalidPoint3DId;
-      }
-      if (!is_same && !keypoints.empty()) {
-        if (has_track && options_.keeps_tracks) {
-          throw ModelError("image \"" + image.name +
-                           "\": its 2D points are not the keypoints of the "
-                           "database one by one, so that its tracks cannot be "
-                           "kept; --clear_points 1 makes new ones");
-        }
-        image.points2D.clear();
-        for (const Eigen::Vector2d& keypoint : keypoints) {
-          image.points2D.push_back({keypoint.x(), keypoint.y()});
-        }
-      }
-      begin_.push_back(begin_.back() +
-                       static_cast<int64_t>(image.points2D.size()));
-    }
-    is_open_.assign(begin_.back(), 0);
-    num_matches_.assign(begin_.back(), 0);
-    rays_.resize(begin_.back());
+    TakeKeypointsOf(database_, options_.keeps_tracks, &model_);
+    numbers_ = KeypointNumbers(model_);
+    is_open_.assign(numbers_.size(), 0);
+    num_matches_.assign(numbers_.size(), 0);
+    rays_.resize(numbers_.size());
     ParallelFor(static_cast<int64_t>(model_.images.size()), 1,
                 context_.num_threads,
                 [&](int64_t begin, int64_t end, int /*worker*/) {
@@ -118,8 +93,9 @@ class MatchTriangulator {
     if (!geometry.has_pose) return;
     const Eigen::Matrix3d world_from_cam =
         geometry.cam_from_world.rotation.transpose();
-    for (int64_t k = begin_[i]; k < begin_[i + 1]; ++k) {
-      const Point2D& point = model_.images[i].points2D[k - begin_[i]];
+    const int64_t first = numbers_.First(i);
+    for (int64_t k = first; k < numbers_.First(i + 1); ++k) {
+      const Point2D& point = model_.images[i].points2D[k - first];
       const auto ray =
           RayOf(model_.cameras[geometry.camera], {point.x, point.y});
       if (!ray) continue;
@@ -134,7 +110,7 @@ class MatchTriangulator {
     const auto indices = ImageIndices(model_);
     for (const Point3D& point : points3D_) {
       const auto keypoint = [&](uint64_t e) {
-        return begin_[indices.at(elements_[e].image_id)] +
+        return numbers_.First(indices.at(elements_[e].image_id)) +
                elements_[e].point2D_idx;
       };
       for (uint64_t e = point.track_begin + 1; e < point.track_end; ++e) {
@@ -171,8 +147,8 @@ class MatchTriangulator {
       summary_.num_matches += num_matches;
       summary_.num_disagreeing += num_matches - num_agreeing;
       for (const auto& [k1, k2] : pair.matches) {
-        ++num_matches_[begin_[pair.image1] + k1];
-        ++num_matches_[begin_[pair.image2] + k2];
+        ++num_matches_[numbers_.First(pair.image1) + k1];
+        ++num_matches_[numbers_.First(pair.image2) + k2];
       }
       edges_.insert(edges_.end(), agreeing[p].begin(), agreeing[p].end());
     }
@@ -180,15 +156,24 @@ class MatchTriangulator {
 
   std::vector<std::pair<int64_t, int64_t>> Agreeing(
       const VerifiedPair& pair) const {
-    std::vector<std::pair<int64_t, int64_t>> agreeing;
-    const Vector3d baseline = Center(geometries_[pair.image2].cam_from_world) -
-                              Center(geometries_[pair.image1].cam_from_world);
+    const double tolerance = std::sqrt(2) * options_.max_error_px;
+    std::vector<std::pair<int64_t, int64_t>> keypoints, agreeing;
+    std::vector<EpipolarMatch> matches;
     for (const auto& [k1, k2] : pair.matches) {
-      const int64_t a = begin_[pair.image1] + k1, b = begin_[pair.image2] + k2;
+      const int64_t a = numbers_.First(pair.image1) + k1,
+                    b = numbers_.First(pair.image2) + k2;
       if (!is_open_[a] || !is_open_[b]) continue;
-      const double error = EpipolarMatch(rays_[a], rays_[b]).ErrorPx(baseline);
-      if (error <= std::sqrt(2) * options_.max_error_px) {
-        agreeing.emplace_back(a, b);
+      keypoints.emplace_back(a, b);
+      matches.emplace_back(rays_[a], rays_[b]);
+    }
+    const Vector3d baseline =
+        has_positions_
+            ? Vector3d(Center(geometries_[pair.image2].cam_from_world) -
+                       Center(geometries_[pair.image1].cam_from_world))
+            : SearchBaseline(matches, tolerance, kCellsOfPair).baseline;
+    for (size_t n = 0; n < matches.size(); ++n) {
+      if (matches[n].ErrorPx(baseline) <= tolerance) {
+        agreeing.push_back(keypoints[n]);
       }
     }
     return agreeing;
@@ -217,31 +202,8 @@ class MatchTriangulator {
     tracks->erase(kept, tracks->end());
   }
 
-  bool HasImageTwice(const MatchTrack& track) const {
-    for (size_t n = 1; n < track.keypoints.size(); ++n) {
-      if (ImageOf(track.keypoints[n - 1]) == ImageOf(track.keypoints[n])) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  // The model with these tracks.
   Model ModelWith(const std::vector<MatchTrack>& tracks) const {
-    Model model = model_;
-    for (size_t n = 0; n < tracks.size(); ++n) {
-      Point3D& point = model.points3D.emplace_back();
-      point.id = n + 1;
-      point.xyz = tracks[n].xyz;
-      point.track_begin = model.track_elements.size();
-      for (const int64_t k : tracks[n].keypoints) {
-        Image& image = model.images[ImageOf(k)];
-        model.track_elements.push_back({image.id, IndexOf(k)});
-        image.points2D[IndexOf(k)].point3D_id = point.id;
-      }
-      point.track_end = model.track_elements.size();
-    }
-    return model;
+    return numbers_.ModelWith(tracks, model_);
   }
 
   // Takes out what belongs to one point and closes it, and what belongs to
@@ -257,7 +219,7 @@ class MatchTriangulator {
           errors.begin() + static_cast<std::ptrdiff_t>(point.track_begin),
           errors.begin() + static_cast<std::ptrdiff_t>(point.track_end),
           [&](double error) { return error <= options_.max_error_px; });
-      if (is_within && !HasImageTwice(tracks[n])) {
+      if (is_within && !numbers_.HasImageTwice(tracks[n])) {
         Accept(std::move(tracks[n]));
       } else {
         if (!is_within) ++summary_.num_in_conflict;
@@ -287,7 +249,7 @@ class MatchTriangulator {
     for (MatchTrack& track : *tracks) {
       std::vector<Ray> rays;
       for (const int64_t k : track.keypoints) {
-        rays.push_back({Center(geometries_[ImageOf(k)].cam_from_world),
+        rays.push_back({Center(geometries_[numbers_.ImageOf(k)].cam_from_world),
                         rays_[k].ray.normalized()});
       }
       track.xyz = RetriangulateMidpoint(rays).value_or(rays[0].centre);
@@ -337,7 +299,8 @@ class MatchTriangulator {
         const double here = *error++;
         if (!(here <= options_.max_error_px)) continue;
         const bool is_twin =
-            !nearest.empty() && ImageOf(nearest.back()) == ImageOf(k);
+            !nearest.empty() &&
+            numbers_.ImageOf(nearest.back()) == numbers_.ImageOf(k);
         if (is_twin && here >= lowest) continue;
         if (is_twin) nearest.pop_back();
         nearest.push_back(k);
@@ -360,7 +323,6 @@ class MatchTriangulator {
                 return a.keypoints < b.keypoints;
               });
     model_ = ModelWith(accepted_);
-    summary_.num_more_than_noise = RemoveMoreThanNoise(context_, &model_);
     summary_.num_narrow = RemoveNarrow(options_.min_angle_deg, &model_);
     UpdatePointErrors(PixelErrors(model_, context_.num_threads), &model_);
   }
@@ -372,18 +334,25 @@ class MatchTriangulator {
   const std::vector<ImageGeometry> geometries_;
   std::vector<Point3D> points3D_;  // the model's own
   std::vector<TrackElement> elements_;
-  // Of each of Model::images the number of its first keypoint, and their count.
-  std::vector<int64_t> begin_;
+  KeypointNumbers numbers_;
   std::vector<PixelRay> rays_;  // world axes
   // Of keypoints: has a ray and a pose and belongs to no point yet.
   std::vector<char> is_open_;
   std::vector<int32_t> num_matches_;  // of keypoints, agreeing or not
   std::vector<std::pair<int64_t, int64_t>> edges_;  // keypoints that match
   std::vector<MatchTrack> accepted_;
+  bool has_positions_ = true;
   MatchTracksSummary summary_;
 };
 
 }  // namespace
+
+Model TracksFromRotations(const Model& model, const Database& database,
+                          double max_error_px, const Context& context) {
+  MatchTracksOptions options;
+  options.max_error_px = max_error_px;
+  return MatchTriangulator(model, database, options, context).RunOnRotations();
+}
 
 MatchTracksResult TriangulateMatches(const Model& model,
                                      const Database& database,

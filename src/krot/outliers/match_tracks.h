@@ -29,8 +29,6 @@ struct MatchTracksSummary {
   int64_t num_in_conflict = 0;  // of these, no point is within max_error_px
   int64_t num_two_views = 0;    // points left out, seen by one match alone
   int64_t num_narrow = 0;       // points left out, below min_angle_deg
-  // Observations within max_error_px that noise does not explain, left out.
-  int64_t num_more_than_noise = 0;
 };
 
 struct MatchTracksResult {
@@ -47,9 +45,8 @@ struct MatchTracksResult {
 // it agrees with is found (PlacePointsRobustly); what is within max_error_px of
 // that, of every image the nearest, is a track, and the rest is joined anew.
 // Each point then moves to the least squares of its track; observations that
-// are above max_error_px there, or that noise does not explain (SnoopNoise),
-// go. Two keypoints that have no match but each other are left out, since
-// nothing checks them.
+// are above max_error_px there go. Two keypoints that have no match but each
+// other are left out, since nothing checks them.
 //
 // Throws std::invalid_argument for options out of range, ModelError for cameras
 // without an image plane. Requires a valid model; ids of points are
@@ -59,5 +56,30 @@ MatchTracksResult TriangulateMatches(const Model& model,
                                      const Database& database,
                                      const MatchTracksOptions& options,
                                      const Context& context);
+
+// Tracks of a model whose rotations and rigs alone are known; its positions
+// only have to be finite. A match counts if it agrees with the baseline that
+// most matches of its pair agree with (SearchBaseline). Keypoints of an image
+// that a track has twice are left out; points have no place. Otherwise as
+// TriangulateMatches.
+Model TracksFromRotations(const Model& model, const Database& database,
+                          double max_error_px, const Context& context);
+
+struct PlacedMatches {
+  Model model;  // without points where there is nothing to make them from
+  MatchTracksSummary summary;  // of its tracks
+  int64_t num_unplaced = 0;    // images with rotations, but without a track
+};
+
+// Positions and points from rotations and matches, nothing else: the tracks of
+// the rotations alone, their robust start (FindRobustStart), then twice
+// TriangulateMatches and robust least squares of its tracks, since it divides
+// tracks and drops wrong matches better the better the positions are. Place and
+// scale are the model's where it has positions. Images without a track stay
+// where they are. Requires and throws what TriangulateMatches does, with
+// keeps_tracks false. The same bits at any number of threads.
+PlacedMatches PlaceMatches(const Model& model, const Database& database,
+                           const MatchTracksOptions& options,
+                           const Context& context);
 
 }  // namespace krot

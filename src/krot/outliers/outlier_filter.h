@@ -28,6 +28,9 @@ struct OutlierFilterOptions {
   // model stays as it is. From nothing, without a profile, it is ten times the
   // median error of the start.
   std::optional<double> max_error;
+  // Whether the model's own positions come from nothing but rotations and
+  // tracks: then weak parts are looked for there, too.
+  bool has_start_from_nothing = false;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // kConflicts: the proof, most of the time
   // Of what is left; its norm is the errors'. Its init kFeasible is from

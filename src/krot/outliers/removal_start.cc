@@ -63,6 +63,7 @@ RemovalStart FindRemovalStart(const Model& model,
         "error, " +
         Pixels(start.max_error));
   }
+  if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
   return start;
 }
 

@@ -20,6 +20,7 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
   OutlierFilterOptions filter;
   filter.max_error = options.max_error;
   filter.find_conflicts = options.find_conflicts;
+  filter.has_start_from_nothing = options.has_start_from_nothing;
   filter.solve = options.solve;
   filter.solve.on_built = nullptr;
   filter.solve.find_lowest = options.solve.describe_certificate;

@@ -18,6 +18,8 @@ struct TolerantSolveOptions {
   // > 0. None: all stay, unless the model holds no positions and no start
   // serves all of them; then the bound is FilterOutliers' choice.
   std::optional<double> max_error;
+  // As OutlierFilterOptions has it.
+  bool has_start_from_nothing = false;
   bool find_conflicts = false;  // the proof of how many had to go
 };
 

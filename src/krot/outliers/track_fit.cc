@@ -1,11 +1,11 @@
 #include "krot/outliers/track_fit.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <utility>
 
-#include "krot/analysis/noise.h"
 #include "krot/analysis/track_noise.h"
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
@@ -43,6 +43,89 @@ bool RemoveWorst(const Point3D& point, double max_error_px, TrackNoise* fit) {
 }
 
 }  // namespace
+
+KeypointNumbers::KeypointNumbers(const Model& model) {
+  for (const Image& image : model.images) {
+    begin_.push_back(begin_.back() +
+                     static_cast<int64_t>(image.points2D.size()));
+  }
+}
+
+int32_t KeypointNumbers::ImageOf(int64_t keypoint) const {
+  return static_cast<int32_t>(
+      std::upper_bound(begin_.begin(), begin_.end(), keypoint) -
+      begin_.begin() - 1);
+}
+
+bool KeypointNumbers::HasImageTwice(const MatchTrack& track) const {
+  for (size_t n = 1; n < track.keypoints.size(); ++n) {
+    if (ImageOf(track.keypoints[n - 1]) == ImageOf(track.keypoints[n])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void KeypointNumbers::LeaveOutTwins(MatchTrack* track) const {
+  const std::vector<int64_t> all = std::move(track->keypoints);
+  track->keypoints.clear();
+  for (size_t n = 0; n < all.size(); ++n) {
+    const int32_t image = ImageOf(all[n]);
+    if ((n > 0 && ImageOf(all[n - 1]) == image) ||
+        (n + 1 < all.size() && ImageOf(all[n + 1]) == image)) {
+      continue;
+    }
+    track->keypoints.push_back(all[n]);
+  }
+}
+
+Model KeypointNumbers::ModelWith(const std::vector<MatchTrack>& tracks,
+                                 Model model) const {
+  for (size_t n = 0; n < tracks.size(); ++n) {
+    Point3D& point = model.points3D.emplace_back();
+    point.id = n + 1;
+    point.xyz = tracks[n].xyz;
+    point.track_begin = model.track_elements.size();
+    for (const int64_t k : tracks[n].keypoints) {
+      const int32_t i = ImageOf(k);
+      const auto index = static_cast<uint32_t>(k - First(i));
+      Image& image = model.images[i];
+      model.track_elements.push_back({image.id, index});
+      image.points2D[index].point3D_id = point.id;
+    }
+    point.track_end = model.track_elements.size();
+  }
+  return model;
+}
+
+void TakeKeypointsOf(const Database& database, bool keeps_tracks,
+                     Model* model) {
+  model->points3D.clear();
+  model->track_elements.clear();
+  for (size_t i = 0; i < model->images.size(); ++i) {
+    Image& image = model->images[i];
+    const auto& keypoints = database.keypoints[i];
+    bool is_same = keypoints.size() == image.points2D.size();
+    bool has_track = false;
+    for (size_t k = 0; k < image.points2D.size(); ++k) {
+      Point2D& point = image.points2D[k];
+      is_same = is_same && keypoints[k] == Eigen::Vector2d(point.x, point.y);
+      has_track = has_track || point.point3D_id != kInvalidPoint3DId;
+      point.point3D_id = kInvalidPoint3DId;
+    }
+    if (is_same || keypoints.empty()) continue;
+    if (has_track && keeps_tracks) {
+      throw ModelError("image \"" + image.name +
+                       "\": its 2D points are not the keypoints of the "
+                       "database one by one, so that its tracks cannot be "
+                       "kept; --clear_points 1 makes new ones");
+    }
+    image.points2D.clear();
+    for (const Eigen::Vector2d& keypoint : keypoints) {
+      image.points2D.push_back({keypoint.x(), keypoint.y()});
+    }
+  }
+}
 
 std::vector<std::vector<int64_t>> JoinMatches(
     const std::vector<std::pair<int64_t, int64_t>>& edges,
@@ -108,25 +191,6 @@ std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
         }
       });
   return fitted;
-}
-
-int64_t RemoveMoreThanNoise(const Context& context, Model* model) {
-  const NoiseSnooping snooping = SnoopNoise(*model, {}, context);
-  std::vector<char> is_removed(model->track_elements.size(), 0);
-  for (const SnoopedObservation& one : snooping.removed) {
-    if (!one.is_of_two) is_removed[one.element] = 1;
-  }
-  int64_t num_removed = 0;
-  for (size_t k = 0; k < model->points3D.size(); ++k) {
-    const Point3D& point = model->points3D[k];
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (!is_removed[e]) continue;
-      model->points3D[k].xyz = snooping.noise.points[k];
-      ++num_removed;
-    }
-  }
-  *model = RemoveObservations(*model, is_removed).model;
-  return num_removed;
 }
 
 int64_t RemoveNarrow(double min_angle_deg, Model* model) {

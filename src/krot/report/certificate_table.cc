@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
@@ -90,8 +91,48 @@ std::string CertificateTable(const CertificateVerdict& verdict,
          PositionsTable(verdict.positions, max_observations);
 }
 
+std::string BaselineTable(const Model& model,
+                          const BaselineCertificate& certificate,
+                          int max_pairs) {
+  std::vector<const BaselineCertificate::Pair*> pairs;
+  int64_t num_matches = 0, most = 0;
+  for (const BaselineCertificate::Pair& pair : certificate.pairs) {
+    pairs.push_back(&pair);
+    num_matches += pair.num_matches;
+    most += pair.most_explained;
+  }
+  std::string text =
+      "The certificate holds: with the rotations of this model no baselines "
+      "explain more\nthan " +
+      Thousands(most) + " of the " + Thousands(num_matches) + " matches of " +
+      Counted(static_cast<int64_t>(pairs.size()), "pair") +
+      " of images within " + FormatNumber(certificate.tolerance_px, 4) +
+      " px of their epipolar lines.\nOf a pair that few explain, a rotation "
+      "is wrong, or the matches are.\n";
+  if (pairs.empty() || max_pairs == 0) return text;
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const BaselineCertificate::Pair* a,
+                      const BaselineCertificate::Pair* b) {
+                     return a->most_explained * b->num_matches <
+                            b->most_explained * a->num_matches;
+                   });
+  std::map<ImageId, std::string> names;
+  for (const Image& image : model.images) names[image.id] = image.name;
+  TextTable table;
+  table.AddRow({"image", "image", "matches", "explained", "proved at most"});
+  for (size_t n = 0; n < std::min(pairs.size(), static_cast<size_t>(max_pairs));
+       ++n) {
+    table.AddRow({names[pairs[n]->image_id1], names[pairs[n]->image_id2],
+                  Thousands(pairs[n]->num_matches),
+                  Thousands(pairs[n]->num_explained),
+                  Thousands(pairs[n]->most_explained)});
+  }
+  return text + table.ToString();
+}
+
 std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<ConflictVerdict>& conflicts,
+                      const std::optional<BaselineCertificate>& baselines,
                       const std::string& version) {
   Json of_conflicts;
   if (conflicts) {
@@ -99,8 +140,22 @@ std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                     {"num_conflicts", conflicts->num_conflicts},
                     {"num_observations", conflicts->num_observations}};
   }
+  Json of_baselines;
+  if (baselines) {
+    Json pairs = Json::array();
+    for (const BaselineCertificate::Pair& pair : baselines->pairs) {
+      pairs.push_back({{"image_id1", pair.image_id1},
+                       {"image_id2", pair.image_id2},
+                       {"num_matches", pair.num_matches},
+                       {"num_explained", pair.num_explained},
+                       {"most_explained", pair.most_explained}});
+    }
+    of_baselines = {{"tolerance_px", baselines->tolerance_px},
+                    {"pairs", pairs}};
+  }
   const Json json = {{"version", version},
                      {"command", "certificate_checker"},
+                     {"baselines", of_baselines},
                      {"certificate", VerdictJson(certificate)},
                      {"conflicts", of_conflicts}};
   return ReportText(json);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/bridge/baseline_certificate.h"
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_file.h"
 
@@ -22,9 +23,16 @@ std::string SupportTable(const std::vector<SupportObservation>& support,
 std::string CertificateTable(const CertificateVerdict& verdict,
                              int max_observations);
 
-// report.json of certificate_checker for what it accepted: one of the two.
+// Of an accepted certificate of baselines the `max_pairs` pairs of which the
+// least share is explained.
+std::string BaselineTable(const Model& model,
+                          const BaselineCertificate& certificate,
+                          int max_pairs);
+
+// report.json of certificate_checker for what it accepted: one of the three.
 std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<ConflictVerdict>& conflicts,
+                      const std::optional<BaselineCertificate>& baselines,
                       const std::string& version);
 
 }  // namespace krot

@@ -46,7 +46,8 @@ std::string FillTemplate(
 
 std::string HtmlPage(const std::string& report_json, const Model& before,
                      const Model& after, int num_threads,
-                     const std::string& crops_json) {
+                     const std::string& crops_json,
+                     const std::string& pairs_json) {
   const Eigen::Vector3d origin = SceneOrigin(before);
   const auto view = [&](const Model& model) {
     return ModelViewJson(model, origin, kMaxShownPoints, num_threads);
@@ -55,6 +56,7 @@ std::string HtmlPage(const std::string& report_json, const Model& before,
       kHtmlPageTemplate,
       {{"report", EscapeForScript(report_json)},
        {"crops", EscapeForScript(crops_json)},
+       {"pairs", EscapeForScript(pairs_json)},
        {"models", EscapeForScript("{\"before\":" + view(before) +
                                   ",\"after\":" + view(after) + "}")}});
 }

@@ -16,12 +16,14 @@ namespace krot {
 // errors. Byte sequences that are not UTF-8 are replaced.
 //
 // `crops_json` goes into #krot-crops: photos of suspects (docs/formats.md), []
-// without.
+// without. `pairs_json` goes into #krot-pairs: PairViewJson's text, with photos
+// where there are some, null without.
 //
 // Requires valid models (ValidateModel). O(observations log observations); the
 // same text at any number of threads.
 std::string HtmlPage(const std::string& report_json, const Model& before,
                      const Model& after, int num_threads = -1,
-                     const std::string& crops_json = "[]");
+                     const std::string& crops_json = "[]",
+                     const std::string& pairs_json = "null");
 
 }  // namespace krot

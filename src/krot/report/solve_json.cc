@@ -4,6 +4,7 @@
 #include "krot/report/adjustment_report.h"
 #include "krot/report/report_json.h"
 #include "krot/report/solve_report.h"
+#include "krot/report/track_report.h"
 
 namespace krot {
 namespace {
@@ -209,6 +210,7 @@ std::string SolveJson(const SolveReport& report) {
         {"support_point3D_ids", SameImageInSupport(summary)},
         {"largest_left_out", NumberOrNull(LargestTwin(summary))}}},
       {"outliers", OutliersJson(report.outliers)},
+      {"matches", report.matches ? MatchesJson(*report.matches) : Json()},
       {"contradictions", ContradictionsJson(report.run.contradictions)},
       {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},

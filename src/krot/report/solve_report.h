@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "krot/outliers/match_tracks.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/report/problem_words.h"
@@ -18,6 +19,8 @@ struct SolveReport {
   SolveSummary summary;
   // Where not everything was to stay; its own solve is the summary above.
   std::optional<OutlierFilterSummary> outliers;
+  // Where positions and points come from a database's.
+  std::optional<MatchTracksSummary> matches;
 };
 
 // For the terminal: errors before and after, what was left out, why it ended,

@@ -11,6 +11,7 @@
 #include "krot/report/solve_error_table.h"
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
+#include "krot/report/track_report.h"
 
 namespace krot {
 namespace {
@@ -127,9 +128,8 @@ std::string SolveEndSentence(const SolveSummary& summary) {
     case SolveTermination::kZeroCost:
       return "Ended" + after + " with nothing left to lower.";
     case SolveTermination::kWithinBound:
-      return "Every error is within the bound that was asked for. The lowest "
-             "maximum was not looked for; --certificate_path, or leaving "
-             "--Solver.max_error out, does that.";
+      return "Every error is within the bound. The lowest maximum was not "
+             "looked for; --certificate_path does that.";
     case SolveTermination::kCollapsed:
       return "Ended" + after + " in a collapse of the scene.";
     case SolveTermination::kMaxSweeps:
@@ -268,8 +268,9 @@ std::string SolveTable(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   std::ostringstream text;
   text << "\nReprojection errors, pixels\n"
-       << SolveErrorTable(summary) << BracketOf(report)
-       << SolveCountsSentence(summary) << '\n'
+       << SolveErrorTable(summary)
+       << (report.matches ? MatchesSentence(*report.matches) : "")
+       << BracketOf(report) << SolveCountsSentence(summary) << '\n'
        << SameImageSentence(summary)
        << NotFiniteSentence(summary.pixel_error_after)
        << (summary.is_given_back ? "" : CollapseLines(summary.collapse));

@@ -37,8 +37,6 @@ std::string TrackTable(const TrackReport& report) {
   add("divided, as no point fits all", summary.num_in_conflict);
   add("left out, as they are a single match", summary.num_two_views);
   add("left out, as their rays are too narrow", summary.num_narrow);
-  add("observations left out that noise does not explain",
-      summary.num_more_than_noise);
   text += table.ToString();
   if (summary.num_contradictory_pairs > 0) {
     text += "\nThe matches of " +
@@ -52,22 +50,34 @@ std::string TrackTable(const TrackReport& report) {
                          FormatNumber(report.seconds_triangulate, 2) + " s");
 }
 
+Json MatchesJson(const MatchTracksSummary& summary) {
+  return {{"num_pairs", summary.num_pairs},
+          {"num_contradictory_pairs", summary.num_contradictory_pairs},
+          {"num_matches", summary.num_matches},
+          {"num_disagreeing_matches", summary.num_disagreeing},
+          {"num_components", summary.num_components},
+          {"num_image_twice", summary.num_image_twice},
+          {"num_in_conflict", summary.num_in_conflict},
+          {"num_two_views", summary.num_two_views},
+          {"num_narrow", summary.num_narrow}};
+}
+
+std::string MatchesSentence(const MatchTracksSummary& summary) {
+  return "The points come from the matches of " +
+         Counted(summary.num_pairs, "pair") + " of images" +
+         (summary.num_contradictory_pairs > 0
+              ? "; those of " +
+                    Counted(summary.num_contradictory_pairs, "other pair") +
+                    " contradict the positions and are not used"
+              : std::string()) +
+         ".\n";
+}
+
 std::string TrackJson(const TrackReport& report) {
-  const MatchTracksSummary& summary = report.summary;
-  const Json json = {
+  Json json = {
       {"version", report.run.version},
       {"command", "point_triangulator"},
       {"verdict", TrackSentence(report)},
-      {"num_pairs", summary.num_pairs},
-      {"num_contradictory_pairs", summary.num_contradictory_pairs},
-      {"num_matches", summary.num_matches},
-      {"num_disagreeing_matches", summary.num_disagreeing},
-      {"num_components", summary.num_components},
-      {"num_image_twice", summary.num_image_twice},
-      {"num_in_conflict", summary.num_in_conflict},
-      {"num_two_views", summary.num_two_views},
-      {"num_narrow", summary.num_narrow},
-      {"num_more_than_noise", summary.num_more_than_noise},
       {"num_points", report.num_points},
       {"num_observations", report.num_observations},
       {"mean_track_length", MeanTrackLength(report)},
@@ -83,6 +93,7 @@ std::string TrackJson(const TrackReport& report) {
       {"threads", report.run.threads},
       {"seed", report.run.seed},
   };
+  json.update(MatchesJson(report.summary));
   return ReportText(json);
 }
 

@@ -5,6 +5,7 @@
 
 #include "krot/model.h"
 #include "krot/outliers/match_tracks.h"
+#include "krot/report/report_json.h"
 #include "krot/report/run_record.h"
 
 namespace krot {
@@ -25,6 +26,12 @@ std::string TrackSentence(const TrackReport& report);
 
 // For the terminal: the sentence, and what became of the matches.
 std::string TrackTable(const TrackReport& report);
+
+// Their numbers, for report.json.
+Json MatchesJson(const MatchTracksSummary& summary);
+
+// "The points come from the matches of 249 pairs of images."
+std::string MatchesSentence(const MatchTracksSummary& summary);
 
 // report.json; the keys are listed in docs/cli.md.
 std::string TrackJson(const TrackReport& report);

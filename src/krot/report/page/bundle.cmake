@@ -6,7 +6,7 @@
 cmake_minimum_required(VERSION 3.22)
 
 set(modules dom format data vectors boxes errors_table verdict facts lists axes curves
-    convergence profile suspects frusta colors verdicts framing orbit shaders renderer layers
+    convergence profile pairs suspects frusta colors verdicts framing orbit shaders renderer layers
     picking selection viewer controls main)
 
 set(script "")

@@ -27,8 +27,8 @@ export function count(value) {
     kDash : value.toLocaleString('en-US');
 }
 
-export function counted(value, noun) {
-  return `${count(value)} ${noun}${value === 1 ? '' : 's'}`;
+export function counted(value, noun, nouns = `${noun}s`) {
+  return `${count(value)} ${value === 1 ? noun : nouns}`;
 }
 
 export function seconds(value) {

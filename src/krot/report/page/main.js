@@ -10,6 +10,7 @@ import { errorsTable } from './errors_table.js';
 import { cards, differencesTable, factsTable } from './facts.js';
 import { counted } from './format.js';
 import { imagesTable, pairImages, supportTable } from './lists.js';
+import { pairsFigure, pairsNote } from './pairs.js';
 import { profileChart, profileTable } from './profile.js';
 import { rotationSentence, suspectRows } from './suspects.js';
 import { scope, verdict } from './verdict.js';
@@ -67,6 +68,13 @@ function showVerdicts(report, show) {
   byId('wrong-observations').append(wrongObservationsTable(report, show));
 }
 
+function showPairs({ database }, view, show) {
+  byId('pairs-section').hidden = !database || !view;
+  if (!database || !view) return;
+  byId('pairs-note').textContent = pairsNote(database);
+  byId('pairs').append(pairsFigure(database, view, show));
+}
+
 function showCourse(report) {
   const chart = report.iterations ? convergenceChart(report) : null;
   if (chart) byId('convergence').append(chart);
@@ -119,6 +127,7 @@ function showPage(report, models) {
       sharesPoints: !isComparison(report),
     });
   showVerdicts(report, show);
+  showPairs(report, readJson('krot-pairs'), show);
   showBoxes(report, show);
   showSupport(support, show);
   showSuspects(report, readJson('krot-crops'), show);
