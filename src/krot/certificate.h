@@ -47,6 +47,9 @@ struct ConflictVerdict {
   int64_t num_conflicts = 0;
   int64_t num_observations = 0;  // of all conflicts
   double max_error = 0;          // true pixels
+  // Whether the file has a bound for each observation: max_error is the
+  // largest.
+  bool has_own_bounds = false;
 };
 
 // Accepts if the file's digest of the model agrees and its multipliers prove

@@ -96,7 +96,7 @@ struct OutlierOptions {
   // explains; if it is not proved that noise does not explain all, nothing is
   // removed.
   std::optional<double> max_error;
-  bool find_conflicts = true;  // kConflicts: the proof, most of the time
+  bool find_conflicts = true;  // the proof, most of the time
   bool make_profile = false;   // kConflicts: fill OutlierResult::profile
   SolveOptions solve;          // of what is left; nothing may be fixed
 };

@@ -137,7 +137,8 @@ TEST_F(OutlierFilterCommand, TakesItsBoundFromTheElbowOfTheProfile) {
 // Everything above what noise explains goes; nothing else has to.
 TEST_F(OutlierFilterCommand, ChoosesItsBoundByTheNoise) {
   const KrotResult result =
-      WithoutABound({"--conflicts_path", folder_ / "c.json"});
+      WithoutABound({"--OutlierFilter.method", "conflicts", "--conflicts_path",
+                     folder_ / "c.json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
   EXPECT_GT(report["num_must_go"], 0);
@@ -155,7 +156,8 @@ TEST_F(OutlierFilterCommand, CallsNoObservationOfNoiseWrong) {
     options.start_translation_noise = options.start_point_noise = 0;
     Save(SynthesizeScene(options).model, folder_ / "input");
     const KrotResult result =
-        WithoutABound({"--conflicts_path", folder_ / "c.json"});
+        WithoutABound({"--OutlierFilter.method", "conflicts",
+                       "--conflicts_path", folder_ / "c.json"});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_THAT(result.out, HasSubstr("removed 0 of "));
     EXPECT_THAT(result.out, HasSubstr("no elbow"));
@@ -289,15 +291,24 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
       "outlier_filter",   "--input_path",     folder_ / "input",
       "--output_path",    folder_ / "output", "--report_path",
       folder_ / "r.json", "--outliers_path",  folder_ / "o.csv",
-      "--html_path",      folder_ / "r.html"};
+      "--html_path",      folder_ / "r.html", "--conflicts_path",
+      folder_ / "c.json"};
   const KrotResult result = RunKrot(arguments);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("is more than noise of "));
   const Json report = Json::parse(ReadBytes(folder_ / "r.json"));
   EXPECT_EQ(report["method"], "snooping");
   EXPECT_TRUE(report["max_error"].is_null());
-  EXPECT_TRUE(report["num_must_go"].is_null());
-  EXPECT_GT(report["num_removed"], 0);
+  const int must_go = report["num_must_go"];
+  EXPECT_GT(must_go, 0);
+  EXPECT_LE(must_go, report["num_removed"]);
+  EXPECT_THAT(result.out, HasSubstr("That at least " + std::to_string(must_go) +
+                                    " observations must go is proved"));
+  const KrotResult check = Check("c.json");
+  EXPECT_EQ(check.exit_code, 0) << check.err;
+  EXPECT_THAT(check.out, HasSubstr("at least " + std::to_string(must_go) +
+                                   " observations must go"));
+  EXPECT_THAT(check.out, HasSubstr("their own bounds in the file"));
   for (const Json& removed : report["removed"]) {
     EXPECT_TRUE(removed["w"].is_number() || removed["w"].is_null());
   }
@@ -306,7 +317,7 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
   EXPECT_EQ(WithoutABound({"--OutlierFilter.method", "threshold"}).exit_code,
             1);
   EXPECT_EQ(WithoutABound({"--OutlierFilter.method", "snooping",
-                           "--conflicts_path", folder_ / "c.json"})
+                           "--OutlierFilter.profile_path", folder_ / "p.json"})
                 .exit_code,
             1);
   EXPECT_EQ(Filter({"--OutlierFilter.method", "snooping"}).exit_code, 1);

@@ -20,22 +20,36 @@ struct Packed {
   ConflictFile file;
 };
 
-const Packed& PackedScene() {
-  static const Packed packed = [] {
-    Packed result;
-    result.model = MakeOutlierScene(1, 0.05).model;
-    const BuiltProblem built = BuildProblem(result.model, {});
-    std::vector<int64_t> all(built.pixels.size());
-    std::iota(all.begin(), all.end(), 0);
-    std::vector<PixelCertificate> proofs;
-    Work work;
-    for (const Conflict& conflict :
-         PackConflicts(result.model, built, {Norm::L2(), 2}, all, {}, &work)) {
-      proofs.push_back(conflict.proof);
+Packed PackScene(bool has_own_bounds) {
+  Packed result;
+  result.model = MakeOutlierScene(1, 0.05).model;
+  BuiltProblem built = BuildProblem(result.model, {});
+  std::vector<int64_t> all(built.pixels.size());
+  if (has_own_bounds) {
+    std::vector<double> scales;
+    for (size_t i = 0; i < all.size(); ++i) {
+      scales.push_back(i % 3 == 0 ? 1 : 0.7);
     }
-    result.file = DescribeConflicts(result.model, built, Norm::L2(), 2, proofs);
-    return result;
-  }();
+    ScaleObservations(scales, &built);
+  }
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<PixelCertificate> proofs;
+  Work work;
+  for (const Conflict& conflict :
+       PackConflicts(result.model, built, {Norm::L2(), 2}, all, {}, &work)) {
+    proofs.push_back(conflict.proof);
+  }
+  result.file = DescribeConflicts(result.model, built, Norm::L2(), 2, proofs);
+  return result;
+}
+
+const Packed& PackedScene() {
+  static const Packed packed = PackScene(false);
+  return packed;
+}
+
+const Packed& PackedWithOwnBounds() {
+  static const Packed packed = PackScene(true);
   return packed;
 }
 
@@ -97,6 +111,43 @@ TEST(ConflictFile, IsRefusedOnceItIsTamperedWith) {
     const ConflictVerdict verdict = VerifyConflictFile(model, file);
     EXPECT_FALSE(verdict.is_accepted);
     EXPECT_THAT(verdict.refusal, HasSubstr(tampering.refusal));
+  }
+}
+
+TEST(ConflictFile, WithABoundForEachObservationHoldsForThese) {
+  const auto& [model, file] = PackedWithOwnBounds();
+  ASSERT_GE(file.conflicts.size(), 2u);
+  const std::string json = ConflictJson(file);
+  EXPECT_EQ(ConflictJson(ParseConflicts(json, "file")), json);
+  const ConflictVerdict verdict =
+      VerifyConflictFile(model, ParseConflicts(json, "file"));
+  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+  EXPECT_TRUE(verdict.has_own_bounds);
+  EXPECT_EQ(verdict.num_conflicts, static_cast<int64_t>(file.conflicts.size()));
+  EXPECT_FALSE(VerifyConflictFile(model, PackedScene().file).has_own_bounds);
+}
+
+TEST(ConflictFile, IsRefusedWhereItsBoundsAreTamperedWith) {
+  const std::vector<std::pair<const char*, std::function<void(ConflictFile*)>>>
+      tamperings = {
+          {"not one bound per observation",
+           [](auto* f) { f->conflicts[0].max_errors.pop_back(); }},
+          {"not one bound per observation",
+           [](auto* f) { f->conflicts[0].max_errors[0] = 0; }},
+          {"not one bound per observation",
+           [](auto* f) { f->conflicts[0].max_errors[0] = 3; }},
+          {"conflict 1: ",
+           [](auto* f) {
+             for (double& bound : f->conflicts[0].max_errors) bound = 2;
+           }},
+          {"conflict 1: ", [](auto* f) { f->version = 1; }},
+      };
+  for (const auto& [refusal, change] : tamperings) {
+    auto [model, file] = PackedWithOwnBounds();
+    change(&file);
+    const ConflictVerdict verdict = VerifyConflictFile(model, file);
+    EXPECT_FALSE(verdict.is_accepted);
+    EXPECT_THAT(verdict.refusal, HasSubstr(refusal));
   }
 }
 

@@ -70,6 +70,64 @@ TEST(PackConflicts, AreInfeasibleAndIrreducibleByAnIndependentOracle) {
   }
 }
 
+// Scales that differ from one observation to the next.
+std::vector<double> Scales(const BuiltProblem& built) {
+  std::vector<double> scales;
+  for (size_t i = 0; i < built.pixels.size(); ++i) {
+    scales.push_back(0.5 + 0.1 * static_cast<double>(i * 7 % 6));
+  }
+  return scales;
+}
+
+TEST(PackConflicts, WithABoundForEachHoldByAnIndependentOracle) {
+  if (!HasOracle()) GTEST_SKIP() << "built without CLP";
+  for (const uint64_t seed : {1u, 2u, 3u}) {
+    SCOPED_TRACE(seed);
+    const SyntheticScene scene = MakeOutlierScene(seed, 0.06, 14, 0.3);
+    BuiltProblem built = BuildProblem(scene.model, {});
+    const std::vector<double> scales = Scales(built);
+    KnownRotationProblem by_hand = built.problem;
+    for (size_t i = 0; i < scales.size(); ++i) {
+      by_hand.observations[i].E.bottomRows<2>() /= scales[i];
+    }
+    ScaleObservations(scales, &built);
+    Work work;
+    const std::vector<Conflict> conflicts = PackConflicts(
+        scene.model, built, {Norm::LInf(), kBound}, All(built), {}, &work);
+    ASSERT_GE(conflicts.size(), 2u);
+    for (const Conflict& conflict : conflicts) {
+      EXPECT_GT(OptimumByOracle(by_hand, Norm::LInf(), conflict.observations),
+                kBound);
+    }
+    // Two disjoint ones: whichever single observation goes, it is not enough.
+    for (const int64_t gone : All(built)) {
+      std::vector<int64_t> others = All(built);
+      others.erase(others.begin() + gone);
+      EXPECT_GT(OptimumByOracle(by_hand, Norm::LInf(), others), kBound) << gone;
+    }
+  }
+}
+
+TEST(PackConflicts, AreThoseOfTwiceTheBoundWhereAllScalesAreAHalf) {
+  SceneOptions options = OutlierScene(5, 0.05, 60, 0.5);
+  options.camera_model_id = 4;  // OPENCV
+  const SyntheticScene scene = SynthesizeScene(options);
+  BuiltProblem built = BuildProblem(scene.model, {});
+  Work work;
+  const std::vector<Conflict> plain = PackConflicts(
+      scene.model, built, {Norm::L2(), kBound}, All(built), {}, &work);
+  ScaleObservations(std::vector<double>(built.pixels.size(), 0.5), &built);
+  const std::vector<Conflict> scaled = PackConflicts(
+      scene.model, built, {Norm::L2(), 2 * kBound}, All(built), {}, &work);
+  ASSERT_GT(plain.size(), 1u);
+  ASSERT_EQ(scaled.size(), plain.size());
+  for (size_t n = 0; n < plain.size(); ++n) {
+    EXPECT_EQ(scaled[n].observations, plain[n].observations);
+    EXPECT_NEAR(scaled[n].proof.lower_bound, 2 * plain[n].proof.lower_bound,
+                1e-6);
+  }
+}
+
 TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
   for (const uint64_t seed : {4u, 5u}) {
     const SyntheticScene scene = MakeOutlierScene(seed, 0.05);

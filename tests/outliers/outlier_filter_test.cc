@@ -1,6 +1,7 @@
 #include "krot/outliers/outlier_filter.h"
 
 #include <cmath>
+#include <map>
 #include <random>
 #include <set>
 #include <string>
@@ -9,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/bridge/conflict_file.h"
+#include "krot/check.h"
 #include "krot/model.h"
 #include "tests/outliers/outlier_scenes.h"
 
@@ -228,6 +230,48 @@ TEST(FilterOutliers, BySnoopingFindsPlantedOutliersAndNeedsNoBound) {
               summary.kept_error_before.rms);
     EXPECT_EQ(result.summary.pixel_error_after.count,
               summary.kept_error_before.count);
+  }
+}
+
+TEST(FilterOutliers, BySnoopingProvesHowManyMustGo) {
+  SceneOptions options = OutlierScene(7, 0.04, 200, 0.5);
+  options.camera_model_id = 4;  // OPENCV
+  const SyntheticScene scene = SynthesizeScene(options);
+  const OutlierFilterResult result =
+      FilterOutliers(scene.model, Snooping(), {});
+  const OutlierFilterSummary& summary = result.summary;
+  // What was planted would be enough, and is nearly all that is proved.
+  const auto num_planted = static_cast<double>(scene.outliers.size());
+  EXPECT_LE(static_cast<double>(summary.num_proved), num_planted);
+  EXPECT_GE(static_cast<double>(summary.num_proved), 0.7 * num_planted);
+  const ConflictVerdict verdict =
+      VerifyConflictFile(scene.model, *summary.conflicts);
+  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
+  EXPECT_EQ(verdict.num_conflicts, summary.num_proved);
+  EXPECT_TRUE(verdict.has_own_bounds);
+  // What was removed is enough: all others are within bounds that depend on
+  // what of their noise shows.
+  const ModelNoise noise = EstimateNoise(result.model, {}, {});
+  const std::vector<double> errors = PixelErrors(result.model);
+  std::map<std::pair<ImageId, uint32_t>, double> bounds;
+  for (size_t e = 0; e < errors.size(); ++e) {
+    const TrackElement& element = result.model.track_elements[e];
+    const double bound = summary.snooping->max_error_px *
+                         std::sqrt(noise.observations[e].redundancy[1]);
+    EXPECT_LE(errors[e], 1.0001 * bound);
+    bounds[{element.image_id, element.point2D_idx}] = bound;
+  }
+  EXPECT_DOUBLE_EQ(summary.conflicts->max_error,
+                   summary.snooping->max_error_px);
+  for (const auto& conflict : summary.conflicts->conflicts) {
+    for (size_t n = 0; n < conflict.observations.size(); ++n) {
+      const auto& o = conflict.observations[n];
+      const auto found = bounds.find({o.image_id, o.point2D_idx});
+      const bool is_kept = found != bounds.end();
+      EXPECT_NEAR(conflict.max_errors[n],
+                  is_kept ? found->second : summary.snooping->max_error_px,
+                  1e-3);
+    }
   }
 }
 

@@ -7,24 +7,30 @@ wrong, beside a look at mean errors and a threshold.
 MODEL is a COLMAP model of pinholes or SIMPLE_RADIAL, RADIAL, OPENCV cameras (read
 through `colmap model_converter`); without one, or with "-", scenes are made by
 `krot model_synthesizer`: 30 images, noise of one pixel. For each fault SEEDS (10)
-trials are counted together. The faults:
+trials are counted together; the table so far is printed after each seed. The
+faults:
 
-turned: three images (one in models of fewer than ten) are turned about their
-    centres, by so many degrees and any axis. Their 2D points keep what COLMAP
-    would let them keep: `adjusted`: the points move to their least squares and
-    what is then 4 px and more off goes, twice (colmap bundle_adjuster with
-    cameras held, and point_filtering); `nearest`: each sees the 3D point that the
-    turned camera puts nearest to it, if that is within 4 px.
-moved: so many per cent of all observations are moved by so many pixels in any
-    direction, in scenes so many sigma, and everything is adjusted (krot
+turned, shifted: three images (one in models of fewer than ten) are turned about
+    their centres by so many degrees, or moved by so many per cent of the radius
+    (RMS) of all centres, about any axis and in any direction. Their 2D points
+    keep what COLMAP would let them keep: `adjusted`: the points move to their
+    least squares and what is then 4 px and more off goes, twice (colmap
+    bundle_adjuster with cameras held, and point_filtering); `nearest`: each sees
+    the 3D point that the camera now puts nearest to it, if that is within 4 px.
+moved: so many per cent of all observations are moved by so many sigma (as
+    model_checker finds it) in any direction, and everything is adjusted (krot
     bundle_adjuster).
+exchanged: one per cent of the observations change their points with another of
+    their image, `near`: the nearest, and everything is adjusted.
 
 Rivals call wrong: `mean`: an image whose mean error is more than twice the median
 image's; `2 px`: an observation of more than 2 px, an image with more than half of
-its observations above. A planted image that keeps fewer than ten observations is
-not counted: little says that it is wrong.
+its observations above. What each calls wrong without the fault is not counted. A
+planted image that keeps fewer than ten observations is not counted: little says
+that it is wrong.
 """
 
+import copy
 import json
 import math
 import pathlib
@@ -35,7 +41,9 @@ import sys
 import tempfile
 
 TURNS = (0.2, 0.5, 1, 2, 5)
-MOVES = ((0.1, 10), (1, 5), (1, 10), (1, 50), (10, 10))
+SHIFTS = (1, 5, 20)
+MOVES = tuple((percent, sigmas) for percent in (0.1, 1, 10)
+              for sigmas in (5, 10, 50))
 LIMIT = 4.0
 FEWEST = 10
 
@@ -54,6 +62,7 @@ class Model:
 
     def __init__(self, folder):
         self.folder = folder
+        self.camera_file = (folder / "cameras.txt").read_bytes()
         self.cameras = {}
         for row in self.rows("cameras.txt"):
             self.cameras[row[0]] = (row[1], [float(p) for p in row[4:]])
@@ -78,8 +87,7 @@ class Model:
     def write(self, folder):
         """Tracks are made of the images' 2D points; those of one go."""
         folder.mkdir(parents=True)
-        (folder / "cameras.txt").write_bytes(
-            (self.folder / "cameras.txt").read_bytes())
+        (folder / "cameras.txt").write_bytes(self.camera_file)
         tracks = {}
         for image, points in self.points2D.items():
             for index, (_, _, point) in enumerate(points):
@@ -128,6 +136,24 @@ class Model:
             result[index] = (math.hypot(pixel[0] - x, pixel[1] - y)
                              if pixel else math.inf)
         return result
+
+    def centre(self, image):
+        q, t = self.images[image][0][:4], self.images[image][0][4:]
+        R = rotation(*q)
+        return [-sum(R[r][c] * t[r] for r in range(3)) for c in range(3)]
+
+    def radius(self):
+        centres = [self.centre(image) for image in self.images]
+        middle = [statistics.fmean(c) for c in zip(*centres)]
+        return math.sqrt(statistics.fmean(
+            math.dist(c, middle) ** 2 for c in centres))
+
+    def shift(self, image, percent, rng):
+        """In any direction of the world, so in any of the camera."""
+        d = [rng.gauss(0, 1) for _ in range(3)]
+        length = percent / 100 * self.radius() / math.hypot(*d)
+        pose = self.images[image][0]
+        pose[4:] = [t + length * v for t, v in zip(pose[4:], d)]
 
     def turn(self, image, degrees, rng):
         """About its centre."""
@@ -205,17 +231,24 @@ def to_text(source, target):
         target, "--output_type", "TXT")
 
 
-def base_model(krot, path, folder, seed):
-    if path:
-        to_text(path, folder / "base")
-    else:
-        run(krot, "model_synthesizer", "--output_path", folder / "made",
-            "--Scene.num_frames", 30, "--Scene.num_points", 1500,
-            "--Scene.track_length", 5, "--Scene.pixel_noise", 1,
-            "--random_seed", seed)
-        run(krot, "bundle_adjuster", "--input_path", folder / "made",
-            "--output_path", folder / "base", "--output_type", "TXT")
-    return Model(folder / "base")
+class Base:
+    """A model before anything is planted, and what is called wrong in it."""
+
+    def __init__(self, krot, path, folder, seed):
+        if path:
+            to_text(path, folder / "base")
+        else:
+            run(krot, "model_synthesizer", "--output_path", folder / "made",
+                "--Scene.num_frames", 30, "--Scene.num_points", 1500,
+                "--Scene.track_length", 5, "--Scene.pixel_noise", 1,
+                "--random_seed", seed)
+            run(krot, "bundle_adjuster", "--input_path", folder / "made",
+                "--output_path", folder / "base", "--output_type", "TXT")
+        self.krot = krot
+        self.model = Model(folder / "base")
+        self.report = check(krot, folder / "base", folder)
+        self.images = called_images(self.report, self.model)
+        self.observations = called_observations(self.report, self.model)
 
 
 def check(krot, path, folder):
@@ -224,84 +257,140 @@ def check(krot, path, folder):
     return json.loads((folder / "report.json").read_text())
 
 
-class Counts:
-    """Found of planted, and called of what is not."""
-
-    def __init__(self):
-        self.planted, self.found, self.called = 0, 0, 0
-
-    def add(self, planted, called):
-        self.planted += len(planted)
-        self.found += len(planted & called)
-        self.called += len(called)
-
-    def row(self):
-        recall = self.found / self.planted if self.planted else math.nan
-        precision = self.found / self.called if self.called else math.nan
-        return f"{recall:.3f} | {precision:.3f}"
-
-
-def turned_trial(krot, path, seed, degrees, how, counts):
-    """Adds to counts; returns how many planted ones keep too little."""
-    rng = random.Random(seed)
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        model = base_model(krot, path, folder, seed)
-        images = sorted(model.images)
-        planted = set(rng.sample(images, 3 if len(images) >= 10 else 1))
-        for image in sorted(planted):
-            model.turn(image, degrees, rng)
-        if how == "nearest":
-            for image in sorted(planted):
-                see_nearest(model, image)
-        model.write(folder / "planted")
-        final = folder / "planted"
-        if how == "adjusted":
-            adjust_points_and_filter(folder)
-            final = folder / "filtered"
-        report = check(krot, final, folder)
-        model = Model(final)
+def called_images(report, model):
     errors = {image: list(model.errors(image).values())
               for image in model.images}
-    thin = {i for i in planted if len(errors.get(i, [])) < FEWEST}
-    planted -= thin
     means = {i: statistics.fmean(e) for i, e in errors.items() if e}
     middle = statistics.median(means.values())
-    called = {
-        "krot": {str(i["image_id"]) for i in report["images"]
-                 if i["verdict"] == "wrong"},
-        "mean": {i for i, m in means.items() if m > 2 * middle},
-        "2 px": {i for i, e in errors.items()
-                 if e and sum(v > 2 for v in e) > len(e) / 2}}
-    for rival, images in called.items():
-        counts[rival].add(planted, images - thin)
-    return len(thin)
+    return {"krot": {str(i["image_id"]) for i in report["images"]
+                     if i["verdict"] == "wrong"},
+            "mean": {i for i, m in means.items() if m > 2 * middle},
+            "2 px": {i for i, e in errors.items()
+                     if e and sum(v > 2 for v in e) > len(e) / 2}}
 
 
-def moved_trial(krot, path, seed, percent, pixels, counts):
-    rng = random.Random(seed)
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
-        model = base_model(krot, path, folder, seed)
-        everything = [(image, index) for image in sorted(model.images)
-                      for index, row in enumerate(model.points2D[image])
-                      if row[2] != "-1"]
-        planted = set(rng.sample(everything, max(
-            1, round(percent / 100 * len(everything)))))
-        for image, index in sorted(planted):
-            angle = 2 * math.pi * rng.random()
-            model.points2D[image][index][0] += pixels * math.cos(angle)
-            model.points2D[image][index][1] += pixels * math.sin(angle)
-        model.write(folder / "planted")
-        run(krot, "bundle_adjuster", "--input_path", folder / "planted",
-            "--output_path", folder / "adjusted", "--output_type", "TXT")
-        report = check(krot, folder / "adjusted", folder)
-        model = Model(folder / "adjusted")
-    counts["krot"].add(planted, {
-        (str(o["image_id"]), o["point2D_idx"]) for o in report["observations"]})
-    counts["2 px"].add(planted, {
-        (image, index) for image in model.images
-        for index, error in model.errors(image).items() if error > 2})
+def called_observations(report, model):
+    return {"krot": {(str(o["image_id"]), o["point2D_idx"])
+                     for o in report["observations"]},
+            "2 px": {(image, index) for image in model.images
+                     for index, error in model.errors(image).items()
+                     if error > 2}}
+
+
+class Counts:
+    """Of one fault: planted, found, and called of what is not."""
+
+    def __init__(self):
+        self.planted = self.thin = 0
+        self.found = dict.fromkeys(("krot", "mean", "2 px"), 0)
+        self.called = dict.fromkeys(self.found, 0)
+        self.asked = set()
+
+    def add(self, planted, called, before, thin=frozenset()):
+        self.planted += len(planted - thin)
+        self.thin += len(planted & thin)
+        self.asked |= set(called)
+        for rival, those in called.items():
+            found = planted & those - thin
+            self.found[rival] += len(found)
+            self.called[rival] += len(found) + len(
+                those - planted - before[rival])
+
+    def row(self):
+        cells = [str(self.planted), str(self.thin)]
+        for rival, found in self.found.items():
+            if rival not in self.asked:
+                cells += ["–", "–"]
+                continue
+            cells += [f"{part / whole:.3f}" if whole else "–" for part, whole
+                      in ((found, self.planted), (found, self.called[rival]))]
+        return " | ".join(cells)
+
+
+def wrong_images(base, folder, rng, change, how, counts):
+    model = copy.deepcopy(base.model)
+    images = sorted(model.images)
+    planted = set(rng.sample(images, 3 if len(images) >= 10 else 1))
+    for image in sorted(planted):
+        change(model, image)
+    if how == "nearest":
+        for image in sorted(planted):
+            see_nearest(model, image)
+    model.write(folder / "planted")
+    final = folder / "planted"
+    if how == "adjusted":
+        adjust_points_and_filter(folder)
+        final = folder / "filtered"
+    report = check(base.krot, final, folder)
+    model = Model(final)
+    thin = {i for i in planted
+            if i not in model.images or len(model.errors(i)) < FEWEST}
+    counts.add(planted, called_images(report, model), base.images, thin)
+
+
+def wrong_observations(base, folder, rng, plant, percent, counts):
+    model = copy.deepcopy(base.model)
+    everything = [(image, index) for image in sorted(model.images)
+                  for index, row in enumerate(model.points2D[image])
+                  if row[2] != "-1"]
+    chosen = sorted(rng.sample(everything, max(
+        1, round(percent / 100 * len(everything)))))
+    planted = set()
+    for image, index in chosen:
+        planted |= {(image, n) for n in plant(model, image, index)}
+    model.write(folder / "planted")
+    run(base.krot, "bundle_adjuster", "--input_path", folder / "planted",
+        "--output_path", folder / "adjusted", "--output_type", "TXT")
+    report = check(base.krot, folder / "adjusted", folder)
+    counts.add(planted, called_observations(report, Model(folder / "adjusted")),
+               base.observations)
+
+
+def move(model, image, index, pixels, rng):
+    angle = 2 * math.pi * rng.random()
+    model.points2D[image][index][0] += pixels * math.cos(angle)
+    model.points2D[image][index][1] += pixels * math.sin(angle)
+    return [index]
+
+
+def exchange(model, image, index, is_near, rng):
+    """Two 2D points of an image get each other's 3D points."""
+    rows = model.points2D[image]
+    others = [n for n, row in enumerate(rows)
+              if row[2] not in ("-1", rows[index][2])]
+    if not others:
+        return []
+    other = rng.choice(others)
+    if is_near:
+        other = min(others, key=lambda n: math.dist(rows[n][:2],
+                                                    rows[index][:2]))
+    rows[index][2], rows[other][2] = rows[other][2], rows[index][2]
+    return [index, other]
+
+
+def faults():
+    """Names, and what plants one trial: (base, folder, rng, counts)."""
+    for kind, sizes, unit in (("turn", TURNS, "°"), ("shift", SHIFTS, " %")):
+        for how in ("adjusted", "nearest"):
+            for size in sizes:
+                yield (f"{kind}ed by {size}{unit}, {how}",
+                       lambda base, folder, rng, counts, kind=kind, how=how,
+                       size=size: wrong_images(
+                           base, folder, rng, lambda model, image:
+                           getattr(model, kind)(image, size, rng), how, counts))
+    for percent, sigmas in MOVES:
+        yield (f"{percent} % moved by {sigmas} sigma",
+               lambda base, folder, rng, counts, percent=percent,
+               sigmas=sigmas: wrong_observations(
+                   base, folder, rng, lambda model, image, index: move(
+                       model, image, index, sigmas * base.report["sigma_px"],
+                       rng), percent, counts))
+    for name, is_near in (("", False), (", near", True)):
+        yield (f"1 % exchanged{name}",
+               lambda base, folder, rng, counts, is_near=is_near:
+               wrong_observations(
+                   base, folder, rng, lambda model, image, index: exchange(
+                       model, image, index, is_near, rng), 0.5, counts))
 
 
 def main():
@@ -309,26 +398,23 @@ def main():
         sys.exit(__doc__)
     krot = pathlib.Path(sys.argv[1]).resolve()
     path = sys.argv[2] if len(sys.argv) > 2 and sys.argv[2] != "-" else None
-    seeds = range(1, 1 + (int(sys.argv[3]) if len(sys.argv) > 3 else 10))
-    print("| fault | planted | too few left | krot: recall | precision | "
-          "mean: recall | precision | 2 px: recall | precision |\n"
-          "|---|---|---|---|---|---|---|---|---|")
-    for how in ("adjusted", "nearest"):
-        for degrees in TURNS:
-            counts = {rival: Counts() for rival in ("krot", "mean", "2 px")}
-            thin = sum(turned_trial(krot, path, seed, degrees, how, counts)
-                       for seed in seeds)
-            print(f"| turned by {degrees}°, {how} | {counts['krot'].planted} | "
-                  f"{thin} | " +
-                  " | ".join(c.row() for c in counts.values()) + " |",
-                  flush=True)
-    for percent, pixels in MOVES:
-        counts = {rival: Counts() for rival in ("krot", "2 px")}
-        for seed in seeds:
-            moved_trial(krot, path, seed, percent, pixels, counts)
-        print(f"| {percent} % moved by {pixels} px | {counts['krot'].planted} | "
-              f"| {counts['krot'].row()} | – | – | {counts['2 px'].row()} |",
-              flush=True)
+    num_seeds = int(sys.argv[3]) if len(sys.argv) > 3 else 10
+    counts = {name: Counts() for name, _ in faults()}
+    base = None
+    for seed in range(1, num_seeds + 1):
+        if base is None or path is None:
+            with tempfile.TemporaryDirectory() as name:
+                base = Base(krot, path, pathlib.Path(name), seed)
+        for fault, trial in faults():
+            with tempfile.TemporaryDirectory() as name:
+                trial(base, pathlib.Path(name), random.Random(seed),
+                      counts[fault])
+        print(f"\n{path or 'scenes'}, {seed} seeds\n\n"
+              "| fault | planted | too few left | krot: recall | precision | "
+              "mean: recall | precision | 2 px: recall | precision |\n"
+              "|---|---|---|---|---|---|---|---|---|")
+        for fault, row in counts.items():
+            print(f"| {fault} | {row.row()} |", flush=True)
 
 
 if __name__ == "__main__":

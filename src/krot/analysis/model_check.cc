@@ -22,9 +22,12 @@ constexpr double kNoisyImage = 3;
 constexpr double kExplained = 0.5;
 // Of the share of its 2D points that the median image keeps in tracks.
 constexpr double kFewKept = 1.0 / 3;
+// Of the largest error that the model was filtered for: the 95 % quantile of
+// errors that fill the disc is near it.
+constexpr double kToTheLimit = 0.7;
 // Chernoff's bound is for a quantile that is known. Taken from the same errors,
-// it passes that of noise by image in three of 200 scenes, and in none with this
-// margin.
+// it passes that of noise by image in three of 200 scenes, and in none with
+// this margin.
 constexpr double kOwnQuantile = 10;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
@@ -54,6 +57,19 @@ class Checker {
       check_.images.back().name = image.name;
     }
     for (const int32_t n : image_of_) ++check_.images[n].num_observations;
+    const std::vector<double> errors = PixelErrors(model, context.num_threads);
+    std::vector<std::vector<double>> of_image(model.images.size());
+    std::vector<double> all;
+    for (size_t e = 0; e < errors.size(); ++e) {
+      if (!std::isfinite(errors[e])) continue;
+      of_image[image_of_[e]].push_back(errors[e]);
+      all.push_back(errors[e]);
+    }
+    const double limit = Quantile(999, std::move(all));
+    for (std::vector<double>& own : of_image) {
+      reaches_limit_.push_back(Quantile(950, std::move(own)) >
+                               kToTheLimit * limit);
+    }
   }
 
   ModelCheck Run() {
@@ -67,7 +83,7 @@ class Checker {
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
       AddRemoved();
-    } while (CallWorstImage());
+    } while (CallWrong(WorstImage()));
     Describe();
     FindSecondPoints();
     HowFirmly();
@@ -102,11 +118,14 @@ class Checker {
     }
   }
 
-  void CallWrong(int32_t n) {
+  // False for -1.
+  bool CallWrong(int32_t n) {
+    if (n < 0) return false;
     check_.images[n].verdict = ImageVerdict::kWrong;
     for (size_t e = 0; e < image_of_.size(); ++e) {
       if (image_of_[e] == n) noise_options_.is_left_out[e] = 1;
     }
+    return true;
   }
 
   bool IsWrong(int32_t n) const {
@@ -140,16 +159,8 @@ class Checker {
     }
   }
 
-  // Whether there is one. Contradictions come first, as they bend what the
+  // -1: none. Sets its fault. Contradictions come first, as they bend what the
   // others see.
-  bool CallWorstImage() {
-    const int32_t worst = WorstImage();
-    if (worst < 0) return false;
-    CallWrong(worst);
-    return true;
-  }
-
-  // -1: none. Sets its fault.
   int32_t WorstImage() {
     int32_t worst = -1;
     double most = 0;
@@ -244,17 +255,23 @@ class Checker {
     const double exponent = size * Divergence(share, gaussian);
     const double kept = KeptShare(n) / (kFewKept * median_kept_);
     return exponent > LeastExponent() + std::log(kOwnQuantile) ||
-           (kept < 1 &&
+           (kept < 1 && reaches_limit_[n] &&
             exponent - size * Divergence(share, disc) > std::log(kept));
   }
 
+  // 0 of none.
+  static double Quantile(size_t per_mille, std::vector<double> values) {
+    if (values.empty()) return 0;
+    std::sort(values.begin(), values.end());
+    return values[(per_mille * values.size() - 1) / 1000];
+  }
+
   // Of the errors, those below half of their 95 % quantile. Requires one.
-  static double ShareBelowHalf(std::vector<double> squares) {
-    std::sort(squares.begin(), squares.end());
-    const double quantile = squares[(95 * squares.size() - 1) / 100];
+  static double ShareBelowHalf(const std::vector<double>& squares) {
+    const double half = Quantile(950, squares) / 4;
     const auto below =
-        std::lower_bound(squares.begin(), squares.end(), quantile / 4) -
-        squares.begin();
+        std::count_if(squares.begin(), squares.end(),
+                      [half](double square) { return square < half; });
     return static_cast<double>(below) / static_cast<double>(squares.size());
   }
 
@@ -352,6 +369,9 @@ class Checker {
   const ModelCheckOptions& options_;
   const Context& context_;
   std::vector<int32_t> image_of_;  // by track element
+  // By image: its errors in the model are as large as any, as chance matches'
+  // are up to what COLMAP filters.
+  std::vector<char> reaches_limit_;
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
   std::vector<ImageSums> sums_;  // as Model::images

@@ -63,6 +63,9 @@ struct BuiltProblem {
   std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
   std::vector<Eigen::Vector2d> pixels;  // of the observations
+  // Of the observations, > 0: their rows and errors are divided by it, so that
+  // a bound of epsilon is one of epsilon * scale pixels for each. Empty: 1.
+  std::vector<double> scales;
   // Behind what the model has, the problem holds kRowsPerPosition views for
   // each of these, each with an observation that has no pixel: of a fixed point
   // behind the model's, one for each camera, or from a fixed frame behind the
@@ -80,6 +83,9 @@ struct BuiltProblem {
   bool HasPixel(int64_t observation) const {
     return problem.observations[observation].view <
            static_cast<int32_t>(image_of.size());
+  }
+  double ScaleOf(int64_t observation) const {
+    return scales.empty() ? 1 : scales[observation];
   }
   int64_t NumPixels() const {
     return static_cast<int64_t>(problem.observations.size()) -
@@ -107,6 +113,10 @@ struct BuiltProblem {
 // + points log points); 100 bytes each.
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
+
+// Gives the observations scales, one each. Requires a problem without any, and
+// without positions.
+void ScaleObservations(std::vector<double> scales, BuiltProblem* built);
 
 // The model's own translations and points as an estimate of a problem that was
 // built from it, wherever they are: nothing is re-triangulated, and depths may

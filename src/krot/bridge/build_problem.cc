@@ -289,6 +289,13 @@ BuiltProblem BuildProblem(const Model& model,
   return built;
 }
 
+void ScaleObservations(std::vector<double> scales, BuiltProblem* built) {
+  for (size_t i = 0; i < scales.size(); ++i) {
+    built->problem.observations[i].E.bottomRows<2>() /= scales[i];
+  }
+  built->scales = std::move(scales);
+}
+
 const char* LeftOutName(LeftOut reason) {
   switch (reason) {
     case LeftOut::kBehind:

@@ -20,6 +20,7 @@ BuiltProblem BuiltPart(const BuiltProblem& built, const ProblemSubset& subset,
     part.point_of[own.point] = built.point_of[in_whole.point];
     part.point2D_of.push_back(built.point2D_of[i]);
     part.pixels.push_back(built.pixels[i]);
+    if (!built.scales.empty()) part.scales.push_back(built.scales[i]);
   }
   return part;
 }

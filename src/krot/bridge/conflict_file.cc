@@ -25,10 +25,12 @@ ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
     return reader.Member(json, "the file", key);
   };
   const Json& version = member("version");
-  if (version != kConflictFileVersion) {
-    reader.Fail("version", version, std::to_string(kConflictFileVersion));
+  if (version != 1 && version != kConflictFileVersion) {
+    reader.Fail("version", version,
+                "1 or " + std::to_string(kConflictFileVersion));
   }
   ConflictFile file;
+  file.version = version;
   file.norm = reader.ReadNorm(member("norm"));
   file.max_error = reader.Number(member("max_error"), "max_error");
   file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
@@ -46,6 +48,15 @@ ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
     conflict.observations =
         reader.ReadSupport(reader.Member(conflicts[n], place, "observations"),
                            kCertificateVersion, place + ".observations");
+    if (file.version == kConflictFileVersion) {
+      const std::string bounds = place + ".max_errors";
+      const Json& values = reader.Array(
+          reader.Member(conflicts[n], place, "max_errors"), bounds);
+      for (size_t i = 0; i < values.size(); ++i) {
+        conflict.max_errors.push_back(
+            reader.Number(values[i], bounds + "[" + std::to_string(i) + "]"));
+      }
+    }
     file.conflicts.push_back(std::move(conflict));
   }
   return file;
@@ -60,10 +71,19 @@ ConflictFile DescribeConflicts(
   file.norm = norm;
   file.max_error = max_error;
   file.model_sha256 = ModelSha256(model);
+  if (!built.scales.empty()) file.version = kConflictFileVersion;
   for (const PixelCertificate& certificate : certificates) {
-    file.conflicts.push_back(
-        {certificate.lower_bound, certificate.rows.lower_bound,
-         certificate.rows.defect, DescribeSupport(model, built, certificate)});
+    ConflictFile::Conflict conflict{certificate.lower_bound,
+                                    certificate.rows.lower_bound,
+                                    certificate.rows.defect,
+                                    DescribeSupport(model, built, certificate),
+                                    {}};
+    if (!built.scales.empty()) {
+      for (const CertifiedObservation& o : certificate.rows.observations) {
+        conflict.max_errors.push_back(built.scales[o.observation] * max_error);
+      }
+    }
+    file.conflicts.push_back(std::move(conflict));
   }
   return file;
 }
@@ -76,6 +96,9 @@ std::string ConflictJson(const ConflictFile& file) {
                          {"defect", conflict.defect},
                          {"observations", SupportJson(conflict.observations,
                                                       kCertificateVersion)}});
+    if (file.version == kConflictFileVersion) {
+      conflicts.back()["max_errors"] = conflict.max_errors;
+    }
   }
   Json json = {{"version", file.version},
                {"norm", NormJson(file.norm)},
@@ -106,6 +129,7 @@ using Support = CertificateFile::SupportObservation;
 // An entry of the file and the conflict that it is of.
 struct Entry {
   size_t conflict = 0;
+  size_t place = 0;  // in the conflict
   const Support* observation = nullptr;
   int64_t index = -1;  // in the problem; -1: not found
 };
@@ -117,10 +141,12 @@ std::vector<Entry> FindEntries(const Model& model, const BuiltProblem& built,
   std::vector<Entry> entries;
   std::multimap<Key, size_t> by_key;
   for (size_t n = 0; n < file.conflicts.size(); ++n) {
-    for (const Support& o : file.conflicts[n].observations) {
+    const std::vector<Support>& observations = file.conflicts[n].observations;
+    for (size_t place = 0; place < observations.size(); ++place) {
+      const Support& o = observations[place];
       by_key.emplace(Key(o.image_id, o.point2D_idx, o.point3D_id),
                      entries.size());
-      entries.push_back({n, &o});
+      entries.push_back({n, place, &o});
     }
   }
   for (size_t i = 0; i < built.problem.observations.size(); ++i) {
@@ -147,6 +173,14 @@ std::string NameOfConflict(size_t n) {
   return "conflict " + std::to_string(n + 1);
 }
 
+bool AreBounds(const ConflictFile::Conflict& conflict, double largest) {
+  return conflict.max_errors.size() == conflict.observations.size() &&
+         std::all_of(conflict.max_errors.begin(), conflict.max_errors.end(),
+                     [&](double bound) {
+                       return bound > 0 && bound <= (1 + 1e-12) * largest;
+                     });
+}
+
 // Why one conflict is refused, or nothing.
 std::optional<std::string> RefuseConflict(const Model& model,
                                           const BuiltProblem& built,
@@ -158,7 +192,13 @@ std::optional<std::string> RefuseConflict(const Model& model,
   }
   std::sort(entries.begin(), entries.end(),
             [](const Entry& a, const Entry& b) { return a.index < b.index; });
+  const bool has_own = file.version == kConflictFileVersion;
+  if (has_own && !AreBounds(conflict, file.max_error)) {
+    return NameOfConflict(n) +
+           " has not one bound per observation, above 0 and at most max_error";
+  }
   std::vector<int64_t> observations;
+  std::vector<double> scales;
   PixelCertificate certificate;
   certificate.lower_bound = conflict.lower_bound;
   certificate.rows.lower_bound = conflict.rows_bound;
@@ -169,11 +209,16 @@ std::optional<std::string> RefuseConflict(const Model& model,
          entry.observation->y});
     certificate.bearings.push_back(entry.observation->bearing);
     observations.push_back(entry.index);
+    if (has_own) {
+      scales.push_back(conflict.max_errors[entry.place] / file.max_error);
+    }
   }
   if (observations.empty()) return NameOfConflict(n) + " is empty";
   const ProblemSubset subset(built.problem, std::move(observations));
-  const PixelCertificateCheck check = CheckPixelCertificate(
-      model, BuiltPart(built, subset, built.start), file.norm, certificate, {});
+  BuiltProblem part = BuiltPart(built, subset, built.start);
+  ScaleObservations(std::move(scales), &part);
+  const PixelCertificateCheck check =
+      CheckPixelCertificate(model, part, file.norm, certificate, {});
   if (check.is_accepted) return std::nullopt;
   return NameOfConflict(n) + ": " + check.refusal;
 }
@@ -225,6 +270,7 @@ ConflictVerdict VerifyConflictFile(const Model& model,
   verdict.num_conflicts = static_cast<int64_t>(file.conflicts.size());
   verdict.num_observations = static_cast<int64_t>(entries.size());
   verdict.max_error = file.max_error;
+  verdict.has_own_bounds = file.version == kConflictFileVersion;
   return verdict;
 }
 

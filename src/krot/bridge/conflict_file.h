@@ -12,28 +12,32 @@
 
 namespace krot {
 
-inline constexpr int kConflictFileVersion = 1;
+// Version 2: observations have bounds of their own.
+inline constexpr int kConflictFileVersion = 2;
 
 // Conflicts without a common observation, in terms of the model's ids: a proof
 // that as many observations at least must go for all others to be within a
-// bound (docs/formats.md). Each is a certificate of version 2 whose lower bound
-// is above it.
+// bound, or each within its own (docs/formats.md). Each is a certificate of
+// version 2 whose lower bound is above it.
 struct ConflictFile {
   struct Conflict {
     double lower_bound = 0;  // true pixels; > max_error
     double rows_bound = 0;   // delta of the rows, pixels
     double defect = 0;       // of the rows' identities, relative
     std::vector<CertificateFile::SupportObservation> observations;
+    // Version 2: the bounds of the observations, true pixels; > 0. Those above,
+    // and lambda and y, are of errors times the file's max_error over these.
+    std::vector<double> max_errors;
   };
 
-  int version = kConflictFileVersion;
+  int version = 1;
   Norm norm;
-  double max_error = 0;  // the bound, true pixels
+  double max_error = 0;  // the bound, true pixels; version 2: the largest
   std::string model_sha256;
   std::vector<Conflict> conflicts;
 };
 
-// `certificates` must be of built.problem.
+// `certificates` must be of built.problem. Version 2 if that has scales.
 ConflictFile DescribeConflicts(
     const Model& model, const BuiltProblem& built, Norm norm, double max_error,
     const std::vector<PixelCertificate>& certificates);

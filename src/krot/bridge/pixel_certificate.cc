@@ -47,9 +47,10 @@ double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
   }
   const Reprojection::Source& source = reprojection.SourceOf(o.observation);
   const double unit = rows.lower_bound * o.lambda;
-  const std::optional<double> largest =
-      SupportBound(source.model_id, source.params, built.pixels[o.observation],
-                   bearings[n], o.y, gamma, norm.p, sufficient * unit);
+  const double scale = built.ScaleOf(o.observation);
+  const std::optional<double> largest = SupportBound(
+      source.model_id, source.params, built.pixels[o.observation], bearings[n],
+      o.y / scale, scale * gamma, norm.p, sufficient * unit);
   return largest ? *largest / unit : kNoRegion;
 }
 
@@ -88,9 +89,10 @@ bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
   const double gamma = certificate.lower_bound;
   const std::optional<double> kappa = RemainderBound(
       source.model_id, source.params, built.pixels[o.observation],
-      certificate.bearings[n], gamma, norm.p, kSmallRemainder);
+      certificate.bearings[n], built.ScaleOf(o.observation) * gamma, norm.p,
+      kSmallRemainder);
   if (!kappa) return false;
-  // |L| <= sqrt(2) |L|_p over S_i.
+  // |L| <= sqrt(2) |L|_p over S_i; over the scale, of which gamma is a bound.
   const double reach =
       1.5 * gamma * (1 + *kappa) / (certificate.rows.lower_bound * o.lambda);
   const double allowance = change.y * reach + change.depth;
@@ -214,6 +216,7 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
       return check;
     }
     problem.observations[i].E = *row;
+    problem.observations[i].E.bottomRows<2>() /= built.ScaleOf(i);
   }
   const CertificateCheck rows =
       CheckCertificate(problem, norm, certificate.rows);

@@ -32,6 +32,9 @@ namespace krot {
 // -y_i; at an optimum that direction is the error's own, its supporting line
 // touches S_i where the point projects, and gamma = delta.
 //
+// Where observations have scales, the true error and L_i are those over them:
+// S_i are the rays within gamma times the scale.
+//
 // Where positions are known, z is of estimates that keep them alone: their rows
 // are those of `level` delta (position_rows.h), within which every camera in
 // its ball is seen.

@@ -50,7 +50,8 @@ double Reprojection::Error(const Estimate& estimate, Norm norm,
   const std::optional<Eigen::Vector2d> e =
       ProjectionError(source.model_id, source.params, built_.pixels[i], x_cam);
   if (!e) return kInfinity;
-  const double error = NormOf(*e, norm) + Resolution(estimate, i, x_cam);
+  const double error =
+      NormOf(*e, norm) / built_.ScaleOf(i) + Resolution(estimate, i, x_cam);
   return std::isfinite(error) ? error : kInfinity;
 }
 
@@ -108,6 +109,7 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
                                       built_.pixels[i], InCamera(estimate, i));
                   if (row) {
                     observation.E = *row;
+                    observation.E.bottomRows<2>() /= built_.ScaleOf(i);
                   } else {
                     do_project[begin / kObservationsPerChunk] = 0;
                   }

@@ -27,7 +27,8 @@ class Reprojection {
   // Whether observation i is one of the model: what Error and SourceOf are of.
   bool IsOfModel(int64_t i) const { return built_.HasPixel(i); }
 
-  // ||pi(x_cam) - pixel||_p of observation i, which is one of the model, and
+  // ||pi(x_cam) - pixel||_p of observation i, which is one of the model, over
+  // its scale, and
   // what the last digits of the coordinates may add to it: an estimate whose
   // points lie closer to a camera than its coordinates resolve is not as good
   // as it seems. Infinity where the point does not project, as behind its

@@ -27,8 +27,9 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
        {"snooping", OutlierMethod::kSnooping}},
       "conflicts: few, by the least sum of excesses, and a proof of how many "
       "must go; threshold: what is above the bound, solve, and again, to "
-      "compare with; snooping, the default without max_error, profile_path "
-      "and conflicts_path: what noise does not explain, then least squares");
+      "compare with; snooping, the default without max_error and "
+      "profile_path: what noise does not explain, then least squares, and a "
+      "proof of how many must go");
   AddFinishLoss(&options->solve, table);
   table->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
                  Above(0.0),
@@ -39,9 +40,9 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                     "the result is the same, bit by bit");
 }
 
-void ResolveOutlierFilterOptions(const OptionTable& table, bool needs_conflicts,
+void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
                                  OutlierFilterOptions* options) {
-  if (!options->max_error && !needs_conflicts &&
+  if (!options->max_error && !makes_profile &&
       !table.IsGiven("OutlierFilter.method")) {
     options->method = OutlierMethod::kSnooping;
   }

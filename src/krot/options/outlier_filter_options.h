@@ -12,7 +12,7 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
 // To be called after they are set: the method where none is given, which is
 // conflicts with a bound or if something is asked for that needs them. Throws
 // OptionError for options that would have no effect, or lack another.
-void ResolveOutlierFilterOptions(const OptionTable& table, bool needs_conflicts,
+void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
                                  OutlierFilterOptions* options);
 
 }  // namespace krot

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/bridge/reprojection.h"
+#include "krot/check.h"
 #include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
@@ -84,34 +84,19 @@ void Profiler::Append(ProfileLevel level) {
   levels.push_back(std::move(level));
 }
 
-NoiseLimit LimitAt(const Reprojection& reprojection,
-                   const KnownRotationProblem& problem,
-                   const Estimate& estimate, Norm norm) {
-  std::vector<double> variances;  // of an axis, by each observation alone
-  for (int32_t k = 0; k < problem.num_points; ++k) {
-    const double rows = 2.0 * static_cast<double>(problem.point_begin[k + 1] -
-                                                  problem.point_begin[k]);
-    if (rows <= 3) continue;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      const double error = reprojection.Error(estimate, Norm::L2(), i);
-      variances.push_back(error * error * rows / (rows - 3));
-    }
-  }
-  NoiseLimit noise;
-  noise.max_error = kLeastNoise;
-  if (variances.empty()) return noise;
-  const auto count = static_cast<double>(variances.size());
-  const auto middle =
-      variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
-  std::nth_element(variances.begin(), middle, variances.end());
-  noise.sigma = std::sqrt(*middle / (2 * std::log(2.0)));
+NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
+  NoiseLimit limit;
+  limit.max_error = kLeastNoise;
+  const ModelNoise noise = EstimateNoise(model, {}, context);
+  if (!noise.sigma_px) return limit;
+  limit.sigma = *noise.sigma_px;
   // ||e||_1 <= sqrt(2) ||e||_2.
   const double factor = norm.p == 1 ? std::sqrt(2.0) : 1;
-  noise.max_error =
-      std::max(kLeastNoise, factor * noise.sigma *
+  const auto count = static_cast<double>(noise.num_tested);
+  limit.max_error =
+      std::max(kLeastNoise, factor * limit.sigma *
                                 std::sqrt(2 * std::log(count / kFalseAlarm)));
-  return noise;
+  return limit;
 }
 
 ErrorProfile Profiler::Run() {
@@ -152,14 +137,14 @@ ErrorProfile Profiler::Run() {
 
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context) {
-  const Reprojection reprojection(model, built);
-  const NoiseLimit own =
-      LimitAt(reprojection, built.problem, built.start, norm);
+  const NoiseLimit own = LimitOf(model, norm, context);
   context.Stage("measuring the noise");
   const Estimate robust = FindRobustStart(
       built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
-  const NoiseLimit limit = LimitAt(reprojection, built.problem, robust, norm);
-  return limit.sigma < own.sigma ? limit : own;
+  const NoiseLimit limit =
+      LimitOf(ApplyEstimate(model, built, robust), norm, context);
+  const bool is_lower = limit.sigma > 0 && !(limit.sigma >= own.sigma);
+  return is_lower || own.sigma == 0 ? limit : own;
 }
 
 ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,

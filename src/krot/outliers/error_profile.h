@@ -25,13 +25,10 @@ struct NoiseLimit {
   double max_error = 0;
 };
 
-// From the median error at built.start or at FindRobustStart's, whichever has
-// less: the one is nearer to the least squares, the other does not mind a start
-// that is off. Points of least squares take up 3 of the 2 n coordinates of a
-// track of n observations, so that an error shows the share (2 n - 3) / (2 n)
-// of its variance, on average [Baarda 1968]; the median of the squares is then
-// 2 ln 2 sigma^2, whatever a few others are, and one of N is above
-// 2 ln(N / 0.05) sigma^2 with a probability of 5 % at most (Bonferroni).
+// The sigma of EstimateNoise (krot/check.h) with the cameras of the model or of
+// FindRobustStart, whichever has less: the one is nearer to the least squares,
+// the other does not mind a start that is off. One of N errors is above
+// sigma sqrt(2 ln(N / 0.05)) with a probability of 5 % at most (Bonferroni).
 // Nothing below a thousandth of a pixel is told from rounding. Takes less than
 // a solve.
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,

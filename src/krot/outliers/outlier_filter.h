@@ -32,7 +32,7 @@ struct OutlierFilterOptions {
   // tracks: then weak parts are looked for there, too.
   bool has_start_from_nothing = false;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
-  bool find_conflicts = true;  // kConflicts: the proof, most of the time
+  bool find_conflicts = true;  // the proof, most of the time
   // Of what is left; its norm is the errors'. Its init kFeasible is from
   // nothing but rotations and tracks, and so is any model whose cameras have no
   // place or all the same.
@@ -61,6 +61,10 @@ struct SnoopingSummary {
   double critical_w = 0;  // at the end
   int64_t num_tested = 0;
   int num_rounds = 0;  // of removals with the cameras as they stand
+  // What noise explains of an observation at most, critical_w sigma, pixels:
+  // the bound of the conflicts. Of each that is kept it is the square root of
+  // its redundancy of that.
+  double max_error_px = 0;
   // In the input, of the observations that are kept.
   PixelErrorStatistics kept_error_before;
 };
@@ -85,13 +89,14 @@ struct OutlierFilterSummary {
   // That fit, but were left alone in their tracks, which went with them.
   int64_t num_left_alone = 0;
   int64_t num_points_removed = 0;
-  // So many at least had to go, whatever is done: disjoint conflicts.
+  // So many at least had to go, whatever is done: disjoint conflicts. With
+  // kSnooping, for what noise explains of each to be its bound.
   int64_t num_proved = 0;
   // Whether more conflicts were looked for until none was found: the search
   // ends early where hardly anything can be decided.
   bool is_search_complete = true;
   int64_t num_irreducible = 0;            // of the conflicts
-  std::optional<ConflictFile> conflicts;  // kConflicts
+  std::optional<ConflictFile> conflicts;  // kConflicts, kSnooping
   // Most removed observations first; those without are left out.
   std::vector<Suspect> tracks, images, cameras;
   std::optional<RotationSuspect> rotation_suspect;

@@ -12,9 +12,16 @@ namespace krot {
 // is left, rotations and intrinsics fixed, and it begins anew, until the least
 // squares leaves nothing to remove. As options.solve.finish.loss says, it is
 // the least of a robust loss. Where nothing is removed, or there is no sigma,
-// as in a model without poses, the model is a copy of the input. The same bits
-// at any number of threads. Throws ModelError for cameras without an image
-// plane.
+// as in a model without poses, the model is a copy of the input.
+//
+// Then conflicts are looked for: no translations and points bring all errors
+// within what noise explains of each. For an observation that is kept that is
+// critical_w sigma sqrt(r), r the larger eigenvalue of its R_ii among what is
+// kept (krot/check.h), for all others critical_w sigma. So what was removed is
+// enough, and noise alone has no conflict with probability 95 %.
+//
+// The same bits at any number of threads. Throws ModelError for cameras without
+// an image plane.
 OutlierFilterResult FilterBySnooping(const Model& model,
                                      const OutlierFilterOptions& options,
                                      const Context& context);

@@ -137,6 +137,7 @@ std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
   Json of_conflicts;
   if (conflicts) {
     of_conflicts = {{"max_error", conflicts->max_error},
+                    {"has_own_bounds", conflicts->has_own_bounds},
                     {"num_conflicts", conflicts->num_conflicts},
                     {"num_observations", conflicts->num_observations}};
   }

@@ -108,6 +108,7 @@ Json SnoopingJson(const std::optional<SnoopingSummary>& snooping) {
           {"critical_w", snooping->critical_w},
           {"num_tested", snooping->num_tested},
           {"num_rounds", snooping->num_rounds},
+          {"max_error_px", snooping->max_error_px},
           {"kept_error_before", ErrorJson(snooping->kept_error_before)}};
 }
 
@@ -133,6 +134,13 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
       " explains;\nbefore the removal it was " +
       pixels(*snooping.sigma_before_px) +
       ". What is left is at its least squares, rotations fixed.\n";
+  if (summary.num_proved > 0) {
+    text += "That at least " + Counted(summary.num_proved, "observation") +
+            " must go is proved: with these rotations, wherever cameras and\n"
+            "points are put, so many have errors that such noise does not "
+            "explain (above " +
+            pixels(snooping.max_error_px) + ", or less in short tracks).\n";
+  }
   const PixelErrorStatistics& before = snooping.kept_error_before;
   const PixelErrorStatistics& after = summary.pixel_error_after;
   const auto rises = [&](const char* name, double was, double is) {
@@ -384,6 +392,8 @@ std::string ConflictTable(const ConflictVerdict& verdict) {
   return "The conflicts hold: whatever the translations and points, at least " +
          Counted(verdict.num_conflicts, "observation") +
          " must go\nfor all others to be within " +
+         (verdict.has_own_bounds ? "their own bounds in the file, at most "
+                                 : "") +
          FormatNumber(verdict.max_error, 6) + " px.\n  " +
          Counted(verdict.num_conflicts, "conflict") + " of " +
          Counted(verdict.num_observations, "observation") +

@@ -11,11 +11,13 @@ function movement(before, after, decimals) {
 
 // What noise does not explain.
 function snoopingVerdict({ snooping, num_removed: removed, num_observations,
-  pixel_error: { after } }) {
+  num_must_go: proved, pixel_error: { after } }) {
   const noise = `noise of ${snooping.sigma_px.toFixed(3)} px explains`;
   if (removed === 0) return `No observation is more than ${noise}.`;
   return `${count(removed)} of ${counted(num_observations, 'observation')} are ` +
-    `more than ${noise}. Without them the root mean square error of the ` +
+    `more than ${noise}${proved ?
+      `; at least ${count(proved)} must go (proved)` : ''}. ` +
+    'Without them the root mean square error of the ' +
     `others ${movement(snooping.kept_error_before.rms, after.rms, 4)}.`;
 }
 
