@@ -52,17 +52,18 @@ endfunction()
 # What nearly every source includes, parsed once by the first target of its
 # kind: GCC's precompiled headers bring their level of optimisation with them.
 # Not where the compiler is launched by a cache, which would not hold what is
-# compiled so, and not in an executable beside libraries that are compiled for a
-# module: -fPIE and -fPIC do not go together.
+# compiled so.
 function(krot_precompiled_headers target kind)
-  if(CMAKE_CXX_COMPILER_LAUNCHER OR EMSCRIPTEN OR NOT KROT_UNITY
+  if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT KROT_UNITY
      OR target STREQUAL krot_base)
     return()
   endif()
   get_target_property(type ${target} TYPE)
   if(CMAKE_POSITION_INDEPENDENT_CODE AND type STREQUAL EXECUTABLE
      AND NOT kind STREQUAL TEST)
-    return()
+    # The libraries' headers are compiled for a module, with -fPIC.
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    target_compile_options(${target} PRIVATE -fPIC)
   endif()
   get_property(first GLOBAL PROPERTY KROT_PRECOMPILED_${kind})
   if(first)
@@ -112,7 +113,7 @@ function(krot_test name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name}
     PRIVATE ${ARG_DEPENDS} Eigen3::Eigen GTest::gmock GTest::gtest_main)
-  set_target_properties(${name} PROPERTIES
+  set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 8
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   if(ARG_SLOW)
     gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
