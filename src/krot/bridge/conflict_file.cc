@@ -45,7 +45,7 @@ ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
     conflict.defect = number("defect");
     conflict.observations =
         reader.ReadSupport(reader.Member(conflicts[n], place, "observations"),
-                           kCertificateVersion, place + ".observations");
+                           place + ".observations");
     file.conflicts.push_back(std::move(conflict));
   }
   return file;
@@ -74,8 +74,7 @@ std::string ConflictJson(const ConflictFile& file) {
     conflicts.push_back({{"lower_bound", conflict.lower_bound},
                          {"rows_bound", conflict.rows_bound},
                          {"defect", conflict.defect},
-                         {"observations", SupportJson(conflict.observations,
-                                                      kCertificateVersion)}});
+                         {"observations", SupportJson(conflict.observations)}});
   }
   Json json = {{"version", file.version},
                {"norm", NormJson(file.norm)},
