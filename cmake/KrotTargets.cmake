@@ -1,9 +1,10 @@
-# krot_library(<folder> [COLD] [SOURCES file...] [DEPENDS target...])
+# krot_library(<folder> [COLD|WARM] [SOURCES file...] [DEPENDS target...])
 #
 # One library per folder of src/krot: krot_<folder>, alias krot::<folder>.
-# Without sources it is header-only. COLD: see krot_cold.
+# Without sources it is header-only. COLD: see krot_cold. WARM: most of it runs
+# once or twice in a command, and what remains gains nothing from -O3.
 function(krot_library folder)
-  cmake_parse_arguments(ARG "COLD" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "COLD;WARM" "" "SOURCES;DEPENDS" ${ARGN})
   set(target krot_${folder})
   if(ARG_SOURCES)
     add_library(${target} ${ARG_SOURCES})
@@ -12,6 +13,9 @@ function(krot_library folder)
     if(ARG_COLD)
       krot_cold(${target})
       krot_precompiled_headers(${target} COLD)
+    elseif(ARG_WARM)
+      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
+      krot_precompiled_headers(${target} WARM)
     else()
       krot_precompiled_headers(${target} HOT)
     endif()
@@ -47,22 +51,23 @@ function(krot_cold target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-# krot_precompiled_headers(<target> HOT|COLD|TEST)
+# krot_precompiled_headers(<target> HOT|WARM|COLD|TEST)
 #
 # What nearly every source includes, parsed once by the first target of its
 # kind: GCC's precompiled headers bring their level of optimisation with them.
 # Not where the compiler is launched by a cache, which would not hold what is
-# compiled so, and not in an executable beside libraries that are compiled for a
-# module: -fPIE and -fPIC do not go together.
+# compiled so.
 function(krot_precompiled_headers target kind)
-  if(CMAKE_CXX_COMPILER_LAUNCHER OR EMSCRIPTEN OR NOT KROT_UNITY
+  if(CMAKE_CXX_COMPILER_LAUNCHER OR NOT KROT_UNITY
      OR target STREQUAL krot_base)
     return()
   endif()
   get_target_property(type ${target} TYPE)
   if(CMAKE_POSITION_INDEPENDENT_CODE AND type STREQUAL EXECUTABLE
      AND NOT kind STREQUAL TEST)
-    return()
+    # The libraries' headers are compiled for a module, with -fPIC.
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    target_compile_options(${target} PRIVATE -fPIC)
   endif()
   get_property(first GLOBAL PROPERTY KROT_PRECOMPILED_${kind})
   if(first)
@@ -112,7 +117,7 @@ function(krot_test name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name}
     PRIVATE ${ARG_DEPENDS} Eigen3::Eigen GTest::gmock GTest::gtest_main)
-  set_target_properties(${name} PROPERTIES
+  set_target_properties(${name} PROPERTIES UNITY_BUILD_BATCH_SIZE 8
     RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   if(ARG_SLOW)
     gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST

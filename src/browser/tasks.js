@@ -18,8 +18,7 @@ function checkVerdict({ certificate, conflicts }) {
   const given = certificate.num_fixed_frames + certificate.num_fixed_points +
     certificate.num_positions > 0 ? 'with what it takes as known, ' : '';
   return `The certificate holds: ${given}whatever the translations and ` +
-    `points, the largest error is at least ${lowerBound(bound)} px` +
-    (certificate.is_linearised ? ', linearised at the observations; ' : '; ') +
+    `points, the largest error is at least ${lowerBound(bound)} px; ` +
     (cost === null ? 'this model has observations behind their cameras.' :
       `this model has ${pixels(cost)} px.`);
 }

@@ -27,8 +27,6 @@ struct CertificateVerdict {
   // behind its camera.
   std::optional<double> cost;
   std::optional<double> relative_gap;  // (cost - lower_bound) / cost
-  // Version 1: the bound is one of rows linearised at the observations.
-  bool is_linearised = false;
   // Of those whose positions it takes as fixed.
   int64_t num_fixed_images = 0;
   int64_t num_fixed_points = 0;

@@ -52,15 +52,13 @@ enum class SolveTermination {
 enum class LeftOut {
   kBehind,        // does not see its point, even after re-triangulation
   kUndistortion,  // neither a projection nor a trustworthy ray
-  kOffAxis,       // never any more; reports keep the name
   kShortTrack,    // fewer than min_track_length usable observations
   kNoPose,        // the image has no frame or no finite translation
   kSameImage,     // its track has a closer one of the same image
   kFixed,         // neither its image nor its point may move
 };
-inline constexpr int kNumLeftOutReasons = 7;
-// "behind", "undistortion", "off_axis", "short_track", "no_pose", "same_image",
-// "fixed".
+inline constexpr int kNumLeftOutReasons = 6;
+// "behind", "undistortion", "short_track", "no_pose", "same_image", "fixed".
 const char* LeftOutName(LeftOut reason);
 
 // An observation that, with the others of its certificate, sets the maximum.

@@ -25,7 +25,7 @@ namespace {
 // With more of them the last digits of Ceres differ from run to run.
 const Context kOneThread{1};
 
-SceneOptions SmallScene() {
+SceneOptions SmallOptions() {
   SceneOptions options;
   options.num_frames = 8;
   options.num_points = 80;
@@ -132,7 +132,7 @@ double IndependentFixedRotationCost(const Model& model,
 }
 
 TEST(AdjustBundle, WithFixedRotationsEndsWhereAnIndependentProblemDoes) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   const BundleAdjustmentResult result =
       AdjustBundle(model, RotationsFixed(), kOneThread);
   const double expected = IndependentFixedRotationCost(model, nullptr);
@@ -155,7 +155,7 @@ FixedParts SomeFixed(const Model& model) {
 }
 
 TEST(AdjustBundle, WithFixedPartsEndsWhereAnIndependentProblemDoes) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   BundleAdjustmentOptions options = RotationsFixed();
   options.fixed = SomeFixed(model);
   const BundleAdjustmentResult result =
@@ -168,7 +168,7 @@ TEST(AdjustBundle, WithFixedPartsEndsWhereAnIndependentProblemDoes) {
 
 TEST(AdjustBundle, LeavesTheBitsOfWhatIsFixedAndMovesTheRest) {
   for (const bool is_bounded : {false, true}) {
-    SceneOptions scene = SmallScene();
+    SceneOptions scene = SmallOptions();
     scene.sensors_per_rig = 2;
     const Model model = SynthesizeScene(scene).model;
     BundleAdjustmentOptions options = Exact();
@@ -205,7 +205,7 @@ TEST(AdjustBundle, LeavesTheBitsOfWhatIsFixedAndMovesTheRest) {
 }
 
 TEST(AdjustBundle, WithARobustLossEndsWhereAnIndependentProblemDoes) {
-  SceneOptions scene = SmallScene();
+  SceneOptions scene = SmallOptions();
   scene.outlier_ratio = 0.02;
   const Model model = SynthesizeScene(scene).model;
   BundleAdjustmentOptions options = RotationsFixed();
@@ -226,7 +226,7 @@ TEST(AdjustBundle, WithARobustLossEndsWhereAnIndependentProblemDoes) {
 TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {
   for (int id = 0; id < 17; ++id) {
     SCOPED_TRACE(id);
-    SceneOptions scene = SmallScene();
+    SceneOptions scene = SmallOptions();
     scene.camera_model_id = id;
     scene.sensors_per_rig = 2;
     scene.pixel_noise = 0;
@@ -240,7 +240,7 @@ TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {
 }
 
 TEST(AdjustBundle, LeavesTheBitsOfWhatIsHeldStill) {
-  SceneOptions scene = SmallScene();
+  SceneOptions scene = SmallOptions();
   scene.sensors_per_rig = 2;
   const Model model = SynthesizeScene(scene).model;
   BundleAdjustmentOptions options = Exact();
@@ -263,7 +263,7 @@ TEST(AdjustBundle, LeavesTheBitsOfWhatIsHeldStill) {
 }
 
 TEST(AdjustBundle, RefinesOneGroupOfIntrinsicsAtATime) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   for (int group = 0; group < 3; ++group) {
     BundleAdjustmentOptions options = Exact();
     options.refine_focal_length = group == 0;
@@ -282,7 +282,7 @@ TEST(AdjustBundle, RefinesOneGroupOfIntrinsicsAtATime) {
 }
 
 TEST(AdjustBundle, LeavesShortTracksAndEmptyImagesWhereTheyAre) {
-  Model model = SynthesizeScene(SmallScene()).model;
+  Model model = SynthesizeScene(SmallOptions()).model;
   // The first point keeps one observation.
   Point3D& point = model.points3D[0];
   for (uint64_t e = point.track_begin + 1; e < point.track_end; ++e) {
@@ -310,7 +310,7 @@ TEST(AdjustBundle, LeavesShortTracksAndEmptyImagesWhereTheyAre) {
 }
 
 TEST(AdjustBundle, LeavesOutWhatIsBehindItsCamera) {
-  Model model = SynthesizeScene(SmallScene()).model;
+  Model model = SynthesizeScene(SmallOptions()).model;
   model.points3D[0].xyz *= -1e3;
   const int64_t num_behind =
       static_cast<int64_t>(Summarize(PixelErrors(model, 1)).not_finite);
@@ -320,14 +320,14 @@ TEST(AdjustBundle, LeavesOutWhatIsBehindItsCamera) {
 }
 
 TEST(AdjustBundle, GivesTheSameBitsAgainOnOneThread) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   const Model a = AdjustBundle(model, Exact(), kOneThread).model;
   const Model b = AdjustBundle(model, Exact(), kOneThread).model;
   EXPECT_EQ(ModelComparison({}).FirstDifference(a, b), "");
 }
 
 TEST(AdjustBundle, ReachesTheSameCostWithEveryLinearSolver) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   BundleAdjustmentOptions options = Exact();
   const BundleAdjustmentSummary dense =
       AdjustBundle(model, options, kOneThread).summary;
@@ -345,7 +345,7 @@ TEST(AdjustBundle, ReachesTheSameCostWithEveryLinearSolver) {
 }
 
 TEST(AdjustBundle, StopsWhenCancelled) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   BundleAdjustmentOptions options = Exact();
   CancelFlag cancel{false};
   int num_calls = 0;
@@ -361,7 +361,7 @@ TEST(AdjustBundle, StopsWhenCancelled) {
 }
 
 TEST(AdjustBundle, RefusesOptionsOutOfRangeByName) {
-  const Model model = SynthesizeScene(SmallScene()).model;
+  const Model model = SynthesizeScene(SmallOptions()).model;
   using Options = BundleAdjustmentOptions;
   const auto message = [&](const auto& set) -> std::string {
     Options options;
@@ -412,7 +412,7 @@ TEST(AdjustBundle, RefusesOptionsOutOfRangeByName) {
 }
 
 TEST(AdjustBundle, RefusesPanoramas) {
-  Model model = SynthesizeScene(SmallScene()).model;
+  Model model = SynthesizeScene(SmallOptions()).model;
   model.cameras[0].model_id = 17;
   model.cameras[0].params = {1024, 512};
   EXPECT_THROW(AdjustBundle(model, {}, kOneThread), ModelError);

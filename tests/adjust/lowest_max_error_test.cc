@@ -17,7 +17,7 @@ namespace {
 
 const Context kOneThread{1};
 
-SceneOptions NoisyScene() {
+SceneOptions NoisyOptions() {
   SceneOptions options;
   options.num_frames = 8;
   options.num_points = 80;
@@ -48,7 +48,7 @@ double MaxError(const Model& model) {
 
 TEST(LowestMaxError, IsBelowWhatFixedRotationsAndWhatACapAllow) {
   for (const int sensors_per_rig : {1, 2}) {
-    SceneOptions scene = NoisyScene();
+    SceneOptions scene = NoisyOptions();
     scene.sensors_per_rig = sensors_per_rig;
     const Model model = SynthesizeScene(scene).model;
     const AdjustModelResult lowered = AdjustModel(model, Lowered(), kOneThread);
@@ -73,7 +73,7 @@ TEST(LowestMaxError, IsTheSameFromOtherStarts) {
   std::vector<double> ends;
   for (const uint64_t seed : {1, 2, 3}) {
     // The same observations; other rotations, translations and points.
-    SceneOptions scene = NoisyScene();
+    SceneOptions scene = NoisyOptions();
     Model model = SynthesizeScene(scene).model;
     scene.rotation_noise_deg = 0.2;
     scene.start_translation_noise = 0.01;
@@ -92,7 +92,7 @@ TEST(LowestMaxError, IsTheSameFromOtherStarts) {
 }
 
 TEST(LowestMaxError, LeavesLeastSquaresWhereNothingIsGained) {
-  const Model model = SynthesizeScene(NoisyScene()).model;
+  const Model model = SynthesizeScene(NoisyOptions()).model;
   const AdjustModelResult result =
       AdjustModel(model, RotationsAndCamerasFixed(), kOneThread);
   const double lowest = result.summary.start->LowestCost();
@@ -105,7 +105,7 @@ TEST(LowestMaxError, LeavesLeastSquaresWhereNothingIsGained) {
 }
 
 TEST(LowestMaxError, IsThatOfTheBestIterateWhenCancelled) {
-  const Model model = SynthesizeScene(NoisyScene()).model;
+  const Model model = SynthesizeScene(NoisyOptions()).model;
   CancelFlag cancel{false};
   AdjustModelOptions options = Lowered();
   options.adjustment.callback =
@@ -122,7 +122,7 @@ TEST(LowestMaxError, IsThatOfTheBestIterateWhenCancelled) {
 }
 
 TEST(LowestMaxError, EndsWithTheIterationsThatAreAllowed) {
-  const Model model = SynthesizeScene(NoisyScene()).model;
+  const Model model = SynthesizeScene(NoisyOptions()).model;
   AdjustModelOptions options = Lowered();
   options.adjustment.max_num_iterations = 4;
   const AdjustModelResult result = AdjustModel(model, options, kOneThread);
@@ -133,7 +133,7 @@ TEST(LowestMaxError, EndsWithTheIterationsThatAreAllowed) {
 }
 
 TEST(LowestMaxError, IsRefusedTogetherWithACap) {
-  const Model model = SynthesizeScene(NoisyScene()).model;
+  const Model model = SynthesizeScene(NoisyOptions()).model;
   BundleAdjustmentOptions options = Lowered().adjustment;
   options.max_error = 3;
   EXPECT_THROW(AdjustBundle(model, options), std::invalid_argument);

@@ -18,7 +18,7 @@
 namespace krot {
 namespace {
 
-constexpr double kNoCap = 1e300;
+constexpr double kUncapped = 1e300;
 
 Model SmallScene(int camera_model_id) {
   SceneOptions options;
@@ -45,7 +45,7 @@ Eigen::MatrixXd DenseRedundancy(const Model& model,
   const auto errors_at = [&](double step) {
     AdjustmentBlocks moved = blocks;
     MoveAlong(columns, blocks, direction, step, &moved);
-    const auto errors = ProjectErrors(moved, kNoCap, 1);
+    const auto errors = ProjectErrors(moved, kUncapped, 1);
     Eigen::VectorXd stacked(num_rows);
     for (size_t i = 0; i < errors->size(); ++i) {
       stacked.segment<2>(static_cast<Eigen::Index>(2 * i)) = (*errors)[i].r;

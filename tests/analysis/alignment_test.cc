@@ -1,3 +1,4 @@
+#include "krot/base/numbers.h"
 #include "krot/analysis/alignment.h"
 
 #include <cmath>
@@ -20,8 +21,6 @@ namespace {
 using Eigen::AngleAxisd;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 Similarity SomeSimilarity() {
   return {2.5, AngleAxisd(1.2, Vector3d(1, -2, 3).normalized()).matrix(),

@@ -12,7 +12,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-SyntheticScene Scene() {
+SyntheticScene CollapsingScene() {
   SceneOptions options;
   options.num_frames = 6;
   options.num_points = 60;
@@ -31,7 +31,7 @@ void PutIntoCamera(Model* model, size_t k, double distance) {
 }
 
 TEST(Collapse, IsNotWhereAModelImproves) {
-  const SyntheticScene scene = Scene();
+  const SyntheticScene scene = CollapsingScene();
   const Collapse collapse = FindCollapse(scene.model, scene.ground_truth);
   EXPECT_FALSE(collapse.Any());
   EXPECT_FALSE(collapse.IsWhole());
@@ -40,7 +40,7 @@ TEST(Collapse, IsNotWhereAModelImproves) {
 }
 
 TEST(Collapse, NamesPointsThatCameToLieInACamera) {
-  const Model before = Scene().model;
+  const Model before = CollapsingScene().model;
   Model after = before;
   PutIntoCamera(&after, 3, 1e-9);
   PutIntoCamera(&after, 5, 1e-3);  // near, but it has a position
@@ -51,7 +51,7 @@ TEST(Collapse, NamesPointsThatCameToLieInACamera) {
 }
 
 TEST(Collapse, ComparesPointsOfTheSameIdWhereOthersWereRemoved) {
-  const Model before = Scene().model;
+  const Model before = CollapsingScene().model;
   Model after = before;
   PutIntoCamera(&after, 3, 1e-9);
   after.points3D.erase(after.points3D.begin());
@@ -62,7 +62,7 @@ TEST(Collapse, ComparesPointsOfTheSameIdWhereOthersWereRemoved) {
 }
 
 TEST(Collapse, NamesPointsThatWentToInfinity) {
-  const Model before = Scene().model;
+  const Model before = CollapsingScene().model;
   Model after = before;
   after.points3D[4].xyz *= 1e9;
   const Collapse collapse = FindCollapse(before, after);
@@ -71,7 +71,7 @@ TEST(Collapse, NamesPointsThatWentToInfinity) {
 }
 
 TEST(Collapse, IsNotWhatWasThereBefore) {
-  Model before = Scene().model;
+  Model before = CollapsingScene().model;
   PutIntoCamera(&before, 3, 1e-9);
   before.points3D[4].xyz *= 1e9;
   Model after = before;
@@ -80,7 +80,7 @@ TEST(Collapse, IsNotWhatWasThereBefore) {
 }
 
 TEST(Collapse, CountsWhereThereWasNoPositionBefore) {
-  Model before = Scene().model;
+  Model before = CollapsingScene().model;
   Model after = before;
   for (Frame& frame : before.frames) {
     frame.rig_from_world.translation.setConstant(std::nan(""));
@@ -92,7 +92,7 @@ TEST(Collapse, CountsWhereThereWasNoPositionBefore) {
 }
 
 TEST(Collapse, IsWholeWhereMostPointsFell) {
-  const Model before = Scene().model;
+  const Model before = CollapsingScene().model;
   Model after = before;
   for (size_t k = 0; k < after.points3D.size(); ++k) {
     PutIntoCamera(&after, k, 1e-9);
@@ -104,7 +104,7 @@ TEST(Collapse, IsWholeWhereMostPointsFell) {
 }
 
 TEST(Collapse, IsWholeWhereAllPointsBecomeOne) {
-  const Model before = Scene().model;
+  const Model before = CollapsingScene().model;
   Model after = before;
   for (Point3D& point : after.points3D) point.xyz *= 1e-9;
   const Collapse collapse = FindCollapse(before, after);

@@ -17,7 +17,7 @@ namespace {
 
 using Color = std::array<uint8_t, 3>;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Three points with tracks of two, one and two observations.
@@ -57,7 +57,7 @@ TEST(ErrorColor, TellsHundredthsOfTheTopApart) {
 
 TEST(ColorPointsByError, TakesTheLargestOfTheTrack) {
   Model model = ThreePoints();
-  ColorPointsByError({1, 3, 2, 0.5, kNaN}, 4, &model);
+  ColorPointsByError({1, 3, 2, 0.5, kNoError}, 4, &model);
   EXPECT_EQ(model.points3D[0].color, ErrorColor(3, 4));
   EXPECT_EQ(model.points3D[1].color, ErrorColor(2, 4));
   EXPECT_EQ(model.points3D[2].color, ErrorColor(0.5, 4));
@@ -65,7 +65,7 @@ TEST(ColorPointsByError, TakesTheLargestOfTheTrack) {
 
 TEST(ColorPointsByError, IsGreyWhereNoErrorIsFinite) {
   Model model = ThreePoints();
-  ColorPointsByError({1, 3, 2, kInfinity, kNaN}, 4, &model);
+  ColorPointsByError({1, 3, 2, kInfinity, kNoError}, 4, &model);
   EXPECT_EQ(model.points3D[2].color, (Color{128, 128, 128}));
 }
 
@@ -89,7 +89,7 @@ TEST(ColorPointsByError, RefusesWhatDoesNotFit) {
   Model model = ThreePoints();
   EXPECT_THROW(ColorPointsByError({1, 2}, 4, &model), std::invalid_argument);
   const std::vector<double> errors(5, 1.0);
-  for (const double top : {0.0, -1.0, kNaN, kInfinity}) {
+  for (const double top : {0.0, -1.0, kNoError, kInfinity}) {
     EXPECT_THROW(ColorPointsByError(errors, top, &model),
                  std::invalid_argument);
   }

@@ -1,3 +1,4 @@
+#include "krot/base/numbers.h"
 #include "krot/analysis/model_comparison.h"
 
 #include <algorithm>
@@ -16,8 +17,6 @@ namespace krot {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 SceneOptions NoisyScene() {
   SceneOptions options;

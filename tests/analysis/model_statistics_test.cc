@@ -11,11 +11,11 @@
 namespace krot {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 // Three images (the last without pose) by two cameras, and two points with
 // tracks {image 11, image 12, image 13} and {image 11, image 12}.
-Model ThreeImages() {
+Model ThreeCountedImages() {
   Model model;
   const int pinhole = FindCameraModel("SIMPLE_PINHOLE")->id;
   model.cameras = {{1, pinhole, 100, 80, {100, 50, 40}},
@@ -30,7 +30,7 @@ Model ThreeImages() {
     image.points2D.push_back({0, 0, kInvalidPoint3DId});
     if (n < 2) image.points2D.push_back({0, 0, 22});
   }
-  model.images[2].cam_from_world.translation.x() = kNaN;
+  model.images[2].cam_from_world.translation.x() = kUnknown;
   UseTrivialRigs(&model);
   model.track_elements = {{11, 0}, {12, 0}, {13, 0}, {11, 2}, {12, 2}};
   model.points3D.resize(2);
@@ -43,10 +43,10 @@ Model ThreeImages() {
   return model;
 }
 
-const std::vector<double> kErrors = {1, 4, kNaN, 4, 2};
+const std::vector<double> kErrors = {1, 4, kUnknown, 4, 2};
 
 TEST(ComputeColmapStatistics, CountsObservationsOfRegisteredImages) {
-  const ColmapStatistics statistics = ComputeColmapStatistics(ThreeImages());
+  const ColmapStatistics statistics = ComputeColmapStatistics(ThreeCountedImages());
   EXPECT_EQ(statistics.num_rigs, 0);
   EXPECT_EQ(statistics.num_frames, 0);
   EXPECT_EQ(statistics.num_cameras, 2);
@@ -59,7 +59,7 @@ TEST(ComputeColmapStatistics, CountsObservationsOfRegisteredImages) {
 }
 
 TEST(ComputeColmapStatistics, AveragesStoredErrorsThatAreSet) {
-  Model model = ThreeImages();
+  Model model = ThreeCountedImages();
   EXPECT_EQ(ComputeColmapStatistics(model).mean_reprojection_error, 0.5);
   model.points3D[1].error = 1.5;
   EXPECT_EQ(ComputeColmapStatistics(model).mean_reprojection_error, 1);
@@ -75,7 +75,7 @@ TEST(ComputeColmapStatistics, OfAnEmptyModelIsZero) {
 
 TEST(ErrorsByImage, ListsEveryImageInItsOrder) {
   const std::vector<ImageErrors> by_image =
-      ErrorsByImage(ThreeImages(), kErrors);
+      ErrorsByImage(ThreeCountedImages(), kErrors);
   ASSERT_EQ(by_image.size(), 3u);
   EXPECT_EQ(by_image[0].image_name, "image11");
   EXPECT_EQ(by_image[0].errors.max, 4);
@@ -88,7 +88,7 @@ TEST(ErrorsByImage, ListsEveryImageInItsOrder) {
 
 TEST(ErrorsByCamera, JoinsTheImagesOfEachCamera) {
   const std::vector<CameraErrors> by_camera =
-      ErrorsByCamera(ThreeImages(), kErrors);
+      ErrorsByCamera(ThreeCountedImages(), kErrors);
   ASSERT_EQ(by_camera.size(), 2u);
   EXPECT_EQ(by_camera[0].camera_id, 1u);
   EXPECT_EQ(by_camera[0].num_images, 2);
@@ -100,7 +100,7 @@ TEST(ErrorsByCamera, JoinsTheImagesOfEachCamera) {
 
 TEST(WorstObservations, AreSortedByErrorThenByTrack) {
   const std::vector<WorstObservation> worst =
-      WorstObservations(ThreeImages(), kErrors, 3);
+      WorstObservations(ThreeCountedImages(), kErrors, 3);
   ASSERT_EQ(worst.size(), 3u);
   EXPECT_EQ(worst[0].image_name, "image12");
   EXPECT_EQ(worst[0].point3D_id, 21u);
@@ -113,15 +113,15 @@ TEST(WorstObservations, AreSortedByErrorThenByTrack) {
 }
 
 TEST(WorstObservations, AreNoMoreThanThereAreErrors) {
-  EXPECT_EQ(WorstObservations(ThreeImages(), kErrors, 100).size(), 4u);
-  EXPECT_TRUE(WorstObservations(ThreeImages(), kErrors, 0).empty());
+  EXPECT_EQ(WorstObservations(ThreeCountedImages(), kErrors, 100).size(), 4u);
+  EXPECT_TRUE(WorstObservations(ThreeCountedImages(), kErrors, 0).empty());
 }
 
 TEST(ModelStatistics, RefuseErrorsOfAnotherModel) {
-  EXPECT_THROW(ErrorsByImage(ThreeImages(), {1}), std::invalid_argument);
-  EXPECT_THROW(ErrorsByCamera(ThreeImages(), {1}), std::invalid_argument);
-  EXPECT_THROW(WorstObservations(ThreeImages(), {1}, 1), std::invalid_argument);
-  EXPECT_THROW(WorstObservations(ThreeImages(), kErrors, -1),
+  EXPECT_THROW(ErrorsByImage(ThreeCountedImages(), {1}), std::invalid_argument);
+  EXPECT_THROW(ErrorsByCamera(ThreeCountedImages(), {1}), std::invalid_argument);
+  EXPECT_THROW(WorstObservations(ThreeCountedImages(), {1}, 1), std::invalid_argument);
+  EXPECT_THROW(WorstObservations(ThreeCountedImages(), kErrors, -1),
                std::invalid_argument);
 }
 

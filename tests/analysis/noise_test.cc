@@ -36,15 +36,15 @@ Model Scene(const SceneOptions& options) {
   return SynthesizeScene(options).ground_truth;
 }
 
-Point2D& Pixel(Model* model, uint64_t e) {
+Point2D& PixelOf(Model* model, uint64_t e) {
   const TrackElement& element = model->track_elements[e];
   const int32_t image = ImageIndices(*model).at(element.image_id);
   return model->images[image].points2D[element.point2D_idx];
 }
 
 void Move(Model* model, uint64_t e, double x, double y) {
-  Pixel(model, e).x += x;
-  Pixel(model, e).y += y;
+  PixelOf(model, e).x += x;
+  PixelOf(model, e).y += y;
 }
 
 int64_t Length(const Point3D& point) {
@@ -292,8 +292,8 @@ TEST(EstimateNoise, TakesAPointAtInfinityForWhatItIs) {
       const auto pixel = ProjectPoint(camera.model_id, camera.params.data(),
                                       geometries[n].cam_from_world * point.xyz);
       ASSERT_TRUE(pixel);
-      Pixel(&model, e).x = pixel->x() + normal(random);
-      Pixel(&model, e).y = pixel->y() + normal(random);
+      PixelOf(&model, e).x = pixel->x() + normal(random);
+      PixelOf(&model, e).y = pixel->y() + normal(random);
     }
   }
   const ModelNoise noise = EstimateNoise(model, {}, {});

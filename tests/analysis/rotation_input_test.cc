@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-Model Scene() {
+Model RotatedScene() {
   SceneOptions options;
   options.num_frames = 8;
   options.num_points = 60;
@@ -37,7 +37,7 @@ FileBytes InverseRotations(const Model& model, size_t num_images = 8) {
 }
 
 TEST(TakeRotations, RefusesInverseOnesThatTheErrorsSpeakAgainst) {
-  Model model = Scene();
+  Model model = RotatedScene();
   const FileBytes file = InverseRotations(model);
   EXPECT_THAT(
       ModelErrorOf([&] { TakeRotations(file, &model); }),
@@ -48,7 +48,7 @@ TEST(TakeRotations, RefusesInverseOnesThatTheErrorsSpeakAgainst) {
 
 // Most observations are of images that it does not name.
 TEST(TakeRotations, RefusesInverseOnesOfAFewImages) {
-  Model model = Scene();
+  Model model = RotatedScene();
   const FileBytes file = InverseRotations(model, 3);
   EXPECT_THAT(ModelErrorOf([&] { TakeRotations(file, &model); }),
               HasSubstr("r.txt: found rotations that are "));
@@ -56,7 +56,7 @@ TEST(TakeRotations, RefusesInverseOnesOfAFewImages) {
 
 // The list is right, and the model's own rotations are the inverse ones.
 TEST(TakeRotations, DoesNotRefuseWhereTheModelFitsNoBetter) {
-  Model model = Scene();
+  Model model = RotatedScene();
   const Model sound = model;
   for (Image& image : model.images) {
     QuaternionWxyz& q = image.cam_from_world.quaternion_wxyz;
@@ -73,7 +73,7 @@ TEST(TakeRotations, DoesNotRefuseWhereTheModelFitsNoBetter) {
 }
 
 TEST(TakeRotations, MeasuresWhatTheyDoToTheErrors) {
-  Model model = Scene();
+  Model model = RotatedScene();
   std::string lines;
   for (const Image& image : model.images) lines += image.name + " 1 0 0 0\n";
   const RotationInput input = TakeRotations({"r.txt", lines}, &model);

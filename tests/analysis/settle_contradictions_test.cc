@@ -13,7 +13,7 @@
 namespace krot {
 namespace {
 
-Model Scene() {
+Model ContradictoryScene() {
   SceneOptions options;
   options.num_frames = 6;
   options.num_points = 60;
@@ -68,7 +68,7 @@ std::string FollowedIn(Model* model) {
 }
 
 TEST(SettleContradictions, LeavesAModelThatAgreesWithItselfAlone) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   for (const char* value :
        {"auto", "follow_tracks", "follow_images", "refuse"}) {
     Model model = scene;
@@ -80,12 +80,12 @@ TEST(SettleContradictions, LeavesAModelThatAgreesWithItselfAlone) {
 }
 
 TEST(SettleContradictions, RefusesAnotherValue) {
-  Model model = Scene();
+  Model model = ContradictoryScene();
   EXPECT_THROW(SettleContradictions("tracks", &model), std::invalid_argument);
 }
 
 TEST(SettleContradictions, FollowsTheImagesWhereTracksNameWrong2DPoints) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model model = WithTracksOfNeighbours(scene);
   EXPECT_EQ(FollowedIn(&model), "images");
   EXPECT_EQ(model.track_elements.size(), scene.track_elements.size());
@@ -93,14 +93,14 @@ TEST(SettleContradictions, FollowsTheImagesWhereTracksNameWrong2DPoints) {
 }
 
 TEST(SettleContradictions, FollowsTheTracksWhere2DPointsNameWrong3DPoints) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model model = WithNamesOfNeighbours(scene, 1000);
   EXPECT_EQ(FollowedIn(&model), "tracks");
   EXPECT_THAT(model, IsModel(scene));
 }
 
 TEST(SettleContradictions, FollowsTheBetterSideWhereAThirdOfTheOtherIsWrong) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   const size_t num_wrong = scene.images[0].points2D.size() / 3;
   Model model = WithNamesOfNeighbours(scene, num_wrong);
   const Contradictions found = SettleContradictions("auto", &model);
@@ -110,7 +110,7 @@ TEST(SettleContradictions, FollowsTheBetterSideWhereAThirdOfTheOtherIsWrong) {
 }
 
 TEST(SettleContradictions, CountsElementsThatDoNotExistAsInfinitelyWrong) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model model = scene;
   for (TrackElement& element : model.track_elements) {
     element.point2D_idx += 100000;
@@ -122,7 +122,7 @@ TEST(SettleContradictions, CountsElementsThatDoNotExistAsInfinitelyWrong) {
 }
 
 TEST(WorseImagesSide, IsThatOfAModelThatContradictsItselfAndFittedAlone) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model moved = scene;
   for (Point3D& point : moved.points3D) point.xyz *= 1.01;
   EXPECT_FALSE(WorseImagesSide(scene, moved));
@@ -140,7 +140,7 @@ TEST(WorseImagesSide, IsThatOfAModelThatContradictsItselfAndFittedAlone) {
 }
 
 TEST(SettleContradictions, LetsTracksSpeakFor2DPointsThatNameNothing) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   for (const size_t every : {1, 3}) {
     Model model = scene;
     for (size_t e = 0; e < model.track_elements.size(); e += every) {
@@ -152,7 +152,7 @@ TEST(SettleContradictions, LetsTracksSpeakFor2DPointsThatNameNothing) {
 }
 
 TEST(SettleContradictions, LetsImagesSpeakForTracksThatAreEmpty) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model model = scene;
   model.track_elements.clear();
   for (Point3D& point : model.points3D) point.track_begin = point.track_end = 0;
@@ -169,14 +169,14 @@ Model WithA2DPointInTwoTracks(Model model) {
 }
 
 TEST(SettleContradictions, LeavesA2DPointInTwoTracksToTheOneThatItNames) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model model = WithA2DPointInTwoTracks(scene);
   EXPECT_EQ(FollowedIn(&model), "both");
   EXPECT_THAT(model, IsModel(scene));
 }
 
 TEST(SettleContradictions, DropsWhatOnlyOneSideHasIfItIsTheWorst) {
-  const Model scene = Scene();
+  const Model scene = ContradictoryScene();
   Model model = WithA2DPointInTwoTracks(scene);
   NameOf(&model, model.track_elements.front()) = kInvalidPoint3DId;
   // Of the two tracks the first comes first, which is right here.
@@ -200,7 +200,7 @@ TEST(SettleContradictions, DropsWhatOnlyOneSideHasIfItIsTheWorst) {
 }
 
 TEST(SettleContradictions, ChoosesNeitherWhereNeitherFits) {
-  Model model = WithTracksOfNeighbours(WithNamesOfNeighbours(Scene(), 1000));
+  Model model = WithTracksOfNeighbours(WithNamesOfNeighbours(ContradictoryScene(), 1000));
   // Names are one off, tracks are, too, but in the other direction.
   const Model before = model;
   EXPECT_EQ(FollowedIn(&model), "neither");
@@ -208,7 +208,7 @@ TEST(SettleContradictions, ChoosesNeitherWhereNeitherFits) {
 }
 
 TEST(SettleContradictions, HasNothingToChooseWithoutTracks) {
-  Model model = WithTracksOfNeighbours(WithNamesOfNeighbours(Scene(), 1000));
+  Model model = WithTracksOfNeighbours(WithNamesOfNeighbours(ContradictoryScene(), 1000));
   model.points3D.resize(1);
   model.points3D[0].track_end = 1;
   model.track_elements.resize(1);
@@ -221,7 +221,7 @@ TEST(SettleContradictions, HasNothingToChooseWithoutTracks) {
 TEST(SettleContradictions, HasNothingToMeasureByWithoutPositions) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const double value : {0.0, nan}) {
-    Model model = WithA2DPointInTwoTracks(Scene());
+    Model model = WithA2DPointInTwoTracks(ContradictoryScene());
     for (Frame& frame : model.frames) {
       frame.rig_from_world.translation.setConstant(value);
     }

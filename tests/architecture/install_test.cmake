@@ -50,7 +50,7 @@ endif()
 
 file(RENAME ${prefix} ${moved})
 run(${CMAKE_COMMAND} -S ${EXAMPLES_DIR} -B ${SCRATCH_DIR}/build
-    -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release -DCMAKE_PREFIX_PATH=${moved}
+    -G ${GENERATOR} -DCMAKE_BUILD_TYPE=None -DCMAKE_PREFIX_PATH=${moved}
     -DCMAKE_CXX_COMPILER=${CXX_COMPILER} -DCMAKE_CXX_FLAGS=${CXX_FLAGS})
 run(${CMAKE_COMMAND} --build ${SCRATCH_DIR}/build)
 set(examples ${SCRATCH_DIR}/build)

@@ -14,8 +14,6 @@
 
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/model_digest.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/camera/camera_model.h"
 #include "krot/context.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
@@ -51,35 +49,6 @@ Solved Solve(const Model& model, Norm norm) {
           DescribeCertificate(model, built, norm, optimum.certificate)};
 }
 
-// The same as files of version 1 spoke of it: with rows at the observations.
-Solved SolveLinearised(const Model& model, Norm norm) {
-  BuiltProblem built = BuildProblem(model, {});
-  const Reprojection reprojection(model, built);
-  std::vector<UndistortedObservation> rays(built.pixels.size());
-  for (size_t i = 0; i < rays.size(); ++i) {
-    const Reprojection::Source& source = reprojection.SourceOf(i);
-    EXPECT_EQ(UndistortPixel(source.model_id, source.params, built.pixels[i],
-                             std::nullopt, &rays[i]),
-              UndistortStatus::kOk);
-    built.problem.observations[i].E = RowAtRay(rays[i].u, rays[i].J);
-  }
-  const JointIterate iterate =
-      SolveToGap(built.problem, norm, built.start, 1e-7);
-  const std::optional<Certificate> rows = Certify(built.problem, norm, iterate);
-  EXPECT_TRUE(rows);
-  const std::vector<Eigen::Vector3d> unused(rows->observations.size(),
-                                            Eigen::Vector3d::Zero());
-  CertificateFile file = DescribeCertificate(
-      model, built, norm, {*rows, unused, rows->lower_bound});
-  file.version = 1;
-  for (size_t n = 0; n < file.observations.size(); ++n) {
-    const UndistortedObservation& ray = rays[rows->observations[n].observation];
-    file.observations[n].u = ray.u;
-    file.observations[n].J = ray.J;
-  }
-  return {ApplyEstimate(model, built, iterate.estimate), file};
-}
-
 class CertificateOfModel : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override { solved_ = Solve(MakeModel(GetParam()), Norm::L2()); }
@@ -103,7 +72,6 @@ TEST_P(CertificateOfModel, IsAcceptedAfterAWalkThroughItsFile) {
   ASSERT_TRUE(verdict.cost && verdict.relative_gap);
   EXPECT_GE(*verdict.relative_gap, -1e-12);
   EXPECT_LE(*verdict.relative_gap, 1e-6);
-  EXPECT_FALSE(verdict.is_linearised);
   EXPECT_EQ(verdict.support.size(), file.observations.size());
   EXPECT_NEAR(verdict.support.front().error_px, *verdict.cost, 1e-10);
 }
@@ -275,58 +243,6 @@ TEST_P(CertificateOfModel, NamesWhatDoesNotBelong) {
 INSTANTIATE_TEST_SUITE_P(SensorsPerRig, CertificateOfModel,
                          ::testing::Values(1, 2));
 
-TEST(CertificateOfVersion1, IsStillReadAndVerified) {
-  const Solved solved = SolveLinearised(MakeModel(2), Norm::L2());
-  const std::string json = CertificateJson(solved.file);
-  const CertificateFile file = ParseCertificate(json, "c.json");
-  EXPECT_EQ(CertificateJson(file), json);
-  const CertificateVerdict verdict = VerifyCertificateFile(solved.model, file);
-  EXPECT_TRUE(verdict.is_accepted) << verdict.refusal;
-  EXPECT_TRUE(verdict.is_linearised);
-  EXPECT_NEAR(verdict.lower_bound, file.lower_bound, 1e-9);
-  EXPECT_EQ(verdict.support.size(), file.observations.size());
-}
-
-TEST(CertificateOfVersion1, IsRefusedIfAnyNumberOfItsFileChanges) {
-  const Solved solved = SolveLinearised(MakeModel(1), Norm::L2());
-  const CertificateFile original =
-      ParseCertificate(CertificateJson(solved.file), "c.json");
-  const auto refusal =
-      [&](const std::function<void(CertificateFile*)>& change) {
-        CertificateFile file = original;
-        change(&file);
-        const CertificateVerdict verdict =
-            VerifyCertificateFile(solved.model, file);
-        EXPECT_FALSE(verdict.is_accepted);
-        return verdict.refusal;
-      };
-  for (size_t n = 0; n < original.observations.size(); ++n) {
-    const auto refusal_of_one =
-        [&](const std::function<void(CertificateFile::SupportObservation*)>&
-                change) {
-          return refusal(
-              [&](CertificateFile* f) { change(&f->observations[n]); });
-        };
-    using Observation = CertificateFile::SupportObservation;
-    const auto is_named = HasSubstr("u or J of observation");
-    EXPECT_THAT(refusal_of_one([](Observation* o) { o->u[1] += 1e-6; }),
-                is_named);
-    EXPECT_THAT(refusal_of_one([](Observation* o) { o->u[0] = std::nan(""); }),
-                is_named);
-    EXPECT_THAT(refusal_of_one([](Observation* o) { o->J(0, 1) += 1e-3; }),
-                is_named);
-    EXPECT_THAT(refusal_of_one([](Observation* o) { o->J *= 2; }), is_named);
-    refusal_of_one([](Observation* o) { o->y *= 0.5; });
-  }
-  refusal([](CertificateFile* f) { f->rows_bound *= 1 + 1e-6; });
-}
-
-TEST(CertificateOfVersion1, ProvesNothingAboutThePixelsIfRenamed) {
-  Solved solved = SolveLinearised(MakeModel(1), Norm::L2());
-  solved.file.version = 2;
-  EXPECT_FALSE(VerifyCertificateFile(solved.model, solved.file).is_accepted);
-}
-
 TEST(CertificateFile, IsReadInAnyOrderOfItsObservations) {
   Solved solved = Solve(MakeModel(1), Norm::LInf());
   std::reverse(solved.file.observations.begin(),
@@ -391,7 +307,7 @@ TEST_F(WrongCertificateFile, IsNamedWithThePlaceAndWhatWasExpected) {
   EXPECT_THAT(MessageOf("[]"), HasSubstr("expected an object"));
   EXPECT_THAT(MessageOf("{\"version\": 1e999}"), HasSubstr("no JSON"));
   EXPECT_THAT(Message([](Json* j) { (*j)["version"] = 3; }),
-              HasSubstr("version is 3, expected 1 or 2"));
+              HasSubstr("version is 3, expected 2"));
   EXPECT_THAT(Message([](Json* j) { j->erase("rows_bound"); }),
               HasSubstr("has no \"rows_bound\""));
   EXPECT_THAT(Message([](Json* j) { j->erase("norm"); }),
@@ -416,24 +332,6 @@ TEST_F(WrongCertificateFile, IsNamedWithThePlaceAndWhatWasExpected) {
               HasSubstr("expected a number"));
   EXPECT_THAT(observation("y", {1}), HasSubstr("array of two numbers"));
   EXPECT_THAT(observation("lambda", "1"), HasSubstr("observations[1].lambda"));
-}
-
-TEST(WrongCertificateFileOfVersion1, IsNamedWithThePlaceAndWhatWasExpected) {
-  const Json json = Json::parse(
-      CertificateJson(SolveLinearised(MakeModel(1), Norm::L2()).file));
-  const auto message = [&](const char* key, const Json& value) -> std::string {
-    Json changed = json;
-    changed["observations"][1][key] = value;
-    try {
-      ParseCertificate(changed.dump(), "c.json");
-    } catch (const ModelError& error) {
-      return error.what();
-    }
-    return "none";
-  };
-  EXPECT_THAT(message("u", {1}), HasSubstr("array of two numbers"));
-  EXPECT_THAT(message("u", {1, "2"}), HasSubstr("expected a number"));
-  EXPECT_THAT(message("J", {1, 2}), HasSubstr("observations[1].J[0]"));
 }
 
 TEST(ReadCertificateFile, SaysWhichFileCannotBeRead) {

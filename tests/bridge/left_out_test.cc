@@ -82,8 +82,8 @@ TEST(LeftOutName, IsTheKeyOfTheReport) {
     names.push_back(LeftOutName(static_cast<LeftOut>(r)));
   }
   EXPECT_THAT(names,
-              ElementsAre("behind", "undistortion", "off_axis", "short_track",
-                          "no_pose", "same_image", "fixed"));
+              ElementsAre("behind", "undistortion", "short_track", "no_pose",
+                          "same_image", "fixed"));
 }
 
 TEST(LeftOut, NothingDependsOnTranslationsThatAreIgnored) {

@@ -13,13 +13,13 @@
 namespace krot {
 namespace {
 
-struct RealModel {
+struct CountedModel {
   const char* folder;
   int64_t num_observations;  // all of them usable
   double cost;               // pixels, from a reference solver
 };
 
-class BuildProblemOfRealModel : public ::testing::TestWithParam<RealModel> {};
+class BuildProblemOfRealModel : public ::testing::TestWithParam<CountedModel> {};
 
 TEST_P(BuildProblemOfRealModel, KeepsEverythingAndAgreesOnTheCost) {
   const char* root = std::getenv("KROT_REAL_MODELS");
@@ -40,11 +40,11 @@ TEST_P(BuildProblemOfRealModel, KeepsEverythingAndAgreesOnTheCost) {
 
 INSTANTIATE_TEST_SUITE_P(
     Local, BuildProblemOfRealModel,
-    ::testing::Values(RealModel{"crane8_txt", 6037, 3.995},
-                      RealModel{"room50_opencv", 55090, 4.368},
-                      RealModel{"task41_rigs_frames", 20785, 3.9919},
-                      RealModel{"longtracks92", 39489, 3.9860},
-                      RealModel{"tower", 169618, 8.682}),
+    ::testing::Values(CountedModel{"crane8_txt", 6037, 3.995},
+                      CountedModel{"room50_opencv", 55090, 4.368},
+                      CountedModel{"task41_rigs_frames", 20785, 3.9919},
+                      CountedModel{"longtracks92", 39489, 3.9860},
+                      CountedModel{"tower", 169618, 8.682}),
     [](const auto& test) { return std::string(test.param.folder); });
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include "krot/base/numbers.h"
 #include "krot/camera/projection_row.h"
 
 #include <cmath>
@@ -16,7 +17,6 @@
 namespace krot {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr int kEquirectangular = 17;
 
 Eigen::Vector2d LinearError(const Eigen::Matrix3d& E,

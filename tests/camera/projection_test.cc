@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/dual.h"
 #include "krot/camera/models.h"
@@ -10,8 +11,6 @@
 
 namespace krot {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 Eigen::Vector2d Project(std::string_view name,
                         const std::vector<double>& params,

@@ -1,3 +1,4 @@
+#include "krot/base/numbers.h"
 #include "krot/camera/remainder_bound.h"
 
 #include <cmath>
@@ -18,7 +19,6 @@
 namespace krot {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double NormOf(const Eigen::Vector2d& v, double p) {

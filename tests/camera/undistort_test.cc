@@ -5,14 +5,13 @@
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/models.h"
 #include "tests/camera/random_camera.h"
 
 namespace krot {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 struct Outcome {
   UndistortStatus status;

@@ -135,7 +135,7 @@ TEST_F(Options, ThatContradictEachOtherAreRefused) {
                 "has no effect without --Solver.finish_loss huber or cauchy");
   ExpectRefused(
       "solver",
-      Paths() + Words{"--Solver.method", "joint", "--Solver.finish", "sweeps"},
+      Paths() + Words{"--Solver.method", "joint", "--Solver.finish", "none"},
       "--Solver.finish has no effect but with --Solver.method auto");
   ExpectRefused("solver",
                 {"--input_path", folder_ / "input", "--output_path",

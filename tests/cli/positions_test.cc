@@ -207,8 +207,7 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
   for (const std::vector<std::string>& options :
        std::vector<std::vector<std::string>>{{"--Solver.max_error", "3"},
                                              {"--Solver.norm", "1"},
-                                             {"--Solver.polish", "full"},
-                                             {"--Solver.finish", "sweeps"}}) {
+                                             {"--Solver.polish", "full"}}) {
     const KrotResult result = Solve("input", "output", Options(options));
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_THAT(result.err, HasSubstr("--positions_path has no effect"));

@@ -12,7 +12,7 @@
 namespace krot {
 namespace {
 
-RandomScene MakeScene(unsigned seed, double baseline = 0) {
+RandomScene MakeSlackScene(unsigned seed, double baseline = 0) {
   RandomSceneOptions options;
   options.num_frames = 5;
   options.num_points = 40;
@@ -68,7 +68,7 @@ double Size(const RandomScene& scene, const Estimate& estimate) {
 TEST(MinimizeSlack, LeavesNoneWhereTheBoundIsTheCostOfTheStart) {
   for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
     for (const double baseline : {0.0, 0.1}) {
-      const RandomScene scene = MakeScene(1, baseline);
+      const RandomScene scene = MakeSlackScene(1, baseline);
       const double cost = Cost(scene.problem, scene.estimate, norm, 1);
       SlackOptions options;
       options.norm = norm;
@@ -86,7 +86,7 @@ TEST(MinimizeSlack, LeavesNoneWhereTheBoundIsTheCostOfTheStart) {
 
 TEST(MinimizeSlack, FindsAnEstimateWithinTheBoundFromNothing) {
   for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
-    const RandomScene scene = MakeScene(5);
+    const RandomScene scene = MakeSlackScene(5);
     const double bound = 1.01 * Cost(scene.problem, scene.estimate, norm, 1);
     SlackOptions options;
     options.norm = norm;
@@ -105,7 +105,7 @@ TEST(MinimizeSlack, CannotBeLoweredByAnyNearbyEstimate) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
-    const RandomScene scene = MakeScene(2);
+    const RandomScene scene = MakeSlackScene(2);
     const double cost = Cost(scene.problem, scene.estimate, norm, 1);
     const double bound = 0.1 * cost;
     SlackOptions options;
@@ -139,7 +139,7 @@ TEST(MinimizeSlack, CannotBeLoweredByAnyNearbyEstimate) {
 }
 
 TEST(MinimizeSlack, GivesObservationsWithinTheBoundNoPrice) {
-  const RandomScene scene = MakeScene(3);
+  const RandomScene scene = MakeSlackScene(3);
   const double cost = Cost(scene.problem, scene.estimate, Norm::L2(), 1);
   const double bound = 0.2 * cost;
   Estimate estimate = scene.estimate;
@@ -159,7 +159,7 @@ TEST(MinimizeSlack, GivesObservationsWithinTheBoundNoPrice) {
 
 TEST(MinimizeSlack, EndsWithTheGapAskedForHoweverFarApartTheWeightsAre) {
   for (const Norm norm : {Norm::L1(), Norm::L2(), Norm::LInf()}) {
-    const RandomScene scene = MakeScene(6);
+    const RandomScene scene = MakeSlackScene(6);
     const double cost = Cost(scene.problem, scene.estimate, norm, 1);
     SlackOptions options;
     options.norm = norm;
@@ -174,7 +174,7 @@ TEST(MinimizeSlack, EndsWithTheGapAskedForHoweverFarApartTheWeightsAre) {
 }
 
 TEST(MinimizeSlack, RefusesOptionsOutOfRange) {
-  const RandomScene scene = MakeScene(4);
+  const RandomScene scene = MakeSlackScene(4);
   Estimate estimate = scene.estimate;
   SlackOptions options;
   EXPECT_THROW(MinimizeSlack(scene.problem, 0, options, {}, &estimate),

@@ -39,9 +39,11 @@ class Injector:
         self.place = place
         self.library = library
         self.log = place.folder.parent / "faults.log"
+        self.calls = {}
 
     def run(self, fault):
-        """The result, whether the fault struck, and the calls if it ended."""
+        """The result, whether the fault struck, and the calls of each kind if
+        it ended."""
         self.log.unlink(missing_ok=True)
         self.place.reset()
         kind = fault.split(":")[0]
@@ -50,15 +52,22 @@ class Injector:
                                  "KROT_FAULT": fault,
                                  "KROT_FAULT_LOG": str(self.log)})
         words = self.log.read_text().split() if self.log.exists() else []
-        calls = int(words[words.index("calls") + 1]) if "calls" in words else 0
+        calls = {name: int(count) for name, count in zip(words[::2], words[1::2])
+                 if name in KINDS}
         return result, "struck" in words, calls
+
+    def count(self, kind):
+        """The calls of this kind in a run without a fault."""
+        if kind == "thread" or kind not in self.calls:
+            counted = self.run(f"{kind}:0")[2]
+            self.calls = {**counted, **self.calls, kind: counted.get(kind, 0)}
+        return self.calls[kind]
 
 
 def test_kind(injector, kind, limit, dice):
     """Faults injected, how many were refused, how many ended by a signal, and a
     line for each thing that is wrong."""
-    _, _, calls = injector.run(f"{kind}:0")
-    numbers = range(1, calls + 1)
+    numbers = range(1, injector.count(kind) + 1)
     faults = [f"{kind}:{n}" for n in numbers]
     if kind in LASTING:
         faults += [f"{kind}:{n}+" for n in numbers]

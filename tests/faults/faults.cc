@@ -3,7 +3,8 @@
 //   KROT_FAULT=KIND:N   the N-th call of this kind since main began
 //   KROT_FAULT=KIND:N+  that one and all later ones, as on a disk that is full
 //   KROT_FAULT_LOG=FILE takes "struck NAME" once a call has failed, and
-//                       "calls COUNT" when main returns
+//                       "KIND COUNT" when main returns, of the kind that was
+//                       chosen and of all that change nothing by themselves
 //
 // What the kinds do is the table kKinds.
 
@@ -84,6 +85,7 @@ long struck_call = 0;
 bool is_sticky = false;
 const char* log_file = nullptr;
 std::atomic<long> num_calls{0};
+std::atomic<long> num_of_call[16] = {};  // by the bit in Call
 std::atomic<bool> is_armed{false};
 
 template <typename Function>
@@ -105,6 +107,7 @@ void Log(const char* word, const char* value) {
 // Whether this call must fail; errno is set then.
 bool Strikes(int call, const char* name) {
   if (!is_armed.load(std::memory_order_relaxed)) return false;
+  ++num_of_call[__builtin_ctz(static_cast<unsigned>(call))];
   if ((chosen->always_fail & call) != 0) {
     errno = EINVAL;
     return true;
@@ -138,9 +141,16 @@ int CountingMain(int argc, char** argv, char** environment) {
   is_armed = chosen != nullptr;
   const int exit_code = real_main(argc, argv, environment);
   is_armed = false;
-  char count[24];
-  snprintf(count, sizeof count, "%ld", num_calls.load());
-  Log("calls", count);
+  for (const Kind& kind : kKinds) {
+    if (&kind != chosen && kind.always_fail != 0) continue;
+    long sum = 0;
+    for (int bit = 0; bit < 16; ++bit) {
+      if ((kind.calls >> bit & 1) != 0) sum += num_of_call[bit];
+    }
+    char count[24];
+    snprintf(count, sizeof count, "%ld", sum);
+    Log(kind.name, count);
+  }
   return exit_code;
 }
 

@@ -21,7 +21,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kGap = 1e-6;
+constexpr double kFixedGap = 1e-6;
 
 void Fix(int num_frames, int num_points, RandomScene* scene) {
   KnownRotationProblem& problem = scene->problem;
@@ -120,10 +120,10 @@ RandomScene WithoutFixed(const RandomScene& scene) {
   return merged;
 }
 
-JointOptions Options(Norm norm) {
+JointOptions FixedOptions(Norm norm) {
   JointOptions options;
   options.norm = norm;
-  options.relative_gap = kGap;
+  options.relative_gap = kFixedGap;
   return options;
 }
 
@@ -143,7 +143,7 @@ void ExpectOptimumOfMerged(const RandomScene& scene, Norm norm,
                            double tolerance) {
   Estimate estimate = scene.estimate;
   const JointSummary summary =
-      SolveJoint(scene.problem, Options(norm), {}, &estimate);
+      SolveJoint(scene.problem, FixedOptions(norm), {}, &estimate);
   EXPECT_EQ(summary.termination, JointTermination::kGapReached);
   ExpectInPlace(scene.problem, estimate);
   EXPECT_EQ(summary.cost_final, Cost(scene.problem, estimate, norm, 1));
@@ -151,11 +151,11 @@ void ExpectOptimumOfMerged(const RandomScene& scene, Norm norm,
   const CertificateCheck check =
       CheckCertificate(scene.problem, norm, *summary.certificate);
   EXPECT_TRUE(check.is_accepted) << check.refusal;
-  EXPECT_GE(check.proved_bound, (1 - kGap) * summary.cost_final);
+  EXPECT_GE(check.proved_bound, (1 - kFixedGap) * summary.cost_final);
 
   RandomScene merged = WithoutFixed(scene);
   const JointSummary expected =
-      SolveJoint(merged.problem, Options(norm), {}, &merged.estimate);
+      SolveJoint(merged.problem, FixedOptions(norm), {}, &merged.estimate);
   // One point through shifted cameras has baselines that say nothing.
   if (!IsScaleFree(scene.problem)) {
     EXPECT_EQ(expected.termination, JointTermination::kGapReached);
@@ -171,7 +171,7 @@ TEST(Fixed, FramesGiveTheOptimumOfOneRigInTheirPlace) {
     for (const int num_frames : {1, 2, 3}) {
       RandomScene scene = MakeSmallScene(seed);
       Fix(num_frames, 0, &scene);
-      ExpectOptimumOfMerged(scene, kNorms[seed % 3], 2 * kGap);
+      ExpectOptimumOfMerged(scene, kNorms[seed % 3], 2 * kFixedGap);
     }
   }
 }
@@ -180,7 +180,7 @@ TEST(Fixed, FramesOfRigsGiveTheOptimumOfOneRigInTheirPlace) {
   for (unsigned seed = 0; seed < 3; ++seed) {
     RandomScene scene = MakeSmallScene(seed, 0.3);
     Fix(2, 0, &scene);
-    ExpectOptimumOfMerged(scene, Norm::L2(), 2 * kGap);
+    ExpectOptimumOfMerged(scene, Norm::L2(), 2 * kFixedGap);
   }
 }
 
@@ -189,7 +189,7 @@ TEST(Fixed, PointsGiveTheOptimumOfOnePointSeenThroughShiftedCameras) {
     for (const int num_points : {1, 4}) {
       RandomScene scene = MakeSmallScene(seed);
       Fix(0, num_points, &scene);
-      ExpectOptimumOfMerged(scene, kNorms[seed % 3], 2 * kGap);
+      ExpectOptimumOfMerged(scene, kNorms[seed % 3], 2 * kFixedGap);
     }
   }
 }
@@ -206,13 +206,13 @@ TEST(Fixed, FramesAndPointsGiveTheOptimumOfBothHeldTogether) {
 TEST(Fixed, AllFramesLeaveEveryPointToItself) {
   RandomScene scene = MakeSmallScene(2);
   Fix(scene.problem.num_frames, 0, &scene);
-  ExpectOptimumOfMerged(scene, Norm::L2(), 2 * kGap);
+  ExpectOptimumOfMerged(scene, Norm::L2(), 2 * kFixedGap);
 }
 
 TEST(Fixed, AllPointsLeaveEveryFrameToItself) {
   RandomScene scene = MakeSmallScene(3);
   Fix(0, scene.problem.num_points, &scene);
-  ExpectOptimumOfMerged(scene, Norm::L2(), 2 * kGap);
+  ExpectOptimumOfMerged(scene, Norm::L2(), 2 * kFixedGap);
 }
 
 TEST(Fixed, AFrameAloneChangesNoOptimum) {
@@ -223,8 +223,8 @@ TEST(Fixed, AFrameAloneChangesNoOptimum) {
   Estimate expected = free.estimate;
   Estimate found = scene.estimate;
   EXPECT_NEAR(
-      SolveJoint(scene.problem, Options(Norm::L2()), {}, &found).cost_final,
-      SolveJoint(free.problem, Options(Norm::L2()), {}, &expected).cost_final,
+      SolveJoint(scene.problem, FixedOptions(Norm::L2()), {}, &found).cost_final,
+      SolveJoint(free.problem, FixedOptions(Norm::L2()), {}, &expected).cost_final,
       1e-4);
   ExpectInPlace(scene.problem, found);
 }
@@ -234,7 +234,7 @@ TEST(Fixed, PositionsElsewhereAreNotProvedByTheCertificate) {
   Fix(2, 0, &scene);
   Estimate estimate = scene.estimate;
   const JointSummary summary =
-      SolveJoint(scene.problem, Options(Norm::L2()), {}, &estimate);
+      SolveJoint(scene.problem, FixedOptions(Norm::L2()), {}, &estimate);
   ASSERT_TRUE(summary.certificate);
   // The sum of its constants is next to zero and linear in the position: it
   // keeps its sign in one direction at most.

@@ -22,7 +22,7 @@ InitializerOptions Options(Norm norm, double max_error) {
   return options;
 }
 
-double OptimalCost(const RandomScene& scene, Norm norm) {
+double CostFromTheTruth(const RandomScene& scene, Norm norm) {
   JointOptions options;
   options.norm = norm;
   Estimate estimate = scene.estimate;
@@ -79,7 +79,7 @@ TEST_P(FindStartTest, MeetsABoundJustAboveTheOptimum) {
       SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
       const RandomScene scene = MakeSmallScene(seed, baseline);
       const InitializerOptions options =
-          Options(norm(), 1.01 * OptimalCost(scene, norm()));
+          Options(norm(), 1.01 * CostFromTheTruth(scene, norm()));
       Estimate estimate;
       const InitializerSummary summary =
           FindStart(scene.problem, options, {}, &estimate);
@@ -93,7 +93,7 @@ TEST_P(FindStartTest, ProvesThatABoundBelowTheOptimumIsUnattainable) {
     for (unsigned seed = 11; seed <= 14; ++seed) {
       SCOPED_TRACE(testing::Message() << baseline << ", seed " << seed);
       const RandomScene scene = MakeSmallScene(seed, baseline);
-      const double optimum = OptimalCost(scene, norm());
+      const double optimum = CostFromTheTruth(scene, norm());
       for (const double share : {0.01, 0.5, 0.99}) {
         const InitializerOptions options = Options(norm(), share * optimum);
         Estimate estimate = scene.estimate;
@@ -110,7 +110,7 @@ TEST_P(FindStartTest, ProvesThatABoundBelowTheOptimumIsUnattainable) {
 TEST_P(FindStartTest, NamesTheObservationsOfTheComponentThatMissesTheBound) {
   RandomScene good = MakeSmallScene(21);
   const RandomScene bad = MakeSmallScene(22);
-  const double bound = 0.9 * OptimalCost(bad, norm());
+  const double bound = 0.9 * CostFromTheTruth(bad, norm());
   for (Observation& o : good.problem.observations) {
     o.E.bottomRows<2>() *= 1e-3;
   }

@@ -15,7 +15,7 @@
 namespace krot {
 namespace {
 
-constexpr double kGap = 1e-4;  // the reference's own, too
+constexpr double kReferenceGap = 1e-4;  // the reference's own, too
 
 struct RealModel {
   const char* folder;
@@ -42,7 +42,7 @@ class RealModelTest : public testing::TestWithParam<RealModel> {
 
   void ExpectOptimumFrom(Estimate estimate) const {
     JointOptions options;
-    options.relative_gap = kGap;
+    options.relative_gap = kReferenceGap;
     const JointSummary summary =
         SolveJoint(built_.problem, options, {}, &estimate);
     EXPECT_EQ(summary.termination, JointTermination::kGapReached);
@@ -55,7 +55,7 @@ class RealModelTest : public testing::TestWithParam<RealModel> {
     const CertificateCheck check =
         CheckCertificate(built_.problem, options.norm, *summary.certificate);
     EXPECT_TRUE(check.is_accepted) << check.refusal;
-    EXPECT_GE(check.proved_bound, (1 - kGap) * summary.cost_final);
+    EXPECT_GE(check.proved_bound, (1 - kReferenceGap) * summary.cost_final);
     EXPECT_LE(check.proved_bound, summary.cost_final);
     RecordProperty("iterations", static_cast<int>(summary.iterations.size()));
   }

@@ -15,7 +15,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kAgreement = 1e-9;  // pixels
+constexpr double kDegenerateAgreement = 1e-9;  // pixels
 constexpr int kInstances = 50;
 
 // How far two ways of evaluating the residuals at x may differ: v and w are
@@ -67,8 +67,8 @@ class DegenerateTest : public testing::TestWithParam<double> {
     const DescentSummary summary = Minimize(problem, &x);
     const OracleOptimum oracle =
         MinimizeByEllipsoids(problem.residuals, norm(), x, /*radius=*/20);
-    ASSERT_LT(oracle.cost - oracle.lower_bound, 0.5 * kAgreement);
-    EXPECT_NEAR(summary.cost, oracle.cost, kAgreement);
+    ASSERT_LT(oracle.cost - oracle.lower_bound, 0.5 * kDegenerateAgreement);
+    EXPECT_NEAR(summary.cost, oracle.cost, kDegenerateAgreement);
     EXPECT_EQ(summary.termination, DescentTermination::kStationary);
   }
 
@@ -80,7 +80,7 @@ TEST_P(DegenerateTest, OneRayIsMetExactly) {
     const ResidualProblem problem = generator_.Triangulation(1, 5);
     Vector3d x = generator_.Start(problem, 0.5);
     const DescentSummary summary = Minimize(problem, &x);
-    EXPECT_LT(summary.cost, kAgreement);
+    EXPECT_LT(summary.cost, kDegenerateAgreement);
     EXPECT_EQ(summary.termination, DescentTermination::kZeroCost);
   }
 }
@@ -91,7 +91,7 @@ TEST_P(DegenerateTest, ConsistentDataLeaveNoResidual) {
       for (const ResidualProblem& problem :
            {generator_.Triangulation(rays, 0), generator_.Resection(rays, 0)}) {
         Vector3d x = generator_.Start(problem, 0.5);
-        EXPECT_LT(Minimize(problem, &x).cost, kAgreement);
+        EXPECT_LT(Minimize(problem, &x).cost, kDegenerateAgreement);
       }
     }
   }
@@ -104,7 +104,7 @@ TEST_P(DegenerateTest, AStartAtTheOptimumStays) {
     const double cost = Minimize(problem, &x).cost;
     Vector3d again = x;
     const DescentSummary summary = Minimize(problem, &again);
-    EXPECT_NEAR(summary.cost, cost, kAgreement);
+    EXPECT_NEAR(summary.cost, cost, kDegenerateAgreement);
     EXPECT_EQ(summary.termination, DescentTermination::kStationary);
   }
 }
@@ -129,7 +129,7 @@ TEST_P(DegenerateTest, OneImageTwiceCostsHalfTheirDistance) {
     problem.residuals.push_back(twin);
     Vector3d x = generator_.Start(problem, 0.5);
     const DescentSummary summary = Minimize(problem, &x);
-    EXPECT_NEAR(summary.cost, 0.5 * NormOf(offset, norm()), kAgreement);
+    EXPECT_NEAR(summary.cost, 0.5 * NormOf(offset, norm()), kDegenerateAgreement);
     EXPECT_EQ(summary.termination, DescentTermination::kStationary);
   }
 }
@@ -257,7 +257,7 @@ TEST_P(DegenerateTest, ManyActiveResidualsAreNoObstacle) {
   EXPECT_NEAR(problem.Cost(Vector3d::Zero(), norm()), 4, 1e-12);
   for (int instance = 0; instance < kInstances; ++instance) {
     Vector3d x = generator_.Start(problem, 0.3);
-    EXPECT_NEAR(Minimize(problem, &x).cost, 4, kAgreement);
+    EXPECT_NEAR(Minimize(problem, &x).cost, 4, kDegenerateAgreement);
   }
 }
 
@@ -273,7 +273,7 @@ TEST_P(DegenerateTest, TheUnitOfLengthDoesNotMatter) {
       }
       Vector3d y = unit * x;
       const double cost = Minimize(problem, &x).cost;
-      EXPECT_NEAR(Minimize(scaled, &y).cost, cost, kAgreement);
+      EXPECT_NEAR(Minimize(scaled, &y).cost, cost, kDegenerateAgreement);
     }
   }
 }
@@ -313,13 +313,13 @@ TEST_P(DegenerateTest, ABlindStartIsLeftWhereItIs) {
   }
 }
 
-std::string NameOf(const testing::TestParamInfo<double>& info) {
+std::string NormName(const testing::TestParamInfo<double>& info) {
   if (std::isinf(info.param)) return "LInf";
   return "L" + std::to_string(static_cast<int>(10 * info.param));
 }
 
 INSTANTIATE_TEST_SUITE_P(, DegenerateTest,
-                         testing::Values(1, 1.5, 2, 3, Norm::LInf().p), NameOf);
+                         testing::Values(1, 1.5, 2, 3, Norm::LInf().p), NormName);
 
 }  // namespace
 }  // namespace krot

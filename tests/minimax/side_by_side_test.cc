@@ -17,7 +17,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kAgreement = 1e-9;  // pixels
+constexpr double kSideBySideAgreement = 1e-9;  // pixels
 
 struct Task {
   ResidualProblem problem;
@@ -100,11 +100,11 @@ void ExpectSameOptimum(const Tasks& starts, const Tasks& side_by_side,
     const DescentSummary& summary = side_by_side[n].summary;
     const double start = problem.Cost(starts[n].x, Norm::L2());
     EXPECT_NEAR(summary.cost, alone[n].summary.cost,
-                kAgreement * std::max(1.0, alone[n].summary.cost));
+                kSideBySideAgreement * std::max(1.0, alone[n].summary.cost));
     EXPECT_NEAR(summary.cost_initial, start, 1e-12 * start);
     EXPECT_LE(summary.cost, summary.cost_initial);
     EXPECT_NEAR(problem.Cost(side_by_side[n].x, Norm::L2()), summary.cost,
-                kAgreement);
+                kSideBySideAgreement);
   }
 }
 
@@ -128,7 +128,7 @@ TEST(SideBySide, OptimaAreThoseOfTheOracle) {
   for (const Task& task : tasks) {
     const OracleOptimum oracle = MinimizeByEllipsoids(
         task.problem.residuals, Norm::L2(), task.x, /*radius=*/20);
-    EXPECT_NEAR(task.summary.cost, oracle.cost, kAgreement);
+    EXPECT_NEAR(task.summary.cost, oracle.cost, kSideBySideAgreement);
   }
 }
 
@@ -206,7 +206,7 @@ double MeanExcess(const Tasks& coarse, const Tasks& fine) {
   for (size_t n = 0; n < fine.size(); ++n) {
     const double optimum = fine[n].summary.cost;
     const double excess = coarse[n].summary.cost - optimum;
-    EXPECT_GE(excess, -kAgreement);
+    EXPECT_GE(excess, -kSideBySideAgreement);
     sum += excess / std::max(optimum, 1e-3);
   }
   return sum / static_cast<double>(fine.size());
@@ -312,7 +312,7 @@ TEST(SideBySide, NastyProblemsEndNoHigherThanAlone) {
     EXPECT_LE(together[n].summary.cost, together[n].summary.cost_initial);
     EXPECT_LE(together[n].summary.cost,
               alone[n].summary.cost +
-                  kAgreement * std::max(1.0, alone[n].summary.cost));
+                  kSideBySideAgreement * std::max(1.0, alone[n].summary.cost));
   }
 }
 

@@ -39,7 +39,7 @@ std::string With(std::string bytes, size_t offset, T value) {
   return bytes.replace(offset, sizeof(T), Bytes(value));
 }
 
-std::string ErrorOf(void (*parse)(const FileBytes&, Model*),
+std::string BinaryError(void (*parse)(const FileBytes&, Model*),
                     const std::string& bytes) {
   Model model;
   return ModelErrorOf([&] { parse({"f.bin", bytes}, &model); });
@@ -126,7 +126,7 @@ TEST(BinaryIo, RefusesAFileCutAtAnyByte) {
   for (const Part& part : kParts) {
     const std::string bytes = part.format(model);
     for (size_t size = 0; size < bytes.size(); ++size) {
-      EXPECT_THAT(ErrorOf(part.parse, bytes.substr(0, size)),
+      EXPECT_THAT(BinaryError(part.parse, bytes.substr(0, size)),
                   AllOf(StartsWith("f.bin, byte "), HasSubstr("expected")))
           << part.name << " cut at " << size;
     }
@@ -143,7 +143,7 @@ TEST(BinaryIo, SurvivesHugeValuesAtAnyByte) {
       for (const uint64_t value :
            {~uint64_t{0}, uint64_t{1} << 62, uint64_t{1} << 40,
             uint64_t{0x7fffffff}, uint64_t{0}}) {
-        EXPECT_NO_THROW(ErrorOf(part.parse, With(bytes, offset, value)))
+        EXPECT_NO_THROW(BinaryError(part.parse, With(bytes, offset, value)))
             << part.name << ", " << value << " at " << offset;
       }
     }
@@ -155,7 +155,7 @@ TEST(BinaryIo, ChecksEveryCountAgainstTheFile) {
   for (const Part& part : kParts) {
     const std::string bytes = part.format(model);
     for (const uint64_t count : {~uint64_t{0}, uint64_t{1} << 33}) {
-      EXPECT_THAT(ErrorOf(part.parse, With(bytes, 0, count)),
+      EXPECT_THAT(BinaryError(part.parse, With(bytes, 0, count)),
                   AllOf(HasSubstr("byte 0: found number of"),
                         HasSubstr(std::to_string(count)),
                         HasSubstr("expected at most")))
@@ -163,17 +163,17 @@ TEST(BinaryIo, ChecksEveryCountAgainstTheFile) {
     }
   }
   const size_t num_points2D = 8 + 4 + 56 + 4 + sizeof("left/a b.jpg");
-  EXPECT_THAT(ErrorOf(ParseImagesBinary, With(FormatImagesBinary(model),
+  EXPECT_THAT(BinaryError(ParseImagesBinary, With(FormatImagesBinary(model),
                                               num_points2D, uint64_t{1} << 60)),
               HasSubstr("found number of 2D points = 1152921504606846976"));
   EXPECT_THAT(
-      ErrorOf(ParsePoints3DBinary, With(FormatPoints3DBinary(model),
+      BinaryError(ParsePoints3DBinary, With(FormatPoints3DBinary(model),
                                         8 + 8 + 24 + 3 + 8, uint64_t{1000})),
       HasSubstr("found track length = 1000"));
   EXPECT_THAT(
-      ErrorOf(ParseRigsBinary, With(FormatRigsBinary(model), 12, ~uint32_t{0})),
+      BinaryError(ParseRigsBinary, With(FormatRigsBinary(model), 12, ~uint32_t{0})),
       HasSubstr("found number of sensors = 4294967295"));
-  EXPECT_THAT(ErrorOf(ParseFramesBinary, With(FormatFramesBinary(model),
+  EXPECT_THAT(BinaryError(ParseFramesBinary, With(FormatFramesBinary(model),
                                               8 + 8 + 56, ~uint32_t{0})),
               HasSubstr("found number of data ids = 4294967295"));
 }
@@ -181,7 +181,7 @@ TEST(BinaryIo, ChecksEveryCountAgainstTheFile) {
 TEST(BinaryIo, RefusesBytesAfterTheLastRecord) {
   const Model model = TinyRigModel();
   for (const Part& part : kParts) {
-    EXPECT_THAT(ErrorOf(part.parse, part.format(model) + "xyz"),
+    EXPECT_THAT(BinaryError(part.parse, part.format(model) + "xyz"),
                 HasSubstr("found 3 more bytes after the last record, expected "
                           "the end of the file"))
         << part.name;
@@ -189,7 +189,7 @@ TEST(BinaryIo, RefusesBytesAfterTheLastRecord) {
 }
 
 TEST(BinaryIo, RefusesAnUnknownCameraModel) {
-  EXPECT_EQ(ErrorOf(ParseCamerasBinary,
+  EXPECT_EQ(BinaryError(ParseCamerasBinary,
                     With(FormatCamerasBinary(TinyModel()), 12, int32_t{99})),
             "f.bin, byte 12: found camera model id 99 (camera 7), expected 0 "
             "to 17");
@@ -199,14 +199,14 @@ TEST(BinaryIo, RefusesANameWithoutEnd) {
   std::string bytes = FormatImagesBinary(TinyModel());
   bytes.resize(8 + 4 + 56 + 4);
   bytes += std::string(200, 'x');
-  EXPECT_THAT(ErrorOf(ParseImagesBinary, bytes),
+  EXPECT_THAT(BinaryError(ParseImagesBinary, bytes),
               HasSubstr("byte 72: found no zero byte before the end of the "
                         "file, expected one that ends the name of an image"));
 }
 
 TEST(BinaryIo, RefusesAPoseFlagThatIsNoFlag) {
   const size_t flag = 8 + 4 + 4 + 8 + 8;
-  EXPECT_THAT(ErrorOf(ParseRigsBinary,
+  EXPECT_THAT(BinaryError(ParseRigsBinary,
                       With(FormatRigsBinary(TinyRigModel()), flag, uint8_t{7})),
               HasSubstr("byte 32: found pose flag 7"));
 }

@@ -34,7 +34,7 @@ void Convert(const fs::path& input, const fs::path& output,
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
 }
 
-void Write(const Model& model, const fs::path& folder, ModelFormat format) {
+void WriteForColmap(const Model& model, const fs::path& folder, ModelFormat format) {
   WriteModelOptions options;
   options.format = format;
   WriteModel(model, folder, options);
@@ -80,8 +80,8 @@ TEST(Colmap, ReadsWhatIsWrittenHereAndWritesWhatIsReadHere) {
   if (!HasColmap()) GTEST_SKIP() << "colmap is not installed";
   const Model model = TinyColmapModel();
   const TempFolder folder;
-  Write(model, folder / "binary", ModelFormat::kBinary);
-  Write(model, folder / "text", ModelFormat::kText);
+  WriteForColmap(model, folder / "binary", ModelFormat::kBinary);
+  WriteForColmap(model, folder / "text", ModelFormat::kText);
   Convert(folder / "binary", folder / "binary-to-text", "TXT");
   Convert(folder / "text", folder / "text-to-binary", "BIN");
 
@@ -92,7 +92,7 @@ TEST(Colmap, ReadsWhatIsWrittenHereAndWritesWhatIsReadHere) {
   EXPECT_THAT(Sorted(from_text), IsModel(Sorted(model)));
   EXPECT_THAT(Sorted(from_binary), IsModel(Sorted(model)));
 
-  Write(from_binary, folder / "again", ModelFormat::kBinary);
+  WriteForColmap(from_binary, folder / "again", ModelFormat::kBinary);
   for (const std::string& name : FileNames(folder / "again")) {
     EXPECT_EQ(ReadBytes(folder / "again" / name),
               ReadBytes(folder / "text-to-binary" / name))

@@ -43,7 +43,7 @@ void WriteImages(DatabaseWriter* writer) {
   writer->AddPair(1, 2, {{0, 0}});
 }
 
-std::string ErrorOf(const fs::path& path, const Model& model) {
+std::string DatabaseError(const fs::path& path, const Model& model) {
   return ModelErrorOf([&] { ReadDatabase(path, model); });
 }
 
@@ -142,27 +142,27 @@ TEST(Database, IsRefusedIfTheModelWasMadeFromOtherFeatures) {
   }
   Model model = ThreeImages();
   model.images[0].points2D = {{28, 66, 7}, {2, 3, 7}, {5, 66, 7}};
-  EXPECT_THAT(ErrorOf(folder / "database.db", model),
+  EXPECT_THAT(DatabaseError(folder / "database.db", model),
               HasSubstr("keypoints of image \"a.jpg\": found 3 keypoints that "
                         "are not the model's 3 2D points"));
   // Of fewer, those that see something must be among the keypoints.
   model.images[0].points2D = {{30, 4, 7}};
-  EXPECT_EQ(ErrorOf(folder / "database.db", model), "");
+  EXPECT_EQ(DatabaseError(folder / "database.db", model), "");
   model.images[0].points2D = {{30, 5, 7}};
-  EXPECT_THAT(ErrorOf(folder / "database.db", model),
+  EXPECT_THAT(DatabaseError(folder / "database.db", model),
               HasSubstr("expected the database that the model was made from"));
 }
 
 TEST(Database, IsRefusedWithOneSentenceIfItIsNone) {
   const TempFolder folder;
   const fs::path path = folder / "database.db";
-  EXPECT_THAT(ErrorOf(path, ThreeImages()), HasSubstr("cannot be opened"));
-  EXPECT_THAT(ErrorOf(folder.path(), ThreeImages()),
+  EXPECT_THAT(DatabaseError(path, ThreeImages()), HasSubstr("cannot be opened"));
+  EXPECT_THAT(DatabaseError(folder.path(), ThreeImages()),
               HasSubstr("is no regular file, expected COLMAP's database"));
   WriteBytes(path, "");
-  EXPECT_THAT(ErrorOf(path, ThreeImages()), HasSubstr("is no SQLite database"));
+  EXPECT_THAT(DatabaseError(path, ThreeImages()), HasSubstr("is no SQLite database"));
   WriteBytes(path, "version https://git-lfs.github.com/spec/v1\noid sha256:4d");
-  EXPECT_THAT(ErrorOf(path, ThreeImages()), HasSubstr("is a Git LFS pointer"));
+  EXPECT_THAT(DatabaseError(path, ThreeImages()), HasSubstr("is a Git LFS pointer"));
 }
 
 TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
@@ -221,7 +221,7 @@ TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
       WriteImages(&writer);
       writer.Execute(bad.sql);
     }
-    const std::string error = ErrorOf(folder / "database.db", ThreeImages());
+    const std::string error = DatabaseError(folder / "database.db", ThreeImages());
     EXPECT_THAT(error, HasSubstr(bad.sentence)) << bad.sql;
     if (bad.sentence.empty()) {
       EXPECT_EQ(error, "") << bad.sql;
@@ -234,7 +234,7 @@ TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
     DatabaseWriter writer(folder / "database.db");
     WriteImages(&writer);
   }
-  EXPECT_THAT(ErrorOf(folder / "database.db", model),
+  EXPECT_THAT(DatabaseError(folder / "database.db", model),
               HasSubstr("several images of the model with the name \"a.jpg\""));
 }
 
@@ -301,7 +301,7 @@ TEST(Database, IsReadOrRefusedHoweverItIsDamaged) {
       std::string damaged = bytes.substr(0, cut ? i : bytes.size());
       if (!cut) damaged[i] = static_cast<char>(damaged[i] ^ (1 + i % 255));
       WriteBytes(path, damaged);
-      const std::string error = ErrorOf(path, ThreeImages());
+      const std::string error = DatabaseError(path, ThreeImages());
       num_refused += error.empty() ? 0 : 1;
       if (!error.empty()) {
         EXPECT_THAT(error, HasSubstr("database.db: "));
@@ -331,7 +331,7 @@ TEST(Database, IsReadOrRefusedHoweverItIsDamaged) {
       }
     }
     WriteBytes(path, damaged);
-    const std::string error = ErrorOf(path, ThreeImages());
+    const std::string error = DatabaseError(path, ThreeImages());
     if (!error.empty()) {
       EXPECT_THAT(error, HasSubstr("database.db: "));
     }

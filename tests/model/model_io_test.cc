@@ -26,7 +26,7 @@ using ::testing::IsEmpty;
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
-void Write(const Model& model, const fs::path& folder,
+void WriteIn(const Model& model, const fs::path& folder,
            ModelFormat format = ModelFormat::kBinary) {
   WriteModelOptions options;
   options.format = format;
@@ -56,7 +56,7 @@ TEST(ModelIo, ReadsBackWhatItWroteInEitherFormat) {
   const TempFolder folder;
   for (const Model& model : {TinyModel(), TinyRigModel(), Model()}) {
     for (const ModelFormat format : kFormats) {
-      Write(model, folder / "model", format);
+      WriteIn(model, folder / "model", format);
       EXPECT_EQ(DetectModelFormat(folder / "model"), format);
       EXPECT_THAT(ReadModel(folder / "model", format), IsModel(model));
     }
@@ -65,18 +65,18 @@ TEST(ModelIo, ReadsBackWhatItWroteInEitherFormat) {
 
 TEST(ModelIo, WritesRigsAndFramesOnlyIfThereAreAny) {
   const TempFolder folder;
-  Write(TinyRigModel(), folder / "model");
+  WriteIn(TinyRigModel(), folder / "model");
   EXPECT_THAT(FileNames(folder / "model"),
               ElementsAre("cameras.bin", "frames.bin", "images.bin",
                           "points3D.bin", "rigs.bin"));
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   EXPECT_THAT(FileNames(folder / "model"),
               ElementsAre("cameras.bin", "images.bin", "points3D.bin"));
 }
 
 TEST(ModelIo, GivesALegacyModelARigPerCameraAndAFramePerImage) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   const Model model = ReadModel(folder / "model", ModelFormat::kBinary);
   EXPECT_FALSE(model.stores_rigs);
   ASSERT_EQ(model.rigs.size(), model.cameras.size());
@@ -102,7 +102,7 @@ TEST(ModelIo, GivesALegacyModelARigPerCameraAndAFramePerImage) {
 
 TEST(ModelIo, TakesEmptyRigsAndFramesForALegacyModel) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   WriteBytes(folder / "model/rigs.bin", std::string(8, '\0'));
   WriteBytes(folder / "model/frames.bin", std::string(8, '\0'));
   EXPECT_THAT(ReadModel(folder / "model", ModelFormat::kBinary),
@@ -111,8 +111,8 @@ TEST(ModelIo, TakesEmptyRigsAndFramesForALegacyModel) {
 
 TEST(ModelIo, PrefersBinaryAsColmapDoes) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "text", ModelFormat::kText);
-  Write(TinyModel(), folder / "model", ModelFormat::kBinary);
+  WriteIn(TinyModel(), folder / "text", ModelFormat::kText);
+  WriteIn(TinyModel(), folder / "model", ModelFormat::kBinary);
   for (const char* name : {"cameras.txt", "images.txt", "points3D.txt"}) {
     fs::copy_file(folder / "text" / name, folder / "model" / name);
   }
@@ -129,7 +129,7 @@ TEST(ModelIo, SaysWhatAFolderLacks) {
                         "points3D"));
   WriteBytes(folder / "file", "");
   EXPECT_THAT(DetectionError(folder / "file"), HasSubstr("is a file"));
-  Write(TinyModel(), folder / "model", ModelFormat::kText);
+  WriteIn(TinyModel(), folder / "model", ModelFormat::kText);
   fs::remove(folder / "model/images.txt");
   EXPECT_THAT(DetectionError(folder / "model"),
               HasSubstr("found cameras.txt, points3D.txt, expected images.txt "
@@ -138,7 +138,7 @@ TEST(ModelIo, SaysWhatAFolderLacks) {
 
 TEST(ModelIo, PointsToTheSubfolderThatHoldsTheModel) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "sparse/0");
+  WriteIn(TinyModel(), folder / "sparse/0");
   EXPECT_THAT(DetectionError(folder / "sparse"),
               HasSubstr("sparse/0 holds a model"));
   EXPECT_THAT(DetectionError(folder.path()),
@@ -148,7 +148,7 @@ TEST(ModelIo, PointsToTheSubfolderThatHoldsTheModel) {
 TEST(ModelIo, RefusesRigsWithoutFramesAndFramesWithoutRigs) {
   const TempFolder folder;
   for (const ModelFormat format : kFormats) {
-    Write(TinyRigModel(), folder / "model", format);
+    WriteIn(TinyRigModel(), folder / "model", format);
     const std::string end = format == ModelFormat::kBinary ? ".bin" : ".txt";
     fs::rename(folder / ("model/rigs" + end), folder / "aside");
     EXPECT_THAT(ReadingError(folder / "model"),
@@ -162,7 +162,7 @@ TEST(ModelIo, RefusesRigsWithoutFramesAndFramesWithoutRigs) {
 
 TEST(ModelIo, RecognisesGitLfsPointers) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   WriteBytes(folder / "model/images.bin",
              "version https://git-lfs.github.com/spec/v1\n"
              "oid sha256:0000\nsize 12\n");
@@ -173,7 +173,7 @@ TEST(ModelIo, RecognisesGitLfsPointers) {
 
 TEST(ModelIo, NamesTheFileThatCannotBeRead) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   fs::remove(folder / "model/images.bin");
   EXPECT_THAT(
       ModelErrorOf([&] { ReadModel(folder / "model", ModelFormat::kBinary); }),
@@ -191,18 +191,18 @@ TEST(ModelIo, ReplacesAModelOnlyIfAskedTo) {
   fs::remove(folder / "model/cameras.bin");
   EXPECT_THAT(WritingError(folder / "model"),
               HasSubstr("already holds a model"));
-  Write(TinyRigModel(), folder / "model");
+  WriteIn(TinyRigModel(), folder / "model");
   EXPECT_THAT(ReadModel(folder / "model", ModelFormat::kBinary),
               IsModel(TinyRigModel()));
 }
 
 TEST(ModelIo, CarriesForeignFilesOverButNoOtherModelFiles) {
   const TempFolder folder;
-  Write(TinyRigModel(), folder / "model", ModelFormat::kBinary);
+  WriteIn(TinyRigModel(), folder / "model", ModelFormat::kBinary);
   WriteBytes(folder / "model/notes.md", "mine");
   WriteBytes(folder / "model/deep/er/file", "too");
   fs::create_symlink("nowhere", folder / "model/link");
-  Write(TinyModel(), folder / "model", ModelFormat::kText);
+  WriteIn(TinyModel(), folder / "model", ModelFormat::kText);
   EXPECT_THAT(FileNames(folder / "model"),
               ElementsAre("cameras.txt", "deep", "images.txt", "link",
                           "notes.md", "points3D.txt"));
@@ -214,10 +214,10 @@ TEST(ModelIo, CarriesForeignFilesOverButNoOtherModelFiles) {
 
 TEST(ModelIo, KeepsTheFoldersPermissions) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   const fs::perms perms = fs::perms::owner_all | fs::perms::group_exec;
   fs::permissions(folder / "model", perms);
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   EXPECT_EQ(fs::status(folder / "model").permissions(), perms);
 }
 
@@ -239,7 +239,7 @@ TEST(ModelIo, WritesThroughASymbolicLinkToTheFolder) {
   const TempFolder folder;
   fs::create_directory(folder / "real");
   fs::create_directory_symlink(folder / "real", folder / "link");
-  Write(TinyModel(), folder / "link/");
+  WriteIn(TinyModel(), folder / "link/");
   EXPECT_TRUE(fs::is_symlink(folder / "link"));
   EXPECT_THAT(ReadModel(folder / "real", ModelFormat::kBinary),
               IsModel(TinyModel()));
@@ -294,7 +294,7 @@ TEST(ModelIo, RefusesFoldersWithoutWritePermission) {
 
 TEST(ModelIo, RefusesFoldersWithoutReadPermission) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   const WithoutRoot without_root(folder.path());
   fs::permissions(folder / "model", fs::perms::owner_read);
   EXPECT_THAT(DetectionError(folder / "model"),
@@ -310,12 +310,12 @@ TEST(ModelIo, ChangesNothingWhenItOnlyChecks) {
 
 TEST(ModelIo, LeavesTheOldModelAndNoTracesIfWritingFails) {
   const TempFolder folder;
-  Write(TinyModel(), folder / "model");
+  WriteIn(TinyModel(), folder / "model");
   Model unwritable = TinyModel();
   unwritable.images[0].name = "not\ntext";
   for (const char* target : {"model", "new/deep"}) {
     EXPECT_THAT(WriteErrorOf([&] {
-                  Write(unwritable, folder / target, ModelFormat::kText);
+                  WriteIn(unwritable, folder / target, ModelFormat::kText);
                 }),
                 HasSubstr("found the name"));
   }
@@ -330,14 +330,14 @@ TEST(ModelIo, LeavesOneOfTheTwoModelsIfKilled) {
   const TempFolder folder;
   const Model legacy = TinyModel();
   const Model rigs = TinyRigModel();
-  Write(legacy, folder / "model", ModelFormat::kText);
+  WriteIn(legacy, folder / "model", ModelFormat::kText);
   WriteBytes(folder / "model/notes.md", "mine");
   for (int kill = 0; kill < 20; ++kill) {
     const pid_t child = ::fork();
     if (child == 0) {
       for (;;) {
-        Write(rigs, folder / "model", ModelFormat::kBinary);
-        Write(legacy, folder / "model", ModelFormat::kText);
+        WriteIn(rigs, folder / "model", ModelFormat::kBinary);
+        WriteIn(legacy, folder / "model", ModelFormat::kText);
       }
     }
     std::this_thread::sleep_for(std::chrono::microseconds(3000 + 977 * kill));

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 // What programs write: "NAME X Y Z RADIUS" of the images of TinyModel.
 
-std::string ErrorOf(const std::string& text,
+std::string PositionsError(const std::string& text,
                     const PositionsOptions& options = {},
                     const Model& model = TinyModel()) {
   return ModelErrorOf([&] { ReadPositions({"p.txt", text}, model, options); });
@@ -79,7 +79,7 @@ TEST(PositionsFile, SkipsAndCountsWhatTheModelDoesNotHave) {
   EXPECT_EQ(notes,
             "p.txt: skipped 2 of 3 lines, whose image the model does not have; "
             "the first has image \"d.jpg\"");
-  EXPECT_EQ(ErrorOf("d.jpg 1 2 3 4\ne.jpg 1 2 3 4\n"),
+  EXPECT_EQ(PositionsError("d.jpg 1 2 3 4\ne.jpg 1 2 3 4\n"),
             "p.txt: found no image of the model in its 2 lines, the first has "
             "image \"d.jpg\"; expected those of the model, such as image "
             "\"left/a b.jpg\"");
@@ -93,7 +93,7 @@ TEST(PositionsFile, SkipsAndCountsWhatTheModelDoesNotHave) {
 
 TEST(PositionsFile, WithoutRadiiTakesTheOneThatIsGiven) {
   EXPECT_EQ(
-      ErrorOf("c.jpg 1 2 3\n"),
+      PositionsError("c.jpg 1 2 3\n"),
       "p.txt:1: found no RADIUS behind X Y Z, expected X Y Z RADIUS, or X "
       "Y Z and three semi-axes, or these and QW QX QY QZ; "
       "--Problem.position_radius gives one to all such lines");
@@ -124,20 +124,20 @@ TEST(PositionsFile, ThatCannotBeMeantIsRefusedWithItsLine) {
   for (const char* line :
        {"c.jpg 4,99 -7,4 1,37 0,5", "c.jpg;4,99;-7,4;1,37;0,5",
         "c.jpg 4,99 -7,4 1 2", "x y\nc.jpg\t1\t2\t3\t0,5"}) {
-    EXPECT_THAT(ErrorOf(line),
+    EXPECT_THAT(PositionsError(line),
                 HasSubstr("; write numbers with a decimal point, "
                           "without commas"))
         << line;
   }
-  EXPECT_THAT(ErrorOf("c.jpg 1 2 3 4 5"),
+  EXPECT_THAT(PositionsError("c.jpg 1 2 3 4 5"),
               HasSubstr("p.txt:1: found 5 numbers behind image \"c.jpg\", "
                         "expected X Y Z RADIUS, or"));
-  EXPECT_THAT(ErrorOf("c.jpg 1 2"), HasSubstr("found \"c.jpg\", expected a "
+  EXPECT_THAT(PositionsError("c.jpg 1 2"), HasSubstr("found \"c.jpg\", expected a "
                                               "finite number: X Y Z RADIUS"));
   // The first line is no header if it begins as others do.
-  EXPECT_THAT(ErrorOf("c.jpg"), HasSubstr("p.txt:1: found \"c.jpg\""));
-  EXPECT_THAT(ErrorOf("c.jpg 1 2 3 O.5"), HasSubstr("found \"O.5\""));
-  EXPECT_THAT(ErrorOf("c.jpg 1 2 3 4\nname x y z r\n"),
+  EXPECT_THAT(PositionsError("c.jpg"), HasSubstr("p.txt:1: found \"c.jpg\""));
+  EXPECT_THAT(PositionsError("c.jpg 1 2 3 O.5"), HasSubstr("found \"O.5\""));
+  EXPECT_THAT(PositionsError("c.jpg 1 2 3 4\nname x y z r\n"),
               HasSubstr("p.txt:2: found \"r\""));
 }
 
@@ -165,7 +165,7 @@ class LatitudesAndLongitudes : public ::testing::Test {
   }
 
   // What reading says of `scale` * place + `origin`.
-  std::string ErrorOf(const Eigen::Vector3d& scale,
+  std::string PositionsError(const Eigen::Vector3d& scale,
                       const Eigen::Vector3d& origin, bool of_points = false,
                       const std::string& header = "") const {
     std::string text = header;
@@ -196,7 +196,7 @@ TEST_F(LatitudesAndLongitudes, AreRecognisedWhereverThePlaceIs) {
         Eigen::Vector3d(-33.86, 151.2, 0), Eigen::Vector3d(114.051, 22.549, 12),
         Eigen::Vector3d(0.01, 9.45, 10)}) {
     for (const bool of_points : {false, true}) {
-      EXPECT_THAT(ErrorOf(kDegrees, origin, of_points),
+      EXPECT_THAT(PositionsError(kDegrees, origin, of_points),
                   HasSubstr("p.txt: found latitudes and longitudes, expected X "
                             "Y Z in the model's frame and unit; "
                             "tools/scripts/geodetic_to_positions.sh"));
@@ -210,15 +210,15 @@ TEST_F(LatitudesAndLongitudes,
     image.cam_from_world.translation.setZero();
   }
   UseTrivialRigs(&model_);
-  EXPECT_THAT(ErrorOf(kDegrees, {22.549, 114.051, 12}),
+  EXPECT_THAT(PositionsError(kDegrees, {22.549, 114.051, 12}),
               HasSubstr("found latitudes and longitudes"));
   radius_ = 2;
-  EXPECT_EQ(ErrorOf({1, 1, 1}, {22.549, 114.051, 12}), "");
+  EXPECT_EQ(PositionsError({1, 1, 1}, {22.549, 114.051, 12}), "");
 }
 
 TEST_F(LatitudesAndLongitudes, AreRecognisedByTheHeader) {
   EXPECT_THAT(
-      ErrorOf({1, 1, 1}, {0, 0, 0}, false, "image Latitude Longitude h r\n"),
+      PositionsError({1, 1, 1}, {0, 0, 0}, false, "image Latitude Longitude h r\n"),
       HasSubstr("found latitudes and longitudes"));
 }
 
@@ -228,14 +228,14 @@ TEST_F(LatitudesAndLongitudes, AreNotSeenInPositionsOfOtherFramesAndUnits) {
     for (const Eigen::Vector3d& origin :
          {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.5, -0.2, 0.1),
           Eigen::Vector3d(296227, 5707542, 87)}) {
-      EXPECT_EQ(ErrorOf({unit, unit, unit}, origin), "")
+      EXPECT_EQ(PositionsError({unit, unit, unit}, origin), "")
           << unit << " " << origin.transpose();
     }
   }
   // Far from the origin for its size, as far apart as in the model.
-  EXPECT_EQ(ErrorOf({0.1, 0.1, 0.1}, {80, 170, 0}), "");
+  EXPECT_EQ(PositionsError({0.1, 0.1, 0.1}, {80, 170, 0}), "");
   // A single place, or the same one for all, says nothing.
-  EXPECT_EQ(ErrorOf({0, 0, 0}, {22.549, 114.051, 12}), "");
+  EXPECT_EQ(PositionsError({0, 0, 0}, {22.549, 114.051, 12}), "");
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string ErrorOf(const std::string& text, Model model = TinyModel()) {
+std::string RotationsError(const std::string& text, Model model = TinyModel()) {
   return ModelErrorOf([&] { ReplaceRotations({"r.txt", text}, &model); });
 }
 
@@ -87,20 +87,20 @@ TEST(RotationsFile, OfTheModelsOwnRotationsChangesNoBit) {
 }
 
 TEST(RotationsFile, ThatCannotBeMeantIsRefusedWithItsLine) {
-  EXPECT_THAT(ErrorOf("c.jpg 1 0 0 0\nempty.png 1 0 0 0\nc.jpg 1 0 0 0\n"),
+  EXPECT_THAT(RotationsError("c.jpg 1 0 0 0\nempty.png 1 0 0 0\nc.jpg 1 0 0 0\n"),
               HasSubstr("r.txt:3: found image \"c.jpg\" again, expected each "
                         "once; line 1 names it"));
-  EXPECT_THAT(ErrorOf("c.jpg 0 0 0 0"),
+  EXPECT_THAT(RotationsError("c.jpg 0 0 0 0"),
               HasSubstr("r.txt:1: found a quaternion of zeros"));
-  EXPECT_THAT(ErrorOf("c.jpg 1 0 0 0 1 2 3"),
+  EXPECT_THAT(RotationsError("c.jpg 1 0 0 0 1 2 3"),
               HasSubstr("r.txt: found no image of the model in its 1 line, the "
                         "first has image \"c.jpg 1 0 0\""));
-  EXPECT_THAT(ErrorOf("c.jpg 1 0 nan 0"), HasSubstr("found \"nan\""));
-  EXPECT_THAT(ErrorOf("c.jpg 1 0 inf 0"), HasSubstr("found \"inf\""));
-  EXPECT_THAT(ErrorOf("c.jpg 1 0 0"), HasSubstr("found \"c.jpg\""));
-  EXPECT_THAT(ErrorOf("1 0 0 0"), HasSubstr("found no name"));
-  EXPECT_THAT(ErrorOf("0 0 0"), HasSubstr("found the end of the line"));
-  EXPECT_THAT(ErrorOf("# nothing\n"), HasSubstr("r.txt: found no line"));
+  EXPECT_THAT(RotationsError("c.jpg 1 0 nan 0"), HasSubstr("found \"nan\""));
+  EXPECT_THAT(RotationsError("c.jpg 1 0 inf 0"), HasSubstr("found \"inf\""));
+  EXPECT_THAT(RotationsError("c.jpg 1 0 0"), HasSubstr("found \"c.jpg\""));
+  EXPECT_THAT(RotationsError("1 0 0 0"), HasSubstr("found no name"));
+  EXPECT_THAT(RotationsError("0 0 0"), HasSubstr("found the end of the line"));
+  EXPECT_THAT(RotationsError("# nothing\n"), HasSubstr("r.txt: found no line"));
 }
 
 TEST(RotationsFile, GivesAFrameWithoutARotationOneAndNoPlace) {
@@ -119,7 +119,7 @@ TEST(RotationsFile, ThatContradictsItselfWithinAFrameIsRefused) {
   const Eigen::Quaterniond off(
       kTurn * Eigen::AngleAxisd(1e-4, Eigen::Vector3d::UnitX()));
   EXPECT_THAT(
-      ErrorOf(Line("c.jpg", kTurn) + Line("empty.png", off), TinyRigModel()),
+      RotationsError(Line("c.jpg", kTurn) + Line("empty.png", off), TinyRigModel()),
       HasSubstr("r.txt:2: found a rotation 0.000100 rad off the one "
                 "that line 1 gives to the same frame"));
   Model model = TinyRigModel();
@@ -131,7 +131,7 @@ TEST(RotationsFile, ThatContradictsItselfWithinAFrameIsRefused) {
 TEST(RotationsFile, OfANameThatTwoImagesBearIsRefused) {
   Model model = TinyModel();
   model.images[1].name = "c.jpg";
-  EXPECT_THAT(ErrorOf("c.jpg 1 0 0 0", model),
+  EXPECT_THAT(RotationsError("c.jpg 1 0 0 0", model),
               HasSubstr("which several images of the model bear"));
 }
 

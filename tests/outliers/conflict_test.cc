@@ -15,7 +15,7 @@
 namespace krot {
 namespace {
 
-constexpr double kBound = 2;
+constexpr double kConflictBound = 2;
 
 std::vector<int64_t> All(const BuiltProblem& built) {
   std::vector<int64_t> all(built.pixels.size());
@@ -53,17 +53,17 @@ TEST(PackConflicts, AreInfeasibleAndIrreducibleByAnIndependentOracle) {
       const BuiltProblem built = BuildProblem(scene.model, {});
       Work work;
       const std::vector<Conflict> conflicts = PackConflicts(
-          scene.model, built, {norm, kBound}, All(built), {}, &work);
+          scene.model, built, {norm, kConflictBound}, All(built), {}, &work);
       ASSERT_FALSE(conflicts.empty());
       for (const Conflict& conflict : conflicts) {
         EXPECT_TRUE(conflict.is_irreducible);
         EXPECT_GT(OptimumByOracle(built.problem, norm, conflict.observations),
-                  kBound);
+                  kConflictBound);
         for (const int64_t spared : conflict.observations) {
           std::vector<int64_t> others = conflict.observations;
           others.erase(std::find(others.begin(), others.end(), spared));
           EXPECT_LE(OptimumByOracle(built.problem, norm, others),
-                    kBound * (1 + 1e-6));
+                    kConflictBound * (1 + 1e-6));
         }
       }
     }
@@ -132,7 +132,7 @@ TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
   for (const uint64_t seed : {4u, 5u}) {
     const SyntheticScene scene = MakeOutlierScene(seed, 0.05);
     const BuiltProblem built = BuildProblem(scene.model, {});
-    const ErrorBound bound{Norm::L2(), kBound};
+    const ErrorBound bound{Norm::L2(), kConflictBound};
     Work work;
     const std::vector<Conflict> conflicts =
         PackConflicts(scene.model, built, bound, All(built), {}, &work);
@@ -142,7 +142,7 @@ TEST(PackConflicts, HaveNoCommonObservationAndAnAcceptedProof) {
       const PixelCertificateCheck check = CheckPixelCertificate(
           scene.model, built, bound.norm, conflict.proof, {});
       EXPECT_TRUE(check.is_accepted) << check.refusal;
-      EXPECT_GT(check.lower_bound, kBound);
+      EXPECT_GT(check.lower_bound, kConflictBound);
       for (const int64_t i : conflict.observations) {
         EXPECT_TRUE(seen.insert(i).second) << "observation " << i;
       }
@@ -171,7 +171,7 @@ TEST(Decide, EndsSoonWhereNothingCanBeDecided) {
   ASSERT_FALSE(built.pixels.empty());
   Work work;
   const Decision decision =
-      Decide(model, built, {Norm::L2(), kBound}, {}, &work);
+      Decide(model, built, {Norm::L2(), kConflictBound}, {}, &work);
   EXPECT_FALSE(decision.is_feasible);
   EXPECT_FALSE(decision.is_refuted);
   EXPECT_LE(work.done, 500 * static_cast<int64_t>(built.pixels.size()));
@@ -180,7 +180,7 @@ TEST(Decide, EndsSoonWhereNothingCanBeDecided) {
 TEST(PackConflicts, EndWhereTheirWorkIsUsedUp) {
   const SyntheticScene scene = MakeOutlierScene(4, 0.05);
   const BuiltProblem built = BuildProblem(scene.model, {});
-  const ErrorBound bound{Norm::L2(), kBound};
+  const ErrorBound bound{Norm::L2(), kConflictBound};
   Work whole;
   const std::vector<Conflict> all =
       PackConflicts(scene.model, built, bound, All(built), {}, &whole);

@@ -24,7 +24,7 @@ namespace {
 using ::testing::IsEmpty;
 using Track = std::vector<std::pair<ImageId, uint32_t>>;
 
-Model Scene(double pixel_noise = 0) {
+Model MatchedScene(double pixel_noise = 0) {
   SceneOptions options;
   options.num_frames = 10;
   options.num_points = 800;
@@ -67,7 +67,7 @@ MatchTracksResult Triangulate(const Model& poses, const Database& database,
 }
 
 TEST(TriangulateMatches, MakesTheTracksThatMatchesWereMadeFrom) {
-  const Model truth = Scene();
+  const Model truth = MatchedScene();
   MatchTracksOptions options;
   options.min_angle_deg = 0;
   const MatchTracksResult made =
@@ -155,7 +155,7 @@ TEST(PlaceMatches, CountsImagesThatNoMatchesHold) {
 
 // Joins tracks by matches that their epipolar lines agree with.
 TEST(TriangulateMatches, DividesTracksThatWrongMatchesJoinByTheirResiduals) {
-  const Model truth = Scene(0.3);
+  const Model truth = MatchedScene(0.3);
   Database database = DatabaseOf(truth);
   const MatchTracksResult sound = Triangulate(PosesOf(truth), database);
   std::mt19937 random(2);
@@ -184,7 +184,7 @@ TEST(TriangulateMatches, DividesTracksThatWrongMatchesJoinByTheirResiduals) {
 }
 
 TEST(TriangulateMatches, TakesOfTwoKeypointsOfAnImageTheNearerOne) {
-  Model truth = Scene();
+  Model truth = MatchedScene();
   // Each of the first image's 2D points has a twin that is 3 pixels off, which
   // has the same matches.
   Image& image = truth.images[0];
@@ -219,7 +219,7 @@ TEST(TriangulateMatches, TakesOfTwoKeypointsOfAnImageTheNearerOne) {
 }
 
 TEST(TriangulateMatches, DependsOnNoOrderAndNoNumberOfThreads) {
-  const Model truth = Scene(1);
+  const Model truth = MatchedScene(1);
   Database database = DatabaseOf(truth);
   Context one, three;
   one.num_threads = 1;
@@ -235,7 +235,7 @@ TEST(TriangulateMatches, DependsOnNoOrderAndNoNumberOfThreads) {
 }
 
 TEST(TriangulateMatches, LeavesOutWhatNothingChecksAndNarrowRays) {
-  const Model truth = Scene();
+  const Model truth = MatchedScene();
   MatchTracksOptions options;
   options.min_angle_deg = 60;
   const MatchTracksResult made =
@@ -262,7 +262,7 @@ TEST(TriangulateMatches, LeavesOutWhatNothingChecksAndNarrowRays) {
 }
 
 TEST(TriangulateMatches, DoesNotUsePairsThatContradictThePoses) {
-  const Model truth = Scene();
+  const Model truth = MatchedScene();
   Model poses = PosesOf(truth);
   Pose& pose = poses.frames[ImageGeometries(poses)[3].frame].rig_from_world;
   const Eigen::Matrix3d turn =
@@ -277,7 +277,7 @@ TEST(TriangulateMatches, DoesNotUsePairsThatContradictThePoses) {
 }
 
 TEST(TriangulateMatches, KeepsTheModelsTracksIfAsked) {
-  const Model truth = Scene();
+  const Model truth = MatchedScene();
   Database database = DatabaseOf(truth);
   database.pairs.clear();
   MatchTracksOptions options;

@@ -11,7 +11,7 @@ namespace krot {
 namespace {
 
 constexpr size_t kTurnedFrame = 2;
-constexpr double kBound = 2;
+constexpr double kSuspectBound = 2;
 constexpr double kRadians = 3.14159265358979323846 / 180;
 
 // A scene with half a pixel of noise in which one camera is turned where it
@@ -38,7 +38,7 @@ ImageId TurnedImage(const Model& model) {
 
 OutlierFilterSummary Filter(const Model& model) {
   OutlierFilterOptions options;
-  options.max_error = kBound;
+  options.max_error = kSuspectBound;
   return FilterOutliers(model, options, {}).summary;
 }
 
@@ -56,8 +56,8 @@ TEST(RotationSuspect, IsTheImageThatIsTurnedAndItsTurnIsRecovered) {
     EXPECT_LT(suspect.axis_in_cam.dot(axis.normalized()), -0.98);
     EXPECT_GT(suspect.num_above, suspect.num_observations / 4);
     EXPECT_LT(suspect.num_above_turned, suspect.num_above / 4);
-    EXPECT_GT(suspect.lower_bound_with, kBound);
-    EXPECT_LT(suspect.max_error_without, kBound);
+    EXPECT_GT(suspect.lower_bound_with, kSuspectBound);
+    EXPECT_LT(suspect.max_error_without, kSuspectBound);
   }
 }
 

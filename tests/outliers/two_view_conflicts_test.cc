@@ -12,13 +12,13 @@
 namespace krot {
 namespace {
 
-constexpr double kBound = 2;
+constexpr double kTwoViewBound = 2;
 
 struct Charged {
   explicit Charged(uint64_t seed)
       : scene(MakeOutlierScene(seed, 0.05)),
         built(BuildProblem(scene.model, {})),
-        removal(FindRemoval(scene.model, built, {Norm::L2(), kBound}, {})),
+        removal(FindRemoval(scene.model, built, {Norm::L2(), kTwoViewBound}, {})),
         worth(built.pixels.size(), 1) {
     for (const int64_t i : removal.observations) worth[i] = 0;
   }
@@ -36,12 +36,12 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
   for (const uint64_t seed : {1u, 2u, 3u}) {
     const Charged c(seed);
     const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
-                                     kBound);
+                                     kTwoViewBound);
     for (const int64_t i : c.removal.observations) {
       for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
         ++num_candidates;
         Work work;
-        EXPECT_TRUE(FindConflict(c.scene.model, c.built, {Norm::L2(), kBound},
+        EXPECT_TRUE(FindConflict(c.scene.model, c.built, {Norm::L2(), kTwoViewBound},
                                  set, {}, &work))
             << "observation " << i << ", seed " << seed;
       }
@@ -53,7 +53,7 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
 TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
   Charged c(4);
   for (size_t i = 0; i < c.worth.size(); i += 3) c.worth[i] = 0;
-  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate, kBound);
+  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate, kTwoViewBound);
   for (const int64_t i : c.removal.observations) {
     for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
       EXPECT_TRUE(std::is_sorted(set.begin(), set.end()));
@@ -70,7 +70,7 @@ TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
 
 TEST(TwoViewConflicts, HasNoCandidateForWhatIsWithinTheBound) {
   const Charged c(5);
-  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate, kBound);
+  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate, kTwoViewBound);
   for (int64_t i = 0; i < static_cast<int64_t>(c.worth.size()); ++i) {
     if (c.worth[i] == 0) continue;
     EXPECT_TRUE(conflicts.Candidates(i, c.worth).empty());

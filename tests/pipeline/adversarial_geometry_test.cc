@@ -25,7 +25,7 @@ using Eigen::Vector3d;
 
 constexpr double kFocal = 1000;  // pixels
 constexpr int kWidth = 1200;
-constexpr double kGap = 1e-3;
+constexpr double kLargestGap = 1e-3;
 
 struct Geometry {
   std::vector<Vector3d> centres;
@@ -100,7 +100,7 @@ Truth MakeTruth(const Geometry& geometry) {
 // What must hold however hard the scene is.
 SolveSummary ExpectTruthful(const Truth& truth) {
   SolveModelOptions options;
-  options.joint.relative_gap = kGap;
+  options.joint.relative_gap = kLargestGap;
   const SolveModelResult result = SolveModel(truth.start, options);
   ValidateModel(result.model);
   const SolveSummary& summary = result.summary;
@@ -117,7 +117,7 @@ void ExpectSolved(const Truth& truth) {
     EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
     EXPECT_TRUE(summary.is_certified);
   }
-  EXPECT_LE(summary.LowestCost(), truth.max_error / (1 - kGap) + 1e-6);
+  EXPECT_LE(summary.LowestCost(), truth.max_error / (1 - kLargestGap) + 1e-6);
 }
 
 // In a box in front of the cameras.

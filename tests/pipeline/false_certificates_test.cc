@@ -23,8 +23,8 @@ namespace krot {
 namespace {
 
 // Of the largest error, relative: what a claim must be above to be false.
-constexpr double kRounding = 1e-9;
-constexpr double kGap = 1e-6;
+constexpr double kBoundRounding = 1e-9;
+constexpr double kProvedGap = 1e-6;
 
 int NumModels() {
   const char* text = std::getenv("KROT_FALSE_CERTIFICATES");
@@ -47,7 +47,7 @@ class Dice {
   std::mt19937_64 random_;
 };
 
-Model Scene(uint64_t seed) {
+Model ProvedScene(uint64_t seed) {
   SceneOptions options;
   options.num_frames = 4;
   options.num_points = 12;
@@ -67,7 +67,7 @@ struct Solved {
 
 Solved RunSolve(const Model& model) {
   SolveModelOptions options;
-  options.joint.relative_gap = kGap;
+  options.joint.relative_gap = kProvedGap;
   options.finish.finish = Finish::kNone;
   options.describe_certificate = true;
   SolveModelResult result = SolveModel(model, options, {1});
@@ -134,7 +134,7 @@ Model Neighbour(const Model& model, uint64_t seed, Dice* dice) {
           .rig_from_world.quaternion_wxyz[1] += 0.01 * change;
       break;
     default:
-      return Scene(seed + 3000000);
+      return ProvedScene(seed + 3000000);
   }
   return other;
 }
@@ -149,7 +149,7 @@ struct Count {
     ++tried;
     refused += !verdict.is_accepted;
     false_ones +=
-        verdict.is_accepted && verdict.lower_bound > cost * (1 + kRounding);
+        verdict.is_accepted && verdict.lower_bound > cost * (1 + kBoundRounding);
   }
 };
 
@@ -164,7 +164,7 @@ TEST(FalseCertificates, AreNeverAcceptedAndTrueOnesAre) {
   Dice dice(1);
   for (int n = 0; n < NumModels(); ++n) {
     const auto seed = static_cast<uint64_t>(n);
-    const Model model = Scene(seed);
+    const Model model = ProvedScene(seed);
     const Solved solved = RunSolve(model);
     ASSERT_FALSE(solved.certificate.observations.empty());
     whole.Add(model, solved.certificate, solved.cost);

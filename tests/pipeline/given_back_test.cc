@@ -19,7 +19,7 @@
 namespace krot {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoBound = std::numeric_limits<double>::infinity();
 constexpr double kBaseline = 1e-3;
 
 Eigen::Vector2d PixelOf(const Model& model, const Image& image,
@@ -73,7 +73,7 @@ Model ModelThatAnyStepSpoils() {
 class GivenBackIn : public ::testing::TestWithParam<double> {};
 
 INSTANTIATE_TEST_SUITE_P(Norms, GivenBackIn,
-                         ::testing::Values(1, 2, kInfinity));
+                         ::testing::Values(1, 2, kNoBound));
 
 TEST_P(GivenBackIn, IsTheInputAndAllNumbersSpeakOfIt) {
   const Model model = ModelThatAnyStepSpoils();

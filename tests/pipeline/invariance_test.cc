@@ -17,10 +17,10 @@ namespace krot {
 namespace {
 
 // Of costs within the gap that is asked for, relative.
-constexpr double kGap = 1e-5;
-constexpr double kTolerance = 2 * kGap;
+constexpr double kSolvedGap = 1e-5;
+constexpr double kTolerance = 2 * kSolvedGap;
 
-Model Scene() {
+Model InvariantScene() {
   SceneOptions options;
   options.num_frames = 7;
   options.num_points = 80;
@@ -33,9 +33,9 @@ Model Scene() {
   return SynthesizeScene(options).model;
 }
 
-SolveModelResult RunSolve(const Model& model) {
+SolveModelResult SolveClosely(const Model& model) {
   SolveModelOptions options;
-  options.joint.relative_gap = kGap;
+  options.joint.relative_gap = kSolvedGap;
   options.finish.finish = Finish::kNone;
   SolveModelResult result = SolveModel(model, options);
   EXPECT_EQ(result.summary.termination, SolveTermination::kGapReached);
@@ -45,8 +45,8 @@ SolveModelResult RunSolve(const Model& model) {
 
 // That the two models have the same optimum, up to the unit of a pixel.
 void ExpectSameOptimum(const Model& a, const Model& b, double unit = 1) {
-  const SolveSummary first = RunSolve(a).summary;
-  const SolveSummary second = RunSolve(b).summary;
+  const SolveSummary first = SolveClosely(a).summary;
+  const SolveSummary second = SolveClosely(b).summary;
   EXPECT_NEAR(second.cost_final, unit * first.cost_final,
               kTolerance * unit * first.cost_final);
   EXPECT_NEAR(*second.lower_bound, unit * *first.lower_bound,
@@ -54,7 +54,7 @@ void ExpectSameOptimum(const Model& a, const Model& b, double unit = 1) {
 }
 
 TEST(Invariance, OfWhereTheModelLiesAndOfItsUnit) {
-  const Model model = Scene();
+  const Model model = InvariantScene();
   for (const double scale : {1e-6, 1.0, 1e6}) {
     SCOPED_TRACE(scale);
     const Similarity similarity{
@@ -108,7 +108,7 @@ Model Renamed(Model model) {
 }
 
 TEST(Invariance, OfIdsNamesAndOrder) {
-  const Model model = Scene();
+  const Model model = InvariantScene();
   ExpectSameOptimum(model, Renamed(model));
 }
 
@@ -134,13 +134,13 @@ Model WithTwins(const Model& model) {
 }
 
 TEST(Invariance, OfAnObservationThatIsSaidTwice) {
-  const Model model = Scene();
+  const Model model = InvariantScene();
   ExpectSameOptimum(model, WithTwins(model));
 }
 
 // SIMPLE_RADIAL images of four times the resolution.
 TEST(Invariance, OfTheUnitOfPixels) {
-  const Model model = Scene();
+  const Model model = InvariantScene();
   Model larger = model;
   for (Camera& camera : larger.cameras) {
     camera.width *= 4;

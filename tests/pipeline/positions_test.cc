@@ -99,7 +99,7 @@ Model Wiped(Model model) {
   return model;
 }
 
-SolveModelResult RunSolve(const Model& model,
+SolveModelResult SolveWith(const Model& model,
                           const std::vector<KnownPosition>& positions) {
   SolveModelOptions options;
   options.problem.positions = positions;
@@ -206,7 +206,7 @@ TEST(Positions, ThatHoldCamerasBackHaveTheOptimumThatTheirDualProves) {
   options.camera_model_id = 0;
   const Model model = SynthesizeScene(options).model;
   const auto expect_proved = [&](const std::vector<KnownPosition>& positions) {
-    const SolveModelResult result = RunSolve(model, positions);
+    const SolveModelResult result = SolveWith(model, positions);
     ExpectProved(model, result, positions);
     EXPECT_FALSE(result.summary.support_positions.empty());
     ASSERT_TRUE(result.summary.certificate);
@@ -232,8 +232,8 @@ TEST(Positions, AreGivenTheSmallestFactorThatABoundNeeds) {
   const std::vector<KnownPosition> of_points =
       Positions(model, 0.01, 1.5, 9, Of::kPoint3D);
   positions.insert(positions.end(), of_points.begin(), of_points.end());
-  const double as_given = *RunSolve(model, positions).summary.lower_bound;
-  const double without = RunSolve(model, {}).summary.LowestCost();
+  const double as_given = *SolveWith(model, positions).summary.lower_bound;
+  const double without = SolveWith(model, {}).summary.LowestCost();
   SolveModelOptions options;
   options.problem.positions = positions;
   options.inflate_positions_to = (as_given + without) / 2;
@@ -246,7 +246,7 @@ TEST(Positions, AreGivenTheSmallestFactorThatABoundNeeds) {
   EXPECT_LE(LargestRatio(result.model, Scaled(positions, factor.factor)),
             1 + kKept);
   const SolveSummary below =
-      RunSolve(model, Scaled(positions, factor.lower_bound)).summary;
+      SolveWith(model, Scaled(positions, factor.lower_bound)).summary;
   EXPECT_GT(below.LowestCost(), *options.inflate_positions_to);
   ASSERT_TRUE(factor.certificate);
   const CertificateVerdict verdict =
@@ -268,11 +268,11 @@ TEST(Positions, ThatHardlyHoldAnythingBackTakeFewRounds) {
   SolveModelOptions options;
   options.problem.positions = positions;
   options.inflate_positions_to =
-      1.01 * RunSolve(model, {}).summary.LowestCost();
+      1.01 * SolveWith(model, {}).summary.LowestCost();
   const SolveSummary inflated = SolveModel(model, options, {1}).summary;
   ASSERT_TRUE(inflated.position_factor);
   const SolveSummary summary =
-      RunSolve(model, Scaled(positions, inflated.position_factor->factor))
+      SolveWith(model, Scaled(positions, inflated.position_factor->factor))
           .summary;
   EXPECT_EQ(summary.termination, SolveTermination::kGapReached);
   EXPECT_LE(summary.rounds.size(), 15);
@@ -280,10 +280,10 @@ TEST(Positions, ThatHardlyHoldAnythingBackTakeFewRounds) {
 
 TEST(Positions, ThatHoldNothingBackLeaveTheOptimum) {
   const Model model = SynthesizeScene(Options()).model;
-  const SolveModelResult free = RunSolve(model, {});
+  const SolveModelResult free = SolveWith(model, {});
   const std::vector<KnownPosition> positions =
       Positions(free.model, 0.05, 0.2, 2);
-  const SolveModelResult result = RunSolve(model, positions);
+  const SolveModelResult result = SolveWith(model, positions);
   ExpectProved(model, result, positions);
   EXPECT_LE(*result.summary.lower_bound, free.summary.LowestCost());
   EXPECT_LE(*free.summary.lower_bound, result.summary.LowestCost());
@@ -295,8 +295,8 @@ TEST(Positions, BringAModelWithoutTranslationsToTheSameOptimum) {
   for (const std::vector<KnownPosition>& positions :
        {Positions(model, 0.02, 1.2, 1),
         Flattened(Positions(model, 0.02, 1.2, 10, Of::kPoint3D))}) {
-    const SolveModelResult result = RunSolve(model, positions);
-    const SolveModelResult from_nothing = RunSolve(wiped, positions);
+    const SolveModelResult result = SolveWith(model, positions);
+    const SolveModelResult from_nothing = SolveWith(wiped, positions);
     ExpectProved(wiped, from_nothing, positions);
     EXPECT_LE(*result.summary.lower_bound, from_nothing.summary.LowestCost());
     EXPECT_LE(*from_nothing.summary.lower_bound, result.summary.LowestCost());
@@ -309,7 +309,7 @@ TEST(Positions, OfRigsAndFarAwayAreKept) {
   options.rig_baseline = 0.1;
   const Model near = SynthesizeScene(options).model;
   const std::vector<KnownPosition> positions = Positions(near, 0.02, 1.2, 2);
-  const SolveModelResult result = RunSolve(near, positions);
+  const SolveModelResult result = SolveWith(near, positions);
   ExpectProved(near, result, positions);
 
   const Vector3d shift(5e5, -3e5, 4e5);
@@ -323,7 +323,7 @@ TEST(Positions, OfRigsAndFarAwayAreKept) {
   }
   for (Point3D& point : far.points3D) point.xyz += shift;
   for (KnownPosition& position : shifted) position.region.centre += shift;
-  const SolveModelResult of_far = RunSolve(far, shifted);
+  const SolveModelResult of_far = SolveWith(far, shifted);
   EXPECT_EQ(of_far.summary.termination, SolveTermination::kGapReached);
   EXPECT_LE(LargestRatio(of_far.model, shifted), 1 + 2 * kKept);
   EXPECT_NEAR(of_far.summary.LowestCost(), result.summary.LowestCost(),
@@ -337,7 +337,7 @@ TEST(Positions, ThatContradictTheObservationsAreNamed) {
   const Model model = SynthesizeScene(Options()).model;
   std::vector<KnownPosition> positions = Positions(model, 0.02, 0, 1);
   positions[3].region.centre += Vector3d(0.05, 0.03, 0.02);
-  const SolveModelResult result = RunSolve(model, positions);
+  const SolveModelResult result = SolveWith(model, positions);
   ExpectProved(model, result, positions);
   const auto names_it = [&](const SolveSummary& summary) {
     return std::any_of(
@@ -367,7 +367,7 @@ TEST(Positions, ThatNoRigCanHaveAreInConflictWithEachOther) {
       positions[1].region.centre - positions[0].region.centre;
   positions[0].region.centre -= apart / 2;
   positions[1].region.centre += apart / 2;
-  const SolveSummary summary = RunSolve(model, positions).summary;
+  const SolveSummary summary = SolveWith(model, positions).summary;
   EXPECT_EQ(summary.termination, SolveTermination::kInfeasible);
   EXPECT_TRUE(summary.is_certified);
   EXPECT_TRUE(std::any_of(
@@ -378,7 +378,7 @@ TEST(Positions, ThatNoRigCanHaveAreInConflictWithEachOther) {
 TEST(Positions, OfATamperedCertificateAreRefused) {
   const Model model = SynthesizeScene(Options()).model;
   const std::vector<KnownPosition> positions = Positions(model, 0.02, 1.5, 1);
-  const CertificateFile file = *RunSolve(model, positions).summary.certificate;
+  const CertificateFile file = *SolveWith(model, positions).summary.certificate;
   ASSERT_FALSE(file.positions.empty());
   ASSERT_TRUE(VerifyCertificateFile(model, file).is_accepted);
   const auto is_accepted = [&](const auto& change) {

@@ -56,12 +56,6 @@ TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessBySweepsAlone) {
   Compare(SceneToShare(), options);
 }
 
-TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessWithAFinishOfSweeps) {
-  SolveModelOptions options;
-  options.finish.finish = Finish::kSweeps;
-  Compare(SceneToShare(), options);
-}
-
 TEST_P(SolveByRanksTest, HasTheBitsOfOneProcessInTheLargestNorm) {
   SolveModelOptions options;
   options.norm = Norm::LInf();

@@ -15,7 +15,6 @@
 #include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
@@ -212,44 +211,6 @@ TEST(SolveModel, SweepsAloneForANormWithoutAJointSolver) {
   EXPECT_EQ(SolveModel(model, options).summary.method, SolveMethod::kResInt);
   options.method = SolveMethod::kJoint;
   EXPECT_THROW(SolveModel(model, options), std::invalid_argument);
-}
-
-// The largest residual of every frame.
-std::vector<double> FrameMaxima(const BuiltProblem& built,
-                                const Estimate& estimate) {
-  std::vector<double> maxima(built.problem.num_frames, 0);
-  for (const Observation& observation : built.problem.observations) {
-    double& maximum = maxima[built.problem.views[observation.view].frame];
-    maximum = std::max(
-        maximum, ResidualOf(ViewPoint(built.problem, observation, estimate),
-                            Norm::L2()));
-  }
-  return maxima;
-}
-
-// By how much, relative, the frame that gains most can lower its own maximum.
-double LargestFrameGain(const Model& model) {
-  const BuiltProblem built = BuildProblem(model, {});
-  Estimate swept = built.start;
-  BlockSweep(built.problem, {}, Norm::L2(), Context{1}).ResectFrames(&swept);
-  const std::vector<double> before = FrameMaxima(built, built.start);
-  const std::vector<double> after = FrameMaxima(built, swept);
-  double gain = 0;
-  for (size_t f = 0; f < before.size(); ++f) {
-    gain = std::max(gain, (before[f] - after[f]) / before[f]);
-  }
-  return gain;
-}
-
-TEST(SolveModel, LeavesEveryFrameAtItsOwnLowestMaximumAfterSweeps) {
-  SceneOptions scene = NoisyScene();
-  scene.num_frames = 20;  // more than set the maximum
-  const Model model = SynthesizeScene(scene).model;
-  SolveModelOptions options;
-  options.finish.finish = Finish::kSweeps;
-  EXPECT_LT(LargestFrameGain(SolveModel(model, options).model), 1e-6);
-  options.method = SolveMethod::kJoint;
-  EXPECT_GT(LargestFrameGain(SolveModel(model, options).model), 1e-2);
 }
 
 TEST(SolveModel, FindsTheSameOptimumFromNothing) {

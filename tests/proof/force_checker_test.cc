@@ -1,3 +1,4 @@
+#include "krot/base/numbers.h"
 #include "krot/proof/force_checker.h"
 
 #include <algorithm>
@@ -17,8 +18,6 @@ using Real = ForceChecker::Real;
 using Vector2 = ForceChecker::Vector2;
 using Vector3 = ForceChecker::Vector3;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
-
-constexpr double kPi = 3.14159265358979;
 
 // One point, seen twice by one frame: at slopes of 1/2 and 0 with one lens, of
 // 2 and 1 with another. Multipliers whose forces cancel: with f the focal

@@ -19,7 +19,7 @@ const Vector3d kFar(1e6, -1e6, 0);
 const Matrix3d kTurned =
     (Matrix3d() << 1, -1e-15, 0, 1e-15, 1, 0, 0, 0, 1).finished();
 
-View ViewAt(const Vector3d& cam_from_rig_translation, int32_t frame) {
+View SensorAt(const Vector3d& cam_from_rig_translation, int32_t frame) {
   return {Matrix3d::Identity(), Matrix3d::Identity(), cam_from_rig_translation,
           frame};
 }
@@ -35,7 +35,7 @@ KnownRotationProblem TwoSensors(const Vector3d& first = kFar,
                                 const Vector3d& second = kFar) {
   KnownRotationProblem problem;
   problem.num_frames = problem.num_points = 1;
-  problem.views = {ViewAt(first, 0), ViewAt(second, 0)};
+  problem.views = {SensorAt(first, 0), SensorAt(second, 0)};
   const Eigen::Matrix2d J = 1000 * Eigen::Matrix2d::Identity();
   problem.observations = {{RowAtRay({-0.001, 0}, J), 0, 0},
                           {RowAtRay({0.001, 0}, J), 1, 0}};
@@ -97,7 +97,7 @@ TEST(RoundingAllowance, CoversOffsetsOfWhatIsPulled) {
 TEST(RoundingAllowance, CoversWhereFixedFramesAndPointsStand) {
   KnownRotationProblem problem;
   problem.num_frames = problem.num_points = 2;
-  problem.views = {ViewAt(Vector3d::Zero(), 0), ViewAt(kFar, 1)};
+  problem.views = {SensorAt(Vector3d::Zero(), 0), SensorAt(kFar, 1)};
   problem.fixed_translations = {Vector3d(-kFar), Vector3d(-3 * kFar)};
   problem.fixed_points = {Vector3d(3 * kFar), std::nullopt};
   const Eigen::Matrix2d J = Eigen::Matrix2d::Identity();

@@ -42,7 +42,6 @@ TEST(SolveJson, KeepsEveryBitOfItsNumbers) {
   EXPECT_EQ(json["left_out"]["behind"], 2);
   EXPECT_EQ(json["left_out"]["short_track"], 3);
   EXPECT_EQ(json["left_out"]["no_pose"], 0);
-  EXPECT_EQ(json["left_out"]["single_ray"], 0);  // never, but keys stay
 }
 
 TEST(SolveJson, SaysNullForErrorsThatNoObservationHas) {

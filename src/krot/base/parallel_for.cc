@@ -100,7 +100,7 @@ int ResolveNumThreads(int requested) {
 }
 
 void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
-                 const std::function<void(int64_t, int64_t, int)>& body) {
+                 const ChunkBody& body) {
   CheckAtLeast(1, chunk_size, "chunk_size");
   if (count <= 0) return;
   const int64_t num_chunks = NumChunks(count, chunk_size);

@@ -47,6 +47,26 @@ class ThreadPool {
 // otherwise the number of hardware threads. At least 1.
 int ResolveNumThreads(int requested);
 
+// Any callable as body(begin, end, worker), which it refers to: a std::function
+// would be compiled anew for each of them, in more time than most bodies take.
+class ChunkBody {
+ public:
+  template <typename Body>
+  ChunkBody(const Body& body)  // NOLINT(google-explicit-constructor)
+      : body_(&body),
+        call_([](const void* called, int64_t begin, int64_t end, int worker) {
+          (*static_cast<const Body*>(called))(begin, end, worker);
+        }) {}
+
+  void operator()(int64_t begin, int64_t end, int worker) const {
+    call_(body_, begin, end, worker);
+  }
+
+ private:
+  const void* body_;
+  void (*call_)(const void*, int64_t, int64_t, int);
+};
+
 // Calls body(begin, end, worker) for the fixed chunks [0, chunk_size),
 // [chunk_size, 2 chunk_size), ... of [0, count), each exactly once, on up to
 // `num_threads` threads (resolved as above); `worker` in [0, num_threads)
@@ -60,9 +80,8 @@ int ResolveNumThreads(int requested);
 //
 // If bodies throw, all chunks are visited nevertheless, and the exception of
 // the first chunk that threw is rethrown afterwards.
-void ParallelFor(
-    int64_t count, int64_t chunk_size, int num_threads,
-    const std::function<void(int64_t begin, int64_t end, int worker)>& body);
+void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
+                 const ChunkBody& body);
 
 // The number of chunks that ParallelFor makes.
 inline int64_t NumChunks(int64_t count, int64_t chunk_size) {

@@ -302,8 +302,6 @@ const char* LeftOutName(LeftOut reason) {
       return "behind";
     case LeftOut::kUndistortion:
       return "undistortion";
-    case LeftOut::kOffAxis:
-      return "off_axis";
     case LeftOut::kShortTrack:
       return "short_track";
     case LeftOut::kNoPose:

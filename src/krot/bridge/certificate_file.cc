@@ -20,21 +20,17 @@ CertificateFile ReadCertificate(const JsonReader& reader, const Json& json) {
     return reader.Member(json, "the file", key);
   };
   const Json& version = member("version");
-  if (version != 1 && version != kCertificateVersion) {
-    reader.Fail("version", version,
-                "1 or " + std::to_string(kCertificateVersion));
+  if (version != kCertificateVersion) {
+    reader.Fail("version", version, std::to_string(kCertificateVersion));
   }
   CertificateFile file;
-  file.version = version.get<int>();
   file.norm = reader.ReadNorm(member("norm"));
   file.lower_bound = reader.Number(member("lower_bound"), "lower_bound");
-  file.rows_bound = file.version == 1
-                        ? file.lower_bound
-                        : reader.Number(member("rows_bound"), "rows_bound");
+  file.rows_bound = reader.Number(member("rows_bound"), "rows_bound");
   file.defect = reader.Number(member("defect"), "defect");
   file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
   file.observations =
-      reader.ReadSupport(member("observations"), file.version, "observations");
+      reader.ReadSupport(member("observations"), "observations");
   const auto fixed = json.find("fixed");
   if (fixed != json.end()) reader.ReadFixed(*fixed, &file);
   const auto positions = json.find("positions");
@@ -131,17 +127,17 @@ CertificateFile DescribeCertificate(const Model& model,
 }
 
 std::string CertificateJson(const CertificateFile& file) {
-  Json json = {{"version", file.version},
+  Json json = {{"version", kCertificateVersion},
                {"norm", NormJson(file.norm)},
-               {"lower_bound", file.lower_bound}};
-  if (file.version != 1) json["rows_bound"] = file.rows_bound;
-  json["defect"] = file.defect;
-  json["model_sha256"] = file.model_sha256;
+               {"lower_bound", file.lower_bound},
+               {"rows_bound", file.rows_bound},
+               {"defect", file.defect},
+               {"model_sha256", file.model_sha256}};
   if (!file.fixed_images.empty() || !file.fixed_points.empty()) {
     json["fixed"] = FixedJson(file);
   }
   if (!file.positions.empty()) json["positions"] = PositionsJson(file);
-  json["observations"] = SupportJson(file.observations, file.version);
+  json["observations"] = SupportJson(file.observations);
   return json.dump(1) + "\n";
 }
 

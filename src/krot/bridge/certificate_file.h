@@ -14,23 +14,18 @@
 
 namespace krot {
 
-// Version 2 proves a bound in true pixels (pixel_certificate.h). Version 1,
-// which is still read, proves one of rows that are linearised at the
-// observations.
 inline constexpr int kCertificateVersion = 2;
 
-// A certificate in terms of the model's ids: what is written to a file, and
-// can be checked by anyone who has the model (docs/formats.md).
+// A certificate of a bound in true pixels (pixel_certificate.h), in terms of the
+// model's ids: what is written to a file, and can be checked by anyone who has
+// the model (docs/formats.md).
 struct CertificateFile {
   struct SupportObservation {
     ImageId image_id = 0;
     uint32_t point2D_idx = 0;
     Point3DId point3D_id = 0;
-    // Version 2: where the row is taken, in the camera's frame.
+    // Where the row is taken, in the camera's frame.
     Eigen::Vector3d bearing = Eigen::Vector3d::Zero();
-    // Version 1: the row at the pixel's own ray.
-    Eigen::Vector2d u = Eigen::Vector2d::Zero();
-    Eigen::Matrix2d J = Eigen::Matrix2d::Zero();  // pixels
     double lambda = 0;
     Eigen::Vector2d y = Eigen::Vector2d::Zero();
   };
@@ -59,10 +54,9 @@ struct CertificateFile {
     std::vector<Row> rows;
   };
 
-  int version = kCertificateVersion;
   Norm norm;
-  double lower_bound = 0;  // true pixels; version 1: of the rows
-  double rows_bound = 0;   // delta of the rows, pixels; version 2
+  double lower_bound = 0;  // true pixels
+  double rows_bound = 0;   // delta of the rows, pixels
   double defect = 0;       // of the rows' identities, relative
   std::string model_sha256;
   std::vector<SupportObservation> observations;

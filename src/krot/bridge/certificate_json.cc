@@ -12,20 +12,7 @@ using Json = CertificateFileJson;
 
 Json TripleJson(const Eigen::Vector3d& x) { return {x[0], x[1], x[2]}; }
 
-// Version 1: u and J.
-void ReadRow(const JsonReader& reader, const Json& u, const Json& J,
-             const std::string& place,
-             CertificateFile::SupportObservation* observation) {
-  observation->u = reader.Pair(u, place + ".u");
-  if (!J.is_array() || J.size() != 2) {
-    reader.Fail(place + ".J", J, "two rows of two numbers");
-  }
-  observation->J.row(0) = reader.Pair(J[0], place + ".J[0]").transpose();
-  observation->J.row(1) = reader.Pair(J[1], place + ".J[1]").transpose();
-}
-
 CertificateFile::SupportObservation ReadObservation(const JsonReader& reader,
-                                                    int version,
                                                     const Json& json,
                                                     const std::string& place) {
   const auto member = [&](const char* key) -> const Json& {
@@ -39,11 +26,7 @@ CertificateFile::SupportObservation ReadObservation(const JsonReader& reader,
       reader.Id(member("point2D_idx"), place + ".point2D_idx", kLargest32));
   o.point3D_id = reader.Id(member("point3D_id"), place + ".point3D_id",
                            std::numeric_limits<uint64_t>::max());
-  if (version == 1) {
-    ReadRow(reader, member("u"), member("J"), place, &o);
-  } else {
-    o.bearing = reader.Triple(member("bearing"), place + ".bearing");
-  }
+  o.bearing = reader.Triple(member("bearing"), place + ".bearing");
   o.lambda = reader.Number(member("lambda"), place + ".lambda");
   o.y = reader.Pair(member("y"), place + ".y");
   return o;
@@ -132,11 +115,11 @@ Norm JsonReader::ReadNorm(const Json& value) const {
 }
 
 std::vector<CertificateFile::SupportObservation> JsonReader::ReadSupport(
-    const Json& observations, int version, const std::string& place) const {
+    const Json& observations, const std::string& place) const {
   std::vector<CertificateFile::SupportObservation> support;
   Array(observations, place);
   for (size_t n = 0; n < observations.size(); ++n) {
-    support.push_back(ReadObservation(*this, version, observations[n],
+    support.push_back(ReadObservation(*this, observations[n],
                                       place + "[" + std::to_string(n) + "]"));
   }
   return support;
@@ -249,21 +232,15 @@ CertificateFileJson NormJson(Norm norm) {
 }
 
 CertificateFileJson SupportJson(
-    const std::vector<CertificateFile::SupportObservation>& support,
-    int version) {
+    const std::vector<CertificateFile::SupportObservation>& support) {
   Json observations = Json::array();
   for (const CertificateFile::SupportObservation& o : support) {
     Json json = {{"image_id", o.image_id},
                  {"point2D_idx", o.point2D_idx},
-                 {"point3D_id", o.point3D_id}};
-    if (version == 1) {
-      json["u"] = {o.u[0], o.u[1]};
-      json["J"] = {{o.J(0, 0), o.J(0, 1)}, {o.J(1, 0), o.J(1, 1)}};
-    } else {
-      json["bearing"] = {o.bearing[0], o.bearing[1], o.bearing[2]};
-    }
-    json["lambda"] = o.lambda;
-    json["y"] = {o.y[0], o.y[1]};
+                 {"point3D_id", o.point3D_id},
+                 {"bearing", TripleJson(o.bearing)},
+                 {"lambda", o.lambda},
+                 {"y", {o.y[0], o.y[1]}}};
     observations.push_back(std::move(json));
   }
   return observations;

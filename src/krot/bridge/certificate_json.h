@@ -38,9 +38,9 @@ class JsonReader {
                                 const std::string& place) const;
   Eigen::Vector2d Pair(const Json& value, const std::string& place) const;
   Norm ReadNorm(const Json& value) const;
-  // The support of a certificate of a version.
+  // The support of a certificate.
   std::vector<CertificateFile::SupportObservation> ReadSupport(
-      const Json& observations, int version, const std::string& place) const;
+      const Json& observations, const std::string& place) const;
   // Fills in what does not move.
   void ReadFixed(const Json& fixed, CertificateFile* file) const;
   // Fills in where cameras and points are known to be.
@@ -54,7 +54,6 @@ CertificateFileJson NormJson(Norm norm);
 CertificateFileJson FixedJson(const CertificateFile& file);
 CertificateFileJson PositionsJson(const CertificateFile& file);
 CertificateFileJson SupportJson(
-    const std::vector<CertificateFile::SupportObservation>& observations,
-    int version);
+    const std::vector<CertificateFile::SupportObservation>& observations);
 
 }  // namespace krot

@@ -10,7 +10,6 @@
 #include "krot/bridge/model_digest.h"
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/bridge/reprojection.h"
-#include "krot/camera/camera_model.h"
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 #include "krot/model/local_frame.h"
@@ -19,24 +18,9 @@
 namespace krot {
 namespace {
 
-// How far u and J of another implementation may be from ours, relative.
-constexpr double kRayTolerance = 1e-9;
-
 std::string NameOf(const CertificateFile::SupportObservation& o) {
   return "observation " + std::to_string(o.point2D_idx) + " of image " +
          std::to_string(o.image_id);
-}
-
-// Whether u and J, of version 1, are the pixel's. Also false for NaN.
-bool IsSameRay(const CertificateFile::SupportObservation& o,
-               const Reprojection::Source& source,
-               const Eigen::Vector2d& pixel) {
-  UndistortedObservation own;
-  return FindCameraModel(source.model_id)->has_image_plane &&
-         UndistortPixel(source.model_id, source.params, pixel, std::nullopt,
-                        &own) == UndistortStatus::kOk &&
-         (o.u - own.u).norm() <= kRayTolerance * own.u.homogeneous().norm() &&
-         (o.J - own.J).norm() <= kRayTolerance * own.J.norm();
 }
 
 // Why an entry of the file found no observation of the problem for itself.
@@ -103,8 +87,7 @@ FixedClaim FindFixed(const Model& model, const CertificateFile& file) {
   return claim;
 }
 
-// The certificate in terms of the problem, into which the rows of a file of
-// version 1 go.
+// The certificate in terms of the problem.
 struct Translation {
   std::string refusal;
   bool is_unseen = false;  // the problem has not all of its observations
@@ -112,7 +95,7 @@ struct Translation {
 };
 
 Translation Translate(const Model& model, const CertificateFile& file,
-                      BuiltProblem* built) {
+                      const BuiltProblem& built) {
   using Key = std::tuple<ImageId, uint32_t, Point3DId>;
   std::multimap<Key, const CertificateFile::SupportObservation*> by_key;
   for (const CertificateFile::SupportObservation& o : file.observations) {
@@ -123,12 +106,11 @@ Translation Translate(const Model& model, const CertificateFile& file,
   translation.certificate.lower_bound = file.lower_bound;
   rows.lower_bound = file.rows_bound;
   rows.defect = file.defect;
-  const Reprojection reprojection(model, *built);
-  const CertificatePositions positions(model, file, *built);
-  KnownRotationProblem& problem = built->problem;
+  const CertificatePositions positions(model, file, built);
+  const KnownRotationProblem& problem = built.problem;
   for (size_t i = 0; i < problem.observations.size(); ++i) {
-    Observation& own = problem.observations[i];
-    if (!built->HasPixel(static_cast<int64_t>(i))) {
+    const Observation& own = problem.observations[i];
+    if (!built.HasPixel(static_cast<int64_t>(i))) {
       const auto* row = positions.RowOf(static_cast<int64_t>(i));
       if (row == nullptr) continue;
       translation.certificate.bearings.push_back(row->apex);
@@ -137,26 +119,19 @@ Translation Translate(const Model& model, const CertificateFile& file,
       continue;
     }
     const auto found =
-        by_key.find({model.images[built->image_of[own.view]].id,
-                     static_cast<uint32_t>(built->point2D_of[i]),
-                     model.points3D[built->point_of[own.point]].id});
+        by_key.find({model.images[built.image_of[own.view]].id,
+                     static_cast<uint32_t>(built.point2D_of[i]),
+                     model.points3D[built.point_of[own.point]].id});
     if (found == by_key.end()) continue;
     const CertificateFile::SupportObservation& o = *found->second;
     by_key.erase(found);
-    if (file.version == 1 &&
-        !IsSameRay(o, reprojection.SourceOf(static_cast<int64_t>(i)),
-                   built->pixels[i])) {
-      translation.refusal = "u or J of " + NameOf(o) + " is not the model's";
-      return translation;
-    }
-    if (file.version == 1) own.E = RowAtRay(o.u, o.J);
     translation.certificate.bearings.push_back(o.bearing);
     rows.observations.push_back({static_cast<int64_t>(i), o.lambda, o.y});
   }
   if (!by_key.empty()) {
     translation.is_unseen = true;
     translation.refusal =
-        RefusalOfUnused(*by_key.begin()->second, model, *built);
+        RefusalOfUnused(*by_key.begin()->second, model, built);
   }
   return translation;
 }
@@ -189,33 +164,23 @@ CertificateVerdict VerifyCertificateFile(const Model& original,
   build.fixed = std::move(fixed.parts);
   build.positions = frame.ToLocal(positions);
   BuiltProblem built = BuildProblem(model, build);
-  Translation translation = Translate(model, file, &built);
+  Translation translation = Translate(model, file, built);
   if (translation.is_unseen) {
     build.ignore_translations = true;
     built = BuildProblem(model, build);
-    translation = Translate(model, file, &built);
+    translation = Translate(model, file, built);
   }
   verdict.refusal = translation.refusal;
   if (!verdict.refusal.empty()) return verdict;
 
-  if (file.version == 1) {
-    const CertificateCheck check = CheckCertificate(
-        built.problem, file.norm, translation.certificate.rows);
-    verdict.is_accepted = check.is_accepted;
-    verdict.lower_bound = check.proved_bound;
-    verdict.defect = check.defect;
-    verdict.refusal = check.refusal;
-  } else {
-    const PixelCertificateCheck check = CheckPixelCertificate(
-        model, built, file.norm, translation.certificate, {});
-    verdict.is_accepted = check.is_accepted;
-    verdict.lower_bound = check.lower_bound;
-    verdict.defect = check.defect;
-    verdict.refusal = check.refusal;
-  }
+  const PixelCertificateCheck check = CheckPixelCertificate(
+      model, built, file.norm, translation.certificate, {});
+  verdict.is_accepted = check.is_accepted;
+  verdict.lower_bound = check.lower_bound;
+  verdict.defect = check.defect;
+  verdict.refusal = check.refusal;
   if (!verdict.is_accepted) return verdict;
 
-  verdict.is_linearised = file.version == 1;
   const double cost =
       Reprojection(model, built).TrueCost(built.start, file.norm, -1);
   if (std::isfinite(cost)) {

@@ -47,7 +47,7 @@ ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
     conflict.defect = number("defect");
     conflict.observations =
         reader.ReadSupport(reader.Member(conflicts[n], place, "observations"),
-                           kCertificateVersion, place + ".observations");
+                           place + ".observations");
     if (file.version == kConflictFileVersion) {
       const std::string bounds = place + ".max_errors";
       const Json& values = reader.Array(
@@ -94,8 +94,7 @@ std::string ConflictJson(const ConflictFile& file) {
     conflicts.push_back({{"lower_bound", conflict.lower_bound},
                          {"rows_bound", conflict.rows_bound},
                          {"defect", conflict.defect},
-                         {"observations", SupportJson(conflict.observations,
-                                                      kCertificateVersion)}});
+                         {"observations", SupportJson(conflict.observations)}});
     if (file.version == kConflictFileVersion) {
       conflicts.back()["max_errors"] = conflict.max_errors;
     }

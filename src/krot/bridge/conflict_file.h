@@ -17,8 +17,8 @@ inline constexpr int kConflictFileVersion = 2;
 
 // Conflicts without a common observation, in terms of the model's ids: a proof
 // that as many observations at least must go for all others to be within a
-// bound, or each within its own (docs/formats.md). Each is a certificate of
-// version 2 whose lower bound is above it.
+// bound, or each within its own (docs/formats.md). Each is a certificate
+// whose lower bound is above it.
 struct ConflictFile {
   struct Conflict {
     double lower_bound = 0;  // true pixels; > max_error

@@ -51,8 +51,8 @@ struct UndistortedObservation {
 enum class UndistortStatus {
   kOk,
   kNotConverged,  // no ray reproduces the pixel with det J > 0 from the axis
-                  // to the ray, or none was found: "undistortion"
-  kOffAxis        // that ray is 90 degrees or more off the axis: "off_axis"
+                  // to the ray, or none was found
+  kOffAxis        // that ray is 90 degrees or more off the axis
 };
 
 // The ray u whose projection is the pixel and that lies before the first fold

@@ -56,30 +56,9 @@ class ObservationLoop {
   template <typename Value, typename Term, typename Combine>
   Value Reduce(const Value& start, const Term& term,
                const Combine& combine) const {
-    if (ranks_ != nullptr) return ReduceInTurn(start, term, combine);
-    std::vector<Value> parts(NumChunks(count_, kChunk), start);
-    ParallelFor(count_, kChunk, num_threads_,
-                [&](int64_t begin, int64_t end, int) {
-                  Value value = start;
-                  for (int64_t i = begin; i < end; ++i) {
-                    value = combine(value, term(i));
-                  }
-                  parts[begin / kChunk] = value;
-                });
-    Value value = start;
-    for (const Value& part : parts) value = combine(value, part);
-    return value;
-  }
-
- private:
-  static constexpr int64_t kChunk = 4096;
-
-  // Chunks are those of the whole. One that begins on one rank and ends on
-  // another is added up by both, one after the other.
-  template <typename Value, typename Term, typename Combine>
-  Value ReduceInTurn(const Value& start, const Term& term,
-                     const Combine& combine) const {
-    // Up to the first chunk that begins here.
+    // Chunks are those of the whole. One that begins on one rank and ends on
+    // another is added up by both, one after the other: `head` ends where the
+    // first chunk begins here.
     const int64_t head = std::min(count_, (kChunk - first_ % kChunk) % kChunk);
     std::vector<Value> parts(NumChunks(count_ - head, kChunk), start);
     const auto add = [&](int64_t begin, int64_t end, Value value) {
@@ -90,33 +69,40 @@ class ObservationLoop {
                 [&](int64_t begin, int64_t end, int) {
                   parts[begin / kChunk] = add(head + begin, head + end, start);
                 });
-    struct Sum {
-      Value closed;  // of chunks that are complete
-      Value open;    // of the chunk that is not
+    OpenSum<Value> sum{start, start};
+    const auto add_parts = [&](OpenSum<Value>* so_far) {
+      const auto close = [&](int64_t end) {
+        if ((first_ + end) % kChunk != 0 && first_ + end != whole_count_) {
+          return;
+        }
+        so_far->closed = combine(so_far->closed, so_far->open);
+        so_far->open = start;
+      };
+      if (head > 0) {
+        so_far->open = add(0, head, so_far->open);
+        close(head);
+      }
+      for (size_t n = 0; n < parts.size(); ++n) {
+        so_far->open = parts[n];
+        close(std::min(count_, head + static_cast<int64_t>(n + 1) * kChunk));
+      }
     };
-    Sum sum{start, start};
-    ranks_->InTurn(
-        [&](Sum* so_far) {
-          const auto close = [&](int64_t end) {
-            if ((first_ + end) % kChunk != 0 && first_ + end != whole_count_) {
-              return;
-            }
-            so_far->closed = combine(so_far->closed, so_far->open);
-            so_far->open = start;
-          };
-          if (head > 0) {
-            so_far->open = add(0, head, so_far->open);
-            close(head);
-          }
-          for (size_t n = 0; n < parts.size(); ++n) {
-            so_far->open = parts[n];
-            close(
-                std::min(count_, head + static_cast<int64_t>(n + 1) * kChunk));
-          }
-        },
-        &sum);
+    if (ranks_ == nullptr) {
+      add_parts(&sum);
+    } else {
+      ranks_->InTurn(add_parts, &sum);
+    }
     return sum.closed;
   }
+
+ private:
+  static constexpr int64_t kChunk = 4096;
+
+  template <typename Value>
+  struct OpenSum {
+    Value closed;  // of chunks that are complete
+    Value open;    // of the chunk that is not
+  };
 
   int64_t count_;
   int num_threads_;

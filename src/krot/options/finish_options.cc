@@ -7,12 +7,10 @@ void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
   table->AddNamed<Finish>(
       "Solver.finish", &finish->finish,
       {{FinishName(Finish::kLeastSquares), Finish::kLeastSquares},
-       {FinishName(Finish::kSweeps), Finish::kSweeps},
        {FinishName(Finish::kNone), Finish::kNone}},
       "With method auto, what the room above the lowest maximum is for: "
       "least_squares: the least squares of all estimates within finish_slack "
-      "of it; sweeps: every point's and every frame's own maximum is lowered; "
-      "none: nothing");
+      "of it; none: nothing");
   table->AddReal("Solver.finish_slack", &finish->slack,
                  Above(0.0, "relative to the lowest maximum"),
                  "With finish least_squares: how far above the lowest maximum "

@@ -122,13 +122,11 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
     throw OptionError("--Solver.init feasible needs --Solver.norm 1, 2 or inf");
   }
   if (options.norm.p != 2 || method == SolveMethod::kResInt ||
-      options.polish != Polish::kNone ||
-      options.finish.finish == Finish::kSweeps) {
+      options.polish != Polish::kNone) {
     for (const char* name : {"positions_path", "point_positions_path",
                              "Problem.inflate_positions"}) {
       table.Refuse(name,
-                   "but with --Solver.norm 2, the joint solver, and neither a "
-                   "polish nor a finish of sweeps");
+                   "but with --Solver.norm 2, the joint solver, and no polish");
     }
   }
   if (method == SolveMethod::kResInt) {

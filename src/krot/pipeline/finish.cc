@@ -3,15 +3,7 @@
 namespace krot {
 
 const char* FinishName(Finish finish) {
-  switch (finish) {
-    case Finish::kSweeps:
-      return "sweeps";
-    case Finish::kLeastSquares:
-      return "least_squares";
-    case Finish::kNone:
-      break;
-  }
-  return "none";
+  return finish == Finish::kNone ? "none" : "least_squares";
 }
 
 }  // namespace krot

@@ -11,11 +11,10 @@ namespace krot {
 // observations, and the others may be anywhere below.
 enum class Finish {
   kNone,
-  kSweeps,        // every point's and every frame's own maximum is lowered
   kLeastSquares,  // the least squares of all estimates below the cap
 };
 
-// As --Solver.finish takes it: "none", "sweeps", "least_squares".
+// As --Solver.finish takes it: "none", "least_squares".
 const char* FinishName(Finish finish);
 
 struct FinishOptions {

@@ -5,12 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "krot/base/timer.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/joint/step_values.h"
 #include "krot/pipeline/position_level.h"
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
 
 namespace krot {
 namespace {
@@ -19,10 +19,6 @@ namespace {
 constexpr double kShareOfSlack = 0.5;
 // What rounding may add to the largest error, relative.
 constexpr double kRounding = 1e-7;
-// After them a third would hardly lower any block's own maximum.
-constexpr int kSweeps = 2;
-// What a sweep may add to the cost by rounding, relative.
-constexpr double kCostRounding = 1e-12;
 // How much of what positions may be off by the finish takes: more than rounds.
 constexpr double kShareOfKept = 0.75;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -90,50 +86,15 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   reprojection.TakeRows(*estimate, context.num_threads, &built->problem);
 }
 
-void FinishBySweeps(const Reprojection& reprojection,
-                    const SolveModelOptions& options, const Context& context,
-                    const Timer& timer, BuiltProblem* built, Estimate* estimate,
-                    SolveSummary* summary) {
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    const double highest = (1 + kCostRounding) * summary->cost_final;
-    Estimate swept = *estimate;
-    BlockSweep blocks(built->problem, options.res_int.fast_descent,
-                      options.norm, context);
-    blocks.IntersectPoints(&swept);
-    blocks.ResectFrames(&swept);
-    const double rows_cost = MaxOfRanks(
-        context,
-        Cost(built->problem, swept, options.norm, context.num_threads));
-    if (context.IsCancelled() || !(rows_cost <= highest)) return;
-    const double cost = MaxOfRanks(
-        context,
-        reprojection.TrueCost(swept, options.norm, context.num_threads));
-    if (!(cost <= highest)) return;
-    *estimate = std::move(swept);
-    reprojection.TakeRows(*estimate, context.num_threads, &built->problem);
-    summary->cost_final = cost;
-    summary->sweeps.push_back({cost, timer.Seconds()});
-    if (options.res_int.callback) {
-      options.res_int.callback(static_cast<int>(summary->sweeps.size()),
-                               summary->sweeps.back());
-    }
-  }
-}
-
 }  // namespace
 
 void RunFinish(const Model& model, const SolveModelOptions& options,
                std::optional<double> lower_bound, const Context& context,
-               const Timer& timer, BuiltProblem* built, Estimate* estimate,
-               SolveSummary* summary) {
+               BuiltProblem* built, Estimate* estimate, SolveSummary* summary) {
   if (options.finish.finish == Finish::kNone) return;
-  const Reprojection reprojection(model, *built);
-  if (options.finish.finish == Finish::kSweeps) {
-    FinishBySweeps(reprojection, options, context, timer, built, estimate,
-                   summary);
-  } else if (!IsZeroUpToRounding(summary->cost_final)) {
-    FinishByLeastSquares(reprojection, options, lower_bound, context, built,
-                         estimate, summary);
+  if (!IsZeroUpToRounding(summary->cost_final)) {
+    FinishByLeastSquares(Reprojection(model, *built), options, lower_bound,
+                         context, built, estimate, summary);
   }
   if (context.IsCancelled()) {
     summary->termination = SolveTermination::kInterrupted;

@@ -62,8 +62,6 @@ void CheckOptions(const SolveModelOptions& options, const Context& context) {
                 "kResInt", "another with problem.positions");
   CheckArgument(options.polish == Polish::kNone, "polish", "not kNone",
                 "kNone with problem.positions");
-  CheckArgument(options.finish.finish != Finish::kSweeps, "finish", "kSweeps",
-                "another with problem.positions");
 }
 
 // The counts are those of the whole; memory is that of one process, and not
@@ -307,7 +305,7 @@ SolveModelResult SolveInFrame(const Model& model,
     RunFinish(
         model, options,
         certificate ? std::optional(certificate->lower_bound) : std::nullopt,
-        context, solve_timer, &start.built, &estimate, &summary);
+        context, &start.built, &estimate, &summary);
   }
   summary.loose = SettleEstimate(model, start.built,
                                  {options.norm, options.res_int.update_frames},

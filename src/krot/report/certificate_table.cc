@@ -10,12 +10,6 @@
 namespace krot {
 namespace {
 
-std::string LinearisedSentence(const CertificateVerdict& verdict) {
-  if (!verdict.is_linearised) return "";
-  return "Its file is of version 1: the error that it speaks of is linearised "
-         "at the\nobservation, which is exact for pinhole cameras alone.\n";
-}
-
 // What the bound presupposes beside rotations.
 std::string FixedSentence(const CertificateVerdict& verdict) {
   if (verdict.num_fixed_images + verdict.num_fixed_points == 0) return "";
@@ -86,7 +80,7 @@ std::string CertificateTable(const CertificateVerdict& verdict,
   return "The certificate holds: whatever the translations and points, the "
          "largest\nerror is at least the lower bound, in pixels.\n" +
          FixedSentence(verdict) + PositionsSentence(verdict) +
-         LinearisedSentence(verdict) + bounds.ToString() +
+         bounds.ToString() +
          SupportTable(verdict.support, max_observations) +
          PositionsTable(verdict.positions, max_observations);
 }

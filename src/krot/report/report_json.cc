@@ -70,7 +70,6 @@ Json VerdictJson(const std::optional<CertificateVerdict>& verdict) {
   return {{"lower_bound", verdict->lower_bound},
           {"cost", NumberOrNull(verdict->cost)},
           {"relative_gap", NumberOrNull(verdict->relative_gap)},
-          {"is_linearised", verdict->is_linearised},
           {"num_support", verdict->support.size()},
           {"num_fixed_frames", verdict->num_fixed_images},
           {"num_fixed_points", verdict->num_fixed_points},

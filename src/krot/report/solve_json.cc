@@ -180,8 +180,7 @@ Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
 
 std::string SolveJson(const SolveReport& report) {
   const SolveSummary& summary = report.summary;
-  Json left_out = LeftOutJson(LeftOutByReason(summary));
-  left_out["single_ray"] = 0;  // a key that once was stays
+  const Json left_out = LeftOutJson(LeftOutByReason(summary));
   Json sweeps = Json::array();
   for (const Sweep& sweep : summary.sweeps) {
     sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
