@@ -153,13 +153,17 @@ ErrorProfile Profiler::Run() {
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context) {
   const Reprojection reprojection(model, built);
-  const NoiseLimit own =
-      LimitAt(reprojection, built.problem, built.start, norm);
+  const NoiseLimit own = NoiseLimitAtStart(model, built, norm);
   context.Stage("measuring the noise");
   const Estimate robust = FindRobustStart(
       built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
   const NoiseLimit limit = LimitAt(reprojection, built.problem, robust, norm);
   return limit.sigma < own.sigma ? limit : own;
+}
+
+NoiseLimit NoiseLimitAtStart(const Model& model, const BuiltProblem& built,
+                             Norm norm) {
+  return LimitAt(Reprojection(model, built), built.problem, built.start, norm);
 }
 
 ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,

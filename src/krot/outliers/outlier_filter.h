@@ -25,11 +25,15 @@ struct OutlierFilterOptions {
   // The bound, true pixels; > 0. Required by kThreshold. If it is missing, it
   // is what noise explains (FindNoiseLimit), where it is proved that no
   // estimate brings all errors below that; else nothing is removed, and the
-  // model stays as it is. From nothing, without a profile, it is ten times the
-  // median error of the start.
+  // model stays as it is. From nothing, without a profile, it is what noise
+  // explains at the start (NoiseLimitAtStart).
   std::optional<double> max_error;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // kConflicts: the proof, most of the time
+  // From nothing, without max_error: whether a model that has positions stays
+  // as it is, unsolved, if no error of the start is above
+  // solve.init_max_error.
+  bool spares_what_fits = false;
   // Of what is left; its norm is the errors'. Its init kFeasible is from
   // nothing but rotations and tracks, and so is any model whose cameras have no
   // place or all the same.
@@ -74,6 +78,7 @@ struct OutlierFilterSummary {
   // (SolveModelOptions::init_max_error).
   std::vector<WeakPart> weak_parts;
   bool is_bound_beyond_reason = false;
+  bool is_spared = false;  // OutlierFilterOptions::spares_what_fits
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;

@@ -4,16 +4,14 @@
 #include <sstream>
 #include <string>
 
+#include "krot/bridge/reprojection.h"
 #include "krot/finish/robust_least_squares.h"
+#include "krot/outliers/error_profile.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/start.h"
 
 namespace krot {
 namespace {
-
-// Of a bound that is chosen: of the median error, and in pixels.
-constexpr double kBoundPerMedian = 10;
-constexpr double kLeastBound = 1e-3;
 
 std::string Pixels(double value) {
   std::ostringstream words;
@@ -52,16 +50,20 @@ RemovalStart FindRemovalStart(const Model& model,
   if (build.ignore_translations) {
     const double level = options.max_error.value_or(kLevelOfStart);
     PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
+    build.ignore_translations = false;
+    start.fits = Reprojection(model, start.built)
+                         .TrueCost(start.built.start, norm,
+                                   context.num_threads) <=
+                     options.solve.init_max_error &&
+                 HasOwnStart(BuildProblem(model, build));
   }
   if (start.init == SolveInit::kFeasible && !options.max_error &&
       !options.make_profile) {
-    const double median =
-        MedianError(start.built.problem, start.built.start, norm);
-    start.max_error = std::max(kBoundPerMedian * median, kLeastBound);
-    context.Note(
-        "leaving out what does not fit within ten times the median "
-        "error, " +
-        Pixels(start.max_error));
+    const NoiseLimit noise = NoiseLimitAtStart(model, start.built, norm);
+    start.max_error = noise.max_error;
+    context.Note("leaving out what noise of " + Pixels(noise.sigma) +
+                 " per axis does not explain: errors above " +
+                 Pixels(start.max_error));
   }
   return start;
 }

@@ -14,6 +14,9 @@ struct RemovalStart {
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
   double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
+  // From nothing: the model has positions of its own, and all of its
+  // observations are within options.solve.init_max_error at the start.
+  bool fits = false;
 };
 
 // The model's own start or, if options.solve.init says so or the model has

@@ -50,8 +50,8 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
   }
   const auto num_removed = static_cast<int64_t>(summary.removed.size());
   if (summary.is_bound_beyond_reason) {
-    add("hardly anything fits: half of all errors are above a tenth of the "
-        "bound that was chosen, " +
+    add("hardly anything fits: half of all errors are so large that noise "
+        "would explain " +
         FormatNumber(summary.max_error, 4) +
         " px; look at rotations, intrinsics and matches");
   } else if (2 * num_removed > summary.num_observations) {
