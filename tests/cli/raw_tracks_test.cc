@@ -94,6 +94,14 @@ TEST_F(RawTracks, AreNotSearchedForALowestMaximumThatNobodyAskedFor) {
   EXPECT_NEAR(sum, with["finish"]["cost_final"], 1e-2 * sum);
 }
 
+TEST_F(RawTracks, KeepABoundThatIsGivenWhereTheModelHasPositions) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  const KrotResult result =
+      Solve({"--Solver.init", "feasible", "--Solver.max_error", "3"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Report()["outliers"]["max_error"], 3);
+}
+
 TEST_F(RawTracks, WhoseBoundIsBeyondReasonAreNotToBeReliedOn) {
   const KrotResult result = Solve({"--Problem.init_max_error", "0.1"});
   EXPECT_EQ(result.exit_code, 10);

@@ -251,6 +251,8 @@ void OutlierFilter::FindWeakParts(const BuiltProblem& built) {
     part.num_agreeing = link.num_agreeing;
     part.scale_factor = link.scale_factor;
     part.is_held = link.IsHeld();
+    part.turn_deg = link.turn_deg;
+    part.num_agreeing_turned = link.num_agreeing_turned;
   }
 }
 

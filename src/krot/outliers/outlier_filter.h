@@ -30,9 +30,8 @@ struct OutlierFilterOptions {
   std::optional<double> max_error;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // kConflicts: the proof, most of the time
-  // From nothing, without max_error: whether a model that has positions stays
-  // as it is, unsolved, if no error of the start is above
-  // solve.init_max_error.
+  // From nothing, without max_error: whether a model stays as it is, unsolved,
+  // if nothing need go (RemovalStart::fits).
   bool spares_what_fits = false;
   // Of what is left; its norm is the errors'. Its init kFeasible is from
   // nothing but rotations and tracks, and so is any model whose cameras have no

@@ -31,6 +31,22 @@ void PlaceFromTracks(Norm norm, double level, const Context& context,
                Pixels(MedianError(problem, start->built.start, norm)));
 }
 
+bool FitsAsItIs(const Model& model, const OutlierFilterOptions& options,
+                const Context& context, const RemovalStart& start) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  const BuiltProblem own = BuildProblem(model, build);
+  if (!HasOwnStart(own)) return false;
+  const Norm norm = options.solve.norm;
+  const double largest =
+      Reprojection(model, start.built)
+          .TrueCost(start.built.start, norm, context.num_threads);
+  return largest <= start.max_error ||
+         (largest <= options.solve.init_max_error &&
+          MedianError(own.problem, own.start, norm) <
+              2 * MedianError(start.built.problem, start.built.start, norm));
+}
+
 }  // namespace
 
 RemovalStart FindRemovalStart(const Model& model,
@@ -50,17 +66,13 @@ RemovalStart FindRemovalStart(const Model& model,
   if (build.ignore_translations) {
     const double level = options.max_error.value_or(kLevelOfStart);
     PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
-    build.ignore_translations = false;
-    start.fits = Reprojection(model, start.built)
-                         .TrueCost(start.built.start, norm,
-                                   context.num_threads) <=
-                     options.solve.init_max_error &&
-                 HasOwnStart(BuildProblem(model, build));
   }
   if (start.init == SolveInit::kFeasible && !options.max_error &&
       !options.make_profile) {
     const NoiseLimit noise = NoiseLimitAtStart(model, start.built, norm);
     start.max_error = noise.max_error;
+    start.fits = FitsAsItIs(model, options, context, start);
+    if (options.spares_what_fits && start.fits) return start;
     context.Note("leaving out what noise of " + Pixels(noise.sigma) +
                  " per axis does not explain: errors above " +
                  Pixels(start.max_error));

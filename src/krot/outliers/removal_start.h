@@ -14,8 +14,10 @@ struct RemovalStart {
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
   double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
-  // From nothing: the model has positions of its own, and all of its
-  // observations are within options.solve.init_max_error at the start.
+  // From nothing: nothing need go from a model with positions of its own. Noise
+  // explains all errors of the start, or the observations have been chosen by
+  // these positions: the median error there is not twice the start's, and no
+  // error of the start is above options.solve.init_max_error.
   bool fits = false;
 };
 

@@ -16,7 +16,7 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
                                          const Context& context) {
   OutlierFilterOptions filter;
   filter.max_error = options.max_error;
-  filter.spares_what_fits = options.solve.init == SolveInit::kFeasible;
+  filter.spares_what_fits = !options.max_error;
   filter.find_conflicts = options.find_conflicts;
   filter.solve = options.solve;
   filter.solve.on_built = nullptr;

@@ -16,8 +16,8 @@ struct TolerantSolveOptions {
   SolveModelOptions solve;
   // Few observations are removed so that all others are within so many pixels,
   // > 0. None: all stay, unless the start is from nothing, no certificate is
-  // asked for, and the model holds no positions or the start has errors above
-  // solve.init_max_error; then what noise does not explain is removed.
+  // asked for, and something must go (RemovalStart::fits); then what noise does
+  // not explain is removed.
   std::optional<double> max_error;
   bool find_conflicts = false;  // the proof of how many had to go
 };
