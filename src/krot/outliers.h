@@ -51,6 +51,10 @@ struct WeakPart {
   int64_t num_agreeing = 0;              // of these, on one place and scale
   double scale_factor = 1;               // that the scale is held to
   bool is_held = true;                   // well enough to rely on it
+  // By how much all their rotations would have to turn, degrees, for so many
+  // tracks to agree; 0: no turn was found. Nothing is turned.
+  double turn_deg = 0;
+  int64_t num_agreeing_turned = 0;
 };
 
 // How low the largest error can be without some of the observations.

@@ -62,12 +62,14 @@ TEST_F(RawTracks, AreSolvedWithinTheBoundWithAProofOfWhatWasLeftOut) {
   EXPECT_EQ(check.exit_code, 0) << check.err;
 }
 
-TEST_F(RawTracks, AreSolvedWithABoundThatIsChosenAndSaid) {
-  const KrotResult result = Solve({"--Problem.init_max_error", "10"});
+TEST_F(RawTracks, AreSolvedWithABoundThatNoiseChoosesAndThatIsSaid) {
+  const KrotResult result = Solve({"--Solver.init", "feasible"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("leaving out what does not fit within"));
+  EXPECT_THAT(result.err, HasSubstr("leaving out what noise of "));
   const Json report = Report();
-  EXPECT_GT(report["outliers"]["max_error"], 0);
+  // Some five times the scene's noise, which a bound by hand does not beat.
+  EXPECT_GT(report["outliers"]["max_error"], 2 * SmallScene().pixel_noise);
+  EXPECT_LT(report["outliers"]["max_error"], 8 * SmallScene().pixel_noise);
   EXPECT_TRUE(report["outliers"]["num_must_go"].is_null());
   EXPECT_GT(report["num_observations"], 0);
 }
@@ -90,6 +92,14 @@ TEST_F(RawTracks, AreNotSearchedForALowestMaximumThatNobodyAskedFor) {
   // Both end with the least squares below the same cap.
   const double sum = without["finish"]["cost_final"];
   EXPECT_NEAR(sum, with["finish"]["cost_final"], 1e-2 * sum);
+}
+
+TEST_F(RawTracks, KeepABoundThatIsGivenWhereTheModelHasPositions) {
+  Save(SmallLegacyModel(), folder_ / "input");
+  const KrotResult result =
+      Solve({"--Solver.init", "feasible", "--Solver.max_error", "3"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(Report()["outliers"]["max_error"], 3);
 }
 
 TEST_F(RawTracks, WhoseBoundIsBeyondReasonAreNotToBeReliedOn) {
@@ -125,9 +135,10 @@ TEST(WeaklyTiedTracks, AreSaidNotToHoldTheScaleOfAPart) {
   EXPECT_EQ(parts[0]["is_held"], false);
 }
 
-TEST_F(RawTracks, ThatAreNotToLoseAnythingEndWithAHint) {
+TEST_F(RawTracks, WhoseLowestMaximumIsToBeProvedLoseNothing) {
   const KrotResult result =
-      Solve({"--Solver.init", "feasible", "--Problem.init_max_error", "10"});
+      Solve({"--Solver.init", "feasible", "--Problem.init_max_error", "10",
+             "--certificate_path", folder_ / "certificate.json"});
   EXPECT_EQ(result.exit_code, 7);
   EXPECT_THAT(result.err, HasSubstr("--Solver.max_error leaves out"));
 }

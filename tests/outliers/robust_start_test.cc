@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -186,6 +187,74 @@ TEST(FilterOutliers, SaysHowWellFewTracksHoldTheScale) {
   EXPECT_LT(good.scale_factor, 1.1);
   EXPECT_FALSE(scale_factors(10, 10).is_held);
   EXPECT_FALSE(scale_factors(1, 0).is_held);
+}
+
+// Turns all rotations of images that `is_turned` says, by their index, about the
+// world's y axis.
+void TurnPart(const std::function<bool(int)>& is_turned, double degrees,
+              Model* model) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(
+      degrees * M_PI / 180, Eigen::Vector3d::UnitY()));
+  for (size_t n = 0; n < model->images.size(); ++n) {
+    if (!is_turned(static_cast<int>(n))) continue;
+    Image& image = model->images[n];
+    image.cam_from_world.rotation = image.cam_from_world.rotation * turn;
+    for (Frame& frame : model->frames) {
+      if (frame.id != image.frame_id) continue;
+      frame.rig_from_world.rotation = frame.rig_from_world.rotation * turn;
+    }
+  }
+}
+
+TEST(FilterOutliers, SaysByWhichTurnThePartsTracksWouldAgree) {
+  for (const double degrees : {0.0, 20.0}) {
+    const SyntheticScene scene =
+        SynthesizeScene(SceneInParts(kTwoParts.layout));
+    Model model = WeaklyTied(Wiped(scene.model), kTwoParts.part_of,
+                             kTwoParts.are_tied, 30, 5);
+    TurnPart([](int n) { return n >= 12; }, degrees, &model);
+    OutlierFilterOptions options;
+    options.max_error = 3;
+    options.find_conflicts = false;
+    const OutlierFilterResult result = FilterOutliers(model, options, {});
+    ASSERT_EQ(result.summary.weak_parts.size(), 1u);
+    const WeakPart& part = result.summary.weak_parts[0];
+    EXPECT_EQ(part.is_held, degrees == 0);
+    EXPECT_NEAR(part.turn_deg, degrees, 1);
+    if (degrees > 0) EXPECT_GE(part.num_agreeing_turned, 20);
+  }
+}
+
+TEST(FindParts, KeepsThemAtASizeThatIsAskedFor) {
+  SceneOptions scene = SceneInParts(SceneLayout::kOrbit);
+  scene.num_frames = 100;
+  PartOptions options;
+  options.max_frames = 24;
+  const std::vector<int32_t> parts =
+      FindParts(ProblemOf(SynthesizeScene(scene).model), options);
+  std::map<int32_t, int> sizes;
+  for (const int32_t part : parts) ++sizes[part];
+  EXPECT_GE(sizes.size(), 4u);
+  for (const auto& [part, size] : sizes) {
+    EXPECT_GE(size, 24 / 8) << part;
+    EXPECT_LE(size, 24 + 24 / 8) << part;
+  }
+}
+
+TEST(FindRobustStart, SurvivesWrongObservationsInShortTracks) {
+  for (const int seed : {0, 1, 2}) {
+    SceneOptions options = Scene(0.25, 0);
+    options.layout = SceneLayout::kStreet;
+    options.num_frames = 30;
+    options.num_points = 1800;
+    options.track_length = 3;
+    options.random_seed = seed;
+    const SyntheticScene scene = SynthesizeScene(options);
+    EXPECT_LT(CentreError(scene.ground_truth,
+                          AtRobustStart(Wiped(scene.model))),
+              0.02)
+        << seed;
+  }
 }
 
 TEST(FilterOutliers, PlacesAModelWithoutPositions) {

@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
 """Positions from nothing by the number of images and the share of outliers.
 
-    positions_at_size.py KROT [IMAGES ...]
+    positions_at_size.py KROT BENCHMARK [IMAGES ...]
 
-KROT is the built program. Makes rings of so many images (200, 1000 and 5000
-if none are given; 400 observations each, tracks of eight, noise of 1 px,
-rotations off by 0.3 degrees) with 0, 10 and 30 % of the observations wrong,
-lets `krot solver --Solver.init feasible --Solver.max_error 15` find the
-positions, and prints what that took and how far the camera centres are from
-the truth. The Python standard library is enough.
+KROT and BENCHMARK are the built programs. Makes rings of so many images (200,
+1000 and 5000 if none are given; 400 observations each, tracks of eight, noise
+of 1 px, rotations off by 0.3 degrees) with 0, 10 and 30 % of the observations
+wrong, lets `krot solver --Solver.init feasible` find the positions and `krot
+bundle_adjuster` adjust them with a Cauchy loss; up to 1000 images also the
+rival of bearings (`krot_benchmark positioning`). Prints user and system CPU
+seconds, memory, and the RMS distance of the centres from the truth as a
+percentage of the radius. The Python standard library is enough.
 """
 
 import json
@@ -29,11 +31,29 @@ def run(*command):
                   before.ru_utime - before.ru_stime)
 
 
-def measure(krot, folder, images, share):
+def centres(krot, truth, model, report):
+    """Of the radius, per cent; None without a model."""
+    if os.path.exists(report):
+        os.remove(report)
+    run(krot, "model_comparer", "--input_path1", truth, "--input_path2", model,
+        "--alignment", "similarity", "--report_path", report)
+    if not os.path.exists(report):
+        return None
+    with open(report, encoding="utf-8") as file:
+        comparison = json.load(file)
+    return 100 * comparison["center"]["rms"] / comparison["scene_radius"]
+
+
+def cell(value):
+    return "" if value is None else f"{value:.3f}"
+
+
+def measure(krot, benchmark, folder, images, share):
     """One row of the table."""
-    scene, truth, out, report, compared = (
+    scene, truth, out, rival, adjusted, report, compared = (
         os.path.join(folder, name)
-        for name in ("scene", "truth", "out", "report.json", "compared.json"))
+        for name in ("scene", "truth", "out", "rival", "adjusted",
+                     "report.json", "compared.json"))
     code, _ = run(krot, "model_synthesizer", "--output_path", scene,
                   "--ground_truth_path", truth, "--Scene.layout", "orbit",
                   "--Scene.num_frames", str(images),
@@ -44,34 +64,42 @@ def measure(krot, folder, images, share):
                   "--Scene.rotation_noise_deg", "0.3")
     if code != 0:
         sys.exit(f"model_synthesizer ended with code {code}")
+
+    def adjust(model):
+        _, taken = run(krot, "bundle_adjuster", "--input_path", model,
+                       "--output_path", adjusted, "--overwrite", "1",
+                       "--BundleAdjustmentCeres.loss_function_type", "CAUCHY")
+        return f"{cell(centres(krot, truth, adjusted, compared))} | {taken:.0f}"
+
     code, seconds = run(krot, "solver", "--input_path", scene,
                         "--output_path", out, "--report_path", report,
-                        "--Solver.init", "feasible", "--Solver.max_error", "15")
+                        "--Solver.init", "feasible")
     if not os.path.exists(report):
-        return f"| {images} | {share:.0%} | {seconds:.1f} | | | | {code} |"
-    run(krot, "model_comparer", "--input_path1", truth, "--input_path2", out,
-        "--alignment", "similarity", "--report_path", compared)
+        return f"| {images} | {share:.0%} | {seconds:.1f} | | {code} | | | | | | |"
     with open(report, encoding="utf-8") as file:
         memory = json.load(file)["peak_memory_bytes"]
-    with open(compared, encoding="utf-8") as file:
-        comparison = json.load(file)
-    error = comparison["center"]
-    radius = comparison["scene_radius"]
-    return (f"| {images} | {share:.0%} | {seconds:.1f} | {memory / 2**20:.0f} |"
-            f" {100 * error['median'] / radius:.2f} |"
-            f" {100 * error['max'] / radius:.2f} | {code} |")
+    row = (f"| {images} | {share:.0%} | {seconds:.1f} | {memory / 2**20:.0f} |"
+           f" {code} | {cell(centres(krot, truth, out, compared))} |"
+           f" {adjust(out)} |")
+    if images > 1000:
+        return row + " | | | |"
+    _, seconds = run(benchmark, "positioning", "--input_path", scene,
+                     "--output_path", rival)
+    return (row + f" {seconds:.1f} |"
+            f" {cell(centres(krot, truth, rival, compared))} |"
+            f" {adjust(rival)} |")
 
 
 def main():
-    if len(sys.argv) < 2:
+    if len(sys.argv) < 3:
         sys.exit(__doc__)
-    print("| images | wrong | processor s | MB | median centre, % of the radius"
-          " | largest | code |")
-    print("|---|---|---|---|---|---|---|")
-    for images in [int(n) for n in sys.argv[2:]] or [200, 1000, 5000]:
+    print("| images | wrong | processor s | MB | code | centres | adjusted | s"
+          " | rival: s | centres | adjusted | s |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    for images in [int(n) for n in sys.argv[3:]] or [200, 1000, 5000]:
         for share in (0, 0.1, 0.3):
             with tempfile.TemporaryDirectory() as folder:
-                print(measure(sys.argv[1], folder, images, share), flush=True)
+                print(measure(*sys.argv[1:3], folder, images, share), flush=True)
 
 
 if __name__ == "__main__":

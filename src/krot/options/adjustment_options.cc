@@ -110,8 +110,8 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
         "Up to so many images the reduced camera system is dense" + suffix);
     table->AddInteger(
         prefix + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
-        "Up to so many images it is sparse; beyond them conjugate gradients "
-        "solve it" +
+        "Up to so many images it is sparse; beyond them, and where its factor "
+        "has hardly a zero, conjugate gradients solve it" +
             suffix);
   }
   table->AddNamed<RobustLoss>("BundleAdjustmentCeres.loss_function_type",

@@ -147,6 +147,11 @@ NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
   return is_lower || own.sigma == 0 ? limit : own;
 }
 
+NoiseLimit NoiseLimitAtStart(const Model& model, const BuiltProblem& built,
+                             Norm norm, const Context& context) {
+  return LimitOf(ApplyEstimate(model, built, built.start), norm, context);
+}
+
 ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
                               const ErrorProfileOptions& options,
                               const Context& context) {

@@ -34,6 +34,10 @@ struct NoiseLimit {
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context);
 
+// The same at built.start alone. O(observations).
+NoiseLimit NoiseLimitAtStart(const Model& model, const BuiltProblem& built,
+                             Norm norm, const Context& context);
+
 struct ErrorProfileOptions {
   Norm norm;
   // The last level's largest error, true pixels; > 0. None: half of the first

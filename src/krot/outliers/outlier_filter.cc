@@ -251,6 +251,8 @@ void OutlierFilter::FindWeakParts(const BuiltProblem& built) {
     part.num_agreeing = link.num_agreeing;
     part.scale_factor = link.scale_factor;
     part.is_held = link.IsHeld();
+    part.turn_deg = link.turn_deg;
+    part.num_agreeing_turned = link.num_agreeing_turned;
   }
 }
 
@@ -258,6 +260,10 @@ void OutlierFilter::FilterByConflicts() {
   const RemovalStart start = FindRemovalStart(model_, options_, context_);
   const BuiltProblem& built = start.built;
   summary_.init = start.init;
+  if (options_.spares_what_fits && start.fits) {
+    is_given_back_ = summary_.is_spared = true;
+    return;
+  }
   bound_.max_error = start.max_error;
   summary_.is_bound_beyond_reason =
       !options_.max_error && start.max_error > options_.solve.init_max_error;

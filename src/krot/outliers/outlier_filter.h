@@ -25,14 +25,17 @@ struct OutlierFilterOptions {
   // The bound, true pixels; > 0. Required by kThreshold. If it is missing, it
   // is what noise explains (FindNoiseLimit), where it is proved that no
   // estimate brings all errors below that; else nothing is removed, and the
-  // model stays as it is. From nothing, without a profile, it is ten times the
-  // median error of the start.
+  // model stays as it is. From nothing, without a profile, it is what noise
+  // explains at the start (NoiseLimitAtStart).
   std::optional<double> max_error;
   // Whether the model's own positions come from nothing but rotations and
   // tracks: then weak parts are looked for there, too.
   bool has_start_from_nothing = false;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // the proof, most of the time
+  // From nothing, without max_error: whether a model stays as it is, unsolved,
+  // if nothing need go (RemovalStart::fits).
+  bool spares_what_fits = false;
   // Of what is left; its norm is the errors'. Its init kFeasible is from
   // nothing but rotations and tracks, and so is any model whose cameras have no
   // place or all the same.
@@ -81,6 +84,7 @@ struct OutlierFilterSummary {
   // (SolveModelOptions::init_max_error).
   std::vector<WeakPart> weak_parts;
   bool is_bound_beyond_reason = false;
+  bool is_spared = false;  // OutlierFilterOptions::spares_what_fits
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;

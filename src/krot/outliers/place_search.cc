@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "krot/base/parallel_for.h"
@@ -46,9 +47,11 @@ Normal NormalOf(const KnownRotationProblem& problem,
 // Either group's, or what both agree on best.
 std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
                                                    const Place& place) const {
-  const Vector3d x_b = place.scale * track.b.x + place.shift;
+  const Vector3d x_b =
+      place.scale * (place.rotation * track.b.x) + place.shift;
   const Matrix3d& H_a = track.a.H;
-  const Matrix3d H_b = track.b.H / (place.scale * place.scale);
+  const Matrix3d H_b = place.rotation * track.b.H * place.rotation.transpose() /
+                       (place.scale * place.scale);
   const Vector3d both = InverseOf(H_a + H_b) * (H_a * track.a.x + H_b * x_b);
   std::pair<Vector3d, double> best = {both, CostAt(track, place, both)};
   for (const Vector3d& x : {track.a.x, x_b}) {
@@ -115,13 +118,48 @@ Place PlaceSearch::BestPlace(double scale) const {
   return best;
 }
 
-std::optional<Place> PlaceSearch::Propose() const {
+std::vector<const SharedTrack*> PlaceSearch::TracksWithPoints() const {
   std::vector<const SharedTrack*> tracks;
   for (const SharedTrack& track : tracks_) {
     if (track.a.observations.size() >= 2 && track.b.observations.size() >= 2) {
       tracks.push_back(&track);
     }
   }
+  return tracks;
+}
+
+// The similarity of three pairs of points by least squares [Umeyama 1991].
+std::optional<Place> PlaceSearch::ProposeTurned() const {
+  const std::vector<const SharedTrack*> tracks = TracksWithPoints();
+  const auto count = static_cast<int64_t>(tracks.size());
+  const int64_t num_triples = count * (count - 1) * (count - 2) / 6;
+  const int64_t stride = std::max<int64_t>(1, num_triples / kProposals);
+  Place best;
+  int64_t triple = 0;
+  for (int64_t i = 0; i < count; ++i) {
+    for (int64_t j = i + 1; j < count; ++j) {
+      for (int64_t k = j + 1; k < count; ++k, ++triple) {
+        if (triple % stride != 0) continue;
+        Matrix3d from, to;
+        from << tracks[i]->b.x, tracks[j]->b.x, tracks[k]->b.x;
+        to << tracks[i]->a.x, tracks[j]->a.x, tracks[k]->a.x;
+        const Eigen::Matrix4d fit = Eigen::umeyama(from, to);
+        Place place;
+        place.scale = std::cbrt(fit.topLeftCorner<3, 3>().determinant());
+        if (!(place.scale > 0) || !std::isfinite(place.scale)) continue;
+        place.rotation = fit.topLeftCorner<3, 3>() / place.scale;
+        place.shift = fit.topRightCorner<3, 1>();
+        place.cost = Cost(place);
+        if (place.cost < best.cost) best = place;
+      }
+    }
+  }
+  if (!std::isfinite(best.cost)) return std::nullopt;
+  return best;
+}
+
+std::optional<Place> PlaceSearch::Propose() const {
+  const std::vector<const SharedTrack*> tracks = TracksWithPoints();
   const auto count = static_cast<int64_t>(tracks.size());
   if (count < kStrongTracks) return std::nullopt;
   Place best;

@@ -35,7 +35,9 @@ struct SharedTrack {
 };
 
 struct Place {
-  double scale = 1;  // x_a = scale x_b + shift
+  // x_a = scale rotation x_b + shift
+  double scale = 1;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   double cost = std::numeric_limits<double>::infinity();  // squared pixels
 };
@@ -64,6 +66,15 @@ class PlaceSearch {
   // The best that two tracks with points on either side propose, for many such
   // pairs; none where there are few such tracks.
   std::optional<Place> Propose() const;
+  // The same with a turn, which three tracks propose; for few tracks, too.
+  std::optional<Place> ProposeTurned() const;
+  double Cost(const Place& place) const {
+    double sum = 0;
+    for (const SharedTrack& track : tracks_) {
+      sum += std::min(BestPoint(track, place).second, kCutOff * variance_);
+    }
+    return sum;
+  }
   // The best of all scales first.
   std::vector<Place> Profile(const std::vector<double>& scales,
                              const Context& context) const;
@@ -85,20 +96,15 @@ class PlaceSearch {
   double CostAt(const SharedTrack& track, const Place& place,
                 const Eigen::Vector3d& x) const {
     double sum = -track.a.sum - track.b.sum;
-    const Eigen::Vector3d x_b = (x - place.shift) / place.scale;
+    const Eigen::Vector3d x_b =
+        place.rotation.transpose() * (x - place.shift) / place.scale;
     for (const int64_t i : track.a.observations) sum += SquaredError(i, x);
     for (const int64_t i : track.b.observations) sum += SquaredError(i, x_b);
     return std::max(sum, 0.0);
   }
   std::pair<Eigen::Vector3d, double> BestPoint(const SharedTrack& track,
                                                const Place& place) const;
-  double Cost(const Place& place) const {
-    double sum = 0;
-    for (const SharedTrack& track : tracks_) {
-      sum += std::min(BestPoint(track, place).second, kCutOff * variance_);
-    }
-    return sum;
-  }
+  std::vector<const SharedTrack*> TracksWithPoints() const;
   Place BestPlace(double scale) const;
   Place Improve(const Place& place) const;
 

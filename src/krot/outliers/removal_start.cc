@@ -4,16 +4,14 @@
 #include <sstream>
 #include <string>
 
+#include "krot/bridge/reprojection.h"
 #include "krot/finish/robust_least_squares.h"
+#include "krot/outliers/error_profile.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/start.h"
 
 namespace krot {
 namespace {
-
-// Of a bound that is chosen: of the median error, and in pixels.
-constexpr double kBoundPerMedian = 10;
-constexpr double kLeastBound = 1e-3;
 
 std::string Pixels(double value) {
   std::ostringstream words;
@@ -31,6 +29,22 @@ void PlaceFromTracks(Norm norm, double level, const Context& context,
   MinimizeRobustly(problem, context, &start->built.start);
   context.Note("positions from rotations and tracks: the median error is " +
                Pixels(MedianError(problem, start->built.start, norm)));
+}
+
+bool FitsAsItIs(const Model& model, const OutlierFilterOptions& options,
+                const Context& context, const RemovalStart& start) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  const BuiltProblem own = BuildProblem(model, build);
+  if (!HasOwnStart(own)) return false;
+  const Norm norm = options.solve.norm;
+  const double largest =
+      Reprojection(model, start.built)
+          .TrueCost(start.built.start, norm, context.num_threads);
+  return largest <= start.max_error ||
+         (largest <= options.solve.init_max_error &&
+          MedianError(own.problem, own.start, norm) <
+              2 * MedianError(start.built.problem, start.built.start, norm));
 }
 
 }  // namespace
@@ -55,13 +69,14 @@ RemovalStart FindRemovalStart(const Model& model,
   }
   if (start.init == SolveInit::kFeasible && !options.max_error &&
       !options.make_profile) {
-    const double median =
-        MedianError(start.built.problem, start.built.start, norm);
-    start.max_error = std::max(kBoundPerMedian * median, kLeastBound);
-    context.Note(
-        "leaving out what does not fit within ten times the median "
-        "error, " +
-        Pixels(start.max_error));
+    const NoiseLimit noise =
+        NoiseLimitAtStart(model, start.built, norm, context);
+    start.max_error = noise.max_error;
+    start.fits = FitsAsItIs(model, options, context, start);
+    if (options.spares_what_fits && start.fits) return start;
+    context.Note("leaving out what noise of " + Pixels(noise.sigma) +
+                 " per axis does not explain: errors above " +
+                 Pixels(start.max_error));
   }
   if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
   return start;

@@ -14,6 +14,11 @@ struct RemovalStart {
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
   double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
+  // From nothing: nothing need go from a model with positions of its own. Noise
+  // explains all errors of the start, or the observations have been chosen by
+  // these positions: the median error there is not twice the start's, and no
+  // error of the start is above options.solve.init_max_error.
+  bool fits = false;
 };
 
 // The model's own start or, if options.solve.init says so or the model has

@@ -21,8 +21,13 @@
 namespace krot {
 namespace {
 
-// Doubled until the tracks hang together.
-constexpr int64_t kObservationsPerFrame = 60;
+double KT(const char* n, double d) { const char* s = getenv(n); return s ? atof(s) : d; }
+
+// So much redundancy that tracks check each frame by, doubled until they hang
+// together. A track of n observations has 2 n - 3, 2 - 3 / n for each of them.
+constexpr double kRedundancyPerFrame = 120;
+// Larger components are placed in parts of so many frames.
+constexpr int32_t kFramesAtOnce = 250;
 // Parts whose programmes are solved on their own.
 constexpr double kStrongShare = 0.2;
 // Programmes after the first, with weights.
@@ -35,7 +40,7 @@ constexpr double kDearExcess = 0.1;
 // The longest tracks first, each that sees a frame which has too few so far.
 // Ascending.
 std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
-                                    int64_t observations_per_frame) {
+                                    double redundancy_per_frame) {
   const auto length = [&](int32_t k) {
     return problem.point_begin[k + 1] - problem.point_begin[k];
   };
@@ -43,19 +48,20 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   std::iota(longest_first.begin(), longest_first.end(), 0);
   std::stable_sort(longest_first.begin(), longest_first.end(),
                    [&](int32_t a, int32_t b) { return length(a) > length(b); });
-  std::vector<int64_t> num_seen(problem.num_frames, 0);
+  std::vector<double> redundancy(problem.num_frames, 0);
   std::vector<int64_t> covering;
   for (const int32_t k : longest_first) {
     bool is_needed = false;
     for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
          ++i) {
       is_needed =
-          is_needed || num_seen[FrameOf(problem, i)] < observations_per_frame;
+          is_needed || redundancy[FrameOf(problem, i)] < redundancy_per_frame;
     }
     if (!is_needed) continue;
     for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
          ++i) {
-      ++num_seen[FrameOf(problem, i)];
+      redundancy[FrameOf(problem, i)] +=
+          2 - 3 / static_cast<double>(length(k));
       covering.push_back(i);
     }
   }
@@ -63,9 +69,9 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   return covering;
 }
 
-// The same with as many per frame as it takes for all to hang together.
+// The same with as much per frame as it takes for all to hang together.
 std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
-  for (int64_t per_frame = kObservationsPerFrame;; per_frame *= 2) {
+  for (double per_frame = KT("KT_R", kRedundancyPerFrame);; per_frame *= 2) {
     std::vector<int64_t> tracks = CoveringTracks(problem, per_frame);
     if (tracks.size() == problem.observations.size() ||
         SplitIntoComponents(problem, tracks).size() == 1) {
@@ -86,7 +92,7 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   SlackOptions options;
   options.norm = norm;
   options.smallest_mu = kStartMu;
-  for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
+  for (int n = 0; n <= KT("KT_N", kStartReweightings) && !context.IsCancelled(); ++n) {
     context.Stage("positions from rotations and tracks, programme", n + 1,
                   kStartReweightings + 1);
     const SlackSolution solution =
@@ -126,21 +132,18 @@ std::vector<std::vector<int64_t>> SplitIntoParts(
   return split;
 }
 
-Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
-                          double level, const Context& context) {
-  PartOptions options;
-  options.min_tracks = 1;
-  options.compares_scales = false;
-  options.min_share = kStrongShare;
-  const std::vector<int32_t> part_of = FindParts(problem, options);
+// Of parts that are placed apart, each with its own scale, and joined.
+Estimate StartOfParts(const KnownRotationProblem& problem,
+                      const std::vector<int32_t>& part_of, Norm norm,
+                      double level, const Context& context) {
   const std::vector<std::vector<int64_t>> split =
       SplitIntoParts(problem, part_of);
-  if (split.size() == 1) return StartOfPart(problem, norm, level, context);
   Estimate estimate;
   estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
   estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
   std::vector<int32_t> point_part(problem.num_points, -1);
   for (size_t n = 0; n < split.size(); ++n) {
+    if (split[n].empty()) continue;
     const ProblemSubset part(problem, split[n]);
     const Context within =
         context.Within("part " + std::to_string(n + 1) + " of " +
@@ -168,6 +171,26 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
                       &estimate);
   if (!HasBaseline(problem)) NormalizeScale(problem, &estimate);
   return estimate;
+}
+
+Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
+                          double level, const Context& context) {
+  PartOptions options;
+  options.min_tracks = 1;
+  options.compares_scales = false;
+  options.min_share = kStrongShare;
+  std::vector<int32_t> part_of = FindParts(problem, options);
+  const bool is_whole =
+      *std::max_element(part_of.begin(), part_of.end()) == 0;
+  const int32_t at_once = static_cast<int32_t>(KT("KT_F", kFramesAtOnce));
+  if (is_whole && problem.num_frames <= at_once) {
+    return StartOfPart(problem, norm, level, context);
+  }
+  if (is_whole) {
+    options.max_frames = at_once;
+    part_of = FindParts(problem, options);
+  }
+  return StartOfParts(problem, part_of, norm, level, context);
 }
 
 }  // namespace

@@ -5,12 +5,9 @@
 namespace krot {
 namespace {
 
-// Whether nothing came of a model without positions for want of a start that
-// has them all.
-bool NeedsRemoval(const SolveModelOptions& options,
-                  const SolveSummary& summary) {
-  return summary.termination == SolveTermination::kNothingToSolve &&
-         !options.problem.fixed.Any() && options.problem.positions.empty() &&
+// Whether observations may go where no start has them all.
+bool AllowsRemoval(const SolveModelOptions& options) {
+  return !options.problem.fixed.Any() && options.problem.positions.empty() &&
          EffectiveMethod(options) == SolveMethod::kAuto && options.norm.p == 2;
 }
 
@@ -19,6 +16,7 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
                                          const Context& context) {
   OutlierFilterOptions filter;
   filter.max_error = options.max_error;
+  filter.spares_what_fits = !options.max_error;
   filter.find_conflicts = options.find_conflicts;
   filter.has_start_from_nothing = options.has_start_from_nothing;
   filter.solve = options.solve;
@@ -47,8 +45,15 @@ TolerantSolveResult SolveTolerantly(const Model& model,
                                     const TolerantSolveOptions& options,
                                     const Context& context) {
   if (options.max_error) return SolveWithoutOutliers(model, options, context);
+  const bool allows_removal = AllowsRemoval(options.solve);
+  if (allows_removal && options.solve.init == SolveInit::kFeasible &&
+      !options.solve.describe_certificate) {
+    TolerantSolveResult result = SolveWithoutOutliers(model, options, context);
+    if (!result.outliers->is_spared) return result;
+  }
   SolveModelResult solved = SolveModel(model, options.solve, context);
-  if (NeedsRemoval(options.solve, solved.summary)) {
+  if (allows_removal &&
+      solved.summary.termination == SolveTermination::kNothingToSolve) {
     return SolveWithoutOutliers(model, options, context);
   }
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};

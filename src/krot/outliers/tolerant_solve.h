@@ -15,8 +15,9 @@ namespace krot {
 struct TolerantSolveOptions {
   SolveModelOptions solve;
   // Few observations are removed so that all others are within so many pixels,
-  // > 0. None: all stay, unless the model holds no positions and no start
-  // serves all of them; then the bound is FilterOutliers' choice.
+  // > 0. None: all stay, unless the start is from nothing, no certificate is
+  // asked for, and something must go (RemovalStart::fits); then what noise does
+  // not explain is removed.
   std::optional<double> max_error;
   // As OutlierFilterOptions has it.
   bool has_start_from_nothing = false;

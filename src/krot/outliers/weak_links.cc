@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include <Eigen/Geometry>
+
 #include "krot/outliers/place_search.h"
 #include "krot/outliers/robust_points.h"
 #include "krot/problem/components.h"
@@ -83,6 +85,7 @@ class Joiner {
   std::vector<SharedTrack> TracksOf(const GroupPair& pair, int64_t* num_shared);
   bool HasBaselineIn(int32_t group) const;
   WeakLink Join(GroupPair pair);
+  static void FindTurn(const PlaceSearch& tracks, WeakLink* link);
   void Move(int32_t group, const Place& place);
   void Unite(const GroupPair& pair, const Place& place);
 
@@ -188,6 +191,21 @@ void Joiner::Move(int32_t group, const Place& place) {
   }
 }
 
+// Three tracks agree at some turn, whatever they are: twice as many must.
+void Joiner::FindTurn(const PlaceSearch& tracks, WeakLink* link) {
+  constexpr int64_t kTelling = 6;
+  const std::optional<Place> turned = tracks.ProposeTurned();
+  if (!turned) return;
+  const int64_t count = tracks.NumAgreeing(*turned);
+  if (count < kTelling || 2 * count <= link->num_telling ||
+      count < link->num_agreeing + 3) {
+    return;
+  }
+  link->num_agreeing_turned = count;
+  link->turn_deg =
+      Eigen::AngleAxisd(turned->rotation).angle() * 180 / EIGEN_PI;
+}
+
 WeakLink Joiner::Join(GroupPair pair) {
   const bool a_is_metric = HasBaselineIn(pair.a);
   if (!a_is_metric && HasBaselineIn(pair.b)) std::swap(pair.a, pair.b);
@@ -217,12 +235,18 @@ WeakLink Joiner::Join(GroupPair pair) {
         ScalesAround(places[0].scale, step, kFineSteps), context_);
     places.insert(places.begin(), fine.begin(), fine.end());
   }
+  if (!may_move_) {  // the result's own, which no search may hit as well
+    Place own;
+    own.cost = tracks.Cost(own);
+    places.push_back(own);
+  }
   Place best = places[0];
   for (const Place& place : places) {
     if (place.cost < best.cost) best = place;
   }
-  link.num_agreeing =
-      PlaceSearch(problem_, estimate_, sigma_, all).NumAgreeing(best);
+  const PlaceSearch of_all(problem_, estimate_, sigma_, all);
+  link.num_agreeing = of_all.NumAgreeing(best);
+  if (!may_move_) FindTurn(of_all, &link);
   const double now = may_move_ ? best.scale : 1;
   for (const Place& place : places) {
     if (!(place.cost <= best.cost + tracks.no_worse())) continue;

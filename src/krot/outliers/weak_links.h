@@ -23,6 +23,11 @@ struct WeakLink {
   // The group may be larger or smaller by this factor, about, and the tracks
   // would fit as well; infinite if any scale fits. >= 1.
   double scale_factor = 1;
+  // By how much the group's rotations, all alike, would have to turn against
+  // the others', degrees, for more tracks to agree, and how many then would;
+  // 0: no turn was found. Rotations are known, so that nothing turns.
+  double turn_deg = 0;
+  int64_t num_agreeing_turned = 0;
 
   // Beyond this factor, and where the tracks that agree are no more than those
   // that do not, nobody should rely on scale and place.

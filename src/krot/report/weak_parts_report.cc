@@ -29,7 +29,13 @@ std::string WeakPartWords(const WeakPart& part) {
           : std::isfinite(part.scale_factor)
               ? "is held to a factor of " + FormatNumber(part.scale_factor, 2) +
                     " only"
-              : std::string("is not held at all"));
+              : std::string("is not held at all")) +
+         (part.turn_deg > 0
+              ? "; if all their rotations were turned against the rest's by " +
+                    FormatNumber(part.turn_deg, 2) + " degrees, " +
+                    std::to_string(part.num_agreeing_turned) +
+                    " tracks would agree: look at the rotations"
+              : std::string());
 }
 
 }  // namespace
@@ -50,8 +56,8 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
   }
   const auto num_removed = static_cast<int64_t>(summary.removed.size());
   if (summary.is_bound_beyond_reason) {
-    add("hardly anything fits: half of all errors are above a tenth of the "
-        "bound that was chosen, " +
+    add("hardly anything fits: half of all errors are so large that noise "
+        "would explain " +
         FormatNumber(summary.max_error, 4) +
         " px; look at rotations, intrinsics and matches");
   } else if (2 * num_removed > summary.num_observations) {
@@ -73,7 +79,9 @@ Json WeakPartsJson(const OutlierFilterSummary& summary) {
          {"num_agreeing", part.num_agreeing},
          {"scale_factor",
           std::isfinite(part.scale_factor) ? Json(part.scale_factor) : Json()},
-         {"is_held", part.is_held}});
+         {"is_held", part.is_held},
+         {"turn_deg", part.turn_deg},
+         {"num_agreeing_turned", part.num_agreeing_turned}});
   }
   return parts;
 }
