@@ -14,7 +14,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/weakly_tied.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SceneOptions Scene(double outlier_ratio, double rotation_noise_deg) {
@@ -285,4 +285,4 @@ TEST(FilterOutliers, ChoosesABoundWhereNoneIsGiven) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The frame of observation i.
 inline int32_t FrameOf(const KnownRotationProblem& problem, int64_t i) {
@@ -75,4 +75,4 @@ struct PartOptions {
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                const PartOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 double KT(const char* n, double d) { const char* s = getenv(n); return s ? atof(s) : d; }
@@ -217,4 +217,4 @@ double MedianError(const KnownRotationProblem& problem,
   return errors.empty() ? 0 : Median(std::move(errors));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

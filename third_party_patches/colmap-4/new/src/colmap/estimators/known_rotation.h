@@ -17,9 +17,8 @@ namespace colmap {
 MAKE_ENUM_CLASS_OVERLOAD_STREAM(KnownRotationInit, 0, MODEL, FEASIBLE);
 
 // What is chosen among all estimates with the lowest largest error: the least
-// squares, the lowest largest error of each point and frame, or any.
-MAKE_ENUM_CLASS_OVERLOAD_STREAM(
-    KnownRotationFinish, 0, LEAST_SQUARES, SWEEPS, NONE);
+// squares, or any.
+MAKE_ENUM_CLASS_OVERLOAD_STREAM(KnownRotationFinish, 0, LEAST_SQUARES, NONE);
 
 // The known rotation problem: rotations and intrinsics stay, translations and
 // points take the lowest largest reprojection error, which is proved.

@@ -66,7 +66,7 @@ int RunKnownRotationSolver(int argc, char** argv) {
       &known_rotation.finish,
       KnownRotationFinishToString,
       KnownRotationFinishFromString,
-      "{LEAST_SQUARES, SWEEPS, NONE}; what to choose among all estimates with "
+      "{LEAST_SQUARES, NONE}; what to choose among all estimates with "
       "the lowest largest error");
   options.AddDefaultOption("KnownRotation.num_threads",
                            &known_rotation.num_threads);

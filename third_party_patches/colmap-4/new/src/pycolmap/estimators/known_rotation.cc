@@ -45,7 +45,6 @@ void BindKnownRotation(py::module& m) {
   auto PyFinish =
       py::enum_<KnownRotationFinish>(m, "KnownRotationFinish")
           .value("LEAST_SQUARES", KnownRotationFinish::LEAST_SQUARES)
-          .value("SWEEPS", KnownRotationFinish::SWEEPS)
           .value("NONE", KnownRotationFinish::NONE);
   AddStringToEnumConstructor(PyFinish);
 

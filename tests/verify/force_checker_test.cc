@@ -1,5 +1,5 @@
 #include "krot/base/numbers.h"
-#include "krot/proof/force_checker.h"
+#include "krot/verify/force_checker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ForceChecker::Real;
@@ -184,4 +184,4 @@ TEST(ForceChecker, AllowsForWhatChangesAddToTheConstants) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
