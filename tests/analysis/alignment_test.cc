@@ -15,7 +15,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::AngleAxisd;
@@ -238,4 +238,4 @@ TEST(TransformModel, KeepsAllBitsUnderTheIdentityAndNaNUnderAnything) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -129,4 +129,4 @@ TEST(ModelStatistics, RefuseErrorsOfAnotherModel) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

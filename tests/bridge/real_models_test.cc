@@ -10,7 +10,7 @@
 #include "krot/problem/cost.h"
 #include "tests/bridge/model_difference.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct CountedModel {
@@ -49,4 +49,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.folder); });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

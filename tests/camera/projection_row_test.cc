@@ -14,7 +14,7 @@
 #include "krot/camera/chart.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kEquirectangular = 17;
@@ -293,4 +293,4 @@ TEST(ChartAt, IsTheImagePlaneForPerspectiveLensesAndTangentForFisheyes) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

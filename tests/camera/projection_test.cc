@@ -9,7 +9,7 @@
 #include "krot/camera/models.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Eigen::Vector2d Project(std::string_view name,
@@ -218,4 +218,4 @@ TEST(Project, AlsoDifferentiatesByTheParameters) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "krot/camera/projection_row.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -324,4 +324,4 @@ TEST(RemainderBound, NamesArgumentsThatAreOutOfRange) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

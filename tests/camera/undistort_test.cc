@@ -10,7 +10,7 @@
 #include "krot/camera/models.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Outcome {
@@ -274,4 +274,4 @@ TEST(UndistortPixel, OfTheFovModelInvertsTheSmallOmegaPolynomial) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "tests/oracle/ellipsoid_oracle.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -324,4 +324,4 @@ INSTANTIATE_TEST_SUITE_P(, DegenerateTest,
                          NormName);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr int kCertificateVersion = 2;
 
@@ -89,4 +89,4 @@ CertificateFile ParseCertificate(const std::string& json,
 std::string ReadCertificateText(const std::filesystem::path& path);
 CertificateFile ReadCertificateFile(const std::filesystem::path& path);
 
-}  // namespace krot
+}  // namespace krot::internal

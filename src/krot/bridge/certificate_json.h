@@ -9,7 +9,7 @@
 #include "krot/bridge/certificate_file.h"
 #include "krot/math/norm.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the files of certificates and of conflicts have in common.
 
@@ -56,4 +56,4 @@ CertificateFileJson PositionsJson(const CertificateFile& file);
 CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& observations);
 
-}  // namespace krot
+}  // namespace krot::internal

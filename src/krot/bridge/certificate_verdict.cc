@@ -15,7 +15,7 @@
 #include "krot/model/local_frame.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string NameOf(const CertificateFile::SupportObservation& o) {
@@ -194,4 +194,4 @@ CertificateVerdict VerifyCertificateFile(const Model& original,
   return verdict;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,9 +1,9 @@
 #include "krot/pipeline/finish.h"
 
-namespace krot {
+namespace krot::internal {
 
 const char* FinishName(Finish finish) {
   return finish == Finish::kNone ? "none" : "least_squares";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/pipeline/position_level.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the slack, a gap that still leaves room.
@@ -119,4 +119,4 @@ double SumOfLosses(const Reprojection& reprojection,
   return sum[0];
 }
 
-}  // namespace krot
+}  // namespace krot::internal

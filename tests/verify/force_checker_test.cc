@@ -1,4 +1,4 @@
-#include "krot/proof/force_checker.h"
+#include "krot/verify/force_checker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 #include "krot/base/numbers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ForceChecker::Real;
@@ -185,4 +185,4 @@ TEST(ForceChecker, AllowsForWhatChangesAddToTheConstants) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
