@@ -1,10 +1,9 @@
-# krot_library(<folder> [COLD|WARM] [SOURCES file...] [DEPENDS target...])
+# krot_library(<folder> [COLD] [SOURCES file...] [DEPENDS target...])
 #
 # One library per folder of src/krot: krot_<folder>, alias krot::<folder>.
-# Without sources it is header-only. COLD: see krot_cold. WARM: most of it runs
-# once or twice in a command, and what remains gains nothing from -O3.
+# Without sources it is header-only. COLD: see krot_cold.
 function(krot_library folder)
-  cmake_parse_arguments(ARG "COLD;WARM" "" "SOURCES;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "COLD" "" "SOURCES;DEPENDS" ${ARGN})
   set(target krot_${folder})
   if(ARG_SOURCES)
     add_library(${target} ${ARG_SOURCES})
@@ -13,9 +12,6 @@ function(krot_library folder)
     if(ARG_COLD)
       krot_cold(${target})
       krot_precompiled_headers(${target} COLD)
-    elseif(ARG_WARM)
-      target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O2>)
-      krot_precompiled_headers(${target} WARM)
     else()
       krot_precompiled_headers(${target} HOT)
     endif()
@@ -51,7 +47,7 @@ function(krot_cold target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-# krot_precompiled_headers(<target> HOT|WARM|COLD|TEST)
+# krot_precompiled_headers(<target> HOT|COLD|TEST)
 #
 # What nearly every source includes, parsed once by the first target of its
 # kind: GCC's precompiled headers bring their level of optimisation with them.

@@ -1,4 +1,3 @@
-#include "krot/base/numbers.h"
 #include "krot/analysis/alignment.h"
 
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "krot/base/numbers.h"
 #include "krot/model.h"
 #include "krot/model/image_geometry.h"
 #include "krot/synthetic/scene.h"

@@ -1,4 +1,3 @@
-#include "krot/base/numbers.h"
 #include "krot/analysis/model_comparison.h"
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "krot/base/numbers.h"
 #include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 

@@ -46,7 +46,8 @@ Model ThreeCountedImages() {
 const std::vector<double> kErrors = {1, 4, kUnknown, 4, 2};
 
 TEST(ComputeColmapStatistics, CountsObservationsOfRegisteredImages) {
-  const ColmapStatistics statistics = ComputeColmapStatistics(ThreeCountedImages());
+  const ColmapStatistics statistics =
+      ComputeColmapStatistics(ThreeCountedImages());
   EXPECT_EQ(statistics.num_rigs, 0);
   EXPECT_EQ(statistics.num_frames, 0);
   EXPECT_EQ(statistics.num_cameras, 2);
@@ -119,8 +120,10 @@ TEST(WorstObservations, AreNoMoreThanThereAreErrors) {
 
 TEST(ModelStatistics, RefuseErrorsOfAnotherModel) {
   EXPECT_THROW(ErrorsByImage(ThreeCountedImages(), {1}), std::invalid_argument);
-  EXPECT_THROW(ErrorsByCamera(ThreeCountedImages(), {1}), std::invalid_argument);
-  EXPECT_THROW(WorstObservations(ThreeCountedImages(), {1}, 1), std::invalid_argument);
+  EXPECT_THROW(ErrorsByCamera(ThreeCountedImages(), {1}),
+               std::invalid_argument);
+  EXPECT_THROW(WorstObservations(ThreeCountedImages(), {1}, 1),
+               std::invalid_argument);
   EXPECT_THROW(WorstObservations(ThreeCountedImages(), kErrors, -1),
                std::invalid_argument);
 }

@@ -200,7 +200,8 @@ TEST(SettleContradictions, DropsWhatOnlyOneSideHasIfItIsTheWorst) {
 }
 
 TEST(SettleContradictions, ChoosesNeitherWhereNeitherFits) {
-  Model model = WithTracksOfNeighbours(WithNamesOfNeighbours(ContradictoryScene(), 1000));
+  Model model =
+      WithTracksOfNeighbours(WithNamesOfNeighbours(ContradictoryScene(), 1000));
   // Names are one off, tracks are, too, but in the other direction.
   const Model before = model;
   EXPECT_EQ(FollowedIn(&model), "neither");
@@ -208,7 +209,8 @@ TEST(SettleContradictions, ChoosesNeitherWhereNeitherFits) {
 }
 
 TEST(SettleContradictions, HasNothingToChooseWithoutTracks) {
-  Model model = WithTracksOfNeighbours(WithNamesOfNeighbours(ContradictoryScene(), 1000));
+  Model model =
+      WithTracksOfNeighbours(WithNamesOfNeighbours(ContradictoryScene(), 1000));
   model.points3D.resize(1);
   model.points3D[0].track_end = 1;
   model.track_elements.resize(1);

@@ -81,9 +81,8 @@ TEST(LeftOutName, IsTheKeyOfTheReport) {
   for (int r = 0; r < kNumLeftOutReasons; ++r) {
     names.push_back(LeftOutName(static_cast<LeftOut>(r)));
   }
-  EXPECT_THAT(names,
-              ElementsAre("behind", "undistortion", "short_track", "no_pose",
-                          "same_image", "fixed"));
+  EXPECT_THAT(names, ElementsAre("behind", "undistortion", "short_track",
+                                 "no_pose", "same_image", "fixed"));
 }
 
 TEST(LeftOut, NothingDependsOnTranslationsThatAreIgnored) {

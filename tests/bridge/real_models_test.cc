@@ -19,7 +19,8 @@ struct CountedModel {
   double cost;               // pixels, from a reference solver
 };
 
-class BuildProblemOfRealModel : public ::testing::TestWithParam<CountedModel> {};
+class BuildProblemOfRealModel : public ::testing::TestWithParam<CountedModel> {
+};
 
 TEST_P(BuildProblemOfRealModel, KeepsEverythingAndAgreesOnTheCost) {
   const char* root = std::getenv("KROT_REAL_MODELS");

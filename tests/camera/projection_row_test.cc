@@ -1,4 +1,3 @@
-#include "krot/base/numbers.h"
 #include "krot/camera/projection_row.h"
 
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/chart.h"
 #include "tests/camera/random_camera.h"

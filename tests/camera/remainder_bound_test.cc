@@ -1,4 +1,3 @@
-#include "krot/base/numbers.h"
 #include "krot/camera/remainder_bound.h"
 
 #include <cmath>
@@ -12,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/chart.h"
 #include "krot/camera/projection_row.h"
 #include "tests/camera/random_camera.h"

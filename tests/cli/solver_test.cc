@@ -130,10 +130,10 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
                   "finish", "loss", "termination", "cap", "lowest_cost",
                   "cost_initial", "cost_final", "duality_gap", "stationarity",
                   "num_active", "num_iterations", "seconds"));
-  EXPECT_EQ(Keys(report["left_out"]),
-            (std::vector<std::string>{"behind", "fixed", "no_pose",
-                                      "same_image", "short_track",
-                                      "undistortion"}));
+  EXPECT_EQ(
+      Keys(report["left_out"]),
+      (std::vector<std::string>{"behind", "fixed", "no_pose", "same_image",
+                                "short_track", "undistortion"}));
   EXPECT_EQ(Keys(report["pixel_error"]),
             (std::vector<std::string>{"after", "before"}));
   EXPECT_EQ(Keys(report["pixel_error"]["after"]),

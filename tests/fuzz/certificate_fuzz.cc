@@ -41,8 +41,7 @@ void JudgeText(const std::string& json) {
     if (!verdict.is_accepted || file.norm.p != truth.certificate.norm.p) return;
     const bool moves_all =
         verdict.num_fixed_images + verdict.num_fixed_points == 0;
-    Require(!moves_all ||
-                verdict.lower_bound <= truth.cost * (1 + 1e-9),
+    Require(!moves_all || verdict.lower_bound <= truth.cost * (1 + 1e-9),
             "no bound above an error that an estimate has");
   } catch (const ModelError&) {
   }

@@ -222,10 +222,11 @@ TEST(Fixed, AFrameAloneChangesNoOptimum) {
   EXPECT_TRUE(IsScaleFree(scene.problem));
   Estimate expected = free.estimate;
   Estimate found = scene.estimate;
-  EXPECT_NEAR(
-      SolveJoint(scene.problem, FixedOptions(Norm::L2()), {}, &found).cost_final,
-      SolveJoint(free.problem, FixedOptions(Norm::L2()), {}, &expected).cost_final,
-      1e-4);
+  EXPECT_NEAR(SolveJoint(scene.problem, FixedOptions(Norm::L2()), {}, &found)
+                  .cost_final,
+              SolveJoint(free.problem, FixedOptions(Norm::L2()), {}, &expected)
+                  .cost_final,
+              1e-4);
   ExpectInPlace(scene.problem, found);
 }
 

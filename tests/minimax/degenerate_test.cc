@@ -129,7 +129,8 @@ TEST_P(DegenerateTest, OneImageTwiceCostsHalfTheirDistance) {
     problem.residuals.push_back(twin);
     Vector3d x = generator_.Start(problem, 0.5);
     const DescentSummary summary = Minimize(problem, &x);
-    EXPECT_NEAR(summary.cost, 0.5 * NormOf(offset, norm()), kDegenerateAgreement);
+    EXPECT_NEAR(summary.cost, 0.5 * NormOf(offset, norm()),
+                kDegenerateAgreement);
     EXPECT_EQ(summary.termination, DescentTermination::kStationary);
   }
 }
@@ -319,7 +320,8 @@ std::string NormName(const testing::TestParamInfo<double>& info) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, DegenerateTest,
-                         testing::Values(1, 1.5, 2, 3, Norm::LInf().p), NormName);
+                         testing::Values(1, 1.5, 2, 3, Norm::LInf().p),
+                         NormName);
 
 }  // namespace
 }  // namespace krot::internal

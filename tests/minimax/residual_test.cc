@@ -185,15 +185,15 @@ TEST_P(SmoothResidualTest, TangentTouchesAtItsPointAndLiesBelowElsewhere) {
   }
 }
 
-std::string NameOf(const testing::TestParamInfo<double>& info) {
+std::string NameOfNorm(const testing::TestParamInfo<double>& info) {
   if (std::isinf(info.param)) return "LInf";
   return "L" + std::to_string(static_cast<int>(10 * info.param));
 }
 
 INSTANTIATE_TEST_SUITE_P(, ResidualTest,
-                         testing::Values(1, 1.5, 2, 3, kInfinity), NameOf);
+                         testing::Values(1, 1.5, 2, 3, kInfinity), NameOfNorm);
 INSTANTIATE_TEST_SUITE_P(, SmoothResidualTest, testing::Values(1.5, 2, 3),
-                         NameOf);
+                         NameOfNorm);
 
 }  // namespace
 }  // namespace krot::internal

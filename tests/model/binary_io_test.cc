@@ -40,7 +40,7 @@ std::string With(std::string bytes, size_t offset, T value) {
 }
 
 std::string BinaryError(void (*parse)(const FileBytes&, Model*),
-                    const std::string& bytes) {
+                        const std::string& bytes) {
   Model model;
   return ModelErrorOf([&] { parse({"f.bin", bytes}, &model); });
 }
@@ -163,18 +163,19 @@ TEST(BinaryIo, ChecksEveryCountAgainstTheFile) {
     }
   }
   const size_t num_points2D = 8 + 4 + 56 + 4 + sizeof("left/a b.jpg");
-  EXPECT_THAT(BinaryError(ParseImagesBinary, With(FormatImagesBinary(model),
-                                              num_points2D, uint64_t{1} << 60)),
-              HasSubstr("found number of 2D points = 1152921504606846976"));
   EXPECT_THAT(
-      BinaryError(ParsePoints3DBinary, With(FormatPoints3DBinary(model),
-                                        8 + 8 + 24 + 3 + 8, uint64_t{1000})),
-      HasSubstr("found track length = 1000"));
-  EXPECT_THAT(
-      BinaryError(ParseRigsBinary, With(FormatRigsBinary(model), 12, ~uint32_t{0})),
-      HasSubstr("found number of sensors = 4294967295"));
+      BinaryError(ParseImagesBinary, With(FormatImagesBinary(model),
+                                          num_points2D, uint64_t{1} << 60)),
+      HasSubstr("found number of 2D points = 1152921504606846976"));
+  EXPECT_THAT(BinaryError(ParsePoints3DBinary,
+                          With(FormatPoints3DBinary(model), 8 + 8 + 24 + 3 + 8,
+                               uint64_t{1000})),
+              HasSubstr("found track length = 1000"));
+  EXPECT_THAT(BinaryError(ParseRigsBinary,
+                          With(FormatRigsBinary(model), 12, ~uint32_t{0})),
+              HasSubstr("found number of sensors = 4294967295"));
   EXPECT_THAT(BinaryError(ParseFramesBinary, With(FormatFramesBinary(model),
-                                              8 + 8 + 56, ~uint32_t{0})),
+                                                  8 + 8 + 56, ~uint32_t{0})),
               HasSubstr("found number of data ids = 4294967295"));
 }
 
@@ -189,10 +190,11 @@ TEST(BinaryIo, RefusesBytesAfterTheLastRecord) {
 }
 
 TEST(BinaryIo, RefusesAnUnknownCameraModel) {
-  EXPECT_EQ(BinaryError(ParseCamerasBinary,
-                    With(FormatCamerasBinary(TinyModel()), 12, int32_t{99})),
-            "f.bin, byte 12: found camera model id 99 (camera 7), expected 0 "
-            "to 17");
+  EXPECT_EQ(
+      BinaryError(ParseCamerasBinary,
+                  With(FormatCamerasBinary(TinyModel()), 12, int32_t{99})),
+      "f.bin, byte 12: found camera model id 99 (camera 7), expected 0 "
+      "to 17");
 }
 
 TEST(BinaryIo, RefusesANameWithoutEnd) {
@@ -206,9 +208,10 @@ TEST(BinaryIo, RefusesANameWithoutEnd) {
 
 TEST(BinaryIo, RefusesAPoseFlagThatIsNoFlag) {
   const size_t flag = 8 + 4 + 4 + 8 + 8;
-  EXPECT_THAT(BinaryError(ParseRigsBinary,
-                      With(FormatRigsBinary(TinyRigModel()), flag, uint8_t{7})),
-              HasSubstr("byte 32: found pose flag 7"));
+  EXPECT_THAT(
+      BinaryError(ParseRigsBinary,
+                  With(FormatRigsBinary(TinyRigModel()), flag, uint8_t{7})),
+      HasSubstr("byte 32: found pose flag 7"));
 }
 
 }  // namespace

@@ -34,7 +34,8 @@ void Convert(const fs::path& input, const fs::path& output,
   ASSERT_EQ(std::system(command.c_str()), 0) << command;
 }
 
-void WriteForColmap(const Model& model, const fs::path& folder, ModelFormat format) {
+void WriteForColmap(const Model& model, const fs::path& folder,
+                    ModelFormat format) {
   WriteModelOptions options;
   options.format = format;
   WriteModel(model, folder, options);

@@ -156,13 +156,16 @@ TEST(Database, IsRefusedIfTheModelWasMadeFromOtherFeatures) {
 TEST(Database, IsRefusedWithOneSentenceIfItIsNone) {
   const TempFolder folder;
   const fs::path path = folder / "database.db";
-  EXPECT_THAT(DatabaseError(path, ThreeImages()), HasSubstr("cannot be opened"));
+  EXPECT_THAT(DatabaseError(path, ThreeImages()),
+              HasSubstr("cannot be opened"));
   EXPECT_THAT(DatabaseError(folder.path(), ThreeImages()),
               HasSubstr("is no regular file, expected COLMAP's database"));
   WriteBytes(path, "");
-  EXPECT_THAT(DatabaseError(path, ThreeImages()), HasSubstr("is no SQLite database"));
+  EXPECT_THAT(DatabaseError(path, ThreeImages()),
+              HasSubstr("is no SQLite database"));
   WriteBytes(path, "version https://git-lfs.github.com/spec/v1\noid sha256:4d");
-  EXPECT_THAT(DatabaseError(path, ThreeImages()), HasSubstr("is a Git LFS pointer"));
+  EXPECT_THAT(DatabaseError(path, ThreeImages()),
+              HasSubstr("is a Git LFS pointer"));
 }
 
 TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
@@ -221,7 +224,8 @@ TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
       WriteImages(&writer);
       writer.Execute(bad.sql);
     }
-    const std::string error = DatabaseError(folder / "database.db", ThreeImages());
+    const std::string error =
+        DatabaseError(folder / "database.db", ThreeImages());
     EXPECT_THAT(error, HasSubstr(bad.sentence)) << bad.sql;
     if (bad.sentence.empty()) {
       EXPECT_EQ(error, "") << bad.sql;

@@ -27,7 +27,7 @@ using ::testing::IsEmpty;
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
 void WriteIn(const Model& model, const fs::path& folder,
-           ModelFormat format = ModelFormat::kBinary) {
+             ModelFormat format = ModelFormat::kBinary) {
   WriteModelOptions options;
   options.format = format;
   options.overwrite = true;

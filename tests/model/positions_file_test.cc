@@ -19,8 +19,8 @@ using ::testing::HasSubstr;
 // What programs write: "NAME X Y Z RADIUS" of the images of TinyModel.
 
 std::string PositionsError(const std::string& text,
-                    const PositionsOptions& options = {},
-                    const Model& model = TinyModel()) {
+                           const PositionsOptions& options = {},
+                           const Model& model = TinyModel()) {
   return ModelErrorOf([&] { ReadPositions({"p.txt", text}, model, options); });
 }
 
@@ -132,8 +132,9 @@ TEST(PositionsFile, ThatCannotBeMeantIsRefusedWithItsLine) {
   EXPECT_THAT(PositionsError("c.jpg 1 2 3 4 5"),
               HasSubstr("p.txt:1: found 5 numbers behind image \"c.jpg\", "
                         "expected X Y Z RADIUS, or"));
-  EXPECT_THAT(PositionsError("c.jpg 1 2"), HasSubstr("found \"c.jpg\", expected a "
-                                              "finite number: X Y Z RADIUS"));
+  EXPECT_THAT(PositionsError("c.jpg 1 2"),
+              HasSubstr("found \"c.jpg\", expected a "
+                        "finite number: X Y Z RADIUS"));
   // The first line is no header if it begins as others do.
   EXPECT_THAT(PositionsError("c.jpg"), HasSubstr("p.txt:1: found \"c.jpg\""));
   EXPECT_THAT(PositionsError("c.jpg 1 2 3 O.5"), HasSubstr("found \"O.5\""));
@@ -166,8 +167,9 @@ class LatitudesAndLongitudes : public ::testing::Test {
 
   // What reading says of `scale` * place + `origin`.
   std::string PositionsError(const Eigen::Vector3d& scale,
-                      const Eigen::Vector3d& origin, bool of_points = false,
-                      const std::string& header = "") const {
+                             const Eigen::Vector3d& origin,
+                             bool of_points = false,
+                             const std::string& header = "") const {
     std::string text = header;
     for (int n = 0; n < 8; ++n) {
       const Eigen::Vector3d x = scale.cwiseProduct(Place(n)) + origin;
@@ -217,9 +219,9 @@ TEST_F(LatitudesAndLongitudes,
 }
 
 TEST_F(LatitudesAndLongitudes, AreRecognisedByTheHeader) {
-  EXPECT_THAT(
-      PositionsError({1, 1, 1}, {0, 0, 0}, false, "image Latitude Longitude h r\n"),
-      HasSubstr("found latitudes and longitudes"));
+  EXPECT_THAT(PositionsError({1, 1, 1}, {0, 0, 0}, false,
+                             "image Latitude Longitude h r\n"),
+              HasSubstr("found latitudes and longitudes"));
 }
 
 TEST_F(LatitudesAndLongitudes, AreNotSeenInPositionsOfOtherFramesAndUnits) {

@@ -87,9 +87,10 @@ TEST(RotationsFile, OfTheModelsOwnRotationsChangesNoBit) {
 }
 
 TEST(RotationsFile, ThatCannotBeMeantIsRefusedWithItsLine) {
-  EXPECT_THAT(RotationsError("c.jpg 1 0 0 0\nempty.png 1 0 0 0\nc.jpg 1 0 0 0\n"),
-              HasSubstr("r.txt:3: found image \"c.jpg\" again, expected each "
-                        "once; line 1 names it"));
+  EXPECT_THAT(
+      RotationsError("c.jpg 1 0 0 0\nempty.png 1 0 0 0\nc.jpg 1 0 0 0\n"),
+      HasSubstr("r.txt:3: found image \"c.jpg\" again, expected each "
+                "once; line 1 names it"));
   EXPECT_THAT(RotationsError("c.jpg 0 0 0 0"),
               HasSubstr("r.txt:1: found a quaternion of zeros"));
   EXPECT_THAT(RotationsError("c.jpg 1 0 0 0 1 2 3"),
@@ -118,10 +119,10 @@ TEST(RotationsFile, GivesAFrameWithoutARotationOneAndNoPlace) {
 TEST(RotationsFile, ThatContradictsItselfWithinAFrameIsRefused) {
   const Eigen::Quaterniond off(
       kTurn * Eigen::AngleAxisd(1e-4, Eigen::Vector3d::UnitX()));
-  EXPECT_THAT(
-      RotationsError(Line("c.jpg", kTurn) + Line("empty.png", off), TinyRigModel()),
-      HasSubstr("r.txt:2: found a rotation 0.000100 rad off the one "
-                "that line 1 gives to the same frame"));
+  EXPECT_THAT(RotationsError(Line("c.jpg", kTurn) + Line("empty.png", off),
+                             TinyRigModel()),
+              HasSubstr("r.txt:2: found a rotation 0.000100 rad off the one "
+                        "that line 1 gives to the same frame"));
   Model model = TinyRigModel();
   const ReplacedRotations replaced = ReplaceRotations(
       {"r.txt", Line("c.jpg", kTurn) + Line("empty.png", kTurn)}, &model);

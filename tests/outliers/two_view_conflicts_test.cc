@@ -18,7 +18,8 @@ struct Charged {
   explicit Charged(uint64_t seed)
       : scene(MakeOutlierScene(seed, 0.05)),
         built(BuildProblem(scene.model, {})),
-        removal(FindRemoval(scene.model, built, {Norm::L2(), kTwoViewBound}, {})),
+        removal(
+            FindRemoval(scene.model, built, {Norm::L2(), kTwoViewBound}, {})),
         worth(built.pixels.size(), 1) {
     for (const int64_t i : removal.observations) worth[i] = 0;
   }
@@ -41,8 +42,8 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
       for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
         ++num_candidates;
         Work work;
-        EXPECT_TRUE(FindConflict(c.scene.model, c.built, {Norm::L2(), kTwoViewBound},
-                                 set, {}, &work))
+        EXPECT_TRUE(FindConflict(c.scene.model, c.built,
+                                 {Norm::L2(), kTwoViewBound}, set, {}, &work))
             << "observation " << i << ", seed " << seed;
       }
     }
@@ -53,7 +54,8 @@ TEST(TwoViewConflicts, CandidatesDoNotGoTogetherByTheSolver) {
 TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
   Charged c(4);
   for (size_t i = 0; i < c.worth.size(); i += 3) c.worth[i] = 0;
-  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate, kTwoViewBound);
+  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
+                                   kTwoViewBound);
   for (const int64_t i : c.removal.observations) {
     for (const std::vector<int64_t>& set : conflicts.Candidates(i, c.worth)) {
       EXPECT_TRUE(std::is_sorted(set.begin(), set.end()));
@@ -70,7 +72,8 @@ TEST(TwoViewConflicts, CandidatesAreOfTwoViewsAndOfWhatMayBeUsed) {
 
 TEST(TwoViewConflicts, HasNoCandidateForWhatIsWithinTheBound) {
   const Charged c(5);
-  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate, kTwoViewBound);
+  const TwoViewConflicts conflicts(c.built.problem, c.removal.estimate,
+                                   kTwoViewBound);
   for (int64_t i = 0; i < static_cast<int64_t>(c.worth.size()); ++i) {
     if (c.worth[i] == 0) continue;
     EXPECT_TRUE(conflicts.Candidates(i, c.worth).empty());

@@ -148,8 +148,8 @@ struct Count {
     const CertificateVerdict verdict = VerifyCertificateFile(model, file);
     ++tried;
     refused += !verdict.is_accepted;
-    false_ones +=
-        verdict.is_accepted && verdict.lower_bound > cost * (1 + kBoundRounding);
+    false_ones += verdict.is_accepted &&
+                  verdict.lower_bound > cost * (1 + kBoundRounding);
   }
 };
 

@@ -72,8 +72,7 @@ Model ModelThatAnyStepSpoils() {
 
 class GivenBackIn : public ::testing::TestWithParam<double> {};
 
-INSTANTIATE_TEST_SUITE_P(Norms, GivenBackIn,
-                         ::testing::Values(1, 2, kNoBound));
+INSTANTIATE_TEST_SUITE_P(Norms, GivenBackIn, ::testing::Values(1, 2, kNoBound));
 
 TEST_P(GivenBackIn, IsTheInputAndAllNumbersSpeakOfIt) {
   const Model model = ModelThatAnyStepSpoils();

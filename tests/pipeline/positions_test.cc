@@ -100,7 +100,7 @@ Model Wiped(Model model) {
 }
 
 SolveModelResult SolveWith(const Model& model,
-                          const std::vector<KnownPosition>& positions) {
+                           const std::vector<KnownPosition>& positions) {
   SolveModelOptions options;
   options.problem.positions = positions;
   options.describe_certificate = true;

@@ -1,4 +1,3 @@
-#include "krot/base/numbers.h"
 #include "krot/verify/force_checker.h"
 
 #include <algorithm>
@@ -10,6 +9,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+
+#include "krot/base/numbers.h"
 
 namespace krot::internal {
 namespace {

@@ -127,12 +127,10 @@ CertificateFile DescribeCertificate(const Model& model,
 }
 
 std::string CertificateJson(const CertificateFile& file) {
-  Json json = {{"version", kCertificateVersion},
-               {"norm", NormJson(file.norm)},
-               {"lower_bound", file.lower_bound},
-               {"rows_bound", file.rows_bound},
-               {"defect", file.defect},
-               {"model_sha256", file.model_sha256}};
+  Json json = {
+      {"version", kCertificateVersion},  {"norm", NormJson(file.norm)},
+      {"lower_bound", file.lower_bound}, {"rows_bound", file.rows_bound},
+      {"defect", file.defect},           {"model_sha256", file.model_sha256}};
   if (!file.fixed_images.empty() || !file.fixed_points.empty()) {
     json["fixed"] = FixedJson(file);
   }

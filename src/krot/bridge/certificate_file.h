@@ -16,9 +16,9 @@ namespace krot::internal {
 
 inline constexpr int kCertificateVersion = 2;
 
-// A certificate of a bound in true pixels (pixel_certificate.h), in terms of the
-// model's ids: what is written to a file, and can be checked by anyone who has
-// the model (docs/formats.md).
+// A certificate of a bound in true pixels (pixel_certificate.h), in terms of
+// the model's ids: what is written to a file, and can be checked by anyone who
+// has the model (docs/formats.md).
 struct CertificateFile {
   struct SupportObservation {
     ImageId image_id = 0;

@@ -235,12 +235,10 @@ CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& support) {
   Json observations = Json::array();
   for (const CertificateFile::SupportObservation& o : support) {
-    Json json = {{"image_id", o.image_id},
-                 {"point2D_idx", o.point2D_idx},
-                 {"point3D_id", o.point3D_id},
-                 {"bearing", TripleJson(o.bearing)},
-                 {"lambda", o.lambda},
-                 {"y", {o.y[0], o.y[1]}}};
+    Json json = {
+        {"image_id", o.image_id},     {"point2D_idx", o.point2D_idx},
+        {"point3D_id", o.point3D_id}, {"bearing", TripleJson(o.bearing)},
+        {"lambda", o.lambda},         {"y", {o.y[0], o.y[1]}}};
     observations.push_back(std::move(json));
   }
   return observations;

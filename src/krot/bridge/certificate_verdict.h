@@ -15,10 +15,10 @@ namespace krot::internal {
 // Accepts if the digest of the model agrees, every observation is one of the
 // problem that BuildProblem makes of the model, and CheckPixelCertificate
 // accepts the multipliers and bearings. Translations and points do not enter
-// into that: where they keep BuildProblem from using an observation of the certificate,
-// it ignores them. But what the file takes as fixed has to stand where it says,
-// to the bit; and of positions within a radius it speaks as the file has them.
-// Requires a valid model; throws what BuildProblem does.
+// into that: where they keep BuildProblem from using an observation of the
+// certificate, it ignores them. But what the file takes as fixed has to stand
+// where it says, to the bit; and of positions within a radius it speaks as the
+// file has them. Requires a valid model; throws what BuildProblem does.
 // O(observations), and the check.
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);

@@ -80,8 +80,7 @@ std::string CertificateTable(const CertificateVerdict& verdict,
   return "The certificate holds: whatever the translations and points, the "
          "largest\nerror is at least the lower bound, in pixels.\n" +
          FixedSentence(verdict) + PositionsSentence(verdict) +
-         bounds.ToString() +
-         SupportTable(verdict.support, max_observations) +
+         bounds.ToString() + SupportTable(verdict.support, max_observations) +
          PositionsTable(verdict.positions, max_observations);
 }
 
