@@ -10,6 +10,7 @@
 #include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
+#include "krot/pipeline/polish.h"
 
 namespace krot {
 namespace {
@@ -141,8 +142,15 @@ NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
   context.Stage("measuring the noise");
   const Estimate robust = FindRobustStart(
       built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
-  const NoiseLimit limit =
-      LimitOf(ApplyEstimate(model, built, robust), norm, context);
+  Model moved = ApplyEstimate(model, built, robust);
+  NoiseLimit limit = LimitOf(moved, norm, context);
+  if (limit.sigma > 0) {
+    Context alone = context;
+    alone.num_threads = 1;  // Ceres' sums depend on it
+    PolishModel(Polish::kRotationsFixed,
+                {ErrorLoss::Kind::kCauchy, limit.sigma}, {}, alone, &moved);
+    limit = LimitOf(moved, norm, context);
+  }
   const bool is_lower = limit.sigma > 0 && !(limit.sigma >= own.sigma);
   return is_lower || own.sigma == 0 ? limit : own;
 }
