@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "krot/analysis/noise.h"
 #include "krot/base/check.h"
-#include "krot/check.h"
 #include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
@@ -88,7 +88,7 @@ void Profiler::Append(ProfileLevel level) {
 NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   NoiseLimit limit;
   limit.max_error = kLeastNoise;
-  const ModelNoise noise = EstimateNoise(model, {}, context);
+  const ModelNoise noise = SnoopNoise(model, {}, context).noise;
   if (!noise.sigma_px) return limit;
   limit.sigma = *noise.sigma_px;
   // ||e||_1 <= sqrt(2) ||e||_2.
