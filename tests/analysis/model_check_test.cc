@@ -19,7 +19,7 @@
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/scene_database.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -572,4 +572,4 @@ TEST(CheckModel, OfPosesWithoutTracksAsksTheMatchesAlone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "krot/model.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 OutlierFilterOptions Within(double max_error) {
@@ -320,4 +320,4 @@ TEST(FilterOutliers, BySnoopingHasTheSameBitsAtAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How well a model's tracks hold its points.
 
@@ -51,4 +51,4 @@ struct TriangulationAngleStatistics {
 TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
     const Model& model, int num_threads = -1);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "krot/context.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -295,6 +295,12 @@ void ScaleObservations(std::vector<double> scales, BuiltProblem* built) {
   }
   built->scales = std::move(scales);
 }
+
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
 
 const char* LeftOutName(LeftOut reason) {
   switch (reason) {

@@ -10,7 +10,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Version 2: observations have bounds of their own.
 inline constexpr int kConflictFileVersion = 2;
@@ -60,4 +60,4 @@ ConflictFile ParseConflicts(const std::string& json,
 ConflictVerdict VerifyConflictFile(const Model& model,
                                    const ConflictFile& file);
 
-}  // namespace krot
+}  // namespace krot::internal

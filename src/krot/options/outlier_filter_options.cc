@@ -6,7 +6,7 @@
 #include "krot/options/option_error.h"
 #include "krot/options/solve_options.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
@@ -60,4 +60,4 @@ void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
   CheckFinishLoss(options->solve, table);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

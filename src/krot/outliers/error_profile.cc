@@ -12,7 +12,7 @@
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/polish.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // That noise alone exceeds the limit.
@@ -167,4 +167,4 @@ ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
   return Profiler(model, built, options, context).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -20,7 +20,7 @@
 #include "krot/pipeline/polish.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the largest eigenvalue: below is rounding.
@@ -245,4 +245,4 @@ OutlierFilterResult FilterBySnooping(const Model& model,
   return SnoopingFilter(model, options, context).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal
