@@ -109,7 +109,10 @@ enum class ImageVerdict {
 // none of them.
 enum class ImageFault {
   kNone,
-  kMatches,       // the matches of its pairs contradict its pose (CheckPairs)
+  kMatches,  // the matches of its pairs contradict its pose (CheckPairs)
+  // The focal length of its own camera stands out among those of others of the
+  // kind, and so many of its observations are more than noise.
+  kLens,
   kContradicted,  // most of its observations are more than noise
   kMisplaced,     // another pose halves the sum of its squared errors
   kChance,        // its errors are those of chance matches
@@ -120,6 +123,9 @@ struct ImageCheck {
   std::string name;
   ImageVerdict verdict = ImageVerdict::kFine;
   ImageFault fault = ImageFault::kNone;
+  // kLens: of its own camera and of the others' (the median), pixels.
+  double focal_length_px = 0;
+  double others_focal_length_px = 0;
   int64_t num_observations = 0;  // in tracks
   // Of these, that others check, and that are more than noise: of an image that
   // is not wrong, without those that are.

@@ -171,6 +171,84 @@ TEST(CheckModel, AsksForAnAdjustmentWhereMostImagesAreMisplaced) {
 
 // What COLMAP keeps of an image with a wrong pose. Of noise of 0.3 pixels most
 // of it is above the critical value, and is removed.
+// A camera and a rig for each image, all alike.
+void GiveEachImageItsOwnCamera(Model* model) {
+  for (size_t n = 1; n < model->images.size(); ++n) {
+    Camera camera = model->cameras[0];
+    Rig rig = model->rigs[0];
+    camera.id += static_cast<CameraId>(n);
+    rig.id += static_cast<RigId>(n);
+    rig.ref_sensor_id->id = camera.id;
+    Frame& frame = FrameOf(model, n);
+    frame.rig_id = rig.id;
+    frame.data[0].sensor_id.id = camera.id;
+    model->images[n].camera_id = camera.id;
+    model->cameras.push_back(camera);
+    model->rigs.push_back(rig);
+  }
+}
+
+TEST(CheckModel, BlamesTheFocalLengthThatStandsOut) {
+  for (int seed = 1; seed <= 5; ++seed) {
+    Model model = Scene(seed);
+    GiveEachImageItsOwnCamera(&model);
+    ValidateModel(model);
+    EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong), IsEmpty());
+    const double focal_length = model.cameras[0].params[0];
+    for (const size_t n : {3, 7}) {
+      model.cameras[n].params[0] *= 1.3;
+    }
+    const ModelCheck check = CheckModel(model);
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+                ElementsAre(model.images[3].id, model.images[7].id));
+    for (const size_t n : {3, 7}) {
+      EXPECT_EQ(check.images[n].fault, ImageFault::kLens);
+      EXPECT_NEAR(check.images[n].focal_length_px, 1.3 * focal_length, 1e-9);
+      EXPECT_NEAR(check.images[n].others_focal_length_px, focal_length, 1e-9);
+    }
+  }
+}
+
+// Zooms that differ are no fault by themselves.
+TEST(CheckModel, BlamesNoFocalLengthThatTheObservationsAgreeWith) {
+  Model model = Scene(1);
+  GiveEachImageItsOwnCamera(&model);
+  Camera& camera = model.cameras[3];
+  ASSERT_EQ(camera.model_id, 2);  // SIMPLE_RADIAL
+  camera.params[0] *= 2;
+  for (Point2D& point : model.images[3].points2D) {
+    point.x += point.x - camera.params[1];
+    point.y += point.y - camera.params[2];
+  }
+  EXPECT_THAT(Images(CheckModel(model), ImageVerdict::kWrong), IsEmpty());
+}
+
+// Its partners are wrong and keep nothing, and what it keeps is noisy.
+TEST(CheckModel, DoesNotCallANoisyImageChanceThatOthersTookItsTracksFrom) {
+  for (int seed = 1; seed <= 10; ++seed) {
+    Model model = Scene(seed, 12, 4, 0.4);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> noise;
+    std::uniform_real_distribution<double> uniform;
+    std::vector<char> is_removed(model.track_elements.size(), 0);
+    int num_kept = 0;
+    for (uint64_t e = 0; e < is_removed.size(); ++e) {
+      Point2D& pixel = Pixel(&model, e);
+      if (model.track_elements[e].image_id != model.images[5].id) {
+        // Some of any image are up to the 4 pixels that COLMAP filters to.
+        if (uniform(random) < 0.01) pixel.x += 4;
+        continue;
+      }
+      pixel.x += noise(random);
+      pixel.y += noise(random);
+      is_removed[e] = ++num_kept > 40;
+    }
+    const ModelCheck check =
+        CheckModel(RemoveObservations(model, is_removed).model);
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
+  }
+}
+
 TEST(CheckModel, FindsAnImageThatFitsByChanceWithinFourPixels) {
   for (int seed = 1; seed <= 10; ++seed) {
     Model model = Scene(seed, 12, 5, seed % 2 == 0 ? 1 : 0.6);

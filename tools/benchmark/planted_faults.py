@@ -2,13 +2,13 @@
 """How many planted faults `krot model_checker` finds, and what else it calls
 wrong, beside a look at mean errors and a threshold.
 
-    planted_faults.py KROT [MODEL] [SEEDS]
+    planted_faults.py KROT [MODEL] [SEEDS] [WORD]
 
 MODEL is a COLMAP model of pinholes or SIMPLE_RADIAL, RADIAL, OPENCV cameras (read
 through `colmap model_converter`); without one, or with "-", scenes are made by
-`krot model_synthesizer`: 30 images, noise of one pixel. For each fault SEEDS (10)
-trials are counted together; the table so far is printed after each seed. The
-faults:
+`krot model_synthesizer`: 30 images, noise of one pixel. For each fault (of those
+with WORD in their name) SEEDS (10) trials are counted together; the table so far
+is printed after each seed. The faults:
 
 turned, shifted: three images (one in models of fewer than ten) are turned about
     their centres by so many degrees, or moved by so many per cent of the radius
@@ -368,7 +368,7 @@ def exchange(model, image, index, is_near, rng):
     return [index, other]
 
 
-def faults():
+def all_faults():
     """Names, and what plants one trial: (base, folder, rng, counts)."""
     for kind, sizes, unit in (("turn", TURNS, "°"), ("shift", SHIFTS, " %")):
         for how in ("adjusted", "nearest"):
@@ -399,13 +399,15 @@ def main():
     krot = pathlib.Path(sys.argv[1]).resolve()
     path = sys.argv[2] if len(sys.argv) > 2 and sys.argv[2] != "-" else None
     num_seeds = int(sys.argv[3]) if len(sys.argv) > 3 else 10
-    counts = {name: Counts() for name, _ in faults()}
+    word = sys.argv[4] if len(sys.argv) > 4 else ""
+    faults = [(name, trial) for name, trial in all_faults() if word in name]
+    counts = {name: Counts() for name, _ in faults}
     base = None
     for seed in range(1, num_seeds + 1):
         if base is None or path is None:
             with tempfile.TemporaryDirectory() as name:
                 base = Base(krot, path, pathlib.Path(name), seed)
-        for fault, trial in faults():
+        for fault, trial in faults:
             with tempfile.TemporaryDirectory() as name:
                 trial(base, pathlib.Path(name), random.Random(seed),
                       counts[fault])

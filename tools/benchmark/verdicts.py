@@ -29,7 +29,7 @@ def run(*command, may_fail=False):
     """What it prints, and its seconds; the last line of its errors if it fails."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run([str(word) for word in command], capture_output=True,
-                          text=True, check=False)
+                          text=True, errors="replace", check=False)
     seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     if done.returncode == 0:
         return done.stdout, seconds
@@ -57,7 +57,7 @@ def print_verdicts(krot, path):
                 continue
             solved, solver = run(krot, "solver", "--input_path", model,
                                  "--output_path", folder / "solved",
-                                 "--num_threads", 1, may_fail=True)
+                                 "--Solver.num_threads", 1, may_fail=True)
             report = json.loads((folder / "report.json").read_text())
         times = f"{checker:.2f} | – | –"
         if solved is not None:

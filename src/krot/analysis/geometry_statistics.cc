@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -57,6 +59,42 @@ std::map<int64_t, int64_t> TrackLengthHistogram(const Model& model) {
     ++histogram[static_cast<int64_t>(point.track_end - point.track_begin)];
   }
   return histogram;
+}
+
+std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
+    const Model& model) {
+  constexpr size_t kFewest = 5;
+  constexpr double kOff = 1.1;
+  constexpr double kDeviations = 3;
+  std::vector<std::vector<size_t>> images_of(model.cameras.size());
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  for (size_t n = 0; n < geometries.size(); ++n) {
+    if (geometries[n].camera >= 0) images_of[geometries[n].camera].push_back(n);
+  }
+  std::map<std::tuple<int, uint64_t, uint64_t>, std::vector<size_t>> kinds;
+  for (size_t c = 0; c < model.cameras.size(); ++c) {
+    const Camera& camera = model.cameras[c];
+    if (images_of[c].size() != 1 || !(camera.params.at(0) > 0)) continue;
+    kinds[{camera.model_id, camera.width, camera.height}].push_back(c);
+  }
+  std::vector<std::optional<OddFocalLength>> odd(model.images.size());
+  for (const auto& [kind, cameras] : kinds) {
+    if (cameras.size() < kFewest) continue;
+    std::vector<double> logs, deviations;
+    for (const size_t c : cameras) {
+      logs.push_back(std::log(model.cameras[c].params[0]));
+    }
+    const double median = Median(logs);
+    for (const double log : logs) deviations.push_back(std::abs(log - median));
+    const double least =
+        std::max(std::log(kOff), kDeviations * Median(deviations));
+    for (size_t n = 0; n < cameras.size(); ++n) {
+      if (deviations[n] <= least) continue;
+      odd[images_of[cameras[n]].front()] = {std::exp(logs[n]),
+                                            std::exp(median)};
+    }
+  }
+  return odd;
 }
 
 DepthStatistics ComputeDepthStatistics(const Model& model) {

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <vector>
 
 #include "krot/model.h"
 
@@ -11,6 +13,19 @@ namespace krot::internal {
 
 // Track length -> number of points that have it.
 std::map<int64_t, int64_t> TrackLengthHistogram(const Model& model);
+
+// The focal length of a camera that one image has for itself, and the median
+// one of such cameras of the same kind and size, pixels.
+struct OddFocalLength {
+  double own = 0;
+  double others = 0;
+};
+// As Model::images: of those whose focal length stands out among at least five,
+// by a tenth and by three times the median deviation; none of the others. A
+// model with a camera for each image, though one camera took them, has such
+// where the focal length was fitted to too little.
+std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
+    const Model& model);
 
 // Of all observations whose image has a pose. Zero if there are none.
 struct DepthStatistics {

@@ -186,6 +186,20 @@ double ImageSums::TurnSpread() const {
                        M.bottomRightCorner<3, 3>());
 }
 
+double PerMille(size_t share, std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[(share * values.size() - 1) / 1000];
+}
+
+double ImageSums::ShareBelowHalf() const {
+  const double half = PerMille(950, squares) / 4;
+  const auto below =
+      std::count_if(squares.begin(), squares.end(),
+                    [half](double one) { return one < half; });
+  return static_cast<double>(below) / static_cast<double>(squares.size());
+}
+
 std::vector<ImageSums> AddUpImages(const Model& model,
                                    const ModelNoise& noise) {
   return ImageAdder(model, noise).Run();

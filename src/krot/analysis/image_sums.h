@@ -38,11 +38,22 @@ struct ImageSums {
   double GainShare() const {
     return square > 0 ? std::min(Gain() / square, 1 - 1e-12) : 0;
   }
+  // Beyond the share that six parameters take of noise.
+  double UnexpectedGainShare() const {
+    const double expected = 6 / static_cast<double>(num_directions);
+    return expected < 1 ? (GainShare() - expected) / (1 - expected) : 0;
+  }
+  // Of the `squares`, those of errors below half of their 95 % quantile.
+  // Requires some.
+  double ShareBelowHalf() const;
   double MeanSquare() const {
     return num_directions > 0 ? square / static_cast<double>(num_directions)
                               : 0;
   }
 };
+
+// The value that so many of a thousand are at most; 0 of none.
+double PerMille(size_t share, std::vector<double> values);
 
 // As Model::images; of the observations of which `noise` says that they are
 // tested. Requires a valid model. O(observations).

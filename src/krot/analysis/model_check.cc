@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
+#include "krot/analysis/geometry_statistics.h"
 #include "krot/analysis/image_sums.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
@@ -54,10 +54,13 @@ class Checker {
     }
     noise_options_.false_alarm = options.false_alarm;
     noise_options_.is_left_out.assign(image_of_.size(), 0);
-    for (const Image& image : model.images) {
-      check_.images.emplace_back();
-      check_.images.back().image_id = image.id;
-      check_.images.back().name = image.name;
+    const auto odd = FindOddFocalLengths(model);
+    for (size_t n = 0; n < model.images.size(); ++n) {
+      ImageCheck& image = check_.images.emplace_back();
+      image.image_id = model.images[n].id;
+      image.name = model.images[n].name;
+      image.focal_length_px = odd[n] ? odd[n]->own : 0;
+      image.others_focal_length_px = odd[n] ? odd[n]->others : 0;
     }
     for (const int32_t n : image_of_) ++check_.images[n].num_observations;
     const std::vector<double> errors = PixelErrors(model, context.num_threads);
@@ -68,9 +71,9 @@ class Checker {
       of_image[image_of_[e]].push_back(errors[e]);
       all.push_back(errors[e]);
     }
-    const double limit = Quantile(999, std::move(all));
+    const double limit = PerMille(999, std::move(all));
     for (std::vector<double>& own : of_image) {
-      reaches_limit_.push_back(Quantile(950, std::move(own)) >
+      reaches_limit_.push_back(PerMille(950, std::move(own)) >
                                kToTheLimit * limit);
     }
   }
@@ -180,13 +183,20 @@ class Checker {
       }
     };
     ask(
+        ImageFault::kLens,
+        [&](size_t n) {
+          return check_.images[n].focal_length_px > 0 &&
+                 ContradictionExponent(n) > LeastExponent();
+        },
+        [&](size_t n) { return ContradictionExponent(n); });
+    ask(
         ImageFault::kContradicted, [&](size_t n) { return IsContradicted(n); },
         [&](size_t n) {
           const ImageCheck& image = check_.images[n];
           return static_cast<double>(2 * image.num_wrong - image.num_tested);
         });
     check_.is_adjusted = MedianOfSound([&](size_t n) {
-                           return sums_[n].GainShare();
+                           return sums_[n].UnexpectedGainShare();
                          }) < kExplained / 2;
     if (check_.is_adjusted) {
       ask(
@@ -196,9 +206,11 @@ class Checker {
     median_square_ =
         MedianOfSound([&](size_t n) { return sums_[n].MeanSquare(); });
     median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
-    ask(
-        ImageFault::kChance, [&](size_t n) { return IsChance(n); },
-        [&](size_t n) { return sums_[n].square; });
+    if (check_.is_adjusted) {
+      ask(
+          ImageFault::kChance, [&](size_t n) { return IsChance(n); },
+          [&](size_t n) { return sums_[n].square; });
+    }
     return worst;
   }
 
@@ -211,12 +223,20 @@ class Checker {
 
   bool IsContradicted(size_t n) const {
     const ImageCheck& image = check_.images[n];
-    if (2 * image.num_wrong <= image.num_tested) return false;
+    return 2 * image.num_wrong > image.num_tested &&
+           ContradictionExponent(n) > LeastExponent();
+  }
+
+  // Of the bound on the probability that three times the noise contradicts so
+  // many of its observations; 0: that is to be expected.
+  double ContradictionExponent(size_t n) const {
+    const ImageCheck& image = check_.images[n];
+    if (image.num_wrong == 0) return 0;
     const double ratio = snooping_.noise.critical_w / kNoisyImage;
     const double p = std::exp(-ratio * ratio / 2);
     const auto num = static_cast<double>(image.num_tested);
     const double share = static_cast<double>(image.num_wrong) / num;
-    return share > p && num * Divergence(share, p) > LeastExponent();
+    return share > p ? num * Divergence(share, p) : 0;
   }
 
   // Of noise of one size, the model's or the image's own, the gain is sigma^2
@@ -252,7 +272,7 @@ class Checker {
     // quantile, and more if the tails are heavier; of a disc a quarter.
     const double gaussian = 1 - std::pow(20, -0.25);
     const double disc = 0.95 / 4;
-    const double share = ShareBelowHalf(sums.squares);
+    const double share = sums.ShareBelowHalf();
     if (!(share < gaussian)) return false;
     const auto size = static_cast<double>(sums.squares.size());
     const double exponent = size * Divergence(share, gaussian);
@@ -260,22 +280,6 @@ class Checker {
     return exponent > LeastExponent() + std::log(kOwnQuantile) ||
            (kept < 1 && reaches_limit_[n] &&
             exponent - size * Divergence(share, disc) > std::log(kept));
-  }
-
-  // 0 of none.
-  static double Quantile(size_t per_mille, std::vector<double> values) {
-    if (values.empty()) return 0;
-    std::sort(values.begin(), values.end());
-    return values[(per_mille * values.size() - 1) / 1000];
-  }
-
-  // Of the errors, those below half of their 95 % quantile. Requires one.
-  static double ShareBelowHalf(const std::vector<double>& squares) {
-    const double half = Quantile(950, squares) / 4;
-    const auto below =
-        std::count_if(squares.begin(), squares.end(),
-                      [half](double square) { return square < half; });
-    return static_cast<double>(below) / static_cast<double>(squares.size());
   }
 
   // Of the image's 2D points, those in tracks.

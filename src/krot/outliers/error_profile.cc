@@ -5,11 +5,12 @@
 #include <string>
 #include <utility>
 
+#include "krot/analysis/noise.h"
 #include "krot/base/check.h"
-#include "krot/check.h"
 #include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
+#include "krot/pipeline/polish.h"
 
 namespace krot::internal {
 namespace {
@@ -87,7 +88,7 @@ void Profiler::Append(ProfileLevel level) {
 NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   NoiseLimit limit;
   limit.max_error = kLeastNoise;
-  const ModelNoise noise = EstimateNoise(model, {}, context);
+  const ModelNoise noise = SnoopNoise(model, {}, context).noise;
   if (!noise.sigma_px) return limit;
   limit.sigma = *noise.sigma_px;
   // ||e||_1 <= sqrt(2) ||e||_2.
@@ -141,8 +142,15 @@ NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
   context.Stage("measuring the noise");
   const Estimate robust = FindRobustStart(
       built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
-  const NoiseLimit limit =
-      LimitOf(ApplyEstimate(model, built, robust), norm, context);
+  Model moved = ApplyEstimate(model, built, robust);
+  NoiseLimit limit = LimitOf(moved, norm, context);
+  if (limit.sigma > 0) {
+    Context alone = context;
+    alone.num_threads = 1;  // Ceres' sums depend on it
+    PolishModel(Polish::kRotationsFixed,
+                {ErrorLoss::Kind::kCauchy, limit.sigma}, {}, alone, &moved);
+    limit = LimitOf(moved, norm, context);
+  }
   const bool is_lower = limit.sigma > 0 && !(limit.sigma >= own.sigma);
   return is_lower || own.sigma == 0 ? limit : own;
 }

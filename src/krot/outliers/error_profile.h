@@ -25,9 +25,9 @@ struct NoiseLimit {
   double max_error = 0;
 };
 
-// The sigma of EstimateNoise (krot/check.h) with the cameras of the model or of
-// FindRobustStart, whichever has less: the one is nearer to the least squares,
-// the other does not mind a start that is off. One of N errors is above
+// The sigma that SnoopNoise ends with, at the cameras of the model or of
+// FindRobustStart, moved on to the least of a Cauchy loss, whichever has less:
+// the latter do not mind a start that is off. One of N errors is above
 // sigma sqrt(2 ln(N / 0.05)) with a probability of 5 % at most (Bonferroni).
 // Nothing below a thousandth of a pixel is told from rounding. Takes less than
 // a solve.

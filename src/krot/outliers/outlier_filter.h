@@ -65,8 +65,8 @@ struct SnoopingSummary {
   int64_t num_tested = 0;
   int num_rounds = 0;  // of removals with the cameras as they stand
   // What noise explains of an observation at most, critical_w sigma, pixels:
-  // the bound of the conflicts. Of each that is kept it is the square root of
-  // its redundancy of that.
+  // the largest bound of the conflicts. Of each it is that times the square
+  // root of its redundancy.
   double max_error_px = 0;
   // In the input, of the observations that are kept.
   PixelErrorStatistics kept_error_before;

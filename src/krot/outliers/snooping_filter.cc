@@ -1,10 +1,13 @@
 #include "krot/outliers/snooping_filter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
+
+#include <Eigen/Eigenvalues>
 
 #include "krot/analysis/noise.h"
 #include "krot/base/timer.h"
@@ -15,9 +18,13 @@
 #include "krot/outliers/packing.h"
 #include "krot/outliers/suspects.h"
 #include "krot/pipeline/polish.h"
+#include "krot/problem/cost.h"
 
 namespace krot::internal {
 namespace {
+
+// Of the largest eigenvalue: below is rounding.
+constexpr double kNotHeld = 1e-13;
 
 // Of an input, and what is still left of it.
 class SnoopingFilter {
@@ -104,7 +111,7 @@ class SnoopingFilter {
     summary_.seconds_solve += timer.Seconds();
   }
 
-  // Bounds for each observation, and conflicts about what was removed.
+  // A bound for each observation, and conflicts about what was removed.
   void Prove() {
     const Timer timer;
     SnoopingSummary& summary = *summary_.snooping;
@@ -114,9 +121,9 @@ class SnoopingFilter {
     BuiltProblem built = BuildProblem(model_, options);
     PlaceAtKept(&built);
     const std::vector<uint64_t> elements = ElementsOf(model_, built);
-    ScaleObservations(Scales(elements), &built);
     Reprojection(model_, built)
         .TakeRows(built.start, context_.num_threads, &built.problem);
+    ScaleObservations(Scales(built), &built);
     Removal removal;
     removal.estimate = built.start;
     for (size_t i = 0; i < elements.size(); ++i) {
@@ -158,16 +165,46 @@ class SnoopingFilter {
     }
   }
 
-  // Of observations that are these track elements of the input.
-  std::vector<double> Scales(const std::vector<uint64_t>& elements) const {
-    std::vector<double> of_element(is_removed_.size(), 1);
-    for (size_t n = 0; n < kept_.element_of.size(); ++n) {
-      const ObservationNoise& one = noise_.observations[n];
-      if (one.num_controlled == 0) continue;
-      of_element[kept_.element_of[n]] = std::sqrt(one.redundancy[1]);
-    }
+  // Per observation the square root of the larger eigenvalue of its R_ii among
+  // all of its point, where that and the cameras stand.
+  static std::vector<double> Scales(const BuiltProblem& built) {
+    const KnownRotationProblem& problem = built.problem;
     std::vector<double> scales;
-    for (const uint64_t e : elements) scales.push_back(of_element[e]);
+    for (int32_t k = 0; k < problem.num_points; ++k) {
+      std::vector<Eigen::Matrix<double, 2, 3>> rows;
+      Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+      for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+           ++i) {
+        const Observation& o = problem.observations[i];
+        const View& view = problem.views[o.view];
+        const AffineMap map =
+            CamFromWorld(view, built.start.translations[view.frame]);
+        const Eigen::Vector3d x_cam =
+            map.leftCols<3>() * built.start.points[k] + map.col(3);
+        const double depth = o.E.row(0).dot(x_cam);
+        const Eigen::Vector2d v = o.E.bottomRows<2>() * x_cam / depth;
+        Eigen::Matrix<double, 2, 3> J =
+            (o.E.bottomRows<2>() - v * o.E.row(0)) / depth * map.leftCols<3>();
+        if (!(depth > 0) || !J.allFinite()) J.setZero();
+        H += J.transpose() * J;
+        rows.push_back(J);
+      }
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> of_H(H);
+      Eigen::Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
+      for (int j = 0; j < 3; ++j) {
+        const double value = of_H.eigenvalues()[j];
+        const bool is_held = value > kNotHeld * of_H.eigenvalues()[2];
+        root.col(j) *= is_held ? 1 / std::sqrt(value) : 0;
+      }
+      for (const Eigen::Matrix<double, 2, 3>& J : rows) {
+        const Eigen::Matrix<double, 2, 3> B = J * root;
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
+        of_R.computeDirect(Eigen::Matrix2d::Identity() - B * B.transpose(),
+                           Eigen::EigenvaluesOnly);
+        const double r = of_R.eigenvalues()[1];
+        scales.push_back(r > kControlled ? std::sqrt(std::min(r, 1.0)) : 1);
+      }
+    }
     return scales;
   }
 

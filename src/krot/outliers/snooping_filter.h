@@ -15,10 +15,10 @@ namespace krot::internal {
 // as in a model without poses, the model is a copy of the input.
 //
 // Then conflicts are looked for: no translations and points bring all errors
-// within what noise explains of each. For an observation that is kept that is
-// critical_w sigma sqrt(r), r the larger eigenvalue of its R_ii among what is
-// kept (krot/check.h), for all others critical_w sigma. So what was removed is
-// enough, and noise alone has no conflict with probability 95 %.
+// within what noise explains of each: critical_w sigma sqrt(r), with r the
+// larger eigenvalue of its R_ii (krot/check.h) in its track as it was read.
+// What was removed is enough for that, and noise alone has no conflict with
+// probability 95 %.
 //
 // The same bits at any number of threads. Throws ModelError for cameras without
 // an image plane.

@@ -15,6 +15,8 @@ const char* FaultName(ImageFault fault) {
   switch (fault) {
     case ImageFault::kMatches:
       return "matches";
+    case ImageFault::kLens:
+      return "lens";
     case ImageFault::kContradicted:
       return "contradicted";
     case ImageFault::kMisplaced:

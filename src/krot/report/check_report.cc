@@ -158,6 +158,16 @@ std::string NextSteps(const CheckReport& report) {
             database + " --input_path " + model + " --output_path REGISTERED\n";
     model = "REGISTERED";
   }
+  if (std::any_of(check.images.begin(), check.images.end(),
+                  [](const ImageCheck& image) {
+                    return image.fault == ImageFault::kLens;
+                  })) {
+    text +=
+        "  Where one camera took all photos, give COLMAP one, so that its "
+        "focal length is fitted to\n  all of them; then map anew:\n    colmap "
+        "feature_extractor --ImageReader.single_camera 1 --database_path " +
+        database + " --image_path IMAGES\n";
+  }
   if (num_weak > 0) {
     text +=
         "  More matches for the weakly held images, and their points:\n    "
@@ -195,6 +205,10 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
     case ImageFault::kMatches:
       return "its matches contradict its " +
              PoseFaultWords(check.pairs->images[&image - check.images.data()]);
+    case ImageFault::kLens:
+      return "its own camera's focal length is " +
+             FormatNumber(image.focal_length_px, 0) + " px, the others' " +
+             FormatNumber(image.others_focal_length_px, 0) + " px";
     case ImageFault::kContradicted:
       return "most of them contradict the others";
     case ImageFault::kMisplaced:
@@ -207,7 +221,9 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
   return "";
 }
 
-std::string CheckSentence(const CheckReport& report) {
+namespace {
+
+std::string ForAdjusted(const CheckReport& report) {
   const ModelCheck& check = report.check;
   if (!check.sigma_px && !check.pairs) {
     return "Nothing can be said: no observation is checked by another one.";
@@ -269,6 +285,16 @@ std::string CheckSentence(const CheckReport& report) {
                        : ".");
 }
 
+}  // namespace
+
+std::string CheckSentence(const CheckReport& report) {
+  const bool is_adjusted = !report.check.sigma_px || report.check.is_adjusted;
+  return (is_adjusted ? ""
+                      : "The model is not adjusted, so adjust it first "
+                        "(colmap bundle_adjuster). As it stands: ") +
+         ForAdjusted(report);
+}
+
 std::string CheckTable(const CheckReport& report, int max_rows) {
   const ModelCheck& check = report.check;
   const auto num_rows = static_cast<size_t>(max_rows);
@@ -281,8 +307,10 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       ".\n";
   if (check.sigma_px && !check.is_adjusted) {
     text +=
-        "Most images do not stand where their own errors would have them: "
-        "adjust the model\n(colmap bundle_adjuster), then check it again.\n";
+        "Not adjusted: most images do not stand where their own errors would "
+        "have them. That alone\nmakes observations and images look wrong; "
+        "check "
+        "the adjusted model again.\n";
   }
   if (check.pairs) text += PairTable(*check.pairs, max_rows);
   return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
