@@ -13,7 +13,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/weakly_tied.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SceneOptions Scene(double outlier_ratio, double rotation_noise_deg) {
@@ -216,4 +216,4 @@ TEST(FilterOutliers, ChoosesABoundWhereNoneIsGiven) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include <jpeglib.h>
 #include <png.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr uint8_t kOutside = 128;
@@ -166,4 +166,4 @@ std::vector<uint8_t> EncodeJpeg(const Photo& photo) {
   return bytes;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

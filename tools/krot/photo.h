@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Pixels of a photo: rows from the top, three bytes (red, green, blue) each.
 struct Photo {
@@ -29,4 +29,4 @@ Photo ShrinkPhoto(const Photo& photo, int width, int height);
 // As the bytes of a JPEG file.
 std::vector<uint8_t> EncodeJpeg(const Photo& photo);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SolveReport DescribeRun(const SolveCommand& command) {
@@ -368,4 +368,4 @@ int RunSolveCommand(const SolveCommand& command) {
   return is_copy ? kExitGivenBack : kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -19,7 +19,7 @@
 #include "krot/report/text_table.h"
 #include "tools/krot/photo.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -215,4 +215,4 @@ std::string PairViewWithPhotos(const std::string& image_path,
   return view.dump();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

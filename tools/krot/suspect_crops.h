@@ -7,7 +7,7 @@
 #include "krot/outliers/outlier_filter.h"
 #include "tools/krot/log.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the report page shows of the photos in a folder: of the removed
 // observations in the front of the summary's list, one per track, the photos of
@@ -24,4 +24,4 @@ std::string PairViewWithPhotos(const std::string& image_path,
                                const Model& model, const Database& database,
                                const PairCheck& check, const LogOptions& log);
 
-}  // namespace krot
+}  // namespace krot::internal

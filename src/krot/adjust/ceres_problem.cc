@@ -17,7 +17,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -270,4 +270,4 @@ std::optional<double> Stationarity(int num_threads, double cost,
   return sum / (2 * cost);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

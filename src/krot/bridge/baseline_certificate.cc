@@ -16,7 +16,7 @@
 #include "krot/context.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = CertificateFileJson;
@@ -316,4 +316,4 @@ BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
   return verdict;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

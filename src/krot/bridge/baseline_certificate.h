@@ -9,7 +9,7 @@
 #include "krot/database.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr int kBaselineCertificateVersion = 1;
 
@@ -64,4 +64,4 @@ struct BaselineVerdict {
 BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                                 const BaselineCertificate& certificate);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/outliers/removal_start.h"
 #include "krot/problem/gauge.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The first of tracks that the robust start's positions divide, the second of
@@ -98,4 +98,4 @@ PlacedMatches PlaceMatches(const Model& model, const Database& database,
   });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/database.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Points for a model whose poses are known, from the verified matches of a
 // database.
@@ -82,4 +82,4 @@ PlacedMatches PlaceMatches(const Model& model, const Database& database,
                            const MatchTracksOptions& options,
                            const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -162,4 +162,4 @@ std::vector<Place> PlaceSearch::Profile(const std::vector<double>& scales,
   return places;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

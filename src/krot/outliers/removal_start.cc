@@ -8,7 +8,7 @@
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/start.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of a bound that is chosen: of the median error, and in pixels.
@@ -67,4 +67,4 @@ RemovalStart FindRemovalStart(const Model& model,
   return start;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Doubled until the tracks hang together.
@@ -194,4 +194,4 @@ double MedianError(const KnownRotationProblem& problem,
   return errors.empty() ? 0 : Median(std::move(errors));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

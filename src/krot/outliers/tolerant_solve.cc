@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Whether nothing came of a model without positions for want of a start that
@@ -54,4 +54,4 @@ TolerantSolveResult SolveTolerantly(const Model& model,
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

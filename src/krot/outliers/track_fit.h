@@ -10,7 +10,7 @@
 #include "krot/database.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What TriangulateMatches does with tracks that are given. Internal to it.
 
@@ -71,4 +71,4 @@ std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
 // Removes points all of whose rays are within the angle. Returns the number.
 int64_t RemoveNarrow(double min_angle_deg, Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The first `max_positions` known positions of a support; empty without any.
 std::string PositionsTable(const std::vector<SupportPosition>& positions,
@@ -35,4 +35,4 @@ std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<BaselineCertificate>& baselines,
                       const std::string& version);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/analysis/epipolar_match.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of a pair that agrees, and of any other.
@@ -102,4 +102,4 @@ Json PairViewJson(const Model& model, const Database& database,
   return PairView(model, database, check).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

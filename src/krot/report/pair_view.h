@@ -4,7 +4,7 @@
 #include "krot/model.h"
 #include "krot/report/report_json.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Images on the report page: their longer side, pixels.
 inline constexpr int kPairViewSide = 480;
@@ -16,4 +16,4 @@ inline constexpr int kPairViewSide = 480;
 Json PairViewJson(const Model& model, const Database& database,
                   const PairCheck& check);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/report/solve_report.h"
 #include "krot/report/track_report.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 const char* TerminationName(SolveTermination termination) {
@@ -262,4 +262,4 @@ std::string SolveJson(const SolveReport& report) {
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/report/text_table.h"
 #include "krot/report/track_report.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // How many observations of the support the terminal shows.
@@ -295,4 +295,4 @@ std::string SolveTable(const SolveReport& report) {
   return text.str();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/report/report_json.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot point_triangulator --database_path` made.
 struct TrackReport {
@@ -36,4 +36,4 @@ std::string MatchesSentence(const MatchTracksSummary& summary);
 // report.json; the keys are listed in docs/cli.md.
 std::string TrackJson(const TrackReport& report);
 
-}  // namespace krot
+}  // namespace krot::internal
