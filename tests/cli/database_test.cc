@@ -198,7 +198,7 @@ TEST_F(DatabaseOption, ProvesWhatNoBaselinesExplain) {
   };
   const Json json = Json::parse(ReadBytes(certificate));
   const Json database = Json::parse(ReadBytes(folder_ / "r.json"))["database"];
-  ASSERT_EQ(json["baselines"].size(), database["num_contradictory"]);
+  ASSERT_EQ(json["baselines"].size(), database["num_contradictory_pairs"]);
   ASSERT_GT(json["baselines"].size(), 3);
   KrotResult result = judge(json, "turned");
   EXPECT_EQ(result.exit_code, 0) << result.err;

@@ -23,8 +23,8 @@ class PairView {
         geometries_(ImageGeometries(model)) {
     for (const ImageGeometry& geometry : geometries_) {
       const Camera& camera = model.cameras[geometry.camera];
-      scales_.push_back(kPairViewSide / static_cast<double>(std::max(
-                                            camera.width, camera.height)));
+      scales_.push_back(kPairViewSide / static_cast<double>(std::max<uint64_t>(
+                                            {1, camera.width, camera.height})));
     }
   }
 
