@@ -237,9 +237,9 @@ TEST(FindRobustStart, SurvivesWrongObservationsInShortTracks) {
     options.track_length = 3;
     options.random_seed = seed;
     const SyntheticScene scene = SynthesizeScene(options);
-    EXPECT_LT(CentreError(scene.ground_truth,
-                          AtRobustStart(Wiped(scene.model))),
-              0.02)
+    EXPECT_LT(
+        CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
+        0.02)
         << seed;
   }
 }

@@ -17,7 +17,6 @@ using Eigen::Vector3d;
 constexpr int64_t kTriedPlaces = 60;
 constexpr int64_t kProposals = 300;
 constexpr int kNewtonSteps = 5;
-constexpr int kPointSteps = 3;  // of a track that does not agree at once
 
 // M^-1, of a matrix that may lack a direction.
 Matrix3d InverseOf(const Matrix3d& M) {
@@ -48,8 +47,7 @@ Normal NormalOf(const KnownRotationProblem& problem,
 // Either group's, or what both agree on best.
 std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
                                                    const Place& place) const {
-  const Vector3d x_b =
-      place.scale * (place.rotation * track.b.x) + place.shift;
+  const Vector3d x_b = place.scale * (place.rotation * track.b.x) + place.shift;
   const Matrix3d& H_a = track.a.H;
   const Matrix3d H_b = place.rotation * track.b.H * place.rotation.transpose() /
                        (place.scale * place.scale);
@@ -58,20 +56,6 @@ std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
   for (const Vector3d& x : {track.a.x, x_b}) {
     const double cost = CostAt(track, place, x);
     if (cost < best.second) best = {x, cost};
-  }
-  // Errors that are far from linear, as where two images stand side by side.
-  for (int n = 0; n < kPointSteps && !(best.second < kCutOff * variance_);
-       ++n) {
-    const Normal a = NormalOf(problem_, cameras_, track.a, best.first);
-    Normal b = NormalOf(problem_, cameras_, track.b,
-                        InB(place, best.first));
-    b.H = place.rotation * b.H * place.rotation.transpose() /
-          (place.scale * place.scale);
-    b.g = place.rotation * b.g / place.scale;
-    const Vector3d x = best.first - InverseOf(a.H + b.H) * (a.g + b.g);
-    const double cost = CostAt(track, place, x);
-    if (!(cost < best.second)) break;
-    best = {x, cost};
   }
   return best;
 }

@@ -87,9 +87,6 @@ class PlaceSearch {
   double no_worse() const { return kNoWorse * variance_; }
 
  private:
-  static Eigen::Vector3d InB(const Place& place, const Eigen::Vector3d& x) {
-    return place.rotation.transpose() * (x - place.shift) / place.scale;
-  }
   double SquaredError(int64_t i, const Eigen::Vector3d& x) const {
     const Observation& o = problem_.observations[i];
     const double error =
@@ -99,7 +96,8 @@ class PlaceSearch {
   double CostAt(const SharedTrack& track, const Place& place,
                 const Eigen::Vector3d& x) const {
     double sum = -track.a.sum - track.b.sum;
-    const Eigen::Vector3d x_b = InB(place, x);
+    const Eigen::Vector3d x_b =
+        place.rotation.transpose() * (x - place.shift) / place.scale;
     for (const int64_t i : track.a.observations) sum += SquaredError(i, x);
     for (const int64_t i : track.b.observations) sum += SquaredError(i, x_b);
     return std::max(sum, 0.0);

@@ -56,8 +56,7 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
     if (!is_needed) continue;
     for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
          ++i) {
-      redundancy[FrameOf(problem, i)] +=
-          2 - 3 / static_cast<double>(length(k));
+      redundancy[FrameOf(problem, i)] += 2 - 3 / static_cast<double>(length(k));
       covering.push_back(i);
     }
   }
