@@ -15,6 +15,9 @@
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 using Eigen::Matrix3d;

@@ -22,7 +22,9 @@ inline bool IsCancelled(const CancelFlag* cancel) {
   return cancel != nullptr && cancel->load(std::memory_order_relaxed);
 }
 
+namespace internal {
 class Ranks;
+}
 
 // How work is done, as opposed to what is done. No result depends on it, unless
 // the work is cancelled: results have the same bits at any number of threads.
@@ -37,7 +39,7 @@ struct Context {
       on_stage = {};
   // The processes that share the points, of krot_mpi alone; null if this one
   // has them all.
-  Ranks* ranks = nullptr;
+  internal::Ranks* ranks = nullptr;
 
   bool IsCancelled() const { return krot::IsCancelled(cancel); }
   void Note(const std::string& sentence) const {

@@ -21,6 +21,9 @@
 #include "krot/tolerances.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 SolveModelOptions PipelineOptions(const SolveOptions& options) {

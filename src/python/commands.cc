@@ -35,7 +35,7 @@
 #include "python/known_files.h"
 #include "python/run.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace py = pybind11;
@@ -314,4 +314,4 @@ void BindCommands(py::module_* module) {
               py::arg("certificate"));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace py = pybind11;
@@ -43,4 +43,4 @@ void AssignKeywords(const py::dict& keywords, OptionTable* table) {
   table->RequireAll();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

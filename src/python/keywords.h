@@ -4,7 +4,7 @@
 
 #include "krot/options/option_table.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Sets options from Python's keywords: `relative_gap` stands for the one option
 // whose name ends so behind its group; {"Solver.relative_gap": ...} spells it
@@ -12,4 +12,4 @@ namespace krot {
 // command line.
 void AssignKeywords(const pybind11::dict& keywords, OptionTable* table);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/analysis/rotation_input.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What a list holds that the model does not have, as a Python warning.
@@ -89,4 +89,4 @@ std::vector<KnownPosition> KnownFiles::Positions(const Model& model) const {
   return positions;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/options/option_table.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The command line's files of what else is known than the model says, as
 // keywords.
@@ -42,4 +42,4 @@ class KnownFiles {
   std::string database_path_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

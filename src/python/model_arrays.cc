@@ -8,7 +8,7 @@
 #include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace py = pybind11;
@@ -138,4 +138,4 @@ std::shared_ptr<Model> ModelFromArrays(const CArray<double>& observations,
   return model;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 template <typename T>
 using CArray =
@@ -34,4 +34,4 @@ std::shared_ptr<Model> ModelFromArrays(const CArray<double>& observations,
                                        const CArray<int64_t>& camera_indices,
                                        const std::vector<std::string>& names);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -23,7 +23,7 @@
 #include "python/bindings.h"
 #include "python/model_arrays.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace py = pybind11;
@@ -230,4 +230,4 @@ void BindModel(py::module_* module) {
            py::arg("relative_sigmas") = std::vector<double>());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

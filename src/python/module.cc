@@ -11,13 +11,13 @@
 
 PYBIND11_MODULE(_core, module) {
   namespace py = pybind11;
-  krot::SilenceCeres();
+  krot::internal::SilenceCeres();
   module.attr("__version__") = KROT_VERSION;
   py::register_exception<krot::ModelError>(module, "ModelError",
                                            PyExc_ValueError);
-  py::register_exception<krot::OptionError>(module, "OptionError",
+  py::register_exception<krot::internal::OptionError>(module, "OptionError",
                                             PyExc_ValueError);
   py::register_exception<krot::WriteError>(module, "WriteError", PyExc_OSError);
-  krot::BindModel(&module);
-  krot::BindCommands(&module);
+  krot::internal::BindModel(&module);
+  krot::internal::BindCommands(&module);
 }

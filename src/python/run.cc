@@ -5,7 +5,7 @@
 
 #include <pybind11/pybind11.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace py = pybind11;
@@ -40,4 +40,4 @@ void RunInterruptibly(const std::function<void(const CancelFlag&)>& work) {
   done.get();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 // The oracles are a dense least-squares problem whose rows are written down one
 // by one, and central differences of the barrier cost.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::MatrixXd;
@@ -190,4 +190,4 @@ TEST(BarrierSystem, HasTheSameBitsAtAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

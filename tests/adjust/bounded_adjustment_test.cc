@@ -11,7 +11,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/multiplier_oracle.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 const Context kOneThread{1};
@@ -157,4 +157,4 @@ TEST(BoundedAdjustment, StopsBelowTheCapWhenCancelled) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

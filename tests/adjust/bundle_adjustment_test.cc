@@ -19,7 +19,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // With more of them the last digits of Ceres differ from run to run.
@@ -419,4 +419,4 @@ TEST(AdjustBundle, RefusesPanoramas) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 // The oracle knows no derivative: central differences of ProjectErrors along
 // motions of every unknown.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -110,4 +110,4 @@ TEST(MoveAlong, KeepsTheBitsOfWhatIsHeldStill) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 // scene: the certified optimum with rotations fixed, bounded adjustments, and
 // ends from other starts.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 const Context kOneThread{1};
@@ -140,4 +140,4 @@ TEST(LowestMaxError, IsRefusedTogetherWithACap) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

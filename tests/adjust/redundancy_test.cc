@@ -15,7 +15,7 @@
 // The oracle knows no derivative and eliminates nothing: central differences of
 // all errors by all unknowns, and R = I - J J^+ by singular values.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kNoCap = 1e300;
@@ -125,4 +125,4 @@ TEST(ExactRedundancy, IsUnknownOfWhatTakesNoPart) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 // The oracle knows no derivative: central differences of a projection written
 // with Eigen's quaternions and the camera's own ProjectRay.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -140,4 +140,4 @@ TEST(ReprojectionCost, FailsBehindTheCamera) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -127,4 +127,4 @@ TEST(RestoreSimilarity, DoesNothingWherePointsOrFramesAreHeldStill) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A noisy scene of two sensors per rig: the blocks of its start, and a cap
 // somewhat above their largest error.
@@ -41,4 +41,4 @@ inline BlockVector RandomDirection(size_t num_points, size_t num_blocks) {
   return direction;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

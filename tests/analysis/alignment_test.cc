@@ -14,7 +14,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::AngleAxisd;
@@ -239,4 +239,4 @@ TEST(TransformModel, KeepsAllBitsUnderTheIdentityAndNaNUnderAnything) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

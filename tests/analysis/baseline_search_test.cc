@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Random = std::mt19937;
@@ -154,4 +154,4 @@ TEST(SearchBaseline, OfNoMatchesExplainsNone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

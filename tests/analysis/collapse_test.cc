@@ -6,7 +6,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -115,4 +115,4 @@ TEST(Collapse, IsWholeWhereAllPointsBecomeOne) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -110,4 +110,4 @@ INSTANTIATE_TEST_SUITE_P(Local, ColmapOracle,
                          });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

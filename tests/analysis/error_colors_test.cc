@@ -12,7 +12,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Color = std::array<uint8_t, 3>;
@@ -96,4 +96,4 @@ TEST(ColorPointsByError, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

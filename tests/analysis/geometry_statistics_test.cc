@@ -7,7 +7,7 @@
 
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -98,4 +98,4 @@ TEST(ComputeTriangulationAngleStatistics, OfTinyAnglesKeepsItsDigits) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -19,7 +19,7 @@
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/scene_database.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -494,4 +494,4 @@ TEST(CheckModel, OfPosesWithoutTracksAsksTheMatchesAlone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

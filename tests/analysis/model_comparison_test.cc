@@ -12,7 +12,7 @@
 #include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -254,4 +254,4 @@ TEST(CompareModels, AsksForACountThatIsNotNegative) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

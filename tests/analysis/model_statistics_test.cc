@@ -8,7 +8,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -126,4 +126,4 @@ TEST(ModelStatistics, RefuseErrorsOfAnotherModel) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

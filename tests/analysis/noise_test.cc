@@ -15,7 +15,7 @@
 #include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -499,4 +499,4 @@ TEST(SnoopNoise, HasTheSameBitsAtAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

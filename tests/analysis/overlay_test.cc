@@ -14,7 +14,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SceneOptions Scene(bool has_rigs) {
@@ -112,4 +112,4 @@ TEST(OverlayModels, TakesModelsWithoutAnything) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

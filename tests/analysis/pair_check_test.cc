@@ -19,7 +19,7 @@
 #include "krot/synthetic/scene_database.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -300,4 +300,4 @@ TEST(CheckPairs, OfARealDatabaseFindsWhatWasPlantedAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

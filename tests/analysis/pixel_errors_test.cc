@@ -10,7 +10,7 @@
 #include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -155,4 +155,4 @@ TEST(UpdatePointErrors, RefusesErrorsOfAnotherModel) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

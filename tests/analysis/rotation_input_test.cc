@@ -10,7 +10,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -85,4 +85,4 @@ TEST(TakeRotations, MeasuresWhatTheyDoToTheErrors) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

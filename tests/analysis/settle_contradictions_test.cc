@@ -10,7 +10,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Model Scene() {
@@ -236,4 +236,4 @@ TEST(SettleContradictions, HasNothingToMeasureByWithoutPositions) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

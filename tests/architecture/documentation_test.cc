@@ -11,7 +11,7 @@
 
 #include "tests/architecture/source_tree.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,4 +87,4 @@ TEST(Documentation, EveryLinkWithinTheProjectLeadsSomewhere) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

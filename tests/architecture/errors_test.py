@@ -17,7 +17,7 @@ SPEAKER = re.compile(
     r"Refuse)(?:\s+\w+)?\(|\brefusal\s*=")
 RETURNED = re.compile(r"\breturn\b")
 # Whose functions return why they refuse.
-RETURNING = re.compile(r"proof/certificate_(check|input)\.cc$|verdict\.cc$")
+RETURNING = re.compile(r"verify/certificate_(check|input)\.cc$|verdict\.cc$")
 LITERAL = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
 TOKEN = re.compile(r"//[^\n]*|'(?:[^'\\\n]|\\.)'|" + LITERAL.pattern)
 EDGES = " ,;:.'\"()[]=-\n"

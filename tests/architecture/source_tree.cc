@@ -6,7 +6,7 @@
 #include <regex>
 #include <stdexcept>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -86,4 +86,4 @@ std::vector<fs::path> ProjectFiles() {
   return files;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // The project's own files, as the architecture tests see them.
 
@@ -33,4 +33,4 @@ std::string LibraryFolder(const std::filesystem::path& file);
 // project outside of build directories. Relative to the project.
 std::vector<std::filesystem::path> ProjectFiles();
 
-}  // namespace krot
+}  // namespace krot::internal

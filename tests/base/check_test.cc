@@ -4,7 +4,7 @@
 
 #include "krot/base/context.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(CheckArgument, SaysNameValueAndRequirement) {
@@ -29,4 +29,4 @@ TEST(CancelFlag, MayBeAbsent) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(DisjointSets, AreOfOneMemberEachAtFirst) {
@@ -39,4 +39,4 @@ TEST(DisjointSets, AreNamedAfterTheirSmallestMemberHoweverTheyWereUnited) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

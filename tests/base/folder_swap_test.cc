@@ -9,7 +9,7 @@
 #include "krot/base/write_file.h"
 #include "tests/testing/temp_folder.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::IsEmpty;
@@ -86,4 +86,4 @@ TEST(FolderEntries, AreItsNamesWithoutItselfAndItsParent) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

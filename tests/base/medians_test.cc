@@ -10,7 +10,7 @@
 
 #include "tests/testing/thread_ranks.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Grouped {
@@ -83,4 +83,4 @@ TEST(GroupMedians, AreOfAllRanksToTheBit) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

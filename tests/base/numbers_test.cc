@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of any bits: most are very large or very small.
@@ -69,4 +69,4 @@ TEST(NumberText, RefusesWhatTheStandardLibraryRefuses) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(ParallelFor, VisitsEveryItemOnceInFixedChunks) {
@@ -85,4 +85,4 @@ TEST(ResolveNumThreads, KeepsPositiveNumbersAndReplacesOthers) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Where threads wait until `count` of them have come; false after a minute.
@@ -140,4 +140,4 @@ TEST(ThreadPool, RoundsAsItsCallerDoes) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

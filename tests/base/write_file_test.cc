@@ -7,7 +7,7 @@
 
 #include "tests/testing/temp_folder.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(WriteFile, ReplacesAFileAndLeavesNothingBesideIt) {
@@ -64,4 +64,4 @@ TEST(WriteFile, WithoutAFolderInItsNameLiesInTheWorkingFolder) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

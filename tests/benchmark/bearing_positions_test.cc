@@ -10,7 +10,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(PositionByBearings, FindsTheCamerasOfASceneWithoutNoise) {
@@ -41,4 +41,4 @@ TEST(PositionByBearings, FindsTheCamerasOfASceneWithoutNoise) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

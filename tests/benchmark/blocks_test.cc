@@ -11,7 +11,7 @@
 #include "tools/benchmark/benchmark_model.h"
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kRadius = 4;        // mean depths, about the start
@@ -69,4 +69,4 @@ INSTANTIATE_TEST_SUITE_P(, BlocksOfRealModels,
                          [](const auto& test) { return test.param; });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

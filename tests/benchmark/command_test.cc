@@ -8,7 +8,7 @@
 
 #include "tools/benchmark/process.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 int ExitCodeOf(std::vector<std::string> arguments) {
@@ -71,4 +71,4 @@ TEST(BenchmarkCommand, MeasuresModelsOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/synthetic_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr ModelSize kSmall = {"small", 6, 60, 240};
@@ -80,4 +80,4 @@ TEST_F(FullRivals, LeastSquaresEndsWhereNoUnknownLowersTheSum) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

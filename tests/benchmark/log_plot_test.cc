@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using testing::ContainsRegex;
@@ -43,4 +43,4 @@ TEST(LogPlot, TellsTheNinthLineFromTheFirst) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using testing::ElementsAre;
@@ -42,4 +42,4 @@ TEST(MeasureModels, IsContentWithoutAny) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

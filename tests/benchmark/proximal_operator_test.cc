@@ -6,7 +6,7 @@
 
 #include "krot/synthetic/random.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Vectors = std::vector<Eigen::Vector2d>;
@@ -63,4 +63,4 @@ TEST(MaxNormProx, IsZeroWhereThePenaltyIsSmall) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

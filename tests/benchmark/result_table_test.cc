@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 ResultTable SmallTable() {
@@ -71,4 +71,4 @@ TEST(ResultTable, FoldsUpDetailsInMarkdown) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "tests/oracle/ellipsoid_oracle.h"
 #include "tools/benchmark/competition.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kSigma = 5;  // pixels
@@ -81,4 +81,4 @@ INSTANTIATE_TEST_SUITE_P(Norms, RivalsTest, testing::Values(2, Norm::LInf().p),
                          NameOf);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 
 #include "tools/benchmark/process.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -132,4 +132,4 @@ TEST_F(RunAll, GoesThroughAndLeavesWhatTheDocumentsTakeUp) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

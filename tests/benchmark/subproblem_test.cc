@@ -8,7 +8,7 @@
 #include "krot/problem/cost.h"
 #include "tools/benchmark/synthetic_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(MidPoint, OfRaysThatMeetIsWhereTheyMeet) {
@@ -117,4 +117,4 @@ TEST(Residuals, OfPointsAndFramesAreThoseOfTheProblem) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

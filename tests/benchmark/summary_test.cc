@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using testing::ElementsAre;
@@ -86,4 +86,4 @@ TEST(Summary, ListsModelsOneByOne) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

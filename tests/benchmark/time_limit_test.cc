@@ -7,7 +7,7 @@
 
 #include "krot/base/timer.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(TimeLimit, RaisesItsFlagOnceItHasPassed) {
@@ -30,4 +30,4 @@ TEST(TimeLimit, IsForgottenOnceItIsGone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

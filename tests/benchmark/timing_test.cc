@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(Median, IsTheMiddleOrTheMeanOfTheTwoThere) {
@@ -33,4 +33,4 @@ TEST(TimeInterleaved, TellsALongRunFromAShortOne) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/bridge/model_difference.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Model NoisyModel(int sensors_per_rig, bool has_rigs) {
@@ -122,4 +122,4 @@ TEST(ApplyEstimate, RefusesAnEstimateOfAnotherSize) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SceneOptions SmallScene() {
@@ -189,4 +189,4 @@ TEST(BuildProblem, RefusesATrackLengthBelowOne) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/model.h"
 #include "tests/bridge/lens_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Point 0 is seen by image 0 alone, so that it takes no part.
@@ -57,4 +57,4 @@ TEST(CarryLeftOutPoints, LeavesAPointWhoseErrorIsBelowTheLevel) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

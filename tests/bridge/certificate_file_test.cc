@@ -21,7 +21,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/bridge/pixel_optimum.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -442,4 +442,4 @@ TEST(ReadCertificateFile, SaysWhichFileCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

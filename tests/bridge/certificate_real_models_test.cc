@@ -7,9 +7,9 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/model/model_io.h"
 #include "tests/bridge/pixel_optimum.h"
-#include "tests/proof/naive_certificate_check.h"
+#include "tests/verify/naive_certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct RealModel {
@@ -54,4 +54,4 @@ INSTANTIATE_TEST_SUITE_P(Local, CertificateOfRealModel,
                          });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -240,4 +240,4 @@ TEST(LeftOut, APanoramaSeesWhatIsBehindIt) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

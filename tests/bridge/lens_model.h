@@ -10,7 +10,7 @@
 #include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 
 struct LensModelOptions {
   int camera_model_id = 2;
@@ -71,4 +71,4 @@ inline Model MakeLensModel(const LensModelOptions& options) {
   return model;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Writes a model out as words, so that two can be compared bit by bit.
@@ -108,4 +108,4 @@ std::string ModelDifference(const Model& a, const Model& b,
   return lines_a.size() == lines_b.size() ? "" : "one model has more records";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Names the first difference between two models; empty if there is none.
 // Numbers are compared by their bits. With `ignore_geometry`, translations of
@@ -12,4 +12,4 @@ namespace krot {
 std::string ModelDifference(const Model& a, const Model& b,
                             bool ignore_geometry);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "tests/bridge/lens_model.h"
 #include "tests/bridge/pixel_optimum.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -210,4 +210,4 @@ TEST(PixelCertificate, OfASupportBeyondAFoldIsNotMade) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,9 +5,9 @@
 #include "krot/bridge/bridge.h"
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/bridge/reprojection.h"
-#include "tests/proof/joint_iterate.h"
+#include "tests/verify/joint_iterate.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A minimum of the true errors of a connected problem, and its certificate.
 struct PixelOptimum {
@@ -44,4 +44,4 @@ inline PixelOptimum SolveInPixels(const Model& model, Norm norm,
   return optimum;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

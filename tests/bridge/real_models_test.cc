@@ -10,7 +10,7 @@
 #include "krot/problem/cost.h"
 #include "tests/bridge/model_difference.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct RealModel {
@@ -48,4 +48,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.folder); });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

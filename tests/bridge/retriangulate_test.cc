@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -56,4 +56,4 @@ TEST(RetriangulateMidpoint, OfNoRaysIsNone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A fifth of the observations have a twin in their image.
@@ -57,4 +57,4 @@ TEST(SameImage, KeepsAllByDefault) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <openssl/sha.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(Sha256Stream, AgreesWithOpenSslAtEveryLengthAroundItsBlocks) {
@@ -26,4 +26,4 @@ TEST(Sha256Stream, AgreesWithOpenSslAtEveryLengthAroundItsBlocks) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

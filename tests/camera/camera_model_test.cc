@@ -8,7 +8,7 @@
 
 #include "krot/camera/models.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(CameraModels, AreEighteenInTheOrderOfTheirIds) {
@@ -67,4 +67,4 @@ TEST(VisitCameraModel, CallsTheVisitorWithTheModelOfTheId) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "krot/camera/camera_model.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -144,4 +144,4 @@ TEST(ColmapOracle, AgreesOnThePixelErrorsOfModelsZeroToTen) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/camera/enclosure.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Long double holds 64 bits: an oracle for what double rounds away.
@@ -104,4 +104,4 @@ TEST(EncloseAtanOverRoot, HoldsTheFunctionAndItsSlope) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

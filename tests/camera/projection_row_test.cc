@@ -13,7 +13,7 @@
 #include "krot/camera/chart.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -293,4 +293,4 @@ TEST(ChartAt, IsTheImagePlaneForPerspectiveLensesAndTangentForFisheyes) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/camera/models.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -219,4 +219,4 @@ TEST(Project, AlsoDifferentiatesByTheParameters) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

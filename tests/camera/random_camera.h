@@ -9,7 +9,7 @@
 
 #include "krot/camera/camera_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Parameters of a plausible camera of this model, some of them strongly
 // distorted: drawn by the parameter's name, "f" to "sy1".
@@ -113,4 +113,4 @@ inline std::string ModelName(int model_id) {
   return std::string(FindCameraModel(model_id)->name);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 
 #include "krot/camera/distortion.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Distortion>
@@ -156,4 +156,4 @@ TEST(RegularSegmentOfRationalDistortion, EndsAtAPole) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

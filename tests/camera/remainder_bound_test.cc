@@ -15,7 +15,7 @@
 #include "krot/camera/projection_row.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -324,4 +324,4 @@ TEST(RemainderBound, NamesArgumentsThatAreOutOfRange) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/camera/models.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -275,4 +275,4 @@ TEST(UndistortPixel, OfTheFovModelInvertsTheSmallOmegaPolynomial) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -231,4 +231,4 @@ TEST_F(BundleAdjuster, PolishesWhatTheSolverFound) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cstdlib>
 
-namespace krot {
+namespace krot::internal {
 
 bool HasColmap() {
   return std::system("command -v colmap >/dev/null 2>&1") == 0;
@@ -18,4 +18,4 @@ bool RunColmap(const std::vector<std::string>& arguments,
   return std::system(command.c_str()) == 0;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

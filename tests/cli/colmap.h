@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Debian's COLMAP, the judge of what KROT writes.
 
@@ -14,4 +14,4 @@ bool HasColmap();
 bool RunColmap(const std::vector<std::string>& arguments,
                const std::filesystem::path& log);
 
-}  // namespace krot
+}  // namespace krot::internal

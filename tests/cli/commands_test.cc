@@ -2,7 +2,7 @@
 
 #include "tests/cli/krot_process.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -47,4 +47,4 @@ TEST(Krot, KeepsAnErrorOnOneLineWhateverTheUserTyped) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

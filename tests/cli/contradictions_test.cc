@@ -16,7 +16,7 @@
 // Models whose tracks and images contradict each other, through every command
 // that reads models.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -333,4 +333,4 @@ TEST_F(OnContradiction, A2DPointInTwoTracksIsAnObservationOfBoth) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

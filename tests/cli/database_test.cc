@@ -13,7 +13,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -185,4 +185,4 @@ TEST_F(DatabaseOption, IsRefusedWithCode2IfItCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

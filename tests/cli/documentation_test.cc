@@ -10,7 +10,7 @@
 
 // docs/cli.md says of every option what --help says, no more and no less.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Option name -> "meaning | value | default".
@@ -118,4 +118,4 @@ TEST(DocumentationOfKrot, ListsTheExitCodesOfHelp) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

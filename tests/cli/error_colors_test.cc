@@ -11,7 +11,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -94,4 +94,4 @@ TEST_F(ErrorColors, AreRefusedWhereTheyHaveNoPlace) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kLastOfColmap38 = 10;
@@ -87,4 +87,4 @@ TEST_P(EveryCameraOfColmap, HasTheErrorsThatColmapFinds) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

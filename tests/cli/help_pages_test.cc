@@ -9,7 +9,7 @@
 
 #include "tests/cli/krot_process.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -82,4 +82,4 @@ TEST(HelpPages, AnUnknownFormatIsRefused) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

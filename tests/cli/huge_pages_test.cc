@@ -15,7 +15,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr std::size_t kMebibyte = std::size_t{1} << 20;
@@ -76,4 +76,4 @@ TEST(HugePages, NothingHasAnAddressTooAndItsOwn) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

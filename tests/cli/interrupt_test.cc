@@ -10,7 +10,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A solve of some 30 sweeps and 5 seconds; the signal comes after the first.
@@ -203,4 +203,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return test.index == 0 ? "Plain" : "Bounded"; });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

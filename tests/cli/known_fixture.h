@@ -8,7 +8,7 @@
 
 #include "tests/cli/krot_process.h"
 
-namespace krot {
+namespace krot::internal {
 
 using Json = nlohmann::json;
 
@@ -40,4 +40,4 @@ class Known : public ::testing::Test {
   TempFolder folder_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

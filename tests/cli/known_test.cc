@@ -16,7 +16,7 @@
 
 // What else is known than the model says: files beside it.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -305,4 +305,4 @@ TEST_F(Known, CoordinatesFarAwayShiftTheResultAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

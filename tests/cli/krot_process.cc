@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void Redirect(int descriptor, const std::filesystem::path& file) {
@@ -73,4 +73,4 @@ KrotResult RunKrot(const std::vector<std::string>& arguments,
   return KrotProcess(arguments, max_memory_bytes).Wait();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

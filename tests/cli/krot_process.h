@@ -11,7 +11,7 @@
 
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a finished run of `krot` left behind.
 struct KrotResult {
@@ -57,4 +57,4 @@ MATCHER_P2(IsOneSentence, speaker, part,
          arg.find(part) != std::string::npos;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

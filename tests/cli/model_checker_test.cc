@@ -13,7 +13,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -113,4 +113,4 @@ TEST_F(ModelCheckerCommand, RefusesWhatItCannotJudge) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -351,4 +351,4 @@ TEST_F(ModelComparer, ComparesRealModelsWithTheirSolutions) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 
 // Models that are not as COLMAP's mapper writes them, and that COLMAP reads.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -221,4 +221,4 @@ TEST_F(OddModels, WithACameraFarAwayIsNamedAndTheOthersKeepTheirPlace) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

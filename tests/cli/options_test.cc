@@ -13,7 +13,7 @@
 // Every option: a value it takes, one it does not take, and the pairs that
 // contradict each other.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Words = std::vector<std::string>;
@@ -444,4 +444,4 @@ TEST_F(Options, ForPointsFromMatchesAndFromTracksDoNotMix) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -313,4 +313,4 @@ TEST_F(OutlierFilterCommand, WithoutABoundRemovesWhatNoiseDoesNotExplain) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 
 // Where things are written, and where they are not.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -217,4 +217,4 @@ TEST_F(Output, SplitsTablesFromProgress) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

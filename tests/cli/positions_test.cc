@@ -11,7 +11,7 @@
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -216,4 +216,4 @@ TEST_F(KnownPositions, ThatCannotBeMeantAreRefused) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

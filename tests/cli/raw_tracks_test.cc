@@ -12,7 +12,7 @@
 
 // `krot solver` on rotations and tracks alone, outliers among them.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -202,4 +202,4 @@ TEST(SameImageOption, GivesAModelWhereverTheTwinsEnd) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

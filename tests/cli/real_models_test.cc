@@ -16,7 +16,7 @@
 
 // `krot solver` on models that COLMAP and others made, with COLMAP as judge.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -297,4 +297,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return std::string(test.param.folder); });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 // Rigs of three sensors: what is calibrated stays to the bit, and the same
 // scene in other rigs has the same optimum.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SceneOptions ThreeSensors() {
@@ -284,4 +284,4 @@ TEST_F(Rigs, OfBaselinesOfNextToNothingEndWithACertificate) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "tests/cli/scenes.h"
 #include "tests/testing/sanitizer.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr uint64_t kMegabyte = 1000000;
@@ -104,4 +104,4 @@ TEST_F(Scarcity, IsAnnouncedToThirtyPercent) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 SceneOptions SmallScene() {
   SceneOptions options;
@@ -128,4 +128,4 @@ Model FarAway(const Model& model, const Eigen::Vector3d& shift) {
   return far;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

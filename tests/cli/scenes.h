@@ -7,7 +7,7 @@
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Models for the tests of the command line.
 
@@ -39,4 +39,4 @@ Model WithShortTracks(const Model& model, uint64_t length);
 // 100 times as large and `shift` away, as in UTM or ECEF coordinates.
 Model FarAway(const Model& model, const Eigen::Vector3d& shift);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 
 #include "tools/krot/log.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -178,4 +178,4 @@ TEST(FitProgress, CutsBetweenCharactersAndTakesThemAsWide) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 
 // The commands on models that they can solve.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = nlohmann::json;
@@ -541,4 +541,4 @@ TEST_F(Commands, SolverHalvesTheCostAtLeastWhereObservationsAreExact) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

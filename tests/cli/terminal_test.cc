@@ -17,7 +17,7 @@
 // What a user sees on a terminal: krot runs on a pseudo-terminal, whose screen
 // is kept here as a terminal keeps it.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // All that arrives on a terminal of so many columns.
@@ -161,4 +161,4 @@ TEST_F(Terminal, ThatIsDumbGetsPlainLines) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -203,4 +203,4 @@ TEST_F(ToleranceAnalyzer, KeepsWhatIsFixedAndTakesItForTheGauge) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -207,4 +207,4 @@ TEST_F(WhatIsFixed, StaysThroughPolishAndBundleAdjustment) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

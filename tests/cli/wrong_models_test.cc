@@ -12,7 +12,7 @@
 // Every way in which an input can be wrong: one sentence, the documented exit
 // code, nothing written.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -305,4 +305,4 @@ INSTANTIATE_TEST_SUITE_P(NothingToSolve, SolverOnWrongModel,
                          ::testing::ValuesIn(ModelsWithNothingToSolve()), Name);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

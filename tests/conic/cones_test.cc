@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kTrials = 2000;
@@ -291,4 +291,4 @@ TYPED_TEST(NtScalingTest, OfACentredPairHasOneEigenvalue) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 RandomScene MakeScene(unsigned seed, int num_points, double baseline = 0) {
@@ -298,4 +298,4 @@ TEST(FindFeasible, RefusesBoundsAndDepthsThatAreNotPositive) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

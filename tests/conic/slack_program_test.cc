@@ -9,7 +9,7 @@
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 RandomScene MakeScene(unsigned seed, double baseline = 0) {
@@ -189,4 +189,4 @@ TEST(MinimizeSlack, RefusesOptionsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "tests/end_to_end/script.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -41,4 +41,4 @@ Comparison CompareWithTruth(const fs::path& model, const fs::path& truth,
   return comparison;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 
 // What tools/scripts/compare_linf_with_ba.sh found of one result.
 struct Result {
@@ -30,4 +30,4 @@ Comparison CompareWithTruth(const std::filesystem::path& model,
                             const std::filesystem::path& truth,
                             const std::filesystem::path& output);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 #include "tests/end_to_end/photos.h"
 #include "tests/end_to_end/script.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -225,4 +225,4 @@ TEST_F(EndToEnd, TheMappersScriptMakesModelProofReportAndOverlay) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

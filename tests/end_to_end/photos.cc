@@ -11,7 +11,7 @@
 #include "krot/synthetic/random.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -120,4 +120,4 @@ void AddNoise(const fs::path& folder, double sigma, uint64_t seed,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Photos of the sample's scene (tools/sample), small enough for a test: twelve
 // neighbouring views of its twenty-four, at half the width and height, as PPM.
@@ -25,4 +25,4 @@ Model TrueCameras();
 void AddNoise(const std::filesystem::path& folder, double sigma, uint64_t seed,
               const std::filesystem::path& noisy_folder);
 
-}  // namespace krot
+}  // namespace krot::internal

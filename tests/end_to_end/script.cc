@@ -6,7 +6,7 @@
 
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 
 ScriptResult RunScript(const std::string& name,
                        const std::vector<std::string>& arguments) {
@@ -23,4 +23,4 @@ ScriptResult RunScript(const std::string& name,
           ReadBytes(folder / "out"), ReadBytes(folder / "err")};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

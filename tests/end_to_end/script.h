@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 struct ScriptResult {
   int exit_code = -1;
@@ -15,4 +15,4 @@ struct ScriptResult {
 ScriptResult RunScript(const std::string& name,
                        const std::vector<std::string>& arguments);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "tests/cli/scenes.h"
 #include "tests/end_to_end/script.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -459,4 +459,4 @@ TEST_F(Scripts, TakeGeodeticCoordinatesToALocalFrame) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

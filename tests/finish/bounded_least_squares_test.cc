@@ -12,7 +12,7 @@
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -282,4 +282,4 @@ TEST(ErrorLoss, WeighsAsItsDerivativeSays) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

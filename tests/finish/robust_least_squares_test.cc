@@ -10,7 +10,7 @@
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Every tenth observation of a noisy scene is 50 pixels off.
@@ -108,4 +108,4 @@ TEST(MinimizeRobustly, LeavesAloneWhatMostObservationsDoNotSee) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model/binary_io.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Part {
@@ -36,9 +36,9 @@ void Read(ByteSource source) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::Read({data, size});
+  krot::internal::Read({data, size});
   return 0;
 }

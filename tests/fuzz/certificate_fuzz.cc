@@ -9,7 +9,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Truth {
@@ -89,14 +89,14 @@ void Tamper(ByteSource source) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::ByteSource source(data, size);
+  krot::internal::ByteSource source(data, size);
   if (source.Byte() == 'T') {
-    krot::Tamper(source);
+    krot::internal::Tamper(source);
   } else {
-    krot::JudgeText(std::string(reinterpret_cast<const char*>(data), size));
+    krot::internal::JudgeText(std::string(reinterpret_cast<const char*>(data), size));
   }
   return 0;
 }

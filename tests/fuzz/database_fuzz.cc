@@ -8,7 +8,7 @@
 #include "tests/fuzz/fuzz.h"
 #include "tests/testing/temp_folder.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void Read(const uint8_t* data, size_t size) {
@@ -36,9 +36,9 @@ void Read(const uint8_t* data, size_t size) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::Read(data, size);
+  krot::internal::Read(data, size);
   return 0;
 }

@@ -10,7 +10,7 @@
 #include "krot/model/file_bytes.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the fuzz targets share: each is one LLVMFuzzerTestOneInput, which takes
 // any bytes. ModelError and OptionError are answers; whatever else leaves a
@@ -64,4 +64,4 @@ inline SyntheticScene FuzzScene() {
   return SynthesizeScene(options);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

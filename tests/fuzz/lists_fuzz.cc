@@ -7,7 +7,7 @@
 #include "krot/model/rotations_file.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void Read(ByteSource source) {
@@ -46,9 +46,9 @@ void Read(ByteSource source) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::Read({data, size});
+  krot::internal::Read({data, size});
   return 0;
 }

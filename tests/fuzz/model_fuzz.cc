@@ -13,7 +13,7 @@
 #include "krot/model/trivial_rigs.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Parse = void (*)(const FileBytes& file, Model* model);
@@ -60,9 +60,9 @@ void Read(ByteSource source) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::Read({data, size});
+  krot::internal::Read({data, size});
   return 0;
 }

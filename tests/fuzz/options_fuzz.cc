@@ -13,7 +13,7 @@
 #include "tests/fuzz/fuzz.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string ProjectFile() {
@@ -55,9 +55,9 @@ void Read(ByteSource source) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::Read({data, size});
+  krot::internal::Read({data, size});
   return 0;
 }

@@ -16,7 +16,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "tests/fuzz/fuzz.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kRounding = 1e-6;  // relative
@@ -214,9 +214,9 @@ void Run(ByteSource source) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  krot::Run({data, size});
+  krot::internal::Run({data, size});
   return 0;
 }

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -124,4 +124,4 @@ TEST(FindConsensus, IsOfAllWhereNothingIsKnown) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

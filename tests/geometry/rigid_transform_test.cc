@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::AngleAxisd;
@@ -58,4 +58,4 @@ TEST(Similarity, MovesPointsAsAnAffineMap) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

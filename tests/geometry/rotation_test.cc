@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::AngleAxisd;
@@ -84,4 +84,4 @@ TEST(RotationOf, WhatCannotBeNormalisedIsNotANumber) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/problem/subset.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kRoom = 1 + 1e-3;
@@ -117,4 +117,4 @@ TEST(ExtendSolution, HasTheSameBitsAtAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

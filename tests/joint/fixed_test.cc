@@ -15,7 +15,7 @@
 // any: fixed frames are one rig with known baselines, fixed points one point
 // that is seen through shifted cameras.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -312,4 +312,4 @@ TEST(Fixed, PositionsHoldTheGauge) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/joint/small_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 InitializerOptions Options(Norm norm, double max_error) {
@@ -278,4 +278,4 @@ TEST(FindStart, RefusesBadOptions) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

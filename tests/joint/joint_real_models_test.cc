@@ -12,7 +12,7 @@
 #include "krot/model/model_io.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kGap = 1e-4;  // the reference's own, too
@@ -104,4 +104,4 @@ INSTANTIATE_TEST_SUITE_P(Local, FindStartOfRealModel,
                          Name);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

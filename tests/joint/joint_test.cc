@@ -13,7 +13,7 @@
 #include "tests/joint/small_scenes.h"
 #include "tests/oracle/lp_oracle.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kGap = 1e-6;
@@ -350,4 +350,4 @@ TEST(SolveJoint, RefusesStartsBehindACameraAndBadOptions) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using testing::ElementsAre;
@@ -53,4 +53,4 @@ TEST(KnownMultipliers, AreTheLatestThatWereKept) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

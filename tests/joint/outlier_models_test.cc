@@ -5,7 +5,7 @@
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Outliers of hundreds of pixels: points slide into cameras on the way down,
@@ -42,4 +42,4 @@ TEST(SolveJoint, ProvesTheOptimumOfModelsWithGrossOutliers) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/problem/cost.h"
 #include "tests/joint/small_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kTinyDepth = 1e-13;
@@ -76,4 +76,4 @@ TEST(SolveJoint, LeavesPointsInCamerasWithinSixtyIterations) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

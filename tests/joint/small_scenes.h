@@ -2,7 +2,7 @@
 
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Small scenes to solve jointly; with a baseline every frame has two cameras.
 inline RandomScene MakeSmallScene(unsigned seed, double baseline = 0) {
@@ -53,4 +53,4 @@ inline void AddUnseen(RandomScene* scene) {
   scene->estimate.points.emplace_back(-1, -2, -3);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 RandomScene MakeScene() {
@@ -208,4 +208,4 @@ TEST(WorkingSet, OfFewPointsHasTheOptimumOfAll) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 
 #include "krot/linear/block_structure.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A symmetric matrix, and its blocks that are not zero.
 struct BlockMatrix {
@@ -62,4 +62,4 @@ inline Eigen::MatrixXd RandomNormalEquations(int num_frames, int num_terms,
   return matrix;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "tests/linear/block_matrix.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Index;
@@ -156,4 +156,4 @@ TEST(ConjugateGradients, LeavesAFrameWithoutRowsWhereItIs) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::MatrixXd;
@@ -68,4 +68,4 @@ TEST(DenseCholesky, RefusesWhatIsNotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

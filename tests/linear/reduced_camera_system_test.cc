@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::MatrixXd;
@@ -368,4 +368,4 @@ TEST(ReducedCameraSystem, WithoutFreeFramesSolvesNothing) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

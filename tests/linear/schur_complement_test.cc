@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
@@ -278,4 +278,4 @@ TYPED_TEST(CentredLeastSquaresTest, HasTheSameBitsAtAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

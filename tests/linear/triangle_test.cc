@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -82,4 +82,4 @@ TEST(InvertCholesky, ReplacesPivotsThatAreTooSmallAndSaysSo) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/math/simplex_qp.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -120,4 +120,4 @@ TEST_F(MinEnclosingBallTest, RefusesOtherCounts) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

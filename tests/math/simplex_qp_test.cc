@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -157,4 +157,4 @@ TEST_F(SimplexQpTest, MinNormPointOfASegmentIsTheFootOfItsPerpendicular) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -43,7 +43,7 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
   Release(memory);
 }
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void ExpectNoAllocationOnceWarm(FastDescentSettings settings, double p) {
@@ -118,4 +118,4 @@ TEST(Allocation, PaperSettingsMakeNoneOnceWarm) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "tests/oracle/ellipsoid_oracle.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -322,4 +322,4 @@ INSTANTIATE_TEST_SUITE_P(, DegenerateTest,
                          testing::Values(1, 1.5, 2, 3, Norm::LInf().p), NameOf);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/minimax/fast_descent.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -133,4 +133,4 @@ TEST(DescentNormals, AreUnitVectorsOfTheActiveResiduals) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

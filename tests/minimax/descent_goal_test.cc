@@ -5,7 +5,7 @@
 #include "krot/minimax/fast_descent.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -121,4 +121,4 @@ INSTANTIATE_TEST_SUITE_P(, DescentGoalTest,
                          testing::Values(1, 1.5, 2, 3, Norm::LInf().p));
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

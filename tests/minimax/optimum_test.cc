@@ -10,7 +10,7 @@
 #include "tests/oracle/ellipsoid_oracle.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kAgreement = 1e-9;  // pixels
@@ -117,4 +117,4 @@ INSTANTIATE_TEST_SUITE_P(
     NameOf);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/minimax/residual_set.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -114,4 +114,4 @@ TEST(ResidualKernel, MetricIsTheSumOverAllResiduals) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

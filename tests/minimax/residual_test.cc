@@ -9,7 +9,7 @@
 #include "krot/minimax/residual_set.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -196,4 +196,4 @@ INSTANTIATE_TEST_SUITE_P(, SmoothResidualTest, testing::Values(1.5, 2, 3),
                          NameOf);
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

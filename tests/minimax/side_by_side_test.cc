@@ -12,7 +12,7 @@
 #include "tests/oracle/ellipsoid_oracle.h"
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -362,4 +362,4 @@ TEST(SideBySide, RefusesOptionsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

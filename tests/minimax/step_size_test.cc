@@ -6,7 +6,7 @@
 
 #include "tests/testing/random_residuals.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -92,4 +92,4 @@ TEST(StepSize, FindsTheZeroOfOneResidual) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::AllOf;
@@ -212,4 +212,4 @@ TEST(BinaryIo, RefusesAPoseFlagThatIsNoFlag) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

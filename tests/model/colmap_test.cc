@@ -14,7 +14,7 @@
 
 // COLMAP itself as the judge, if it is installed.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -101,4 +101,4 @@ TEST(Colmap, ReadsWhatIsWrittenHereAndWritesWhatIsReadHere) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -208,4 +208,4 @@ TEST(Follow, BothTakesTheTracksWhere2DPointsNameNothing) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

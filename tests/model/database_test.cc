@@ -13,7 +13,7 @@
 #include "tests/testing/database_writer.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -341,4 +341,4 @@ TEST(Database, IsReadOrRefusedHoweverItIsDamaged) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

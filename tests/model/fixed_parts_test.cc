@@ -9,7 +9,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -76,4 +76,4 @@ TEST(FixedParts, OfWhichNoneIsThereAreRefused) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

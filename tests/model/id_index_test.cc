@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Record {
@@ -47,4 +47,4 @@ TEST(IdIndex, OfNothingFindsNothing) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -99,4 +99,4 @@ TEST(LocalFrame, IsAmidWhatIsFixed) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -357,4 +357,4 @@ TEST(ModelIo, ListsNamesThatColmapsTextReaderWouldCut) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 
 #include "tests/model/tiny_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string DifferenceAfter(const std::function<void(Model*)>& change,
@@ -57,4 +57,4 @@ TEST(IsModel, IgnoresOnlyWhatItIsToldTo) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

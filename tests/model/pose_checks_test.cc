@@ -11,7 +11,7 @@
 #include "krot/model/trivial_rigs.h"
 #include "tests/model/tiny_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Quaterniond;
@@ -202,4 +202,4 @@ TEST(CheckPoses, LooksAtPosedImagesAlone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

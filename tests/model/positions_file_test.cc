@@ -11,7 +11,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -239,4 +239,4 @@ TEST_F(LatitudesAndLongitudes, AreNotSeenInPositionsOfOtherFramesAndUnits) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

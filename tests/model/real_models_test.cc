@@ -11,7 +11,7 @@
 
 // Models from the wild, if KROT_REAL_MODELS names a folder of them.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -81,4 +81,4 @@ TEST(RealModels, ThatAreGitLfsPointersAreRecognised) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

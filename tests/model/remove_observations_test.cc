@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Two images; point 10 has observations 0 of both, and 0 of the first twice;
@@ -66,4 +66,4 @@ TEST(RemoveObservations, OfNothingIsTheModel) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -136,4 +136,4 @@ TEST(RotationsFile, OfANameThatTwoImagesBearIsRefused) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -290,4 +290,4 @@ TEST(TextIo, RefusesToWriteWhatItCouldNotReadBack) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

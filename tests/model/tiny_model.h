@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A valid legacy model, small enough to be broken at every byte: two cameras,
 // three images (one of them empty), three points. Awkward where files may be:
@@ -81,4 +81,4 @@ inline Model TinyRigModel() {
   return model;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

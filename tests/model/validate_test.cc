@@ -10,7 +10,7 @@
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -241,4 +241,4 @@ TEST(ValidateModel, RefusesSensorsWhoseRotationCannotBeNormalised) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

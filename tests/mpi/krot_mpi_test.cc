@@ -17,7 +17,7 @@
 
 // `mpirun -n N krot_mpi solver` beside `krot solver`: the same files.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -183,4 +183,4 @@ TEST_F(KrotMpi, KilledLeavesTheOldModelOrTheNewAndGoesOn) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

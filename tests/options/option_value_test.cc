@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(OptionValue, IsTakenWholeOrNotAtAll) {
@@ -62,4 +62,4 @@ TEST(NearestName, ForgivesSlipsCasesAndMissingGroups) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = long double;
@@ -148,4 +148,4 @@ OracleOptimum MinimizeByEllipsoids(const std::vector<Residual>& residuals,
           static_cast<double>(bound)};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/math/norm.h"
 #include "krot/minimax/residual.h"
 
-namespace krot {
+namespace krot::internal {
 
 struct OracleOptimum {
   Eigen::Vector3d x = Eigen::Vector3d::Zero();
@@ -33,4 +33,4 @@ OracleOptimum MinimizeByEllipsoids(const std::vector<Residual>& residuals,
                                    Norm norm, const Eigen::Vector3d& center,
                                    double radius, double gap = 1e-11);
 
-}  // namespace krot
+}  // namespace krot::internal

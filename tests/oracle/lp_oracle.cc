@@ -9,7 +9,7 @@
 #include <CoinPackedMatrix.hpp>
 #include <CoinPackedVector.hpp>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -146,11 +146,11 @@ std::optional<double> LargestByLp(const KnownRotationProblem& problem,
   return -model.objectiveValue();
 }
 
-}  // namespace krot
+}  // namespace krot::internal
 
 #else
 
-namespace krot {
+namespace krot::internal {
 
 std::optional<double> OptimalCostByBisection(const KnownRotationProblem&, Norm,
                                              double, double) {
@@ -163,6 +163,6 @@ std::optional<double> LargestByLp(const KnownRotationProblem&, Norm, double,
   return std::nullopt;
 }
 
-}  // namespace krot
+}  // namespace krot::internal
 
 #endif

@@ -6,7 +6,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The optimal cost of a small known rotation problem for p = 1 or infinity,
 // independent of the library: bisection on gamma, where each linear programme
@@ -34,4 +34,4 @@ std::optional<double> LargestByLp(const KnownRotationProblem& problem,
                                   const std::vector<double>& h,
                                   const std::vector<double>& e, double kept);
 
-}  // namespace krot
+}  // namespace krot::internal

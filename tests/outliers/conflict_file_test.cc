@@ -10,7 +10,7 @@
 #include "krot/outliers/conflict.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -119,4 +119,4 @@ TEST(ConflictFile, NamesThePlaceThatCannotBeRead) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tests/oracle/lp_oracle.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kBound = 2;
@@ -169,4 +169,4 @@ TEST(FindConflict, OfAnImageTwiceInATrackIsThePair) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "tests/oracle/lp_oracle.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::vector<int64_t> Kept(const BuiltProblem& built,
@@ -207,4 +207,4 @@ TEST(ErrorProfile, EndsWithTheFirstLevelWhereThatIsLowEnough) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

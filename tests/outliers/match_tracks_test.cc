@@ -18,7 +18,7 @@
 #include "krot/synthetic/scene_database.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::IsEmpty;
@@ -232,4 +232,4 @@ TEST(TriangulateMatches, KeepsTheModelsTracksIfAsked) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kLevel = 1;
@@ -73,4 +73,4 @@ TEST(NearSet, KeepsWhatItHasAndHasEverythingThatWasEverAbove) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

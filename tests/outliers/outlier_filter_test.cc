@@ -12,7 +12,7 @@
 #include "krot/model.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 OutlierFilterOptions Within(double max_error) {
@@ -278,4 +278,4 @@ TEST(FilterOutliers, BySnoopingHasTheSameBitsAtAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

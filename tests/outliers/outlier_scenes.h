@@ -4,7 +4,7 @@
 
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Small scenes with pinhole cameras, noise and outliers.
 inline SceneOptions OutlierScene(uint64_t seed, double outlier_ratio,
@@ -27,4 +27,4 @@ inline SyntheticScene MakeOutlierScene(uint64_t seed, double outlier_ratio,
       OutlierScene(seed, outlier_ratio, num_points, pixel_noise));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/outliers/packing.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kBound = 2;
@@ -88,4 +88,4 @@ TEST(FindRemoval, NeedsNothingWhereEverythingFits) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/weakly_tied.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SceneOptions Scene(double outlier_ratio, double rotation_noise_deg) {
@@ -272,4 +272,4 @@ TEST(FilterOutliers, ChoosesABoundWhereNoneIsGiven) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/outliers/outlier_filter.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr size_t kTurnedFrame = 2;
@@ -85,4 +85,4 @@ TEST(RotationSuspect, IsNoneWhereOutliersAreAllOver) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

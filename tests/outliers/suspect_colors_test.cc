@@ -6,7 +6,7 @@
 
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(ColorSuspects, TellsTracksThatLostObservationsFromThoseInConflictAlone) {
@@ -36,4 +36,4 @@ TEST(ColorSuspects, TellsTracksThatLostObservationsFromThoseInConflictAlone) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

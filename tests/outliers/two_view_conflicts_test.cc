@@ -9,7 +9,7 @@
 #include "krot/outliers/removal.h"
 #include "tests/outliers/outlier_scenes.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kBound = 2;
@@ -78,4 +78,4 @@ TEST(TwoViewConflicts, HasNoCandidateForWhatIsWithinTheBound) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 // judges: no bound may be above its largest error, and what is solved to the
 // gap is not above it either.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -252,4 +252,4 @@ TEST(AdversarialGeometry, RigsOfTinyAndHugeBaselines) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

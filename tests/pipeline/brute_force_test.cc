@@ -16,7 +16,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "tests/bridge/lens_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::MatrixXd;
@@ -217,4 +217,4 @@ TEST_P(BruteForceOf, IsNeverBelowTheBoundAndReachesWhatRoundsReach) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

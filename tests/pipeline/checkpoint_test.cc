@@ -16,7 +16,7 @@
 #include "tests/pipeline/solve_by_ranks.h"
 #include "tests/testing/temp_folder.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -257,4 +257,4 @@ TEST(StepValues, RefuseARecordOfOtherValues) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

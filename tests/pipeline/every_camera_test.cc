@@ -11,7 +11,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/camera/random_camera.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Rows of the same bearings and the same noise, seen by pinholes: each
@@ -79,4 +79,4 @@ TEST_P(EveryCamera, ReachesTheMaximumThatPinholesReachWithTheSameNoise) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -19,7 +19,7 @@
 // the checker thinks. KROT_FALSE_CERTIFICATES models are tried (docs/
 // reliability.md: 10,000).
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the largest error, relative: what a claim must be above to be false.
@@ -190,4 +190,4 @@ TEST(FalseCertificates, AreNeverAcceptedAndTrueOnesAre) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "tests/bridge/lens_model.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -200,4 +200,4 @@ TEST(GivenBack, IsNotAModelWhoseTwinsRiseThatWereLeftOut) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 
 // What a model is called and measured in decides nothing.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of costs within the gap that is asked for, relative.
@@ -157,4 +157,4 @@ TEST(Invariance, OfTheUnitOfPixels) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

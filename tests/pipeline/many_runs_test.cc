@@ -8,7 +8,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Model SmallScene() {
@@ -46,4 +46,4 @@ TEST(ManyRuns, InOneProcessLeaveNothingBehind) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/proof/certificate_search.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Where thousands of observations set the maximum, or are not told from those
@@ -62,4 +62,4 @@ TEST(ProveRows, RepairsTheMultipliersOfALargeSupportForNewRows) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -24,7 +24,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -408,4 +408,4 @@ TEST(Positions, OfATamperedCertificateAreRefused) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

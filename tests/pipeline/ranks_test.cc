@@ -20,7 +20,7 @@
 #include "tests/pipeline/solve_by_ranks.h"
 #include "tests/testing/thread_ranks.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 class SolveByRanksTest : public ::testing::TestWithParam<int> {
@@ -214,4 +214,4 @@ TEST(BlockPattern, OfSharesIsThatOfTheWhole) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "krot/problem/cost.h"
 #include "tests/bridge/lens_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What rounding may add to a cost, relative.
@@ -243,4 +243,4 @@ TEST(SolveInRounds, TakesRowsAnewBeforeItSolvesThemFarFromWhereTheyHold) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

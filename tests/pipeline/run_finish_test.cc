@@ -10,7 +10,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/multiplier_oracle.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Model NoisyModel(int camera_model_id) {
@@ -108,4 +108,4 @@ TEST(RunFinish, LeavesOutWhatACapBelowTheLowestMaximumForbids) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/problem/cost.h"
 #include "tests/bridge/lens_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Two estimates on both sides of a third, three times as far behind it as
@@ -127,4 +127,4 @@ TEST_F(TrustRegions_, BoundTheObservationsWhosePromiseWasNotKept) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

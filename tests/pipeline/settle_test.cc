@@ -19,7 +19,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -362,4 +362,4 @@ TEST(SettleEstimate, HasTheBitsOfOneProcessByRanks) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 // A solve by ranks that are threads of this process, and what its result is
 // compared by.
 
-namespace krot {
+namespace krot::internal {
 
 // Small, with enough noise for sweeps and the joint solver.
 inline SceneOptions SceneToShare() {
@@ -89,4 +89,4 @@ inline void ExpectSameBits(const Solved& a, const Solved& b) {
   EXPECT_EQ(a.summary.support.size(), b.summary.support.size());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/sanitizer.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 int64_t Estimate(const Model& model, SolveMethod method,
@@ -84,4 +84,4 @@ TEST(EstimateSolveMemory, CountsEveryObservationOnTheWayToAStart) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -19,7 +19,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr Ignoring kWhatASolveChanges = {true, true, true};
@@ -525,4 +525,4 @@ TEST(TriangulateModel, TakesOneSweepPerRoundUntilNothingIsToBeGained) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "tests/problem/graph_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::Each;
@@ -61,4 +61,4 @@ TEST(SplitIntoComponents, GivesEachConnectedPartItsObservations) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

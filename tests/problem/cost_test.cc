@@ -12,7 +12,7 @@
 
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -170,4 +170,4 @@ TEST(Cost, RefusesAPowerBelowOne) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -348,4 +348,4 @@ TEST(RestoreGaugeIfHarmless, StaysWhereCoordinatesWouldLoseTheirDigits) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Who sees what, and nothing else: one view per frame; pairs are (frame,
 // point), ordered by point.
@@ -27,4 +27,4 @@ inline KnownRotationProblem MakeGraph(
   return problem;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -89,4 +89,4 @@ TEST(IndexObservations, RefusesObservationsThatAreNotOrderedByPoint) {
 TEST(Observation, TakesEightyBytes) { EXPECT_EQ(sizeof(Observation), 80); }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

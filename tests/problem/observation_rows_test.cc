@@ -4,7 +4,7 @@
 
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A x + b and c'x + d of a row.
@@ -55,4 +55,4 @@ TEST_F(ObservationRows, OfAResectionAreAffineInTheTranslation) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

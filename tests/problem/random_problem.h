@@ -9,7 +9,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Small problems with an estimate in front of every camera.
 
@@ -101,4 +101,4 @@ inline void MoveRay(const Eigen::Vector2d& by, Observation* observation) {
       observation->E.bottomLeftCorner<2, 2>() * by;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tests/problem/graph_problem.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::ElementsAre;
@@ -137,4 +137,4 @@ TEST(PruneUnconstrained, LeavesTheCycleThatAChainHangsOn) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

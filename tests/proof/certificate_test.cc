@@ -14,10 +14,10 @@
 #include "krot/proof/dual_repair.h"
 #include "krot/proof/support.h"
 #include "tests/problem/random_problem.h"
-#include "tests/proof/joint_iterate.h"
-#include "tests/proof/naive_certificate_check.h"
+#include "tests/verify/joint_iterate.h"
+#include "tests/verify/naive_certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 RandomScene MakeScene(unsigned seed, int views_per_frame, double baseline) {
@@ -280,4 +280,4 @@ TEST(MakeCertificate, RefusesAnIterateOfAnotherProblem) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -130,4 +130,4 @@ TEST(LeastNormSolver, RefusesEquationsThatMayHaveNoSolution) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string Encode(const std::string& text) {
@@ -30,4 +30,4 @@ TEST(Base64, EncodesHighBitsAndNumbersLittleEndian) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

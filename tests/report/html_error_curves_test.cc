@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
@@ -81,4 +81,4 @@ TEST(ErrorTail, OfNoErrorIsEmptyAndOfOneHoldsIt) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "krot/report/html_model_view.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using nlohmann::json;
@@ -211,4 +211,4 @@ TEST(SceneOrigin, IsTheMeanOfTheFinitePoints) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -131,4 +131,4 @@ TEST(ModelJson, SaysNullForErrorsThatNoObservationHas) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

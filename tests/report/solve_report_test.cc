@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -395,4 +395,4 @@ TEST(NormName, IsWhatTheOptionTakes) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

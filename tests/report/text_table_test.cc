@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 TEST(TextTable, AlignsTheFirstColumnLeftAndTheOthersRight) {
@@ -40,4 +40,4 @@ TEST(FormatBytes, ChoosesTheUnit) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

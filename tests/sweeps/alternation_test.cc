@@ -6,7 +6,7 @@
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -59,4 +59,4 @@ TEST(Alternation, IsStuckAtTwoPixelsWhereNoneAreAttainable) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/sweeps/block_sweep.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Sweeps and Cost() evaluate the same residuals, of rows and of poses.
@@ -372,4 +372,4 @@ TEST(BlockSweep, ASecondIntersectionGainsNothing) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -98,4 +98,4 @@ TEST_F(ColmapAcceptsScene, AndConvertsItToText) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/camera/camera_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 class DefaultCameraOfModel : public testing::TestWithParam<int> {};
@@ -70,4 +70,4 @@ TEST(DefaultCamera, OfAnUnknownModelIsRefused) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

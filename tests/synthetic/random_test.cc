@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kSamples = 200000;
@@ -57,4 +57,4 @@ TEST(Random, GaussianHasTheMomentsOfTheNormalDistribution) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/camera/camera_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kPanorama = 17;
@@ -67,4 +67,4 @@ double MinDepth(const Model& model) {
   return min_depth;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

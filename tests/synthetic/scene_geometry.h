@@ -7,7 +7,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // One observation of a scene recomputed from the model alone, with plain
 // formulas, so that the tests do not trust the generator.
@@ -29,4 +29,4 @@ double MaxErrorPx(const Model& model);
 // The smallest depth.
 double MinDepth(const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/synthetic/scene_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 bool SamePixels(const Model& a, const Model& b) {
@@ -150,4 +150,4 @@ TEST(SceneNoise, IsTheSameForTheSameSeedAndDiffersForAnother) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

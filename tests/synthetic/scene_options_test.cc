@@ -7,7 +7,7 @@
 
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using testing::StartsWith;
@@ -75,4 +75,4 @@ TEST(SceneOptions, RefuseSensorsThatShareNoPoints) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "tests/synthetic/scene_geometry.h"
 #include "tests/testing/model_matchers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Number of sets that the frames fall into when those that share a point are
@@ -226,4 +226,4 @@ TEST(Scene, OfARigHasTheBaselineAndTheAngleAskedFor) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // Writes databases as COLMAP does, apart from WriteDatabase, and wrong ones.
 class DatabaseWriter {
@@ -111,4 +111,4 @@ class DatabaseWriter {
   sqlite3* database_ = nullptr;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

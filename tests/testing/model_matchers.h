@@ -14,7 +14,7 @@
 #include "krot/model.h"
 #include "tests/testing/temp_folder.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What two models may differ in.
 struct Ignoring {
@@ -209,4 +209,4 @@ inline std::optional<std::filesystem::path> RealModels() {
   return folder;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/adjust/ceres_problem.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The term of an augmented Lagrangian for s = |r|^2 <= cap^2, of multiplier
 // lambda: max(0, lambda + c (s - cap^2) / 2)^2 / c.
@@ -86,4 +86,4 @@ inline LagrangianEnd MinimizeByMultipliers(
   return end;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

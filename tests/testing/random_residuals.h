@@ -9,7 +9,7 @@
 
 #include "krot/minimax/residual_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Random problems (1) of the two kinds that sweeps meet, about 8 units large.
 struct ResidualProblem {
@@ -108,4 +108,4 @@ inline void Fill(const ResidualProblem& problem, ResidualSet* residuals) {
   for (const Residual& residual : problem.residuals) residuals->Add(residual);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

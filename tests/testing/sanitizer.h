@@ -1,6 +1,6 @@
 #pragma once
 
-namespace krot {
+namespace krot::internal {
 
 // Whether the tests are built with a sanitizer that takes memory of its own.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -9,4 +9,4 @@ inline constexpr bool kIsSanitized = true;
 inline constexpr bool kIsSanitized = false;
 #endif
 
-}  // namespace krot
+}  // namespace krot::internal

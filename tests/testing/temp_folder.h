@@ -12,7 +12,7 @@
 #include <system_error>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // A folder that lives as long as this object.
 class TempFolder {
@@ -65,4 +65,4 @@ inline std::vector<std::string> FileNames(const std::filesystem::path& folder) {
   return names;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 
 #include "krot/base/ranks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Ranks that are threads of this process, for tests.
 class ThreadRanks {
@@ -85,4 +85,4 @@ class ThreadRanks {
   int64_t num_meetings_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

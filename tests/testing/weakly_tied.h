@@ -11,7 +11,7 @@
 #include "krot/model.h"
 #include "krot/model/remove_observations.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The same model with so few tracks between two parts: `part_of` says which
 // part an image is of, by its index, and `are_tied` which two parts share
@@ -68,4 +68,4 @@ inline Model WeaklyTied(Model model, const std::function<int(int)>& part_of,
   return RemoveObservations(model, is_removed).model;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

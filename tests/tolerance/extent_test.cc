@@ -12,7 +12,7 @@
 #include "tests/oracle/lp_oracle.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -160,4 +160,4 @@ INSTANTIATE_TEST_SUITE_P(Gauges, FindExtentIn,
                                          Gauge{0.3, 1}, Gauge{0.3, 2}));
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/lp_oracle.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -306,4 +306,4 @@ TEST(AnalyzeTolerances, RefusesWhatHoldsNothingTogether) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

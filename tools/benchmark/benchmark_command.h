@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // The commands of `krot_benchmark`, one .cc file each. They return an exit
 // code or throw what krot_benchmark.cc turns into one.
@@ -16,4 +16,4 @@ int RunJointBenchmark(const std::vector<std::string>& arguments);
 int RunPositioningBenchmark(const std::vector<std::string>& arguments);
 int RunSummaryBenchmark(const std::vector<std::string>& arguments);
 
-}  // namespace krot
+}  // namespace krot::internal

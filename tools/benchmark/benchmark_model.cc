@@ -6,7 +6,7 @@
 #include "krot/model/model_io.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // "south128" of "models/south128/".
@@ -35,4 +35,4 @@ BenchmarkModel ReadBenchmarkModel(const std::string& path,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/bridge/bridge.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A model as the benchmarks meet it: its name, the last part of its path, and
 // its problem with the model's own start.
@@ -19,4 +19,4 @@ struct BenchmarkModel {
 BenchmarkModel ReadBenchmarkModel(const std::string& path,
                                   int min_track_length = 2);
 
-}  // namespace krot
+}  // namespace krot::internal

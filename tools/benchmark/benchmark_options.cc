@@ -1,6 +1,6 @@
 #include "tools/benchmark/benchmark_options.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser) {
   parser->Add({"input_path", "A model to measure on; may be given repeatedly",
@@ -37,4 +37,4 @@ OptionParser MakeBenchmarkParser(const std::string& command,
   return {command, summary, "krot_benchmark"};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What every benchmark takes.
 struct BenchmarkOptions {
@@ -26,4 +26,4 @@ void AddBenchmarkOptions(BenchmarkOptions* options, OptionParser* parser);
 OptionParser MakeBenchmarkParser(const std::string& command,
                                  const std::string& summary);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include "krot/base/write_file.h"
 #include "krot/version.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -58,4 +58,4 @@ void PublishReport(const BenchmarkReport& report,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

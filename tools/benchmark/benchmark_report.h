@@ -9,7 +9,7 @@
 #include "tools/benchmark/result_table.h"
 #include "tools/krot/machine.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one benchmark found.
 struct BenchmarkReport {
@@ -27,4 +27,4 @@ void CheckReportPaths(const BenchmarkOptions& options);
 void PublishReport(const BenchmarkReport& report,
                    const BenchmarkOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "tools/benchmark/timing.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct BlocksOptions {
@@ -135,4 +135,4 @@ int RunBlocksBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "tools/benchmark/timing.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // One timed loop takes at least this long.
@@ -61,4 +61,4 @@ std::vector<std::unique_ptr<SubproblemSolver>> AllSolvers(Norm norm) {
   return solvers;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How one solver did on a list of sub-problems, beside all the others.
 struct Standing {
@@ -33,4 +33,4 @@ std::vector<Standing> Compete(
 // KROT's own solvers, then the rivals that can solve this norm.
 std::vector<std::unique_ptr<SubproblemSolver>> AllSolvers(Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

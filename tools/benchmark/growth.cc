@@ -9,7 +9,7 @@
 #include "krot/model/model_io.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void RunKrot(const KrotRun& run, std::vector<std::string> arguments) {
@@ -96,4 +96,4 @@ Growth MeasureStreet(const KrotRun& run, const std::string& method,
   return growth;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

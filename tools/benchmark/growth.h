@@ -5,7 +5,7 @@
 
 #include "tools/benchmark/process.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A street: frames one after the other, random tracks.
 struct Street {
@@ -54,4 +54,4 @@ Growth MeasureStreet(const KrotRun& run, const std::string& method,
                      const Street& street, const std::string& model,
                      const ScratchFolder& folder);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "tools/benchmark/timing.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct JointBenchmarkOptions {
@@ -191,4 +191,4 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -21,7 +21,7 @@
 #include "tools/benchmark/timing.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct KnownRotationOptions {
@@ -225,4 +225,4 @@ int RunKnownRotationBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A way to solve the whole problem, p = 2, the one or the other of which is
 // measured.
@@ -39,4 +39,4 @@ std::vector<std::unique_ptr<KnownRotationSolver>> PaperFullSolvers(
 std::vector<std::unique_ptr<KnownRotationSolver>> RivalFullSolvers(
     int num_threads);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Command {
@@ -95,8 +95,8 @@ int Main(const std::vector<std::string>& arguments) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 int main(int argc, char** argv) {
-  return krot::Main({argv + std::min(argc, 1), argv + argc});
+  return krot::internal::Main({argv + std::min(argc, 1), argv + argc});
 }

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <sstream>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 bool IsShown(const std::pair<double, double>& point) {
@@ -50,4 +50,4 @@ std::string ToGnuplot(const LogPlot& plot) {
   return script.str();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 struct PlotSeries {
   std::string name;
@@ -23,4 +23,4 @@ struct LogPlot {
 // that are not positive and finite are left out, and lines without any.
 std::string ToGnuplot(const LogPlot& plot);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <exception>
 
-namespace krot {
+namespace krot::internal {
 
 std::vector<std::string> MeasureModels(
     const BenchmarkOptions& options,
@@ -25,4 +25,4 @@ std::vector<std::string> MeasureModels(
   return left_out;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

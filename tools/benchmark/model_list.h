@@ -6,7 +6,7 @@
 
 #include "tools/benchmark/benchmark_options.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Calls `measure` with every input path. A model that it throws for is left
 // out of the results: named on stderr and in the sentences returned, for below
@@ -15,4 +15,4 @@ std::vector<std::string> MeasureModels(
     const BenchmarkOptions& options,
     const std::function<void(const std::string& path)>& measure);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/sweeps/res_int.h"
 #include "tools/benchmark/known_rotation_solver.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The schedule of `krot solver`, without the finish.
@@ -90,4 +90,4 @@ Solvers PaperFullSolvers(int num_threads) {
   return solvers;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

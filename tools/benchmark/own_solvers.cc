@@ -4,7 +4,7 @@
 #include "krot/minimax/side_by_side_descent.h"
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 class OwnSolver : public SubproblemSolver {
@@ -120,4 +120,4 @@ Solvers SideBySideAndPaper(Norm norm) {
   return solvers;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 int RunPositioningBenchmark(const std::vector<std::string>& arguments) {
   std::string input_path, output_path;
@@ -48,4 +48,4 @@ int RunPositioningBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

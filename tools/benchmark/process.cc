@@ -10,7 +10,7 @@
 
 #include "krot/base/timer.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -69,4 +69,4 @@ std::string SiblingExecutable(const std::string& name) {
   return (fs::read_symlink("/proc/self/exe").parent_path() / name).string();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

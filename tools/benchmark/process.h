@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 struct ProcessResult {
   int exit_code = 0;   // -n if signal n ended it; 127 if it was not found
@@ -36,4 +36,4 @@ class ScratchFolder {
 // The executable `name` in the folder of the running one.
 std::string SiblingExecutable(const std::string& name);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -95,4 +95,4 @@ Json ToJson(const ResultTable& table) {
           {"notes", table.notes}};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

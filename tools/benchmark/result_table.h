@@ -5,7 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace krot {
+namespace krot::internal {
 
 // One value of a table: as JSON, and as a reader sees it.
 struct Cell {
@@ -37,4 +37,4 @@ std::string ToMarkdown(const ResultTable& table);
 // {"name", "caption", "columns", "rows": [{column: value}], "notes"}.
 nlohmann::ordered_json ToJson(const ResultTable& table);
 
-}  // namespace krot
+}  // namespace krot::internal

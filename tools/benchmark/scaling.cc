@@ -13,7 +13,7 @@
 #include "tools/benchmark/process.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int64_t kMillion = 1000000;
@@ -205,4 +205,4 @@ int RunScalingBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -167,4 +167,4 @@ std::vector<Residual> RandomTriangulation(int num_cameras, double sigma,
   return residuals;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/synthetic/random.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A problem (1) of [Zhang18] with a start of positive depths, in a unit of
 // length in which the start's mean depth is 1: thresholds in units of x then
@@ -55,4 +55,4 @@ std::optional<Subproblem> MakeBlock(std::vector<Residual> residuals,
 std::vector<Residual> RandomTriangulation(int num_cameras, double sigma,
                                           Random* random);
 
-}  // namespace krot
+}  // namespace krot::internal

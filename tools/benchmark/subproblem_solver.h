@@ -6,7 +6,7 @@
 
 #include "tools/benchmark/subproblem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A way to solve problems (1), the one or the other of which is measured. Keeps
 // its scratch memory; not thread-safe.
@@ -47,4 +47,4 @@ std::vector<std::unique_ptr<SubproblemSolver>> SideBySideAndPaper(Norm norm);
 // Those of the literature that can solve this norm: p = 2 or infinity.
 std::vector<std::unique_ptr<SubproblemSolver>> RivalSolvers(Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 
 #include "tools/benchmark/timing.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -184,4 +184,4 @@ ResultTable Summarize(const Reports& reports) {
   return table;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "tools/benchmark/result_table.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The reports that run_all.sh leaves, parsed, by the names of their files:
 // "triangulation", "blocks", ...
@@ -15,4 +15,4 @@ using Reports = std::map<std::string, nlohmann::ordered_json>;
 // question; "not measured" where the report, or the row of it, is missing.
 ResultTable Summarize(const Reports& reports);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "tools/benchmark/summary.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Reports ReadReports(const std::string& folder) {
@@ -45,4 +45,4 @@ int RunSummaryBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

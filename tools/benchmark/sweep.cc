@@ -18,7 +18,7 @@
 #include "tools/benchmark/timing.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kSweeps = 10;
@@ -159,4 +159,4 @@ int RunSweepBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

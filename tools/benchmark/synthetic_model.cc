@@ -4,7 +4,7 @@
 
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 
 BenchmarkModel SyntheticModel(const ModelSize& size, uint64_t seed) {
   SceneOptions options;
@@ -28,4 +28,4 @@ BenchmarkModel SyntheticModel(const ModelSize& size, uint64_t seed) {
   return model;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

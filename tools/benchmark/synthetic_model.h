@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/benchmark_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The sizes of [Zhang18, Tab. 2].
 struct ModelSize {
@@ -27,4 +27,4 @@ inline constexpr int kNumPaperSizes = 6;
 // noise of 1 pixel, a start off the truth by a percent of the viewing distance.
 BenchmarkModel SyntheticModel(const ModelSize& size, uint64_t seed);
 
-}  // namespace krot
+}  // namespace krot::internal

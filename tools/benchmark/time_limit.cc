@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace krot {
+namespace krot::internal {
 
 TimeLimit::TimeLimit(double seconds)
     : thread_([this, seconds] {
@@ -22,4 +22,4 @@ TimeLimit::~TimeLimit() {
   thread_.join();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

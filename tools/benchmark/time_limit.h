@@ -6,7 +6,7 @@
 
 #include "krot/base/context.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Raises a flag once `seconds` have passed, for a solver that looks at one
 // between its steps.
@@ -27,4 +27,4 @@ class TimeLimit {
   std::thread thread_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of this thread, on a processor.
@@ -56,4 +56,4 @@ std::vector<double> TimeInterleaved(
   return medians;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

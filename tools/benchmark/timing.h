@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // The median; the mean of the two in the middle for an even count. Requires at
 // least one value.
@@ -19,4 +19,4 @@ std::vector<double> TimeInterleaved(
     const std::vector<std::function<void()>>& runs, int repeats,
     double min_seconds);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tools/benchmark/model_list.h"
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kSigma = 5;           // pixels, as in Fig. 4
@@ -250,4 +250,4 @@ int RunTriangulationBenchmark(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Progress ProgressOf(const BundleAdjustmentIteration& iteration) {
@@ -120,4 +120,4 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
   return Run(paths, common, options.Resolve(parser), options.num_threads());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct CheckerOptions {
@@ -100,4 +100,4 @@ int RunCertificateChecker(const std::vector<std::string>& arguments) {
                               : CheckCertificate(options, json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

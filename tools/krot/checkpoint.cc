@@ -10,7 +10,7 @@
 #include "krot/version.h"
 #include "tools/krot/interrupt.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Ends the run, as an interrupt would, where it goes beyond the steps.
@@ -119,4 +119,4 @@ void RemoveCheckpoint(const CheckpointOptions& options, const LogOptions& log) {
       "warning: " + options.path + " cannot be removed: " + error.message());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

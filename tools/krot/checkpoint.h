@@ -7,7 +7,7 @@
 #include "tools/krot/model_files.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The options of a command that can go on where it was killed.
 struct CheckpointOptions {
@@ -35,4 +35,4 @@ std::unique_ptr<Checkpoint> OpenCheckpoint(const CheckpointOptions& options,
 // Once all is written. Says what is left.
 void RemoveCheckpoint(const CheckpointOptions& options, const LogOptions& log);
 
-}  // namespace krot
+}  // namespace krot::internal

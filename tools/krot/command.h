@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // The commands of `krot`, one .cc file each. They return an exit code or
 // throw what tools/krot.cc turns into one.
@@ -18,4 +18,4 @@ int RunModelComparer(const std::vector<std::string>& arguments);
 int RunCertificateChecker(const std::vector<std::string>& arguments);
 int RunModelSynthesizer(const std::vector<std::string>& arguments);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/options/option_error.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What `krot` returns; the table stands in docs/cli.md and in `krot help`.
 enum ExitCode {
@@ -35,4 +35,4 @@ class CommandError : public std::runtime_error {
   ExitCode exit_code_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

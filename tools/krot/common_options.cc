@@ -2,7 +2,7 @@
 
 #include "tools/krot/run_log.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddLogLevel(LogOptions* log, OptionParser* parser) {
   parser->AddInteger("log_level", &log->level, Between(0, 2),
@@ -36,4 +36,4 @@ void AddCommonOptions(const std::string& seed_description,
   });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What every command takes.
 struct CommonOptions {
@@ -20,4 +20,4 @@ void AddProjectPath(std::string* project_path, OptionParser* parser);
 void AddCommonOptions(const std::string& seed_description,
                       CommonOptions* options, OptionParser* parser);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int64_t kUnlimited = std::numeric_limits<int64_t>::max();
@@ -69,4 +69,4 @@ int64_t BytesStillNeeded(int64_t peak_bytes) {
   return peak_bytes - PagesOfProcess().resident * sysconf(_SC_PAGESIZE);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace krot {
+namespace krot::internal {
 
 // Bytes that this process can still take: what is left of the machine's memory
 // and swap, of its control group's and of its own address space, the least of
@@ -13,4 +13,4 @@ int64_t FreeMemoryBytes();
 // hold yet.
 int64_t BytesStillNeeded(int64_t peak_bytes);
 
-}  // namespace krot
+}  // namespace krot::internal

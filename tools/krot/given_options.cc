@@ -13,7 +13,7 @@
 #include "krot/model/text_reader.h"
 #include "krot/options/option_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace po = boost::program_options;
@@ -109,4 +109,4 @@ std::vector<OptionAssignment> ReadProjectFile(
   return assignments;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

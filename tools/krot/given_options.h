@@ -6,7 +6,7 @@
 
 #include "krot/options/option_table.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What `--name value` and `--name=value` say, in their order; `check` sees each
 // before the next is looked at. Throws OptionError for what is neither.
@@ -20,4 +20,4 @@ std::vector<OptionAssignment> GivenOptions(
 std::vector<OptionAssignment> ReadProjectFile(
     const std::string& path, const std::vector<Option>& options);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include "krot/options/option_error.h"
 #include "tools/krot/given_options.h"
 
-namespace krot {
+namespace krot::internal {
 
 std::vector<OptionAssignment> GivenOptions(
     const std::vector<std::string>& arguments, const std::vector<Option>&,
@@ -36,4 +36,4 @@ std::vector<OptionAssignment> ReadProjectFile(const std::string& path,
                     ", this build reads no project files");
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/version.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kHelp[] = "--help=";
@@ -203,4 +203,4 @@ std::string ZshTail() {
          "_krot \"$@\"\n";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/options/option_table.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What --help may print: --help or -h, --help=man, --help=bash, --help=zsh.
 enum class HelpFormat { kText, kMan, kBash, kZsh };
@@ -39,4 +39,4 @@ std::string ZshCompletion(const OptionTable& table);
 std::string ZshHead(const std::vector<CommandSummary>& commands);
 std::string ZshTail();
 
-}  // namespace krot
+}  // namespace krot::internal

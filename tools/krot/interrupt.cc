@@ -8,7 +8,7 @@
 
 #include "tools/krot/command_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 CancelFlag interrupted{false};
@@ -54,4 +54,4 @@ const CancelFlag& DeferInterrupts() {
   return interrupted;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

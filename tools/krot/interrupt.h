@@ -4,7 +4,7 @@
 
 #include "krot/base/context.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What SIGINT and SIGTERM do.
 
@@ -20,4 +20,4 @@ const CancelFlag& DeferInterrupts();
 // Sets that flag.
 void Interrupt();
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -27,7 +27,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/run_log.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Command {
@@ -248,11 +248,11 @@ int Main(const std::vector<std::string>& arguments) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 int main(int argc, char** argv) try {
-  krot::SilenceCeres();
-  return krot::Main({argv + std::min(argc, 1), argv + argc});
+  krot::internal::SilenceCeres();
+  return krot::internal::Main({argv + std::min(argc, 1), argv + argc});
 } catch (const std::bad_alloc&) {
-  return krot::Fail("krot", "out of memory", krot::kExitInternal);
+  return krot::internal::Fail("krot", "out of memory", krot::internal::kExitInternal);
 }

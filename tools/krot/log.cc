@@ -15,7 +15,7 @@
 #include <thread>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -271,4 +271,4 @@ std::string FitProgress(const Progress& progress, int columns) {
          std::string(static_cast<size_t>(cells) - filled, '.') + "] " + words;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

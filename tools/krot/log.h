@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 
 // Where a command's words go. Tables, its result, go to stdout; everything
 // else goes to stderr.
@@ -56,4 +56,4 @@ void EndProgress();
 // `columns` columns.
 std::string FitProgress(const Progress& progress, int columns);
 
-}  // namespace krot
+}  // namespace krot::internal

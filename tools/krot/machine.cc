@@ -7,7 +7,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // "model name : AMD EPYC" of /proc/cpuinfo.
@@ -44,4 +44,4 @@ std::string MachineLine(const Machine& machine) {
          machine.flags;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

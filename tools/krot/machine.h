@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 
 // Where something was run: times mean nothing without it.
 struct Machine {
@@ -18,4 +18,4 @@ Machine ThisMachine();
 // "AMD EPYC, 2 cores, load 1.0; GCC 12.2.0, Release".
 std::string MachineLine(const Machine& machine);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "tools/krot/model_files.h"
 #include "tools/krot/same_path.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct AnalyzerOptions {
@@ -177,4 +177,4 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "tools/krot/same_path.h"
 #include "tools/krot/suspect_crops.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct CheckerCommand {
@@ -205,4 +205,4 @@ int RunModelChecker(const std::vector<std::string>& arguments) {
   return Run(command, parser);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 #include "tools/krot/report_files.h"
 #include "tools/krot/same_path.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -234,4 +234,4 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

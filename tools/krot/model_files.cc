@@ -21,7 +21,7 @@
 #include "tools/krot/run_log.h"
 #include "tools/krot/same_path.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -290,4 +290,4 @@ std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
   return positions;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The paths of a command that reads a model and writes one.
 struct ModelPaths {
@@ -101,4 +101,4 @@ std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
                                               const Model& model,
                                               const LogOptions& log);
 
-}  // namespace krot
+}  // namespace krot::internal

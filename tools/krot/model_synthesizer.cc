@@ -12,7 +12,7 @@
 #include "tools/krot/model_files.h"
 #include "tools/krot/same_path.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct SynthesizerOptions {
@@ -197,4 +197,4 @@ int RunModelSynthesizer(const std::vector<std::string>& arguments) {
   return kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "tools/krot/given_options.h"
 #include "tools/krot/same_path.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kProjectPath[] = "project_path";
@@ -83,4 +83,4 @@ void OptionParser::CheckOutputFiles() const {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "tools/krot/command_error.h"
 #include "tools/krot/help_pages.h"
 
-namespace krot {
+namespace krot::internal {
 
 // COLMAP's manner of options: --name value, --name=value, and
 // --project_path FILE.ini, whose [Group] sections hold the same names;
@@ -54,4 +54,4 @@ class OptionParser : public OptionTable {
   HelpFormat help_format_ = HelpFormat::kText;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

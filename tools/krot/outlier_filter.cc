@@ -19,7 +19,7 @@
 #include "tools/krot/solve_progress.h"
 #include "tools/krot/suspect_crops.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct OutlierCommand {
@@ -228,4 +228,4 @@ int RunOutlierFilter(const std::vector<std::string>& arguments) {
   return Run(command);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include <jpeglib.h>
 #include <png.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr uint8_t kOutside = 128;
@@ -139,4 +139,4 @@ std::vector<uint8_t> EncodeJpeg(const Photo& photo) {
   return bytes;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

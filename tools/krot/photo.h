@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Pixels of a photo: rows from the top, three bytes (red, green, blue) each.
 struct Photo {
@@ -25,4 +25,4 @@ Photo CropPhoto(const Photo& photo, int left, int top, int size);
 // As the bytes of a JPEG file.
 std::vector<uint8_t> EncodeJpeg(const Photo& photo);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "tools/krot/photo.h"
 
-namespace krot {
+namespace krot::internal {
 
 std::optional<Photo> ReadPhoto(const std::string&) { return std::nullopt; }
 
@@ -10,4 +10,4 @@ Photo CropPhoto(const Photo& photo, int, int, int) { return photo; }
 
 std::vector<uint8_t> EncodeJpeg(const Photo&) { return {}; }
 
-}  // namespace krot
+}  // namespace krot::internal

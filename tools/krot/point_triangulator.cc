@@ -16,7 +16,7 @@
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_command.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // COLMAP's call: points from the matches of a database.
@@ -189,4 +189,4 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   return RunSolveCommand(command);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include "krot/base/write_file.h"
 #include "krot/report/html_page.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddHtmlPath(std::string* html_path, OptionParser* parser) {
   parser->AddOutputFile(
@@ -27,4 +27,4 @@ void WriteReports(const std::string& report_path, const std::string& html_path,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 // --html_path, which commands with a report have.
 void AddHtmlPath(std::string* html_path, OptionParser* parser);
@@ -18,4 +18,4 @@ void WriteReports(const std::string& report_path, const std::string& html_path,
                   const Model& after, int num_threads, const LogOptions& log,
                   const std::string& crops_json = "[]");
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -21,7 +21,7 @@
 #include "tools/krot/log.h"
 #include "tools/krot/machine.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,4 +104,4 @@ void EndRunLog(int exit_code) {
   if (run_log) run_log->Timed("exit code " + std::to_string(exit_code));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

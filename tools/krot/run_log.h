@@ -5,7 +5,7 @@
 
 #include "tools/krot/option_parser.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The file of --log_path: all that is needed to repeat a run and to ask about
 // it. Version, machine, every option's value and the digest of every file that
@@ -21,4 +21,4 @@ void LogInput(const std::filesystem::path& path);
 // Ends it; a run that has none ends without.
 void EndRunLog(int exit_code);
 
-}  // namespace krot
+}  // namespace krot::internal

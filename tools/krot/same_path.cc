@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <system_error>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -24,4 +24,4 @@ bool IsSamePath(const std::string& a, const std::string& b) {
   return Normal(a) == Normal(b);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

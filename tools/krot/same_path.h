@@ -2,10 +2,10 @@
 
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 
 // Whether both name the same file or folder, by whatever way: relative,
 // through links, with a slash at the end. They need not exist. "" names none.
 bool IsSamePath(const std::string& a, const std::string& b);
 
-}  // namespace krot
+}  // namespace krot::internal

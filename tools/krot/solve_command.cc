@@ -16,7 +16,7 @@
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SolveReport DescribeRun(const SolveCommand& command) {
@@ -320,4 +320,4 @@ int RunSolveCommand(const SolveCommand& command) {
   return is_copy ? kExitGivenBack : kExitDone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What `solver` and `point_triangulator` have in common: check the paths,
 // read, solve, write, report.
@@ -37,4 +37,4 @@ struct SolveCommand {
 // there is the certificate alone, if it is proved that there is none.
 int RunSolveCommand(const SolveCommand& command);
 
-}  // namespace krot
+}  // namespace krot::internal

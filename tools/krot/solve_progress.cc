@@ -6,7 +6,7 @@
 
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Errors of what is exact are near 0.
@@ -109,4 +109,4 @@ double SolveProgress::IterationFraction(const JointIteration& state) const {
   return LogFraction(std::min(gap, 1.0), goals_.relative_gap);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

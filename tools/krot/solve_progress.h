@@ -6,7 +6,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "tools/krot/log.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Tells the user on stderr that a solve is alive: what its sweeps, its joint
 // iterations and those of the finish have reached (ShowProgress).
@@ -49,4 +49,4 @@ class SolveProgress {
   std::optional<double> last_cost_;  // of a sweep
 };
 
-}  // namespace krot
+}  // namespace krot::internal

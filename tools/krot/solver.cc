@@ -6,7 +6,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/solve_command.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Why sweeps alone, where nobody asked for them by name.
@@ -63,4 +63,4 @@ int RunSolver(const std::vector<std::string>& arguments) {
   return RunSolveCommand(command);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -18,7 +18,7 @@
 #include "krot/report/text_table.h"
 #include "tools/krot/photo.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -184,4 +184,4 @@ std::string SuspectCropsJson(const std::string& image_path, const Model& input,
   return crops.Text();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

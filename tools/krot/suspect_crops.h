@@ -6,7 +6,7 @@
 #include "krot/outliers/outlier_filter.h"
 #include "tools/krot/log.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the report page shows of the photos in a folder: of the removed
 // observations in the front of the summary's list, one per track, the photos of
@@ -18,4 +18,4 @@ std::string SuspectCropsJson(const std::string& image_path, const Model& input,
                              const OutlierFilterSummary& summary,
                              const LogOptions& log);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct ToleranceCommand {
@@ -146,4 +146,4 @@ int RunToleranceAnalyzer(const std::vector<std::string>& arguments) {
   return Run(command);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -21,7 +21,7 @@
 #include "tools/krot_mpi/mpi_ranks.h"
 #include "tools/krot_mpi/shared_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kUsage[] =
@@ -133,10 +133,10 @@ int Main(const std::vector<std::string>& arguments, MpiRanks* ranks) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal
 
 int main(int argc, char** argv) {
-  krot::SilenceCeres();
-  krot::MpiRanks ranks(&argc, &argv);
-  return krot::Main({argv + std::min(argc, 1), argv + argc}, &ranks);
+  krot::internal::SilenceCeres();
+  krot::internal::MpiRanks ranks(&argc, &argv);
+  return krot::internal::Main({argv + std::min(argc, 1), argv + argc}, &ranks);
 }

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // MPI counts in int.
@@ -66,4 +66,4 @@ void MpiRanks::Abort(int exit_code) {
   std::_Exit(exit_code);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/base/ranks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The processes that mpirun started. MPI is initialised as long as it lives;
 // one at a time.
@@ -33,4 +33,4 @@ class MpiRanks : public Ranks {
   int64_t bytes_sent_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/model.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What a solve changes of a point.
@@ -100,4 +100,4 @@ bool SharedModel::Join(Model* model, Model* solved,
   return true;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

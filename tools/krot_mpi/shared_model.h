@@ -5,7 +5,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "tools/krot/model_files.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A model that ranks solve together: every one reads it and keeps its share;
 // the first one reads it again when it is solved, and takes in what the others
@@ -32,4 +32,4 @@ class SharedModel {
   std::vector<std::vector<uint32_t>> point2D_of_;  // of ModelShare
 };
 
-}  // namespace krot
+}  // namespace krot::internal

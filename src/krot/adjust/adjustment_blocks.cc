@@ -8,7 +8,7 @@
 #include "krot/context.h"
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -198,4 +198,4 @@ Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/model/fixed_parts.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 // qw qx qy qz tx ty tz, the quaternion of unit norm.
 using PoseBlock = std::array<double, 7>;
@@ -68,4 +68,4 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
 Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
                   const AdjustmentBlocks& after);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/camera/camera_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Quaterniond;
@@ -124,4 +124,4 @@ void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/linear/block_structure.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The indices of the camera parameters that the options refine, in COLMAP's
 // order. Each group is refined as a whole: focal length(s), principal point,
@@ -56,4 +56,4 @@ struct AdjustmentColumns {
 void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
                const BlockVector& direction, double step, AdjustmentBlocks* to);
 
-}  // namespace krot
+}  // namespace krot::internal

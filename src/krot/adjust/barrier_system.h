@@ -11,7 +11,7 @@
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/schur_complement.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The slack of an error below the cap.
 inline double Slack(double cap2, double squared_error) {
@@ -344,4 +344,4 @@ class BarrierSystem {
   std::vector<std::vector<Eigen::Vector3d>> part_diagonal_, part_gradient_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

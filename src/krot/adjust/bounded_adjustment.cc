@@ -11,7 +11,7 @@
 #include "krot/base/timer.h"
 #include "krot/conic/path_following.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The first weight, as a multiple of the mean cost of an observation. With a
@@ -145,7 +145,7 @@ class BarrierPath {
   }
 
   const AdjustmentBlocks& blocks() const { return now_; }
-  double LargestError() const { return krot::LargestError(errors_); }
+  double LargestError() const { return internal::LargestError(errors_); }
   int64_t NumActive() const {
     return std::count_if(errors_.begin(), errors_.end(),
                          [&](const ProjectedError& error) {
@@ -362,4 +362,4 @@ void LowerMaxError(const BundleAdjustmentOptions& options,
   blocks->cap2 = cap * cap;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

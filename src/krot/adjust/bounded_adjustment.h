@@ -5,7 +5,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/context.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Minimises the squared errors below the cap blocks->cap2, by following the
 // minima of barrier problems. All errors of the start must be below the cap;
@@ -24,4 +24,4 @@ void LowerMaxError(const BundleAdjustmentOptions& options,
                    const Context& context, const AdjustmentColumns& columns,
                    AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -21,7 +21,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void CheckOptions(const BundleAdjustmentOptions& options) {
@@ -208,4 +208,4 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
 
 void SilenceCeres() { FLAGS_minloglevel = google::GLOG_FATAL; }
 
-}  // namespace krot
+}  // namespace krot::internal

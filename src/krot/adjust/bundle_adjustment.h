@@ -11,7 +11,7 @@
 #include "krot/model.h"
 #include "krot/model/fixed_parts.h"
 
-namespace krot {
+namespace krot::internal {
 
 struct BundleAdjustmentResult {
   Model model;  // a copy of the input where nothing was adjusted
@@ -43,4 +43,4 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
 // through glog only prints messages that end the process.
 void SilenceCeres();
 
-}  // namespace krot
+}  // namespace krot::internal

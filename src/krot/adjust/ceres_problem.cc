@@ -18,7 +18,7 @@
 #include "krot/geometry.h"
 #include "krot/linear/block_structure.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -300,4 +300,4 @@ std::optional<double> Stationarity(int num_threads, double cost,
   return sum / (2 * cost);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

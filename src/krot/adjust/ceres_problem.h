@@ -14,7 +14,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/timer.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Reprojection error, projected minus measured, in pixels. Blocks: point (3),
 // rig_from_world (7), sensor_from_rig (7; only with a sensor), camera.
@@ -99,4 +99,4 @@ class IterationObserver final : public ceres::IterationCallback {
   double cost_ = 0;  // at the current estimate
 };
 
-}  // namespace krot
+}  // namespace krot::internal

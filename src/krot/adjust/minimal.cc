@@ -3,7 +3,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 
 BundleAdjustmentResult AdjustBundle(const Model&,
                                     const BundleAdjustmentOptions&,
@@ -14,4 +14,4 @@ BundleAdjustmentResult AdjustBundle(const Model&,
 
 void SilenceCeres() {}
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/adjust/reprojection_errors.h"
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -134,4 +134,4 @@ std::vector<Eigen::Matrix2d> ExactRedundancy(
   return redundancy;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

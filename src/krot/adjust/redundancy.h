@@ -8,7 +8,7 @@
 #include "krot/base/context.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What shows of every observation's noise in a bundle adjustment: with J the
 // derivatives of all errors by all that moves, points, poses and intrinsics,
@@ -29,4 +29,4 @@ std::vector<Eigen::Matrix2d> ExactRedundancy(
     const Model& model, const BundleAdjustmentOptions& options,
     const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

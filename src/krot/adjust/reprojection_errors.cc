@@ -11,7 +11,7 @@
 #include "krot/camera/models.h"
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -264,4 +264,4 @@ void ErrorJacobians::Evaluate(const AdjustmentBlocks& blocks, int num_threads) {
               });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/adjustment_columns.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The error and the depth of an observation.
 struct ProjectedError {
@@ -82,4 +82,4 @@ class ErrorJacobians {
   std::vector<Eigen::Matrix3d> D_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

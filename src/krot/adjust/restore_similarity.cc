@@ -9,7 +9,7 @@
 #include "krot/geometry.h"
 #include "krot/geometry/consensus.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -210,4 +210,4 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

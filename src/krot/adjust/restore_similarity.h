@@ -4,7 +4,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Moves every connected component of `after` by a similarity that gives it the
 // centroid of its camera centres, their RMS distance to it, and the mean
@@ -16,4 +16,4 @@ namespace krot {
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before, AdjustmentBlocks* after);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/geometry.h"
 #include "krot/geometry/consensus.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -141,6 +141,12 @@ std::optional<Similarity> Align(AlignmentKind kind,
   const bool is_same = std::all_of(poses.begin(), poses.end(), &AreEqual);
   return similarity && is_same ? Similarity() : similarity;
 }
+
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
 
 Model TransformModel(const Model& model, const Similarity& world1_from_world2) {
   Model result = model;

@@ -7,7 +7,7 @@
 
 #include "krot/compare.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The angle between two rotations, in [0, 180] degrees; exact for small ones.
 double AngleDeg(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
@@ -52,4 +52,4 @@ std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses);
 std::optional<Similarity> Align(AlignmentKind kind,
                                 const std::vector<PosePair>& poses);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A square of directions on the face of the cube where coordinate `face` is 1.
@@ -158,4 +158,4 @@ BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
   return CellSearch(matches, tolerance_px, max_cells).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

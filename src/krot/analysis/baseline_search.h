@@ -7,7 +7,7 @@
 
 #include "krot/analysis/epipolar_match.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The most matches that one baseline explains.
 struct BaselineSearch {
@@ -30,4 +30,4 @@ struct BaselineSearch {
 BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
                               double tolerance_px, int64_t max_cells = 1000000);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -135,4 +135,4 @@ Collapse FindCollapse(const Model& before, const Model& after,
   return collapse;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/base/context.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Geometry that fits observations because it has degenerated, of a model that
 // was estimated: a point in a camera's centre is on any of its rays, parallel
@@ -41,4 +41,4 @@ struct Collapse {
 Collapse FindCollapse(const Model& before, const Model& after,
                       const Context& context = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,6 +5,9 @@
 #include "krot/model/remove_observations.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 // Whether there is an image to be moved; `moved` gets its pose.

@@ -10,7 +10,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A pixel's ray, and its derivatives by the pixel's two coordinates.
 struct PixelRay {
@@ -70,4 +70,4 @@ struct EpipolarMatch {
   }
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 double SignedMatchError(const WitnessMatch& match,
@@ -133,4 +133,4 @@ std::optional<Eigen::Vector3d> NearestPoint::Solve() const {
   return decomposition.solve(right_side_);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

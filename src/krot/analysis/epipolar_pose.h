@@ -9,7 +9,7 @@
 #include "krot/analysis/epipolar_match.h"
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A match of one image, whose pose is in question, with another, whose pose is
 // known.
@@ -52,4 +52,4 @@ class NearestPoint {
   Eigen::Vector3d right_side_ = Eigen::Vector3d::Zero();
 };
 
-}  // namespace krot
+}  // namespace krot::internal

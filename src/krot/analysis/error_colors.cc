@@ -6,7 +6,7 @@
 
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr std::array<std::array<uint8_t, 3>, 6> kStops = {{{58, 110, 165},
@@ -57,4 +57,4 @@ void ColorPointsByError(const std::vector<double>& errors_px, double top_px,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

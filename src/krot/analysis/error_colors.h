@@ -6,7 +6,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The colour of an error: from blue at 0 by green and yellow to dark red at
 // `top_px` and above, linear between six stops, as on the report page; grey if
@@ -21,4 +21,4 @@ std::array<uint8_t, 3> ErrorColor(double error_px, double top_px);
 void ColorPointsByError(const std::vector<double>& errors_px, double top_px,
                         Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 enum class Choice : uint8_t { kOpen, kWrong, kRight };
@@ -159,4 +159,4 @@ Explanations ExplainContradictions(
   return explanations;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

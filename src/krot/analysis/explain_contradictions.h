@@ -6,7 +6,7 @@
 
 #include "krot/database.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A pair that contradicts the poses, by the matches that are lost if these are
 // called wrong.
@@ -34,4 +34,4 @@ Explanations ExplainContradictions(
     const std::vector<ContradictoryPair>& contradictions,
     int64_t max_nodes = 100000);
 
-}  // namespace krot
+}  // namespace krot::internal

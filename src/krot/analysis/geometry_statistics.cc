@@ -10,7 +10,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -115,4 +115,4 @@ TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
   return statistics;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How well a model's tracks hold its points.
 
@@ -36,4 +36,4 @@ struct TriangulationAngleStatistics {
 TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
     const Model& model, int num_threads = -1);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -191,4 +191,4 @@ std::vector<ImageSums> AddUpImages(const Model& model,
   return ImageAdder(model, noise).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/analysis/noise.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Of an image's observations, in the directions that others control. Points
 // that move along are eliminated: M is its diagonal block of the reduced camera
@@ -48,4 +48,4 @@ struct ImageSums {
 // tested. Requires a valid model. O(observations).
 std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
 
-}  // namespace krot
+}  // namespace krot::internal

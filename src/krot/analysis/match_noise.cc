@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 
 MatchNoise EstimateMatchNoise(
     const std::vector<std::vector<double>>& errors_px) {
@@ -39,4 +39,4 @@ MatchNoise EstimateMatchNoise(
   return noise;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

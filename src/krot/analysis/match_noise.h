@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 struct MatchNoise {
   double sigma_px = 0;      // per axis and keypoint
@@ -19,4 +19,4 @@ struct MatchNoise {
 MatchNoise EstimateMatchNoise(
     const std::vector<std::vector<double>>& errors_px);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,6 +13,9 @@
 #include "krot/model/image_geometry.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 constexpr double kNothingHolds = std::numeric_limits<double>::infinity();

@@ -10,7 +10,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -221,4 +221,4 @@ std::optional<ComparisonSummary> CompareModels(
                        options);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/analysis/model_correspondence.h"
 #include "krot/compare.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The poses of the shared images that have one in both models, in their order.
 std::vector<PosePair> SharedPoses(const Model& model1, const Model& model2,
@@ -21,4 +21,4 @@ std::optional<ComparisonSummary> CompareModels(
     const ModelCorrespondence& correspondence,
     const CompareModelsOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

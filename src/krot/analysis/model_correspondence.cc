@@ -9,7 +9,7 @@
 
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Features do not lie this close to each other; files rounded to a few digits
@@ -198,4 +198,4 @@ ModelCorrespondence FindCorrespondence(const Model& model1,
   return correspondence;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What two models of the same images have in common.
 
@@ -38,4 +38,4 @@ struct ModelCorrespondence {
 ModelCorrespondence FindCorrespondence(const Model& model1,
                                        const Model& model2);
 
-}  // namespace krot
+}  // namespace krot::internal

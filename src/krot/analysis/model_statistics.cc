@@ -7,7 +7,7 @@
 #include "krot/base/check.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void CheckErrors(const Model& model, const std::vector<double>& errors_px) {
@@ -147,4 +147,4 @@ std::vector<WorstObservation> WorstObservations(
   return worst;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

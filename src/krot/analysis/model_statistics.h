@@ -6,7 +6,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a model's errors look like. Everything here is plain data; printing is
 // the tools' business.
@@ -62,4 +62,4 @@ struct WorstObservation {
 std::vector<WorstObservation> WorstObservations(
     const Model& model, const std::vector<double>& errors_px, int count);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int64_t kTracksPerChunk = 256;
@@ -240,12 +240,6 @@ ModelNoise Snooper::TakeNoise() {
 
 }  // namespace
 
-ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options,
-                         const Context& context) {
-  CheckOptions(model, options);
-  return Snooper(model, options, context).TakeNoise();
-}
-
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context) {
   CheckOptions(model, options);
@@ -259,6 +253,18 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
     result.is_sigma_kept = true;
   }
   return result;
+}
+
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
+
+ModelNoise EstimateNoise(const Model& model, const NoiseOptions& options,
+                         const Context& context) {
+  CheckOptions(model, options);
+  return Snooper(model, options, context).TakeNoise();
 }
 
 }  // namespace krot

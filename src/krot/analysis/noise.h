@@ -5,7 +5,7 @@
 
 #include "krot/check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // An observation that is no noise.
 struct SnoopedObservation {
@@ -38,4 +38,4 @@ struct NoiseSnooping {
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/model/contradictions.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What is added to the ids of a model.
@@ -163,4 +163,4 @@ Model OverlayModels(const Model& model1, const Model& model2, int num_threads) {
   return overlay;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How OverlayModels tells the two apart: blue and vermilion, which colour-blind
 // eyes tell apart, too [Okabe and Ito].
@@ -28,4 +28,4 @@ inline constexpr std::array<uint8_t, 3> kOverlayColor2 = {213, 94, 0};
 Model OverlayModels(const Model& model1, const Model& model2,
                     int num_threads = -1);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,6 +17,9 @@
 #include "krot/model/image_geometry.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 // COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).

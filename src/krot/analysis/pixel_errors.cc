@@ -15,6 +15,9 @@
 #include "krot/model/image_geometry.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 constexpr int64_t kPointsPerChunk = 1024;

@@ -13,7 +13,7 @@
 #include "krot/context.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A model speaks against rotations if half of its observations fit with its
@@ -88,4 +88,4 @@ RotationInput TakeRotations(const FileBytes& file, Model* model,
   return input;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model/file_bytes.h"
 #include "krot/model/rotations_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The rotations of a file in place of the model's own, and what that does to
 // its errors while cameras and points stay where they are.
@@ -27,4 +27,4 @@ struct RotationInput {
 RotationInput TakeRotations(const FileBytes& file, Model* model,
                             int num_threads = -1, const FileNote& note = {});
 
-}  // namespace krot
+}  // namespace krot::internal

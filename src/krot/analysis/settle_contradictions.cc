@@ -12,7 +12,7 @@
 #include "krot/model.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the image's larger side. 2D points that have nothing to do with their 3D
@@ -165,4 +165,4 @@ std::optional<std::pair<double, double>> WorseImagesSide(const Model& before,
   return std::pair(errors.max, max_after);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/math/norm.h"
 #include "krot/model/contradictions.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What to do with a model whose tracks and images contradict each other. By
 // `on_contradiction`:
@@ -35,4 +35,4 @@ std::optional<std::pair<double, double>> WorseImagesSide(const Model& before,
                                                          const Model& after,
                                                          Norm norm = {});
 
-}  // namespace krot
+}  // namespace krot::internal

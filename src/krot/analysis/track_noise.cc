@@ -11,7 +11,7 @@
 #include "krot/camera/projection_row.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -275,4 +275,4 @@ Vector3d TrackNoise::Point(int64_t k) const {
   return X[3] > 0 && xyz.allFinite() ? xyz : model_.points3D[k].xyz;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/analysis/noise.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // All tracks of a model, each fitted by itself with the cameras as they stand,
 // and which of their observations take part.
@@ -66,4 +66,4 @@ class TrackNoise {
   std::vector<Eigen::Vector4d> points_;  // homogeneous
 };
 
-}  // namespace krot
+}  // namespace krot::internal

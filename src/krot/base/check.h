@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace krot {
+namespace krot::internal {
 
 // Argument errors read "name = value, must be requirement".
 //
@@ -32,4 +32,4 @@ void CheckAtLeast(int least, const Value& value, std::string_view name) {
   CheckArgument(false, name, value, ">= " + std::to_string(least));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/base/ranks.h"
 #include "krot/base/write_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A checkpoint that cannot be used; what() is one sentence.
 class CheckpointError : public std::runtime_error {
@@ -165,4 +165,4 @@ void RunStep(Checkpoint* checkpoint, const Context& context,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

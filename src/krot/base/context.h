@@ -8,7 +8,7 @@
 #include "krot/base/ranks.h"
 #include "krot/context.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A number of the whole problem, where the processes of a context share its
 // points; in one process it is the number itself.
@@ -62,4 +62,4 @@ inline Context WithoutRanks(const Context& context) {
   return alone;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Union-find with path halving over 0, 1, ..., count - 1. At first each is a
 // set of its own. The root of a set is its smallest member.
@@ -32,4 +32,4 @@ class DisjointSets {
   std::vector<int64_t> parent_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 
 #include "krot/base/write_file.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -271,4 +271,4 @@ void FolderSwap::Commit(
   SyncPlace();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

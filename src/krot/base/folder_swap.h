@@ -6,7 +6,7 @@
 #include <system_error>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // The names in a folder, in no particular order. Throws
 // std::filesystem::filesystem_error. Where memory runs out, std::filesystem's
@@ -75,4 +75,4 @@ class FolderSwap {
   std::filesystem::path staging_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The bits of doubles that are not negative have the order of their values, so
@@ -68,4 +68,4 @@ double MedianOf(const std::vector<double>& values, const Context& context) {
                       context)[0];
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/base/context.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The lower median of each group's values. Values that are negative or not
 // finite, or whose group is -1, do not count; a group without values has NaN.
@@ -18,4 +18,4 @@ std::vector<double> GroupMedians(const std::vector<double>& values,
 // The same of a single group.
 double MedianOf(const std::vector<double>& values, const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <limits>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string Print(const char* format, int decimals, double value) {
@@ -55,4 +55,4 @@ std::string ShortestTextByC(double value) {
   return fixed.size() <= scientific.size() ? fixed : scientific;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

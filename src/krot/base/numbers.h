@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kHalfPi = kPi / 2;
@@ -73,4 +73,4 @@ void AppendNumber(Number value, std::string* text) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 // One call of Run. It lives on the caller's stack until no call of its work
 // runs or may begin.
 struct ThreadPool::Task {
@@ -133,4 +133,4 @@ void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

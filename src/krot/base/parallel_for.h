@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Threads that wait for work, so that none has to be created for it. Their
 // number grows with the number that is asked for at the same time.
@@ -69,4 +69,4 @@ inline int64_t NumChunks(int64_t count, int64_t chunk_size) {
   return (count + chunk_size - 1) / chunk_size;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Processes that solve one problem together. Each has all frames and a share of
 // the points, with their observations; the shares of rank 0, 1, ... one after
@@ -138,4 +138,4 @@ class RanksError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

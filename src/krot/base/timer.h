@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace krot {
+namespace krot::internal {
 
 // Wall-clock seconds since construction. For reports only: no decision of a
 // solver depends on it.
@@ -17,4 +17,4 @@ class Timer {
   Clock::time_point start_ = Clock::now();
 };
 
-}  // namespace krot
+}  // namespace krot::internal

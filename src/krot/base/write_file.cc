@@ -7,7 +7,7 @@
 #include <optional>
 #include <system_error>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -129,4 +129,4 @@ void SyncFolder(const fs::path& folder) {
                    std::generic_category().message(errno));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

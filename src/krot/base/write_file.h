@@ -9,7 +9,7 @@
 
 #include "krot/context.h"
 
-namespace krot {
+namespace krot::internal {
 
 // An open file that is closed when it goes out of scope.
 class FileDescriptor {
@@ -59,4 +59,4 @@ void WriteFileAtomically(const std::filesystem::path& file,
 // power cut. Does nothing for a folder that may not be read. Throws WriteError.
 void SyncFolder(const std::filesystem::path& folder);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -88,4 +88,4 @@ Model ApplyEstimate(const Model& model, const BuiltProblem& built,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

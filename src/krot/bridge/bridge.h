@@ -11,7 +11,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/solve.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Between a COLMAP model and the known rotation problem.
 
@@ -123,4 +123,4 @@ Estimate OwnEstimate(const Model& model, const BuiltProblem& built);
 Model ApplyEstimate(const Model& model, const BuiltProblem& built,
                     const Estimate& estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "krot/context.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -288,6 +288,12 @@ BuiltProblem BuildProblem(const Model& model,
   IndexObservations(&built.problem);
   return built;
 }
+
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
 
 const char* LeftOutName(LeftOut reason) {
   switch (reason) {

@@ -1,6 +1,6 @@
 #include "krot/bridge/built_part.h"
 
-namespace krot {
+namespace krot::internal {
 
 BuiltProblem BuiltPart(const BuiltProblem& built, const ProblemSubset& subset,
                        const Estimate& start) {
@@ -24,4 +24,4 @@ BuiltProblem BuiltPart(const BuiltProblem& built, const ProblemSubset& subset,
   return part;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

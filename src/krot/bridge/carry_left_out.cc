@@ -9,7 +9,7 @@
 #include "krot/minimax/residual.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -89,4 +89,4 @@ void CarryLeftOutPoints(const Model& before,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

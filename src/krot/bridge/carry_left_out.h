@@ -6,7 +6,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Points that took no part in the optimisation, in a model whose frames have
 // moved: where the largest error of such a point, finite before, has risen
@@ -20,4 +20,4 @@ void CarryLeftOutPoints(const Model& before,
                         const BuiltProblem& built, const FixedParts& fixed,
                         double level, Model* after);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/bridge/position_rows.h"
 #include "krot/context.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = CertificateFileJson;
@@ -168,4 +168,4 @@ CertificateFile ReadCertificateFile(const std::filesystem::path& path) {
   return ParseCertificate(ReadCertificateText(path), path.string());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

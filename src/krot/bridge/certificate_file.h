@@ -12,7 +12,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Version 2 proves a bound in true pixels (pixel_certificate.h). Version 1,
 // which is still read, proves one of rows that are linearised at the
@@ -95,4 +95,4 @@ CertificateFile ParseCertificate(const std::string& json,
 std::string ReadCertificateText(const std::filesystem::path& path);
 CertificateFile ReadCertificateFile(const std::filesystem::path& path);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/context.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = CertificateFileJson;
@@ -269,4 +269,4 @@ CertificateFileJson SupportJson(
   return observations;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/bridge/certificate_file.h"
 #include "krot/math/norm.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the files of certificates and of conflicts have in common.
 
@@ -57,4 +57,4 @@ CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& observations,
     int version);
 
-}  // namespace krot
+}  // namespace krot::internal

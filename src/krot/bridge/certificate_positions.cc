@@ -8,7 +8,7 @@
 #include "krot/bridge/position_rows.h"
 #include "krot/model/id_index.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Of = KnownPosition::Of;
@@ -81,4 +81,4 @@ const CertificateFile::Position::Row* CertificatePositions::RowOf(
   return n < position.rows.size() ? &position.rows[n] : nullptr;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/model.h"
 #include "krot/model/positions_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Positions within a radius as the file of a certificate has them.
 
@@ -37,4 +37,4 @@ class CertificatePositions {
   std::vector<const CertificateFile::Position*> positions_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/bridge/position_rows.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 bool HasImageTwice(const KnownRotationProblem& problem, int32_t point) {
@@ -101,4 +101,4 @@ std::vector<SupportObservation> ListSupport(const Model& model,
   return support;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,10 +8,10 @@
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 #include "krot/solve.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Those of a certificate, whose rows those of built.problem are, with the
 // largest share first.
@@ -26,4 +26,4 @@ std::vector<SupportObservation> ListSupport(const Model& model,
                                             const Estimate& estimate, Norm norm,
                                             const Certificate& certificate);
 
-}  // namespace krot
+}  // namespace krot::internal

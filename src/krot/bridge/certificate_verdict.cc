@@ -16,7 +16,7 @@
 #include "krot/model/local_frame.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // How far u and J of another implementation may be from ours, relative.
@@ -229,4 +229,4 @@ CertificateVerdict VerifyCertificateFile(const Model& original,
   return verdict;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

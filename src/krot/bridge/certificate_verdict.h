@@ -10,7 +10,7 @@
 #include "krot/certificate.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Accepts if the digest of the model agrees, every observation is one of the
 // problem that BuildProblem makes of the model, and CheckPixelCertificate
@@ -25,4 +25,4 @@ namespace krot {
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/context.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Json = CertificateFileJson;
@@ -228,4 +228,4 @@ ConflictVerdict VerifyConflictFile(const Model& model,
   return verdict;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

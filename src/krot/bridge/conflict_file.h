@@ -10,7 +10,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr int kConflictFileVersion = 1;
 
@@ -56,4 +56,4 @@ ConflictFile ParseConflicts(const std::string& json,
 ConflictVerdict VerifyConflictFile(const Model& model,
                                    const ConflictFile& file);
 
-}  // namespace krot
+}  // namespace krot::internal

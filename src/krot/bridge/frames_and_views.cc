@@ -6,7 +6,7 @@
 
 #include "krot/bridge/order_of_ids.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddFramesAndViews(const Model& model,
                        const std::vector<ImageGeometry>& geometries,
@@ -62,4 +62,4 @@ void FixPositions(const FixedParts& fixed, BuiltProblem* built) {
       &problem.fixed_points);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

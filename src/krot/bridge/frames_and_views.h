@@ -6,7 +6,7 @@
 #include "krot/model/fixed_parts.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Numbers the frames that have observations, and their images as views, of a
 // problem whose observations name their image as `view`; they name the view
@@ -18,4 +18,4 @@ void AddFramesAndViews(const Model& model,
 // Fixes what is marked of the model where the problem starts.
 void FixPositions(const FixedParts& fixed, BuiltProblem* built);
 
-}  // namespace krot
+}  // namespace krot::internal

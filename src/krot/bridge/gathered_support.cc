@@ -4,7 +4,7 @@
 
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What is not in a problem of an observation.
@@ -112,4 +112,4 @@ std::vector<int64_t> OwnSupport(const Certificate& certificate,
   return own;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

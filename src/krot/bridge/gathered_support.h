@@ -5,9 +5,9 @@
 
 #include "krot/base/ranks.h"
 #include "krot/bridge/bridge.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where ranks share a model's points: those that some observations see, with
 // all that proofs need of them, on the first rank. Numbers "in the whole" count
@@ -37,4 +37,4 @@ GatheredSupport GatherSupport(const Model& model, const BuiltProblem& built,
 std::vector<int64_t> OwnSupport(const Certificate& certificate,
                                 int64_t num_observations, Ranks* ranks);
 
-}  // namespace krot
+}  // namespace krot::internal

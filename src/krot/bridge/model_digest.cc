@@ -12,7 +12,7 @@
 #include "krot/bridge/sha256.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Collects little-endian bytes and digests them in pieces.
@@ -153,4 +153,4 @@ std::string Sha256(std::string_view bytes) {
   return digest.Hex();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

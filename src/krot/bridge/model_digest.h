@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // SHA-256, in 64 lower-case hexadecimal digits, of what a certificate speaks
 // about: cameras, rotations, places in rigs and observations. Translations of
@@ -17,4 +17,4 @@ std::string ModelSha256(const Model& model);
 // Of any bytes, written likewise.
 std::string Sha256(std::string_view bytes);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Indices of the records by their ids, which differ: the order in which a file
 // happens to hold them makes no difference to a result.
@@ -19,4 +19,4 @@ std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
   return order;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

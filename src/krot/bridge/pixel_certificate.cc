@@ -12,7 +12,7 @@
 #include "krot/camera/projection_row.h"
 #include "krot/camera/remainder_bound.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kNoRegion = std::numeric_limits<double>::infinity();
@@ -259,4 +259,4 @@ PixelCertificateCheck LowerUntilAccepted(const Model& model,
   return check;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

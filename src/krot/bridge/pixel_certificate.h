@@ -10,9 +10,9 @@
 #include "krot/bridge/bridge.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A proof in true pixels: no translations and points bring every reprojection
 // error of the support below `lower_bound`.
@@ -96,4 +96,4 @@ std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
                                  double gamma, double sufficient,
                                  const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

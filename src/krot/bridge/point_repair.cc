@@ -4,7 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 
-namespace krot {
+namespace krot::internal {
 bool HasImageTwice(const Observation* observations, int count) {
   for (int i = 0; i < count; ++i) {
     for (int j = 0; j < i; ++j) {
@@ -138,4 +138,4 @@ RepairedPoint RepairPoint(
   return {*midpoint, /*is_retriangulated=*/true};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Observations of one image in the same track: of a point that was matched to
 // two places of an image one is wrong, or both are.
@@ -66,4 +66,4 @@ RepairedPoint RepairPoint(
     int count, const Eigen::Vector3d& xyz,
     const std::function<bool(int, const Eigen::Vector3d&)>& is_seen);
 
-}  // namespace krot
+}  // namespace krot::internal

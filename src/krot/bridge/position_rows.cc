@@ -11,7 +11,7 @@
 #include "krot/geometry.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -264,4 +264,4 @@ bool LevelPositions(const BuiltProblem& built, Certificate* certificate) {
   return true;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

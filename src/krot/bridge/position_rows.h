@@ -9,9 +9,9 @@
 
 #include "krot/bridge/bridge.h"
 #include "krot/model/image_geometry.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // That a camera's centre C is in an ellipsoid |U (C - g)| <= 1, as observations
 // of the known rotation problem: a fixed point at g, seen by views of C's frame
@@ -97,4 +97,4 @@ double LargestPositionRatio(const BuiltProblem& built,
 // below built.position_level would take longer ones than there may be.
 bool LevelPositions(const BuiltProblem& built, Certificate* certificate);
 
-}  // namespace krot
+}  // namespace krot::internal

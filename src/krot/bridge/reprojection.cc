@@ -14,7 +14,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int64_t kObservationsPerChunk = 4096;
@@ -158,4 +158,4 @@ std::vector<char> TakeOuterRows(const Model& model, const BuiltProblem& built,
   return has_row;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/model.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The true residuals of a built problem, through the full cameras: what its
 // linear rows stand for. The problem's Cost is that of the rows; TrueCost is
@@ -82,4 +82,4 @@ std::vector<char> TakeOuterRows(const Model& model, const BuiltProblem& built,
                                 Norm norm, double level, int num_threads,
                                 KnownRotationProblem* problem);
 
-}  // namespace krot
+}  // namespace krot::internal

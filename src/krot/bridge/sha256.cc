@@ -1,6 +1,6 @@
 #include "krot/bridge/sha256.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 __extension__ using Wide = unsigned __int128;
@@ -95,4 +95,4 @@ std::array<unsigned char, 32> Sha256Stream::Finish() {
   return digest;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

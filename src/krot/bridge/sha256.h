@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace krot {
+namespace krot::internal {
 
 // SHA-256 (FIPS 180-4), about 200 MB/s.
 class Sha256Stream {
@@ -25,4 +25,4 @@ class Sha256Stream {
   uint64_t num_bytes_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/camera/models.h"
 #include "krot/camera/undistort.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Model>
@@ -72,4 +72,4 @@ UndistortStatus UndistortPixel(int model_id, const double* params,
   });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

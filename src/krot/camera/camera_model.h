@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // COLMAP's camera models, chosen at run time by their ids. Loops over many
 // observations of one camera can dispatch once instead: VisitCameraModel in
@@ -76,4 +76,4 @@ UndistortStatus UndistortPixel(int model_id, const double* params,
                                const std::optional<Eigen::Vector2d>& u_start,
                                UndistortedObservation* result);
 
-}  // namespace krot
+}  // namespace krot::internal

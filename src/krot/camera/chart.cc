@@ -7,7 +7,7 @@
 #include "krot/camera/dual.h"
 #include "krot/camera/models.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kCosOf80Degrees = 0.17364817766693033;
@@ -70,4 +70,4 @@ Eigen::Matrix2d ChartJacobian(int model_id, const double* params,
   });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

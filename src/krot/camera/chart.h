@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // A plane n'X = 1 on which the rays of a camera near one of them have two
 // coordinates: X(p) = n + B p, with B'B = I, B'n = 0, |n| = 1.
@@ -36,4 +36,4 @@ std::optional<Chart> ChartAt(int model_id, const double* params,
 Eigen::Matrix2d ChartJacobian(int model_id, const double* params,
                               const Chart& chart, const Eigen::Vector3d& x_cam);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 
 // A distortion moves a point (a, b) of the lens plane to (x, y) in the same
 // units, before focal length and principal point. It keeps the centre:
@@ -193,4 +193,4 @@ struct RadTanThinPrismDistortion {
   }
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 
 // A value with its derivatives by two variables, for forward differentiation
 // of the camera models: f(Dual{u, 1, 0}, Dual{v, 0, 1}) carries df/du, df/dv.
@@ -118,4 +118,4 @@ inline Dual<S> atan2(const Dual<S>& y, const Dual<S>& x) {
           (x.value * y.dv - y.value * x.dv) / norm2};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/camera/dual.h"
 #include "krot/camera/interval.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the camera models (models.h) need to be evaluated on intervals, with
 // parameters that are intervals too: P = Interval, T = Interval or
@@ -62,4 +62,4 @@ inline Dual<Interval> AtanOverRoot(const Dual<Interval>& t) {
   return {AtanOverRoot(t.value), slope * t.du, slope * t.dv};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/camera/enclosure.h"
 #include "krot/camera/models.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename T>
@@ -84,4 +84,4 @@ std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
       });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/camera/dual.h"
 #include "krot/camera/interval.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What ErrorMap evaluates at a point, or encloses on a set.
 template <typename T>
@@ -42,4 +42,4 @@ class ErrorMap {
 std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
                                        const ErrorMap::Geometry& geometry);
 
-}  // namespace krot
+}  // namespace krot::internal

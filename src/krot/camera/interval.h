@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace krot {
+namespace krot::internal {
 
 // All numbers in [lo, hi]: arithmetic on sets, so that a function evaluated on
 // an interval encloses its values there (not tightly, but the tighter the
@@ -123,4 +123,4 @@ inline Interval atan2(const Interval& y, const Interval& x) {
   return {kNotANumber, kNotANumber};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

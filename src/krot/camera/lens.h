@@ -4,7 +4,7 @@
 
 #include "krot/base/numbers.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A lens maps the ray (u, v, 1) to a point (a, b) of the lens plane, before
 // any distortion, focal length and principal point:
@@ -241,4 +241,4 @@ struct FovLens {
   }
 };
 
-}  // namespace krot
+}  // namespace krot::internal

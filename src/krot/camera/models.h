@@ -8,7 +8,7 @@
 #include "krot/camera/lens.h"
 #include "krot/camera/root_lens.h"
 
-namespace krot {
+namespace krot::internal {
 
 // COLMAP's camera models, each a lens (lens.h), a distortion (distortion.h)
 // and one or two focal lengths:
@@ -290,4 +290,4 @@ decltype(auto) VisitEveryCameraModel(int model_id, Visitor&& visitor) {
   return VisitCameraModel(model_id, visitor);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/camera/models.h"
 #include "krot/camera/undistort.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Model>
@@ -158,4 +158,4 @@ std::optional<Eigen::Vector3d> PixelBearing(
   return X.stableNormalized();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // The projection of points in the camera's frame, for every model, and its
 // first order: what an observation is to the solver.
@@ -49,4 +49,4 @@ std::optional<Eigen::Vector3d> PixelBearing(
     int model_id, const double* params, const Eigen::Vector2d& pixel,
     const std::optional<Eigen::Vector3d>& x_start = {});
 
-}  // namespace krot
+}  // namespace krot::internal

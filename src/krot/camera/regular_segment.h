@@ -7,7 +7,7 @@
 #include "krot/camera/dual.h"
 #include "krot/camera/interval.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Encloses det D' on the points t q of the lens plane, t in [t_begin, t_end].
 template <typename Distortion>
@@ -57,4 +57,4 @@ bool IsRegularSegment(const double* k, const Eigen::Vector2d& q) {
   return true;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/camera/remainder_search.h"
 #include "krot/math/norm.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Half the sides of the parallelogram in level_px of the linearised lens; the
@@ -124,4 +124,4 @@ std::optional<double> SupportBound(int model_id, const double* params,
   return std::max(0.0, *largest) * unit;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

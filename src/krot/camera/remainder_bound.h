@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // How much wider than the true error's bound the bound of its linearisation has
 // to be. Let f(u) = ProjectionError at the ray u, E the row of the observation
@@ -54,4 +54,4 @@ std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector2d& y, double level_px,
                                    double p, double sufficient = 0);
 
-}  // namespace krot
+}  // namespace krot::internal

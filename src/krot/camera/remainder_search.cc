@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kMaxCells = 4000;
@@ -265,4 +265,4 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
                 });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

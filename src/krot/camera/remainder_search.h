@@ -4,7 +4,7 @@
 
 #include "krot/camera/error_map.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Branch and bound over the box |q|_inf <= reach of an ErrorMap, in the norm
 // p = 1, 2 or infinity: what remainder_bound.h is proved with.
@@ -25,4 +25,4 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
 std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
                                    const Eigen::Vector2d& y, double sufficient);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 
 // The lenses whose image radius follows from a square root; lens.h says what a
 // lens is.
@@ -116,4 +116,4 @@ struct EucmLens {
   }
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/camera/dual.h"
 #include "krot/camera/regular_segment.h"
 
-namespace krot {
+namespace krot::internal {
 
 // UndistortPixel (camera_model.h) for one model known at compile time; what
 // it promises is said there. The pixel is taken back to the lens plane, the
@@ -146,4 +146,4 @@ UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
   return SearchLensPlane<Model>(params, pixel, q_start, accept);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

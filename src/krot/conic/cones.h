@@ -8,7 +8,7 @@
 
 #include "krot/math/norm.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The symmetric cones of one observation and their Jordan algebras
 // [Alizadeh, Goldfarb 2003]: for p = 2 the second-order cone ||v|| <= gamma w
@@ -268,4 +268,4 @@ class NtScaling<FourHalfLines> {
   Vector w_ = Vector::Ones();
 };
 
-}  // namespace krot
+}  // namespace krot::internal

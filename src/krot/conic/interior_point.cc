@@ -9,7 +9,7 @@
 #include "krot/conic/path_following.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Linear programme: mu at the start, beside ObjectiveLength; how much longer a
@@ -293,4 +293,4 @@ InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
              multipliers);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The multipliers of observation i: lambda of its depth, y of its v, with
 // ||y||_dual <= lambda.
@@ -106,7 +106,7 @@ struct LinearObjective {
 // std::invalid_argument otherwise) and which becomes the one with the lowest
 // h'x that was met. The problem must be connected and something in it fixed.
 // Soon the dual residual is h but for rounding and a multiple of e, and then
-// the multipliers prove what krot/proof/extent_check.h says. The gap is
+// the multipliers prove what krot/verify/extent_check.h says. The gap is
 // relative to how far it is from the start to the end that they prove.
 InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
                                     const InteriorPointOptions& options,
@@ -115,4 +115,4 @@ InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
                                     Estimate* estimate,
                                     std::vector<Multiplier>* multipliers);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The programmes that the interior point solves: minimise a scalar g subject to
 // (top_i, v_i) in the cone ||v|| <= top for every observation, where
@@ -336,4 +336,4 @@ class NewtonSystem {
   Direction direction_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

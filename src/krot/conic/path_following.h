@@ -9,7 +9,7 @@
 #include "krot/conic/cones.h"
 #include "krot/conic/interior_point.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the interior point methods share. Each follows a path of minima of
 // barrier problems as their weight mu falls: it factorises Newton's system at
@@ -248,4 +248,4 @@ class ConePath {
   }
 };
 
-}  // namespace krot
+}  // namespace krot::internal

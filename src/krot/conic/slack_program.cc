@@ -10,7 +10,7 @@
 #include "krot/conic/slack_system.h"
 #include "krot/minimax/residual.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Smaller depths than this share of the median count as much in the costs.
@@ -176,4 +176,4 @@ SlackSolution MinimizeSlack(const KnownRotationProblem& problem, double bound,
                              : solve(FourHalfLines());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

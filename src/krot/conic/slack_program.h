@@ -7,7 +7,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Slack relaxation: by how much observations must exceed a bound b, pixels, in
 // all [Olsson, Eriksson, Hartley 2010; Dalalyan, Keriven 2009]:
@@ -23,7 +23,7 @@ namespace krot {
 // is what one would like to know.
 //
 // The dual is about conflicts: multipliers lambda_i <= c_i that are stationary
-// (krot/proof/certificate_check.h) but for a multiple of e. An observation
+// (krot/verify/certificate_check.h) but for a multiple of e. An observation
 // without a multiplier is in none of them.
 struct SlackOptions {
   Norm norm;                    // p = 1, 2 or infinity
@@ -48,4 +48,4 @@ SlackSolution MinimizeSlack(const KnownRotationProblem& problem, double bound,
                             const SlackOptions& options, const Context& context,
                             Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The slack programme (slack_program.h) and its Newton system at an iterate.
 // Every observation has two pairs: T (b w_i + sigma_i; v_i) in the cone, and
@@ -277,4 +277,4 @@ class SlackSystem {
   Direction direction_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/finish/bounded_system.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The first mu, as a share of the cost by pair: the start is near the boundary,
@@ -301,4 +301,4 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
              : Run<PolygonCap>(problem, options, context, estimate);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

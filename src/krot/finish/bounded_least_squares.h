@@ -10,7 +10,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Of all estimates with every error below a cap, the least squares:
 //
@@ -117,4 +117,4 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
                                const BoundedOptions& options,
                                const Context& context, Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/centre_unknowns.h"
 
-namespace krot {
+namespace krot::internal {
 
 // ||e||_p <= cap as kNum conditions h_j(e) >= 0 on an error e, pixels. Each cap
 // offers, at e,
@@ -369,4 +369,4 @@ class BoundedSystem {
   Reach reach_ = {};
 };
 
-}  // namespace krot
+}  // namespace krot::internal

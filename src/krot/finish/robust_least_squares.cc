@@ -10,7 +10,7 @@
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kMaxSteps = 30;
@@ -165,4 +165,4 @@ void MinimizeRobustly(const KnownRotationProblem& problem,
   RobustLeastSquares(problem, context, estimate).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

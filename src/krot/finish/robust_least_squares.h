@@ -3,7 +3,7 @@
 #include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Moves points and frames to a local minimum of
 //
@@ -27,4 +27,4 @@ namespace krot {
 void MinimizeRobustly(const KnownRotationProblem& problem,
                       const Context& context, Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/base/numbers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -124,4 +124,4 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
   return keeps;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

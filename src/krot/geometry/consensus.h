@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // A camera of two models of one scene, which have the same axes.
 struct CameraMove {
@@ -26,4 +26,4 @@ struct CameraMove {
 std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
                                 bool scale_is_free);
 
-}  // namespace krot
+}  // namespace krot::internal

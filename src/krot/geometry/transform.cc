@@ -6,6 +6,9 @@
 #include <Eigen/SVD>
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 using Eigen::Quaterniond;

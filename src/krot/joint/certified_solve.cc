@@ -9,7 +9,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Whether a proof is worth while is asked when the interior point's own gap is
@@ -263,4 +263,4 @@ JointTermination CertifiedSolve::Run(int max_iterations,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

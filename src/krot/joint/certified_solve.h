@@ -11,7 +11,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Told of every iteration, of which only gap and target are filled in.
 using IterationReport = std::function<void(const JointIteration&)>;
@@ -91,4 +91,4 @@ class CertifiedSolve {
   bool is_given_up_ = false;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A working set takes in the points that do not fit in below this share of its
@@ -282,4 +282,4 @@ JointTermination ComponentSolve::Run(const IterationReport& report) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A connected component on its way to its certified optimum, by way of the
 // optima of growing working sets. Internal to SolveJoint.
@@ -94,4 +94,4 @@ class ComponentSolve {
   int64_t num_working_observations_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Tracks that a rank puts forward at a time.
@@ -144,4 +144,4 @@ std::vector<int32_t> FindTies(const KnownRotationProblem& problem,
   return std::move(ties).Taken();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Of `others`, ascending, the longest tracks first, every point that sees a
 // frame of which fewer than `count` observations are tied so far: `tied`, per
@@ -18,4 +18,4 @@ std::vector<int32_t> FindTies(const KnownRotationProblem& problem,
                               std::vector<int64_t> tied,
                               const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

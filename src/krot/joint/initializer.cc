@@ -13,7 +13,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the longest baseline or distance of fixed positions: a depth that is small
@@ -229,4 +229,4 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
   return summary;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

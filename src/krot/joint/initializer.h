@@ -11,7 +11,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 
 struct FeasibleStartOptions {
   Norm norm;
@@ -85,4 +85,4 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
                              const Context& context, Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void CheckOptions(const JointOptions& options) {
@@ -91,4 +91,4 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
   return summary;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The global optimum of the known rotation problem, with a proof: all frames
 // and points at once by the interior point of conic/, each connected component
@@ -80,4 +80,4 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
                         const JointOptions& options, const Context& context,
                         Estimate* estimate, KnownMultipliers* known = nullptr);
 
-}  // namespace krot
+}  // namespace krot::internal

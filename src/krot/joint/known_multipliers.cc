@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 bool HasSmallerName(const CertifiedObservation& a,
@@ -43,4 +43,4 @@ std::vector<Multiplier> KnownMultipliers::Of(
   return multipliers;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

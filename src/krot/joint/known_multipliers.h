@@ -5,9 +5,9 @@
 
 #include "krot/base/checkpoint.h"
 #include "krot/conic/interior_point.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a solve leaves to the next, similar one: multipliers of some of a
 // problem's observations, named by increasing numbers. Only those that are
@@ -38,4 +38,4 @@ class KnownMultipliers {
   std::vector<double> optimum_;  // one, if any
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What steps have in common.
 
@@ -24,4 +24,4 @@ inline void NameValues(StepValues* values,
   });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

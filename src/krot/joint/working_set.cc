@@ -12,7 +12,7 @@
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kShareOfCost = 0.9;
@@ -269,4 +269,4 @@ bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
   return false;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The observations of a problem that the joint solver looks at: of points whose
 // residuals come near the maximum those that do, and enough others to tie every
@@ -102,4 +102,4 @@ bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
                     const Context& context, double level, double highest,
                     Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

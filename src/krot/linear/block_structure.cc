@@ -6,7 +6,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using PatternMatrix = Eigen::SparseMatrix<double>;
@@ -161,4 +161,4 @@ SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern) {
   return size;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

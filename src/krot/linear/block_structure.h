@@ -7,7 +7,7 @@
 
 #include "krot/base/ranks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Least squares of bundle adjustment, in blocks of three columns: those of
 // points, and those of frames or of whatever else points share.
@@ -78,4 +78,4 @@ struct SparseFactorSize {
 };
 SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/linear/triangle.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -240,4 +240,4 @@ bool ConjugateGradients::Solve(const VectorXd& rhs, double tolerance,
   return num_iterations_ < kMaxIterations;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/linear/block_structure.h"
 
-namespace krot {
+namespace krot::internal {
 
 // L with L L' = A but for what is dropped: a block column keeps its largest
 // blocks, half as many as A has there [Lin and More 1999], wherever they stand;
@@ -85,4 +85,4 @@ class ConjugateGradients {
   int num_iterations_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Eigen's products of tiles of 192 take half as long again per number; tiles of
@@ -164,4 +164,4 @@ void DenseCholesky::Solve(double* x) const {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

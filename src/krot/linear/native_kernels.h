@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // What is compiled for the machine at hand. It has no Eigen type in its
 // interface: vector flags change their alignment, and so what callers expect.
@@ -53,4 +53,4 @@ class DenseCholesky {
   std::vector<double> tiles_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/base/ranks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Loops and sums whose result has the same bits at any number of threads, and
 // of ranks that share the points: each rank loops over its own observations or
@@ -239,4 +239,4 @@ class PointParts {
   std::vector<char> has_points_;  // per rank and part: whether it has any
 };
 
-}  // namespace krot
+}  // namespace krot::internal

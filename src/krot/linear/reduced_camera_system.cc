@@ -6,7 +6,7 @@
 
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The first is relative to the diagonal; whoever solves removes the error that
@@ -290,4 +290,4 @@ int64_t ReducedCameraSystem::MemoryBytes() const {
   return static_cast<int64_t>(8 * numbers);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/linear/conjugate_gradients.h"
 #include "krot/linear/native_kernels.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The normal equations of the frames, or of whatever else points share, once
 // the points are eliminated: symmetric, positive definite up to rounding, in
@@ -102,4 +102,4 @@ class ReducedCameraSystem {
   int most_iterations_ = 0;  // of a Solve since the last Factorize
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -268,4 +268,4 @@ void CentredLeastSquares<kRows>::Multiply(const BlockVector& x,
 template class CentredLeastSquares<3>;
 template class CentredLeastSquares<4>;
 
-}  // namespace krot
+}  // namespace krot::internal

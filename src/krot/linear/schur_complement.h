@@ -11,7 +11,7 @@
 #include "krot/linear/reduced_camera_system.h"
 #include "krot/linear/triangle.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What every elimination of the points shares. With the unknowns of points s
 // and of frames t, the normal equations are
@@ -145,4 +145,4 @@ class CentredLeastSquares {
   std::vector<int32_t> order_;  // of a point's observations by frame
 };
 
-}  // namespace krot
+}  // namespace krot::internal

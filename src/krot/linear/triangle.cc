@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A column that keeps less than this share of its norm is a combination of the
@@ -43,4 +43,4 @@ UpperTriangle Orthogonalize(int64_t n, double* rows) {
   return {R[0][0], R[0][1], R[0][2], R[1][1], R[1][2], R[2][2]};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // R of A = Q R, 3x3 and upper triangular. An infinite number on the diagonal
 // stands for a direction that no row of A tells: its unknown is 0.
@@ -58,4 +58,4 @@ bool InvertCholesky(const Eigen::Matrix<Scalar, 3, 3>& A, Scalar least_pivot,
   return is_exact;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,6 +10,9 @@
 #include "krot/base/check.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 using Eigen::Matrix3d;

@@ -5,7 +5,7 @@
 #include "krot/base/check.h"
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Throws std::invalid_argument unless the norm's cone is one of the conic
 // solvers'.
@@ -21,4 +21,4 @@ Real DualNorm(const Eigen::Matrix<Real, 2, 1>& y, Norm norm) {
   return norm.p == 2 ? y.norm() : y.cwiseAbs().sum();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

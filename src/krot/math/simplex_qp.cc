@@ -6,7 +6,7 @@
 
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -250,4 +250,4 @@ Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count,
   return -solution.step;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // A linear piece `value + gradient . d` of a function of the step d.
 struct LinearPiece {
@@ -43,4 +43,4 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
 Eigen::Vector3d MinNormPoint(const Eigen::Vector3d* vectors, int count,
                              std::vector<LinearPiece>* scratch);
 
-}  // namespace krot
+}  // namespace krot::internal

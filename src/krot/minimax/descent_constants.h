@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace krot {
+namespace krot::internal {
 
 // What the descent of one problem (newton_descent.h) and those of problems
 // side by side (lane_descent.h) have in common.
@@ -65,4 +65,4 @@ inline constexpr double kMetricReach = 1e-2;
 // Up to this growth of depths the minimiser is not far away.
 inline constexpr double kNearby = 1e3;
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/minimax.h"
 
-namespace krot {
+namespace krot::internal {
 void FindDescentNormals(const ResidualSet& residuals, const Eigen::Vector3d& x,
                         Norm norm, double active_tolerance,
                         std::vector<Eigen::Vector3d>* descent_normals) {
@@ -85,4 +85,4 @@ double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
   return (ub + lb) / 2;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/math/simplex_qp.h"
 #include "krot/minimax/residual_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The normalised negative gradients of the active residuals, G of
 // [Zhang18, (6)]: all r_i(x) >= (1 - active_tolerance) max_i r_i(x), (5) with
@@ -52,4 +52,4 @@ double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
                     const StepSizeOptions& options,
                     std::vector<LineResidual>* scratch);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/base/check.h"
 #include "krot/minimax/descent_step.h"
 
-namespace krot {
+namespace krot::internal {
 
 void CheckOptions(const FastDescentOptions& options) {
   const auto check = [](bool ok, const char* name, double value,
@@ -84,4 +84,4 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
   return summary;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

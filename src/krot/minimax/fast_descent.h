@@ -7,7 +7,7 @@
 #include "krot/minimax/newton_descent.h"
 #include "krot/minimax/residual_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Throws std::invalid_argument naming the first field out of range.
 void CheckOptions(const FastDescentOptions& options);
@@ -43,4 +43,4 @@ class FastDescent {
   std::vector<LineResidual> line_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

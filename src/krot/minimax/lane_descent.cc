@@ -5,7 +5,7 @@
 #include "krot/minimax/descent_constants.h"
 #include "krot/minimax/lane_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -266,4 +266,4 @@ void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
   Stepping({rows, num_rows}, goal, descents, pieces).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

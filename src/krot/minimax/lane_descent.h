@@ -2,7 +2,7 @@
 
 #include "krot/minimax/lane_memory.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What has become of a lane's problem.
 inline constexpr double kLaneIdle = 0;   // there is none
@@ -70,4 +70,4 @@ bool LanesPay();
 void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
                LaneDescents* descents, LanePiece* pieces);
 
-}  // namespace krot
+}  // namespace krot::internal

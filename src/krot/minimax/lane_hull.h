@@ -4,7 +4,7 @@
 
 #include "krot/minimax/lanes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The active sets of simplex_qp.cc in all lanes at once: the same moves of the
 // same weights, one at a time and in every lane that is due one. For kernels
@@ -74,7 +74,7 @@ struct LaneHull {
   Lanes u01_, u02_, u12_;
 };
 
-namespace internal {
+namespace detail {
 
 // See simplex_qp.cc.
 inline constexpr double kLaneDependence = 1e-10;
@@ -91,7 +91,7 @@ struct FirstBlocking {
   }
 };
 
-}  // namespace internal
+}  // namespace detail
 
 inline Lanes LaneHull::Scale() const {
   Lanes scale = 0;
@@ -109,7 +109,7 @@ inline LaneMask LaneHull::Holds(const Lanes& index) const {
 }
 
 inline void LaneHull::Orthogonalise() {
-  const double dependence = internal::kLaneDependence;
+  const double dependence = detail::kLaneDependence;
   const Lanes smallest = dependence * dependence * Scale();
   const auto column = [this](int a) {
     return Select(Has(a), corner[a].gradient - corner[0].gradient, {0, 0, 0});
@@ -155,7 +155,7 @@ inline LaneMask LaneHull::MoveWeights() {
   Orthogonalise();
   Lanes target[kCorners];
   Minimizer(target);
-  internal::FirstBlocking blocking{1};
+  detail::FirstBlocking blocking{1};
   for (int a = 0; a < kCorners; ++a) {
     const Lanes direction = target[a] - corner[a].weight;
     blocking.Meet(a, Has(a) & (direction < 0), -corner[a].weight / direction);
@@ -209,7 +209,7 @@ inline LaneMask LaneHull::Add(const LaneMask& adding, const LaneCorner& piece) {
     y[m] = Dot(q_[m], rest) * inverse_squared_[m];
     rest = rest - y[m] * q_[m];
   }
-  const double dependence = internal::kLaneDependence;
+  const double dependence = detail::kLaneDependence;
   const Lanes scale = Max(Scale(), Dot(piece.gradient, piece.gradient));
   const LaneMask is_independent =
       Dot(rest, rest) > dependence * dependence * scale;
@@ -217,7 +217,7 @@ inline LaneMask LaneHull::Add(const LaneMask& adding, const LaneCorner& piece) {
       begins | (adding & (size < kCorners) & is_independent);
   Lanes toward[kCorners];
   Barycentric(y, toward);
-  internal::FirstBlocking blocking{std::numeric_limits<double>::infinity()};
+  detail::FirstBlocking blocking{std::numeric_limits<double>::infinity()};
   for (int a = 0; a < kCorners; ++a) {
     blocking.Meet(a, Has(a) & (toward[a] > 0), corner[a].weight / toward[a]);
   }
@@ -236,4 +236,4 @@ inline LaneMask LaneHull::Add(const LaneMask& adding, const LaneCorner& piece) {
   return appends | replaces;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "krot/minimax/lanes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A 3 x 3 matrix in every lane, symmetric or lower triangular. For kernels
 // alone.
@@ -72,4 +72,4 @@ inline void Store(const LaneMatrix& lanes, LaneDoubles (*memory)[6]) {
   Store(lanes.m22, &(*memory)[5]);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

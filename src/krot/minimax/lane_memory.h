@@ -1,6 +1,6 @@
 #pragma once
 
-namespace krot {
+namespace krot::internal {
 
 // Problems (1) side by side, one per lane of a vector. Plain memory, no Eigen:
 // this header is shared with code compiled for other vector units.
@@ -27,4 +27,4 @@ struct alignas(64) LanePiece {
 // As many pieces as can bear a step.
 inline constexpr int kCorners = 4;
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/minimax/lane_matrix.h"
 #include "krot/minimax/lanes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the residuals of all lanes do around x, for p = 2: passes over their
 // rows. The model is that of local_model.h with all residuals as members. For
@@ -204,4 +204,4 @@ inline LaneStep MinimizeLaneModel(const LanePiece* pieces, int count,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/minimax/lane_memory.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Arithmetic in all lanes at once, for kernels alone (krot_native_kernel): the
 // vectors are as long as those of the machine that the file is compiled for,
@@ -167,4 +167,4 @@ inline void Store(const Lanes3& lanes, LaneDoubles (*memory)[3]) {
   Store(lanes.z, &(*memory)[2]);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

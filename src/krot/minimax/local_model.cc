@@ -6,7 +6,7 @@
 #include "krot/linear/triangle.h"
 #include "krot/minimax/descent_constants.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -263,4 +263,4 @@ double LocalModel::DepthGrowth() const {
   return depth / distance;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

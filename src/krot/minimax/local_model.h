@@ -9,7 +9,7 @@
 #include "krot/minimax/residual.h"
 #include "krot/minimax/residual_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The residuals that bear a step, and their multipliers: a warm start for a
 // problem much like theirs.
@@ -140,4 +140,4 @@ class LocalModel {
   SimplexQpSolution solution_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

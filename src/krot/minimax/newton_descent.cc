@@ -7,7 +7,7 @@
 
 #include "krot/minimax/descent_constants.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -271,4 +271,4 @@ DescentSummary NewtonDescent::Minimize(ResidualSet* residuals, Norm norm,
   return summary;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/minimax/local_model.h"
 #include "krot/minimax/residual_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How far a descent goes. The default is as far as rounding allows.
 struct DescentGoal {
@@ -49,4 +49,4 @@ class NewtonDescent {
   std::vector<char> is_member_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -48,12 +48,6 @@ void DifferentiateNorm(const Vector2d& v, Norm norm, double n,
 }
 
 }  // namespace
-
-double ResidualValue(const Residual& residual, const Vector3d& x, Norm norm) {
-  const double w = residual.Depth(x);
-  if (!(w > 0)) return std::numeric_limits<double>::infinity();
-  return NormOf(residual.Numerator(x), norm) / w;  // (2)
-}
 
 int ResidualPieces(const Residual& residual, const Vector3d& x, Norm norm,
                    double share, ResidualPiece pieces[kMaxPieces]) {
@@ -104,6 +98,18 @@ ResidualPiece TangentPiece(const Residual& residual, const Vector3d& x,
   piece.value = s.dot(residual.Numerator(x)) / w;
   piece.gradient = (residual.A.transpose() * s - piece.value * residual.c) / w;
   return piece;
+}
+
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
+
+double ResidualValue(const Residual& residual, const Vector3d& x, Norm norm) {
+  const double w = residual.Depth(x);
+  if (!(w > 0)) return std::numeric_limits<double>::infinity();
+  return NormOf(residual.Numerator(x), norm) / w;  // (2)
 }
 
 }  // namespace krot

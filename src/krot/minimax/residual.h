@@ -5,7 +5,7 @@
 #include "krot/math/norm.h"
 #include "krot/minimax.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A smooth function near x of which r is the maximum: its value, gradient and
 // curvature. For 1 < p < infinity there is one piece, r itself; for p = 1 and
@@ -33,4 +33,4 @@ int ResidualPieces(const Residual& residual, const Eigen::Vector3d& x,
 ResidualPiece TangentPiece(const Residual& residual, const Eigen::Vector3d& x,
                            const Eigen::Vector3d& x_touch, Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

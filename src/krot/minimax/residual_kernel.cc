@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -160,4 +160,4 @@ void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace krot {
+namespace krot::internal {
 
 // Plain memory, no Eigen: this header is shared with code compiled for other
 // vector units.
@@ -49,4 +49,4 @@ double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
 void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
                const double x[3], double cost, double metric[6]);
 
-}  // namespace krot
+}  // namespace krot::internal

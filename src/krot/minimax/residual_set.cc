@@ -1,6 +1,6 @@
 #include "krot/minimax/residual_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A block whose lanes are idle: r = 0 / 1.
 void ResidualSet::AddBlock() {
@@ -27,4 +27,4 @@ double ResidualSet::Evaluate(const Eigen::Vector3d& x, Norm norm) {
                            values_.data());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/minimax/residual.h"
 #include "krot/minimax/residual_kernel.h"
 
-namespace krot {
+namespace krot::internal {
 
 // a_1, b_1, a_2, b_2, c, d.
 inline void RowOf(const Residual& residual, double row[kResidualRow]) {
@@ -80,4 +80,4 @@ class ResidualSet {
   std::vector<double> values_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

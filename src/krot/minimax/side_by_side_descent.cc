@@ -1,6 +1,6 @@
 #include "krot/minimax/side_by_side_descent.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What a lane's end is called. Its status is one that is not kLaneGivesUp.
@@ -119,4 +119,4 @@ void SideBySideDescent::MinimizeAlone(int lane, const DescentGoal& goal) {
   problem.summary = alone_.Minimize(goal, problem.active, problem.x);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/minimax/fast_descent.h"
 #include "krot/minimax/lane_descent.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Solves many small problems (1), min over x in R^3 of max_i r_i(x): each to
 // its goal as FastDescent does, but for p = 2 eight at a time, one per lane of
@@ -96,4 +96,4 @@ class SideBySideDescent {
   Lane lanes_[kLanes];
 };
 
-}  // namespace krot
+}  // namespace krot::internal

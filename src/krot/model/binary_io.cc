@@ -5,7 +5,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/model/binary_reader.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The lists that lie in memory as they lie in the file.
@@ -266,4 +266,4 @@ std::string FormatPoints3DBinary(const Model& model) {
   return bytes;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/model.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // COLMAP's binary files (docs/formats.md): little endian, packed, without
 // magic or version. Bytes that COLMAP 3.8 to 4.x wrote are reproduced
@@ -28,4 +28,4 @@ std::string FormatFramesBinary(const Model& model);
 std::string FormatImagesBinary(const Model& model);
 std::string FormatPoints3DBinary(const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/context.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "COLMAP's binary files are read and written as they lie in "
@@ -103,4 +103,4 @@ class BinaryReader {
   size_t offset_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/validate_parts.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 enum class Claim { kConfirmed, kUnconfirmed, kRepeated, kNonexistent };
@@ -61,7 +61,7 @@ class Claims {
              " in its track, which does not exist";
     }
     const Image& image = model_.images[*n];
-    const std::string where = place + " of " + krot::Describe(image);
+    const std::string where = place + " of " + internal::Describe(image);
     if (claim == Claim::kRepeated) {
       return where + " twice in its track, expected once";
     }
@@ -223,4 +223,4 @@ void DropUnknownPoints3D(Model* model) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A COLMAP model says twice which 2D points see a 3D point: in the tracks and
 // in the images. Scripts write models where the two differ. COLMAP reads them:
@@ -66,4 +66,4 @@ void DropUnknownPoints3D(Model* model);
 // number. Requires consecutive tracks.
 int64_t DropUnknownPoints2D(Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,6 +11,9 @@
 #include "krot/model/sqlite_rows.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 // COLMAP's pair id is this times the smaller image id plus the larger one.

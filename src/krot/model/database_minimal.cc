@@ -6,6 +6,8 @@
 
 namespace krot {
 
+using namespace internal;
+
 Database ReadDatabase(const std::filesystem::path& path, const Model&,
                       const FileNote&) {
   throw ModelError(path.string() +

@@ -11,6 +11,9 @@
 #include "krot/database.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 constexpr int64_t kIdsOfImages = 2147483647;

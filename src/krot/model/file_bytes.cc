@@ -11,7 +11,7 @@
 #include "krot/base/write_file.h"
 #include "krot/context.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 [[noreturn]] void FailWithErrno(const std::string& path, const char* action) {
@@ -62,4 +62,4 @@ FileBytes ReadFileBytes(const std::filesystem::path& path) {
   return file;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 
 // A file in memory, and its name for messages.
 struct FileBytes {
@@ -21,4 +21,4 @@ using FileNote = std::function<void(const std::string& sentence)>;
 // file that it stands for.
 FileBytes ReadFileBytes(const std::filesystem::path& path);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/model/name_list.h"
 
-namespace krot {
+namespace krot::internal {
 
 std::vector<char> FixedFrames(const FileBytes& file, const Model& model,
                               const FileNote& note) {
@@ -38,4 +38,4 @@ std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model,
   return is_fixed;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

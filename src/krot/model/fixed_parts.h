@@ -5,7 +5,7 @@
 #include "krot/model.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The frames of the images that a text file lists, by name or, where no image
 // has such a name, by id; one per line, comments with #. An image may be listed
@@ -20,4 +20,4 @@ std::vector<char> FixedFrames(const FileBytes& file, const Model& model,
 std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model,
                                 const FileNote& note = {});
 
-}  // namespace krot
+}  // namespace krot::internal

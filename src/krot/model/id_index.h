@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Where each id stands in a list of records (cameras, images, points3D, ...).
 //
@@ -80,4 +80,4 @@ class IdIndex {
   std::optional<Id> duplicate_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

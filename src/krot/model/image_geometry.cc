@@ -1,6 +1,6 @@
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Id, typename Record>
@@ -70,4 +70,4 @@ std::unordered_map<ImageId, int32_t> ImageIndices(const Model& model) {
   return IndicesById<ImageId>(model.images);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

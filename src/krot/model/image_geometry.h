@@ -8,7 +8,7 @@
 #include "krot/geometry.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where the image stands: x_cam = cam_from_rig * (rig_from_world * x_world).
 //
@@ -45,4 +45,4 @@ std::optional<SensorPlace> FindSensor(const Rig& rig,
 // Index in Model::images by id.
 std::unordered_map<ImageId, int32_t> ImageIndices(const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

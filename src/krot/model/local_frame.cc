@@ -10,7 +10,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -157,4 +157,4 @@ Model LocalFrame::FromLocal(const Model& before, const Model& local) const {
   return model;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

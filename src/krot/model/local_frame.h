@@ -8,7 +8,7 @@
 #include "krot/model/fixed_parts.h"
 #include "krot/model/positions_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Coordinates of 10^6 to 10^7 m, as in UTM or ECEF, leave few digits for the
 // scene in differences of R s and t, and cameras that turn about a distant
@@ -50,4 +50,4 @@ auto InLocalFrame(const LocalFrame& frame, const Model& model,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

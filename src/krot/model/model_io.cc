@@ -12,7 +12,7 @@
 #include "krot/model/text_io.h"
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
@@ -146,6 +146,22 @@ void WriteModelFiles(const Model& model, ModelFormat format,
 
 }  // namespace
 
+std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model) {
+  std::vector<std::string> names;
+  for (const Image& image : model.images) {
+    if (image.name.find_first_of(" \t\r\n\v\f") != std::string::npos) {
+      names.push_back(image.name);
+    }
+  }
+  return names;
+}
+
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
+
 ModelFormat DetectModelFormat(const fs::path& folder) {
   return Translating<ModelError>(folder, "read", [&] {
     if (!fs::exists(folder)) {
@@ -219,16 +235,6 @@ void WriteModel(const Model& model, const fs::path& folder,
                   " is older than the model beside it, and splatting programs "
                   "read it instead of points3D: remove it, if it was made of "
                   "the old one");
-}
-
-std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model) {
-  std::vector<std::string> names;
-  for (const Image& image : model.images) {
-    if (image.name.find_first_of(" \t\r\n\v\f") != std::string::npos) {
-      names.push_back(image.name);
-    }
-  }
-  return names;
 }
 
 }  // namespace krot

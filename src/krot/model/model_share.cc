@@ -5,7 +5,7 @@
 
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
   std::vector<int32_t> by_id(whole.points3D.size());
@@ -66,4 +66,4 @@ ModelShare TakeShare(const Model& whole, const std::vector<int32_t>& points) {
   return share;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The points that each of `count` processes takes of a model, as indices of its
 // points3D, ascending: consecutive ones in the order of their ids, with about
@@ -23,4 +23,4 @@ struct ModelShare {
 // `points` as CutPoints gives them. Requires a valid model (ValidateModel).
 ModelShare TakeShare(const Model& whole, const std::vector<int32_t>& points);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/base/numbers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int32_t kAmbiguous = -1;  // several images bear the name
@@ -228,4 +228,4 @@ void ListReader::Finish(const FileNote& note) const {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/text_reader.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Text files beside a model that list names, or ids, and numbers: positions,
 // rotations, what must not move. docs/formats.md says what a line may look
@@ -92,4 +92,4 @@ class ListReader {
   Tally paths_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

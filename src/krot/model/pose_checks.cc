@@ -11,7 +11,7 @@
 #include "krot/base/numbers.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What rounding to six digits leaves far behind: radians, or relative to a
@@ -238,4 +238,4 @@ RotationAgreement CompareRotations(const Rotations& own,
   return agreement;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

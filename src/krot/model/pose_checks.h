@@ -10,7 +10,7 @@
 #include "krot/geometry.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The angle between two rotations, in [0, 180] degrees.
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
@@ -58,4 +58,4 @@ struct RotationAgreement {
 RotationAgreement CompareRotations(const std::vector<Eigen::Quaterniond>& own,
                                    const std::vector<QuaternionWxyz>& listed);
 
-}  // namespace krot
+}  // namespace krot::internal

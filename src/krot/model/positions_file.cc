@@ -12,7 +12,7 @@
 #include "krot/model/image_geometry.h"
 #include "krot/model/name_list.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -156,4 +156,4 @@ std::vector<KnownPosition> ReadPointPositions(const FileBytes& file,
   return ReadList(file, model, KnownPosition::Of::kPoint3D, points, options);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Whether all is finite and the semi-axes are above zero and not too different
 // for the digits of what is computed with them.
@@ -35,4 +35,4 @@ std::vector<KnownPosition> ReadPointPositions(
     const FileBytes& file, const Model& model,
     const PositionsOptions& options = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/base/check.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 RemovedObservations RemoveObservations(const Model& model,
                                        const std::vector<char>& is_removed) {
@@ -93,4 +93,4 @@ Model RemoveImages(const Model& model, const std::vector<char>& is_removed) {
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 struct RemovedObservations {
   Model model;
@@ -29,4 +29,4 @@ RemovedObservations RemoveObservations(const Model& model,
 // std::invalid_argument unless there is one mark per image.
 Model RemoveImages(const Model& model, const std::vector<char>& is_removed);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/model/name_list.h"
 #include "krot/model/pose_checks.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What rounding to six digits makes of one rotation, twice, radians.
@@ -245,4 +245,4 @@ ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model,
   return replacement.Apply(file.path);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a file of rotations did to a model.
 struct ReplacedRotations {
@@ -50,4 +50,4 @@ struct ReplacedRotations {
 ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model,
                                    const FileNote& note = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 struct Entry {
@@ -29,4 +29,4 @@ std::optional<int32_t> SensorTypeFromName(std::string_view name) {
   return std::nullopt;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The beginning of the file, as far as it tells what the file is.
@@ -246,4 +246,4 @@ int64_t SqliteRows::CheckedRows(int rows_column, const std::string& where,
   return rows;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 struct sqlite3;
 struct sqlite3_stmt;
 
-namespace krot {
+namespace krot::internal {
 
 // An SQLite database that is read in one state and never written to. All that
 // is wrong with it throws ModelError: a sentence that begins with its path.
@@ -102,4 +102,4 @@ class SqliteRows {
   std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

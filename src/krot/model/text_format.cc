@@ -8,7 +8,7 @@
 #include "krot/model/sensor_type.h"
 #include "krot/model/text_io.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Each of the following begins with the blank that separates it.
@@ -172,4 +172,4 @@ std::string FormatPoints3DText(const Model& model) {
   return text;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

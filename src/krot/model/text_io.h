@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // COLMAP's text files (docs/formats.md). Numbers are written with the fewest
 // digits that give the same bits back; a NaN keeps its sign but not its
@@ -31,4 +31,4 @@ std::string FormatFramesText(const Model& model);
 std::string FormatImagesText(const Model& model);
 std::string FormatPoints3DText(const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

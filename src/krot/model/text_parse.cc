@@ -6,7 +6,7 @@
 #include "krot/model/text_io.h"
 #include "krot/model/text_reader.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 SensorId ReadSensorId(TextReader* reader) {
@@ -210,4 +210,4 @@ void ParsePoints3DText(const FileBytes& file, Model* model) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

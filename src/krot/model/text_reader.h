@@ -13,7 +13,7 @@
 #include "krot/context.h"
 #include "krot/model/file_bytes.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The text without the byte order mark that editors of Windows put in front.
 // Throws ModelError for UTF-16, which PowerShell writes.
@@ -132,7 +132,7 @@ class TextReader {
     if (word.size() > 1 && word[0] == '+' && word[1] != '-') {
       word.remove_prefix(1);
     }
-    const std::optional<T> value = krot::ParseNumber<T>(word);
+    const std::optional<T> value = internal::ParseNumber<T>(word);
     if constexpr (std::is_integral_v<T>) {
       if (!value) return ParseWhole<T>(word);
     }
@@ -145,7 +145,7 @@ class TextReader {
   template <typename T>
   static std::optional<T> ParseWhole(std::string_view word) {
     constexpr double kExact = 9007199254740992.0;  // 2^53
-    const std::optional<double> real = krot::ParseNumber<double>(word);
+    const std::optional<double> real = internal::ParseNumber<double>(word);
     if (!real || std::trunc(*real) != *real || std::abs(*real) >= kExact ||
         *real < static_cast<double>(std::numeric_limits<T>::min()) ||
         *real > static_cast<double>(std::numeric_limits<T>::max())) {
@@ -168,4 +168,4 @@ class TextReader {
   size_t line_number_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

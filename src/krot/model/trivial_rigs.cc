@@ -1,6 +1,6 @@
 #include "krot/model/trivial_rigs.h"
 
-namespace krot {
+namespace krot::internal {
 
 void UseTrivialRigs(Model* model) {
   model->rigs.clear();
@@ -18,4 +18,4 @@ void UseTrivialRigs(Model* model) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Puts trivial rigs and frames in place of the model's, as COLMAP does where
 // its files hold none: a rig per camera, which is its reference sensor, and a
@@ -10,4 +10,4 @@ namespace krot {
 // ids of what they hold.
 void UseTrivialRigs(Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,6 +8,9 @@
 #include "krot/model/validate_parts.h"
 
 namespace krot {
+
+using namespace internal;
+
 namespace {
 
 template <typename Id>

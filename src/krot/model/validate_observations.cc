@@ -3,7 +3,7 @@
 
 #include "krot/model/validate_parts.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Ends a sentence about a track element of a 2D point that does not exist.
@@ -43,4 +43,4 @@ void ValidateObservations(const IndexedModel& model) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/model.h"
 #include "krot/model/id_index.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the parts of ValidateModel share.
 
@@ -56,4 +56,4 @@ void CheckFinite(double value, const Owner& owner, const char* quantity) {
   Fail(owner(), ": found ", quantity, " ", value, ", expected a finite number");
 }
 
-}  // namespace krot
+}  // namespace krot::internal

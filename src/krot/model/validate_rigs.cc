@@ -7,14 +7,14 @@
 #include "krot/model/sensor_type.h"
 #include "krot/model/validate_parts.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Ends a sentence about rigs and frames that are not worth a repair.
 constexpr const char* kUsePosesOfImages =
     "remove both rigs and frames: then the poses in images count";
 
-std::string Describe(const SensorId& sensor_id) {
+std::string DescribeSensor(const SensorId& sensor_id) {
   const auto name = SensorTypeName(sensor_id.type);
   return (name ? std::string(*name)
                : "type " + std::to_string(sensor_id.type)) +
@@ -24,7 +24,7 @@ std::string Describe(const SensorId& sensor_id) {
 void CheckSensorExists(const Rig& rig, const SensorId& sensor_id,
                        const IdIndex<CameraId>& cameras) {
   if (!SensorTypeName(sensor_id.type)) {
-    Fail("rig ", rig.id, ": found the sensor ", Describe(sensor_id),
+    Fail("rig ", rig.id, ": found the sensor ", DescribeSensor(sensor_id),
          ", expected type -1 (none), 0 (camera) or 1 (IMU)");
   }
   if (sensor_id.type == kSensorTypeCamera && !cameras.Find(sensor_id.id)) {
@@ -38,7 +38,7 @@ void CheckSensorsDiffer(const Rig& rig,
   for (size_t i = 0; i < sensor_ids.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
       if (!(sensor_ids[i] == sensor_ids[j])) continue;
-      Fail("rig ", rig.id, ": found the sensor ", Describe(sensor_ids[i]),
+      Fail("rig ", rig.id, ": found the sensor ", DescribeSensor(sensor_ids[i]),
            " twice, expected different sensors");
     }
   }
@@ -78,7 +78,7 @@ int32_t ResolveImage(const IndexedModel& model, const Frame& frame,
                      const FrameData& data) {
   if (data.sensor_id.type != kSensorTypeCamera) {
     Fail("frame ", frame.id, ": found data of the sensor ",
-         Describe(data.sensor_id), ", expected a camera or an IMU");
+         DescribeSensor(data.sensor_id), ", expected a camera or an IMU");
   }
   std::optional<int32_t> position;
   if (data.data_id <= std::numeric_limits<ImageId>::max()) {
@@ -149,4 +149,4 @@ void ValidateRigsAndFrames(const IndexedModel& model) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

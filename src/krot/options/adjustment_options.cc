@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kCeres[] = "BundleAdjustmentCeres.";
@@ -194,4 +194,4 @@ AdjustModelOptions AdjustmentOptions::Resolve(const OptionTable& table) const {
   return options;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include "krot/options/option_table.h"
 #include "krot/pipeline/adjust_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The options of `bundle_adjuster`, under COLMAP 4's names, and under 3.8's.
 class AdjustmentOptions {
@@ -28,4 +28,4 @@ class AdjustmentOptions {
   double max_error_factor_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

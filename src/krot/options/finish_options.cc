@@ -1,6 +1,6 @@
 #include "krot/options/finish_options.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
   FinishOptions* finish = &options->finish;
@@ -65,4 +65,4 @@ void CheckFinishOptions(const SolveModelOptions& options,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

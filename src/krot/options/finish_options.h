@@ -3,7 +3,7 @@
 #include "krot/options/option_table.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What follows the lowest maximum, of `solver` alone: Solver.finish and its
 // like, Solver.polish.
@@ -19,4 +19,4 @@ void CheckFinishLoss(const SolveModelOptions& options,
 void CheckFinishOptions(const SolveModelOptions& options,
                         const OptionTable& table);
 
-}  // namespace krot
+}  // namespace krot::internal

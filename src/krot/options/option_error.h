@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace krot {
+namespace krot::internal {
 
 // An option that cannot be obeyed; what() is one sentence for the user.
 class OptionError : public std::runtime_error {
@@ -10,4 +10,4 @@ class OptionError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

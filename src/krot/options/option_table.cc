@@ -5,7 +5,7 @@
 #include <sstream>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // `text` broken at spaces into lines of at most 80 columns, each indented.
@@ -179,4 +179,4 @@ std::string OptionTable::Help() const {
                        "");
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/options/option_error.h"
 #include "krot/options/option_value.h"
 
-namespace krot {
+namespace krot::internal {
 
 // One option. `range` completes "must be ..." and `parse` decides it.
 struct Option {
@@ -122,4 +122,4 @@ void OptionTable::AddNamed(
        false, names});
 }
 
-}  // namespace krot
+}  // namespace krot::internal

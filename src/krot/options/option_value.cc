@@ -8,7 +8,7 @@
 
 #include "krot/base/numbers.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Number>
@@ -147,4 +147,4 @@ std::string NearestName(const std::string& name,
   return nearest;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

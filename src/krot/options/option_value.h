@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // From the text of a command line value to what it stands for. Each Parse
 // function takes the whole text or returns false; the result is untouched
@@ -48,4 +48,4 @@ std::string ChoiceText(const std::vector<std::string>& choices);
 std::string NearestName(const std::string& name,
                         const std::vector<std::string>& candidates);
 
-}  // namespace krot
+}  // namespace krot::internal

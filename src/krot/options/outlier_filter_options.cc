@@ -6,7 +6,7 @@
 #include "krot/options/option_error.h"
 #include "krot/options/solve_options.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
@@ -59,4 +59,4 @@ void ResolveOutlierFilterOptions(const OptionTable& table, bool needs_conflicts,
   CheckFinishLoss(options->solve, table);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

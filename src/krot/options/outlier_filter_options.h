@@ -3,7 +3,7 @@
 #include "krot/options/option_table.h"
 #include "krot/outliers/outlier_filter.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The options of `outlier_filter`, without its paths.
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
@@ -15,4 +15,4 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
 void ResolveOutlierFilterOptions(const OptionTable& table, bool needs_conflicts,
                                  OutlierFilterOptions* options);
 
-}  // namespace krot
+}  // namespace krot::internal

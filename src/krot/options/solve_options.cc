@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Those that FastDescentSettings::kFast does not look at.
@@ -94,4 +94,4 @@ void CheckSolveOptions(const SolveModelOptions& options,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/options/option_table.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The options that `solver` and `point_triangulator` share, in their groups
 // Solver, FastDescent and Problem.
@@ -20,4 +20,4 @@ void AddSameImage(BuildProblemOptions* options, OptionTable* table);
 void CheckSolveOptions(const SolveModelOptions& options,
                        const OptionTable& table);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/options/finish_options.h"
 #include "krot/options/solve_options.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The paper's own rule, where its settings are asked for [Zhang18, Sec. 5].
@@ -186,4 +186,4 @@ void ResolveSolverOptions(const OptionTable& table,
   ChooseSweeps(table, options);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

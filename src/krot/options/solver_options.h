@@ -3,7 +3,7 @@
 #include "krot/options/option_table.h"
 #include "krot/outliers/tolerant_solve.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The options of `solver`, without its paths.
 void AddSolverOptions(TolerantSolveOptions* options, Context* context,
@@ -13,4 +13,4 @@ void AddSolverOptions(TolerantSolveOptions* options, Context* context,
 // contradict each other, or have no effect. To be called once they are set.
 void ResolveSolverOptions(const OptionTable& table, SolveModelOptions* options);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/model/id_index.h"
 #include "krot/options/solve_options.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int32_t kAmbiguous = -1;
@@ -138,4 +138,4 @@ ToleranceOptions ResolveToleranceOptions(const ToleranceArguments& arguments,
   return options;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/options/option_table.h"
 #include "krot/tolerance/tolerance_analysis.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the options of `tolerance_analyzer` say before there is a model.
 struct ToleranceArguments {
@@ -26,4 +26,4 @@ void AddToleranceOptions(ToleranceArguments* arguments, Context* context,
 ToleranceOptions ResolveToleranceOptions(const ToleranceArguments& arguments,
                                          const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::vector<int64_t> Without(const std::vector<int64_t>& from,
@@ -150,4 +150,4 @@ std::vector<Conflict> PackConflicts(const Model& model,
   return conflicts;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

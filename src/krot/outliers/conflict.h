@@ -10,7 +10,7 @@
 #include "krot/model.h"
 #include "krot/outliers/decision.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Observations that no translations and points bring within a bound together,
 // so that at least one of them must go [Sim, Hartley 2006].
@@ -51,4 +51,4 @@ std::vector<Conflict> PackConflicts(const Model& model,
                                     const std::vector<int64_t>& observations,
                                     const Context& context, Work* work);
 
-}  // namespace krot
+}  // namespace krot::internal

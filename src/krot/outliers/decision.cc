@@ -8,7 +8,7 @@
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the rows, round by round, as long as nothing is decided: optima as near
@@ -129,4 +129,4 @@ std::optional<PixelCertificate> ProveRefutation(
   return best;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

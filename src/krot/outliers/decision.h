@@ -11,7 +11,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What observations are asked to stay within.
 struct ErrorBound {
@@ -52,4 +52,4 @@ std::optional<PixelCertificate> ProveRefutation(
     const Model& model, const BuiltProblem& part, const ErrorBound& bound,
     const Decision& refuted, const Context& context, Work* work);
 
-}  // namespace krot
+}  // namespace krot::internal

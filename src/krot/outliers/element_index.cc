@@ -1,6 +1,6 @@
 #include "krot/outliers/element_index.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Both go along the tracks.
 std::vector<uint64_t> ElementsOf(const Model& model,
@@ -25,4 +25,4 @@ std::vector<uint64_t> ElementsOf(const Model& model,
   return elements;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

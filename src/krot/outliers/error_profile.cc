@@ -11,7 +11,7 @@
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // That noise alone exceeds the limit.
@@ -178,4 +178,4 @@ ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
   return Profiler(model, built, options, context).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

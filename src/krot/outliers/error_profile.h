@@ -12,7 +12,7 @@
 #include "krot/outliers/conflict.h"
 #include "krot/outliers/removal.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How low the largest error can be without some of the observations, and from
 // where on that is no noise.
@@ -88,4 +88,4 @@ ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
                               const ErrorProfileOptions& options,
                               const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

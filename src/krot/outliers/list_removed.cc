@@ -10,7 +10,7 @@
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kNoError = std::numeric_limits<double>::quiet_NaN();
@@ -72,4 +72,4 @@ std::vector<RemovedObservation> ListRemoved(
   return list;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The removed observations of `model`, worst first, with their errors there and
 // where `kept`, what is left of it, has their cameras and points. The vectors
@@ -21,4 +21,4 @@ std::vector<RemovedObservation> ListRemoved(
     const std::vector<int64_t>& conflict_of, const Context& context,
     const std::vector<double>& w = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "krot/outliers/track_fit.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -396,4 +396,4 @@ MatchTracksResult TriangulateMatches(const Model& model,
   return MatchTriangulator(model, database, options, context).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/database.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Points for a model whose poses are known, from the verified matches of a
 // database.
@@ -60,4 +60,4 @@ MatchTracksResult TriangulateMatches(const Model& model,
                                      const MatchTracksOptions& options,
                                      const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/problem/components.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int64_t kTiesPerPoint = 6;
@@ -73,4 +73,4 @@ std::vector<std::vector<int64_t>> NearSet::Parts() const {
   return SplitIntoComponents(*problem_, std::move(observations));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

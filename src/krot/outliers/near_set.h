@@ -5,7 +5,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The observations that a slack programme looks at: those that come near the
 // bound, and enough others to tie their points and every frame. An optimum of
@@ -31,4 +31,4 @@ class NearSet {
   std::vector<char> contains_;  // per observation
 };
 
-}  // namespace krot
+}  // namespace krot::internal

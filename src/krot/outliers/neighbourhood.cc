@@ -9,7 +9,7 @@
 
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -146,4 +146,4 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
   return sets;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where to look for a small conflict of an observation: in a few frames of its
 // track, among the points there whose rays miss each other by most.
@@ -41,4 +41,4 @@ class Neighbourhoods {
   std::vector<std::vector<int32_t>> points_of_frame_;  // ascending
 };
 
-}  // namespace krot
+}  // namespace krot::internal

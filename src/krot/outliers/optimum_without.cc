@@ -11,7 +11,7 @@
 #include "krot/pipeline/rounds.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 
 OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
                             const std::vector<int64_t>& removed,
@@ -49,4 +49,4 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
   return optimum;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

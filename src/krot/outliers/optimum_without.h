@@ -10,7 +10,7 @@
 #include "krot/math/norm.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The lowest largest error of some observations, proved.
 struct OptimumWithout {
@@ -30,4 +30,4 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
                             const Estimate& start, Norm norm,
                             double relative_gap, const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

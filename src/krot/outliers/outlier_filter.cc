@@ -21,7 +21,7 @@
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What rounding may add to an error on its way into a model, relative.
@@ -386,4 +386,4 @@ OutlierFilterResult FilterOutliers(const Model& model,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -14,7 +14,7 @@
 #include "krot/outliers/rotation_suspect.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Removes observations until all others are within a bound, and proves how many
 // had to go: what `krot outlier_filter`, and `krot solver` where not everything
@@ -125,4 +125,4 @@ OutlierFilterResult FilterOutliers(const Model& model,
                                    const OutlierFilterOptions& options,
                                    const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -16,7 +16,7 @@
 #include "krot/proof/certificate.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the open observations so many, the worst, are tried in more frames.
@@ -304,4 +304,4 @@ ConflictPacking PackAgainstRemoval(
       .Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/outliers/conflict.h"
 #include "krot/outliers/removal.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What is found of the conflicts that removed observations take part in.
 struct ConflictPacking {
@@ -45,4 +45,4 @@ ConflictPacking PackAgainstRemoval(
     const Removal& removal, std::vector<Conflict> found, const Context& context,
     int64_t work_per_observation = kMostWork);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/base/disjoint_sets.h"
 
-namespace krot {
+namespace krot::internal {
 
 template <typename Visit>
 void Groups::ForEachTrack(const Visit& visit) const {
@@ -128,4 +128,4 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
   return part_of;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The frame of observation i.
 inline int32_t FrameOf(const KnownRotationProblem& problem, int64_t i) {
@@ -72,4 +72,4 @@ struct PartOptions {
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                const PartOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

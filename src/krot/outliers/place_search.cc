@@ -7,7 +7,7 @@
 
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -199,4 +199,4 @@ std::vector<Place> PlaceSearch::Profile(const std::vector<double>& scales,
   return places;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Chi-squared of three degrees of freedom: one right track in a thousand has
 // more.
@@ -114,4 +114,4 @@ class PlaceSearch {
   const std::vector<SharedTrack> tracks_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

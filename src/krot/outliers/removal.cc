@@ -10,7 +10,7 @@
 #include "krot/problem/subset.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the bound: what the interior point leaves open.
@@ -206,4 +206,4 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
       .Find(bound.max_error, max_programmes);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/outliers/decision.h"
 #include "krot/outliers/near_set.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Observations without which all others are within a bound.
 struct Removal {
@@ -73,4 +73,4 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
                     const ErrorBound& bound, const Context& context,
                     int max_programmes = kMaxProgrammes);
 
-}  // namespace krot
+}  // namespace krot::internal

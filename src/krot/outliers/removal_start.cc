@@ -10,7 +10,7 @@
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/start.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string Pixels(double value) {
@@ -80,4 +80,4 @@ RemovalStart FindRemovalStart(const Model& model,
   return start;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

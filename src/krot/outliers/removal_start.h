@@ -5,7 +5,7 @@
 #include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where the removal of observations starts.
 struct RemovalStart {
@@ -27,4 +27,4 @@ RemovalStart FindRemovalStart(const Model& model,
                               const OutlierFilterOptions& options,
                               const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // Weights for the next slack programme [Candes, Wakin, Boyd 2008]: an excess
 // much below the share `dear` of `bound` costs 1 / dear times as much as one of
@@ -17,4 +17,4 @@ inline std::vector<double> WeightsAgainst(const std::vector<double>& excess,
   return weights;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/bridge/point_repair.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -126,4 +126,4 @@ void PlacePointsRobustly(const KnownRotationProblem& problem,
               });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

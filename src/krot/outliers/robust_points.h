@@ -7,7 +7,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Places points where most of their tracks agree, the frames fixed: of the
 // midpoints of pairs of rays, and of the rays that agree with the best of
@@ -20,4 +20,4 @@ void PlacePointsRobustly(const KnownRotationProblem& problem,
                          double cap, const Context& context,
                          Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

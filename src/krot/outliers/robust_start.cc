@@ -18,7 +18,7 @@
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // So much redundancy that tracks check each frame by, doubled until they hang
@@ -205,4 +205,4 @@ double MedianError(const KnownRotationProblem& problem,
   return errors.empty() ? 0 : Median(std::move(errors));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

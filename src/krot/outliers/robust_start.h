@@ -4,7 +4,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // From nothing, pixels: what is an error is known only afterwards.
 inline constexpr double kLevelOfStart = 2;
@@ -35,4 +35,4 @@ Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
 double MedianError(const KnownRotationProblem& problem,
                    const Estimate& estimate, Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

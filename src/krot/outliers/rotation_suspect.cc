@@ -14,7 +14,7 @@
 #include "krot/minimax/residual.h"
 #include "krot/outliers/optimum_without.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -244,4 +244,4 @@ std::optional<RotationSuspect> FindRotationSuspect(
   return suspect;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

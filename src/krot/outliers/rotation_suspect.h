@@ -15,7 +15,7 @@
 #include "krot/outliers/decision.h"
 #include "krot/outliers/removal.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Of the images that have a part in most conflicts, and in no fewer than three,
 // the one with most observations removed; none otherwise. Points are placed by
@@ -27,4 +27,4 @@ std::optional<RotationSuspect> FindRotationSuspect(
     const std::vector<Conflict>& conflicts, const Removal& removal,
     const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What an observation is worth that others of its track need.
@@ -46,4 +46,4 @@ std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
   return crowded;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What is scarce where open observations look for conflicts: no two may share
 // an observation.
@@ -22,4 +22,4 @@ std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
                                  const std::vector<char>& is_free,
                                  std::vector<int64_t>* open);
 
-}  // namespace krot
+}  // namespace krot::internal

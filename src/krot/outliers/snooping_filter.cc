@@ -11,7 +11,7 @@
 #include "krot/outliers/suspects.h"
 #include "krot/pipeline/polish.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of an input, and what is still left of it.
@@ -129,4 +129,4 @@ OutlierFilterResult FilterBySnooping(const Model& model,
   return SnoopingFilter(model, options, context).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
-namespace krot {
+namespace krot::internal {
 
 // FilterOutliers with OutlierMethod::kSnooping, which asks for no bound. With
 // the cameras as they stand, what noise does not explain is removed
@@ -19,4 +19,4 @@ OutlierFilterResult FilterBySnooping(const Model& model,
                                      const OutlierFilterOptions& options,
                                      const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <unordered_set>
 
-namespace krot {
+namespace krot::internal {
 
 void ColorSuspects(const OutlierFilterSummary& summary, Model* model) {
   std::unordered_set<Point3DId> removed, in_conflict;
@@ -25,4 +25,4 @@ void ColorSuspects(const OutlierFilterSummary& summary, Model* model) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Colours that colour-blind eyes tell apart, too [Okabe and Ito].
 inline constexpr std::array<uint8_t, 3> kRemovedColor = {213, 94, 0};
@@ -18,4 +18,4 @@ inline constexpr std::array<uint8_t, 3> kUnsuspectedColor = {190, 190, 190};
 // takes part in a conflict, otherwise light grey. O(points + conflicts).
 void ColorSuspects(const OutlierFilterSummary& summary, Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

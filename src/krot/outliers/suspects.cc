@@ -7,7 +7,7 @@
 
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Counts per thing, by id.
@@ -66,4 +66,4 @@ void RankSuspects(const Model& model, const std::vector<char>& is_removed,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/outliers/outlier_filter.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Fills in the tracks, images and cameras of a summary: who has observations
 // that were removed, by how many. `conflict_of` says for each track element of
@@ -16,4 +16,4 @@ void RankSuspects(const Model& model, const std::vector<char>& is_removed,
                   const std::vector<int64_t>& conflict_of,
                   OutlierFilterSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

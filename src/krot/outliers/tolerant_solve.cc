@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Whether observations may go where no start has them all.
@@ -58,4 +58,4 @@ TolerantSolveResult SolveTolerantly(const Model& model,
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

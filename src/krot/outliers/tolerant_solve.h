@@ -7,7 +7,7 @@
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // SolveModel, without what cannot be served: what `krot solver` does between
 // reading and writing.
@@ -35,4 +35,4 @@ TolerantSolveResult SolveTolerantly(const Model& model,
                                     const TolerantSolveOptions& options,
                                     const Context& context = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/model/remove_observations.h"
 #include "krot/outliers/robust_points.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -156,4 +156,4 @@ int64_t RemoveNarrow(double min_angle_deg, Model* model) {
   return num_narrow;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

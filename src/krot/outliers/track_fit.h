@@ -9,7 +9,7 @@
 #include "krot/context.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What TriangulateMatches does with tracks that are given. Internal to it.
 
@@ -42,4 +42,4 @@ int64_t RemoveMoreThanNoise(const Context& context, Model* model);
 // Removes points all of whose rays are within the angle. Returns the number.
 int64_t RemoveNarrow(double min_angle_deg, Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

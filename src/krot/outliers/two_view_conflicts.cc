@@ -10,7 +10,7 @@
 
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -206,4 +206,4 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
   return sets;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where to look for the smallest conflict of an observation: with two other
 // points in its image and one more, six observations in all.
@@ -54,4 +54,4 @@ class TwoViewConflicts {
   std::vector<std::vector<int64_t>> observations_of_view_;  // ascending
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -341,4 +341,4 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
   return links;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

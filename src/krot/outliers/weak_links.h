@@ -7,7 +7,7 @@
 #include "krot/outliers/parts.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Parts of a problem that few tracks join, and how well these hold the scale of
 // one part against that of the other.
@@ -60,4 +60,4 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const Estimate& estimate, double cap,
                                     const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

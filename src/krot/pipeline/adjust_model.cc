@@ -8,7 +8,7 @@
 #include "krot/base/check.h"
 #include "krot/model/local_frame.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Every error, so that what COLMAP recomputes is below the cap, too.
@@ -113,4 +113,4 @@ AdjustModelResult AdjustModel(const Model& model,
                       });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

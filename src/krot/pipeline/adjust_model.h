@@ -7,7 +7,7 @@
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // From a COLMAP model to a COLMAP model with a smaller sum of squared
 // reprojection errors, below a cap if asked for: what `krot bundle_adjuster`
@@ -48,4 +48,4 @@ AdjustModelResult AdjustModel(const Model& model,
                               const AdjustModelOptions& options,
                               const Context& context = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/bridge/gathered_support.h"
 #include "krot/bridge/position_rows.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // By the first rank, which has the certificate, in the numbers of the whole.
@@ -70,4 +70,4 @@ void CertifyInfeasible(const Model& model, const BuiltProblem& built,
       summary);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

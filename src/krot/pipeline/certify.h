@@ -7,7 +7,7 @@
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Checks a certificate once more, apart from the solver that made it, and says
 // in the summary what it proves about the estimate. Where ranks share the
@@ -24,4 +24,4 @@ void CertifyInfeasible(const Model& model, const BuiltProblem& built,
                        const std::optional<Certificate>& certificate,
                        SolveSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 
 #include "krot/bridge/model_digest.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kMagic[] = "krot checkpoint 1\n";
@@ -134,4 +134,4 @@ void CheckpointFile::WriteBehind(
   is_broken_ = false;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

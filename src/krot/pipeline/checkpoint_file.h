@@ -10,7 +10,7 @@
 #include "krot/base/checkpoint.h"
 #include "krot/base/write_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A checkpoint in a file (docs/formats.md). A step counts once it is there as a
 // whole, with its digest: what was being written when the process was killed or
@@ -43,4 +43,4 @@ class CheckpointFile : public Checkpoint {
   bool is_broken_ = false;  // it could not be written
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,6 +1,6 @@
 #include "krot/pipeline/finish.h"
 
-namespace krot {
+namespace krot::internal {
 
 const char* FinishName(Finish finish) {
   switch (finish) {
@@ -14,4 +14,4 @@ const char* FinishName(Finish finish) {
   return "none";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/finish/bounded_least_squares.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What becomes of the room that the lowest maximum leaves: it is set by a few
 // observations, and the others may be anywhere below.
@@ -38,4 +38,4 @@ struct FinishSummary {
   double seconds = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/base/check.h"
 #include "krot/bridge/position_rows.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the bracket, relative.
@@ -202,4 +202,4 @@ SolveModelResult SolveWithInflatedPositions(const Model& model,
   return PositionInflater(options, context).Run(model);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include "krot/base/context.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // SolveModel with all radii of options.problem.positions times the smallest
 // factor, at least 1, at which the largest error can be at most
@@ -16,4 +16,4 @@ SolveModelResult SolveWithInflatedPositions(const Model& model,
                                             const SolveModelOptions& options,
                                             const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,6 +1,6 @@
 #include "krot/pipeline/iteration_log.h"
 
-namespace krot {
+namespace krot::internal {
 
 JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
                             SolveSummary* summary) {
@@ -13,4 +13,4 @@ JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
   };
 }
 
-}  // namespace krot
+}  // namespace krot::internal

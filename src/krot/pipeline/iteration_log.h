@@ -3,7 +3,7 @@
 #include "krot/base/timer.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // For the stages of a solve that iterate: appends every iteration to
 // `summary->iterations`, with the seconds of the solve's `timer`, and hands it
@@ -11,4 +11,4 @@ namespace krot {
 JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
                             SolveSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

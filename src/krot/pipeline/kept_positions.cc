@@ -6,7 +6,7 @@
 #include "krot/bridge/position_rows.h"
 #include "krot/pipeline/pixel_proof.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the gap asked for, the level's excess, and how far below the cost proofs
@@ -89,4 +89,4 @@ std::optional<PixelCertificate> KeptPositions::Prove(
   return proof;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

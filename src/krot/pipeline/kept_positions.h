@@ -12,7 +12,7 @@
 #include "krot/pipeline/position_level.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What rounds do beside where cameras are known to be (position_rows.h): they
 // look for the level, keep the best estimate that keeps all positions, and try
@@ -64,4 +64,4 @@ class KeptPositions {
   double cost_ = std::numeric_limits<double>::infinity();
 };
 
-}  // namespace krot
+}  // namespace krot::internal

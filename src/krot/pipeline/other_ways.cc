@@ -7,7 +7,7 @@
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A stall with a bound within so many times the gap asked for is left alone.
@@ -94,4 +94,4 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

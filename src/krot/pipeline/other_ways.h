@@ -8,7 +8,7 @@
 #include "krot/pipeline/solve_model.h"
 #include "krot/pipeline/start.h"
 
-namespace krot {
+namespace krot::internal {
 
 // After SolveInRounds, where that stalled far from any bound: the other ways to
 // the optimum, joint iterations alone from the model's own start and rounds
@@ -22,4 +22,4 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
                   std::optional<PixelCertificate>* certificate,
                   SolveSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

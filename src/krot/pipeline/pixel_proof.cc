@@ -12,7 +12,7 @@
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate_search.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the support's own problem: far below any gap that is asked for.
@@ -222,4 +222,4 @@ std::vector<int64_t> SupportOf(const RowsCertificate& rows) {
   return support;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

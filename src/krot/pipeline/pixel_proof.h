@@ -12,7 +12,7 @@
 #include "krot/pipeline/round_bounds.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A lower bound in true pixels for all estimates, from the observations that
 // set the maximum of the linear rows: `support`, ascending indices. `built` has
@@ -44,4 +44,4 @@ std::optional<PixelCertificate> ProveRows(
 // those that are not there are left out.
 std::vector<int64_t> SupportOf(const RowsCertificate& rows);
 
-}  // namespace krot
+}  // namespace krot::internal

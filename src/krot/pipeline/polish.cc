@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 RobustLoss LossOf(ErrorLoss::Kind kind) {
@@ -57,4 +57,4 @@ const char* PolishName(Polish polish) {
   return "none";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

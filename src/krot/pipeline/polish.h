@@ -5,7 +5,7 @@
 #include "krot/finish/bounded_least_squares.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Least squares after the known rotation problem: a lower mean error, for a
 // maximum that is no longer the lowest.
@@ -31,4 +31,4 @@ PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
 // As --Solver.polish takes it: "none", "rotations_fixed", "full".
 const char* PolishName(Polish polish);
 
-}  // namespace krot
+}  // namespace krot::internal

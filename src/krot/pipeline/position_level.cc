@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of d log G / d log L, which is below 1.
@@ -47,4 +47,4 @@ std::optional<double> PositionLevel::Next(double level, double optimum,
   return std::exp(target + tolerance_ / std::max(slope_, kLeastSlope));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

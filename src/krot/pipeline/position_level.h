@@ -6,7 +6,7 @@
 
 #include "krot/bridge/position_rows.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Within this of the radius, relative, positions are kept in rounds: less than
 // is allowed in the end, so that the finish begins inside.
@@ -40,4 +40,4 @@ class PositionLevel {
   double highest_ = std::numeric_limits<double>::infinity();
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "krot/bridge/pixel_certificate.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A certificate of rows, and what its observations are called among those of
 // the whole problem, -1: none; empty: the same.
@@ -73,4 +73,4 @@ class RoundBounds {
   std::optional<PixelCertificate> proof_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -17,7 +17,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr int kMaxRounds = 30;
@@ -293,4 +293,4 @@ std::optional<PixelCertificate> SolveInRounds(
   return rounds.certificate();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Minimises the largest *true* error in rounds: takes every row where its point
 // projects, solves the linear problem (SolveRows), goes as far along the way to
@@ -33,4 +33,4 @@ std::optional<PixelCertificate> SolveInRounds(
     const Context& context, const Timer& timer, BuiltProblem* built,
     Estimate* estimate, SolveSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

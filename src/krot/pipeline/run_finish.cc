@@ -12,7 +12,7 @@
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the slack, a gap that still leaves room.
@@ -158,4 +158,4 @@ double SumOfLosses(const Reprojection& reprojection,
   return sum[0];
 }
 
-}  // namespace krot
+}  // namespace krot::internal

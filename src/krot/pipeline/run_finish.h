@@ -6,7 +6,7 @@
 #include "krot/bridge/reprojection.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // An estimate that is nearer to the cap, relative, leaves no room for a finish.
 inline constexpr double kLeastRoom = 1e-6;
@@ -35,4 +35,4 @@ double SumOfLosses(const Reprojection& reprojection,
                    const KnownRotationProblem& problem, const ErrorLoss& loss,
                    const Estimate& estimate, const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

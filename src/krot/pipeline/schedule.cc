@@ -7,7 +7,7 @@
 #include "krot/pipeline/start.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of the gap asked for, what the rows' own proof may leave: the rest is for the
@@ -183,4 +183,4 @@ std::optional<Certificate> SolveRows(
   return schedule.Joint(known);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

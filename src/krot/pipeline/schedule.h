@@ -7,7 +7,7 @@
 #include "krot/base/timer.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // One round: the stages of `method` on the linear rows of a problem, from an
 // estimate of positive depths. Adds to the sweeps and the iterations of the
@@ -25,4 +25,4 @@ std::optional<Certificate> SolveRows(
     const Context& context, const Timer& timer, Estimate* estimate,
     KnownMultipliers* known, SolveSummary* summary);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Steps tried: 1, then shorter ones by this factor, until they get worse.
@@ -72,4 +72,4 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
   return best;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

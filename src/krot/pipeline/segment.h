@@ -5,7 +5,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How far to go along the segment from `from` to `to`, the solution of the
 // linear rows taken at `from`, in true errors and in how positions are kept: on
@@ -24,4 +24,4 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
                               const Estimate& from, const Estimate& to,
                               Norm norm, int num_threads);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/pipeline/settling.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A sum of squared errors that is higher by up to so many variances of the
@@ -207,4 +207,4 @@ void MeasureMoves(const Model& before, const Model& after, LooseParts* loose) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/model.h"
 #include "krot/solve.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Images and points that do not hold their place (docs/method/positions.md,
 // "What is not determined").
@@ -47,4 +47,4 @@ LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
 // the same of both. O(images + points).
 void MeasureMoves(const Model& before, const Model& after, LooseParts* loose);
 
-}  // namespace krot
+}  // namespace krot::internal

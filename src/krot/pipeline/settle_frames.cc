@@ -3,7 +3,7 @@
 #include "krot/pipeline/settling.h"
 #include "krot/problem/gauge.h"
 
-namespace krot {
+namespace krot::internal {
 
 using Eigen::Vector3d;
 
@@ -132,4 +132,4 @@ void Settling::SettleFrames() {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/problem/components.h"
 #include "krot/problem/frame_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr double kNoLevel = std::numeric_limits<double>::infinity();
 
@@ -129,4 +129,4 @@ std::vector<Sum> Settling::SumsOf(const std::vector<int32_t>& frames,
   return sums;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -26,7 +26,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A joint solver's stall is an answer only with a bound so near, relative.
@@ -381,4 +381,4 @@ SolveModelResult SolveInFrame(const Model& model,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // p = 1, 2 and infinity.
 inline bool HasJointSolver(Norm norm) {
@@ -15,4 +15,4 @@ SolveModelResult SolveInFrame(const Model& model,
                               const SolveModelOptions& options,
                               const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 int64_t Size(size_t count, size_t bytes) {
@@ -104,4 +104,4 @@ int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
   return static_cast<int64_t>(kAllocated * static_cast<double>(held + most));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

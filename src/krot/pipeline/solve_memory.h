@@ -7,7 +7,7 @@
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The largest resident set, in bytes, of a process that holds `model` and runs
 // SolveModel on it with summary.method and summary.init, if the joint solver
@@ -17,4 +17,4 @@ int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
                             const SolveSummary& summary,
                             const Context& context = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/pipeline/inflate_positions.h"
 #include "krot/pipeline/solve_in_frame.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of a certificate's fixed positions, those that the model has.
@@ -85,4 +85,4 @@ SolveModelOptions PointsOnly(SolveModelOptions options) {
   return options;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

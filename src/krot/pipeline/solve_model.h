@@ -21,7 +21,7 @@
 #include "krot/solve.h"
 #include "krot/sweeps/res_int.h"
 
-namespace krot {
+namespace krot::internal {
 
 // From a COLMAP model to a COLMAP model with a smaller largest reprojection
 // error: what `krot solver` and `krot point_triangulator` do between reading
@@ -226,4 +226,4 @@ SolveModelOptions PointsOnly(SolveModelOptions options);
 // The method that SolveModel uses for these options.
 SolveMethod EffectiveMethod(const SolveModelOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

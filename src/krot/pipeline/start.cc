@@ -9,7 +9,7 @@
 #include "krot/joint/initializer.h"
 #include "krot/joint/step_values.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kStartFromNothing[] = "a start from nothing";
@@ -165,4 +165,4 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
   return start;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

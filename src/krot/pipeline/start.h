@@ -5,7 +5,7 @@
 #include "krot/bridge/bridge.h"
 #include "krot/pipeline/solve_model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where a solve starts.
 struct Start {
@@ -41,4 +41,4 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
                              const SolveModelOptions& options,
                              const Context& context, const JointCallback& log);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -81,4 +81,4 @@ KnownRotationProblem TrustRegions::AddTo(
   return problem;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Bounds on how far single observations' projections may move in one round:
 // those few, near the folds of strong lenses, whose linear rows promise what
@@ -39,4 +39,4 @@ class TrustRegions {
   std::map<int64_t, double> radii_;  // by observation
 };
 
-}  // namespace krot
+}  // namespace krot::internal

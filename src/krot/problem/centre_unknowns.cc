@@ -2,7 +2,7 @@
 
 #include "krot/problem/components.h"
 
-namespace krot {
+namespace krot::internal {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -100,4 +100,4 @@ BlockVector GradientOf(const KnownRotationProblem& problem,
   return gradient;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

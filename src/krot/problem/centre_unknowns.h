@@ -9,7 +9,7 @@
 #include "krot/linear/block_structure.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The known rotation problem as linear systems see it: their unknowns are the
 // points s_k and the frames' centres in the world, C_f = -R_rw' t_f. As
@@ -47,4 +47,4 @@ BlockVector GradientOf(
     const KnownRotationProblem& problem, const BlockStructure& structure,
     const std::function<Eigen::Vector3d(int64_t i)>& multiplier);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/base/disjoint_sets.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Unites frames that points of other ranks connect.
@@ -92,4 +92,4 @@ std::vector<std::vector<int64_t>> SplitIntoComponents(
   return split;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

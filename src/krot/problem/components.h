@@ -6,7 +6,7 @@
 #include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Connected components of the graph whose nodes are frames and points and whose
 // edges are observations. Each may be moved on its own without changing the
@@ -33,4 +33,4 @@ std::vector<std::vector<int64_t>> SplitIntoComponents(
 std::vector<std::vector<int64_t>> SplitIntoComponents(
     const KnownRotationProblem& problem, std::vector<int64_t> observations);
 
-}  // namespace krot
+}  // namespace krot::internal

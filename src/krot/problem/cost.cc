@@ -8,7 +8,7 @@
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -118,4 +118,4 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
              : *std::max_element(chunk_max.begin(), chunk_max.end());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/minimax/residual_kernel.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // x -> R x + o as the matrix [R o].
 using AffineMap = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
@@ -111,7 +111,7 @@ inline bool IsZeroUpToRounding(double cost) { return cost < 1e-9; }
 // In the layout of residual_kernel.h:
 //   {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
 
-namespace internal {
+namespace detail {
 
 inline void AffineRow(const Observation& observation, const AffineMap& map,
                       double row[kResidualRow]) {
@@ -126,13 +126,13 @@ inline void AffineRow(const Observation& observation, const AffineMap& map,
   }
 }
 
-}  // namespace internal
+}  // namespace detail
 
 // Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr.
 inline void IntersectionRow(const AffineMap& cam_from_world,
                             const Observation& observation,
                             double row[kResidualRow]) {
-  internal::AffineRow(observation, cam_from_world, row);
+  detail::AffineRow(observation, cam_from_world, row);
 }
 
 // Res_j: the unknown is the frame's translation t_f, its point at `point`;
@@ -144,7 +144,7 @@ inline void ResectionRow(const View& view, const Observation& observation,
   map.leftCols<3>() = view.cam_from_rig_rotation;
   map.col(3) =
       view.cam_from_world_rotation * point + view.cam_from_rig_translation;
-  internal::AffineRow(observation, map, row);
+  detail::AffineRow(observation, map, row);
 }
 
 // Whether R_sr = I, as of a frame's reference sensor.
@@ -170,4 +170,4 @@ inline void ReferenceResectionRow(const View& view,
   write(0, row + 8);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

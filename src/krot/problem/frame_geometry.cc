@@ -4,7 +4,7 @@
 
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The views that have observations: in this order, a frame's first one is that
@@ -52,4 +52,4 @@ std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
   return frames;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

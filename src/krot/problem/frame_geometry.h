@@ -7,7 +7,7 @@
 #include "krot/base/context.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Centres closer than this, relative to the size of their coordinates and of
 // the component, coincide: rounding is a thousand times smaller.
@@ -26,4 +26,4 @@ struct FrameGeometry {
 std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
                                           const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

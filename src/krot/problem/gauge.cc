@@ -13,7 +13,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/frame_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What a change of coordinates may add to the cost, relative.
@@ -302,4 +302,4 @@ void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate) {
   for (Vector3d& s : estimate->points) s /= median;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

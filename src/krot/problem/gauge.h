@@ -6,7 +6,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The freedom that the known rotation problem leaves: every connected
 // component may be translated and, unless a baseline fixes its size, scaled
@@ -58,4 +58,4 @@ void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
 // baselines (HasBaseline), whose scale is free. O(observations).
 void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

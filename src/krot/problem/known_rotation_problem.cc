@@ -8,7 +8,7 @@
 #include "krot/base/check.h"
 #include "krot/geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 void CheckIndex(int32_t index, int64_t count, const char* list, int64_t element,
@@ -194,4 +194,4 @@ void PutFixed(const KnownRotationProblem& problem, Estimate* estimate) {
   put(problem.fixed_points, &estimate->points);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // The known rotation problem in pixels [Zhang18, (KRot)], for frames with
 // any number of cameras:
@@ -111,4 +111,4 @@ Estimate AllAtOrigin(const KnownRotationProblem& problem);
 // Gives everything that is fixed exactly its fixed position.
 void PutFixed(const KnownRotationProblem& problem, Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

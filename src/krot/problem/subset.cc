@@ -6,7 +6,7 @@
 
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 bool IsAll(const std::vector<char>& is_kept) {
@@ -259,4 +259,4 @@ void GatheredPart::Scatter(const Estimate& part, Estimate* estimate) const {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/base/ranks.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Some of a problem's observations as a problem of its own, with only the
 // points, views and frames that take part in them, in the order of the whole.
@@ -101,4 +101,4 @@ class GatheredPart {
   std::vector<int64_t> in_whole_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

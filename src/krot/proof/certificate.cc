@@ -6,7 +6,7 @@
 #include "krot/proof/certificate_search.h"
 #include "krot/proof/support.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Smaller multipliers, by the largest, are left out at first: a smaller
@@ -97,4 +97,4 @@ Certificate InWhole(const ProblemSubset& part, Certificate certificate) {
   return certificate;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,9 +9,9 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 struct CertificateOptions {
   // The first certificate that proves as much will do, pixels.
@@ -47,4 +47,4 @@ std::optional<Certificate> MakeInfeasibilityCertificate(
 // A part's certificate as one of the whole.
 Certificate InWhole(const ProblemSubset& part, Certificate certificate);
 
-}  // namespace krot
+}  // namespace krot::internal

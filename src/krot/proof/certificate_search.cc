@@ -8,7 +8,7 @@
 #include "krot/proof/dual_repair.h"
 #include "krot/proof/support.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of SelectBalanced. A strict one drops observations that a proof may need, a
@@ -200,4 +200,4 @@ std::vector<int64_t> CertificateSearch::Offer(
   return {};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,9 +11,9 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Looks for certificates among given observations, connected, and keeps the
 // best that the check accepts:
@@ -87,4 +87,4 @@ class CertificateSearch {
 // Of the problem.
 int64_t NumUnknowns(const KnownRotationProblem& problem);
 
-}  // namespace krot
+}  // namespace krot::internal

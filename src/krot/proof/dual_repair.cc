@@ -7,9 +7,9 @@
 #include <Eigen/LU>
 
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/proof/force_balance.h"
+#include "krot/verify/force_balance.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Scalar>
@@ -314,4 +314,4 @@ RepairedMultipliers RepairMultipliers(
   return Repair(problem, norm, delta, multipliers, options).Run();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

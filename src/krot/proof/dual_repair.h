@@ -10,10 +10,10 @@
 #include "krot/conic/interior_point.h"
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 #include "krot/proof/least_norm.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The identities (1) and (2) of certificate_check.h as linear equations in the
 // multipliers y_i, lambda_i, for one delta. Internal to the making of
@@ -101,4 +101,4 @@ RepairedMultipliers RepairMultipliers(
     const std::vector<Multiplier>& multipliers,
     const RepairOptions& options = {});
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::MatrixXd;
@@ -253,4 +253,4 @@ VectorXd LeastNormSolver::SolveByPoints(const VectorXd& rhs) const {
   return solution;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

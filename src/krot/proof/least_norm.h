@@ -11,7 +11,7 @@
 
 #include "krot/linear/schur_complement.h"
 
-namespace krot {
+namespace krot::internal {
 
 // QR by Householder's reflections of matrices of blocks that share columns,
 //
@@ -143,4 +143,4 @@ class LeastNormSolver {
   double last_row_norm2_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -173,4 +173,4 @@ double SuggestedBound(const KnownRotationProblem& problem,
   return weighted_residual / weighted_depth;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How much observation i looks like one that sets the maximum gamma:
 //
@@ -55,4 +55,4 @@ double SuggestedBound(const KnownRotationProblem& problem,
                       const Estimate& estimate,
                       const std::vector<Multiplier>& multipliers);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Json AdjustmentIterationsJson(
@@ -225,4 +225,4 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

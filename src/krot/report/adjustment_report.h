@@ -5,7 +5,7 @@
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot bundle_adjuster` did.
 struct AdjustmentReport {
@@ -29,4 +29,4 @@ std::string NothingToAdjustSentence(const BundleAdjustmentSummary& summary);
 // As report.json has it: "converged", "max_iterations", ...
 std::string AdjustmentTerminationName(BundleAdjustmentTermination termination);
 
-}  // namespace krot
+}  // namespace krot::internal

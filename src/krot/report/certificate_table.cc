@@ -6,7 +6,7 @@
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string LinearisedSentence(const CertificateVerdict& verdict) {
@@ -106,4 +106,4 @@ std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

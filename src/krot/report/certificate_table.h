@@ -7,7 +7,7 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_file.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The first `max_positions` known positions of a support; empty without any.
 std::string PositionsTable(const std::vector<SupportPosition>& positions,
@@ -27,4 +27,4 @@ std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<ConflictVerdict>& conflicts,
                       const std::string& version);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 #include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 const char* VerdictName(ImageVerdict verdict) {
@@ -108,4 +108,4 @@ std::string CheckJson(const CheckReport& report) {
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string NoiseWords(const ModelCheck& check) {
@@ -293,4 +293,4 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
                      "checked " + FormatNumber(report.seconds_check, 2) + " s");
 }
 
-}  // namespace krot
+}  // namespace krot::internal

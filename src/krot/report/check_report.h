@@ -8,7 +8,7 @@
 #include "krot/model.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot model_checker` found.
 struct CheckReport {
@@ -40,4 +40,4 @@ std::string CheckTable(const CheckReport& report, int max_rows);
 // report.json; the keys are listed in docs/cli.md. What is not known is null.
 std::string CheckJson(const CheckReport& report);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include "krot/report/comparison_report.h"
 #include "krot/report/report_json.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Json CountJson(const ComparisonSummary& summary, int64_t ModelCounts::*count) {
@@ -119,4 +119,4 @@ std::string PoseErrorsCsv(const ComparisonSummary& summary) {
   return text.str();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/model/contradictions.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How two models differ: `krot model_comparer`.
 struct ComparisonReport {
@@ -34,4 +34,4 @@ std::string ComparisonJson(const ComparisonReport& report);
 // then its name.
 std::string PoseErrorsCsv(const ComparisonSummary& summary);
 
-}  // namespace krot
+}  // namespace krot::internal

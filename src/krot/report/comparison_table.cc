@@ -11,7 +11,7 @@
 #include "krot/report/error_rows.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string FormatAngle(double degrees) { return FormatNumber(degrees, 6); }
@@ -190,4 +190,4 @@ std::string ComparisonTable(const ComparisonReport& report, int max_rows) {
          CertificateText("Model 2", report.certificate2, max_rows);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace krot {
+namespace krot::internal {
 
 // In quotes, with those that it holds twice.
 inline std::string CsvText(const std::string& text) {
@@ -14,4 +14,4 @@ inline std::string CsvText(const std::string& text) {
   return quoted + "\"";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,6 +1,6 @@
 #include "krot/report/error_rows.h"
 
-namespace krot {
+namespace krot::internal {
 
 void AddErrorHead(const std::string& name, TextTable* table) {
   table->AddRow({name, "observations", "max", "P99", "mean", "RMS"});
@@ -39,4 +39,4 @@ std::string NotFiniteSentence(const PixelErrorStatistics& errors) {
          "projectable), in no row above.\n";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/model.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 
 // One set of observations per row: how many, and their errors.
 void AddErrorHead(const std::string& name, TextTable* table);
@@ -22,4 +22,4 @@ void AddErrorColumns(const std::vector<PixelErrorStatistics>& estimates,
 // there are none.
 std::string NotFiniteSentence(const PixelErrorStatistics& errors);
 
-}  // namespace krot
+}  // namespace krot::internal

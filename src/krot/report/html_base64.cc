@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr char kDigits[] =
@@ -28,4 +28,4 @@ std::string Base64(const unsigned char* bytes, size_t size) {
   return text;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

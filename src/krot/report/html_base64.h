@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // RFC 4648, with padding. O(size).
 std::string Base64(const unsigned char* bytes, size_t size);
@@ -16,4 +16,4 @@ std::string Base64(const std::vector<Number>& numbers) {
                 numbers.size() * sizeof(Number));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <functional>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 size_t HistogramBin(double error_px) {
@@ -49,4 +49,4 @@ std::vector<std::pair<int64_t, double>> ErrorTail(
   return tail;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // The distribution of a model's errors, small enough for a page at any number
 // of observations. Errors that are not finite do not count.
@@ -24,4 +24,4 @@ ErrorHistogram ComputeErrorHistogram(const std::vector<double>& errors_px);
 std::vector<std::pair<int64_t, double>> ErrorTail(
     std::vector<double> errors_px);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -15,7 +15,7 @@
 #include "krot/report/html_error_curves.h"
 #include "krot/report/report_json.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Of all points, in the order of Model::points3D; NaN if none is finite.
@@ -197,4 +197,4 @@ std::string ModelViewJson(const Model& model, const Eigen::Vector3d& origin,
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the report page draws of a model.
 
@@ -50,4 +50,4 @@ std::vector<int64_t> SelectPoints(const std::vector<float>& max_errors,
 // it; zero if there are none. O(points).
 Eigen::Vector3d SceneOrigin(const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

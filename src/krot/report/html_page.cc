@@ -8,7 +8,7 @@
 #include "krot/report/html_model_view.h"
 #include "krot/report/html_page_template.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // JSON holds '<' in strings only. Written as an escape there, no text in it
@@ -59,4 +59,4 @@ std::string HtmlPage(const std::string& report_json, const Model& before,
                                   ",\"after\":" + view(after) + "}")}});
 }
 
-}  // namespace krot
+}  // namespace krot::internal

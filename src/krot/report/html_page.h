@@ -4,7 +4,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The report of a command that made `after` from `before`, or that compared
 // the two, as one HTML page without references to anything outside of it.
@@ -24,4 +24,4 @@ std::string HtmlPage(const std::string& report_json, const Model& before,
                      const Model& after, int num_threads = -1,
                      const std::string& crops_json = "[]");
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,7 +1,7 @@
 #include "krot/report/model_report.h"
 #include "krot/report/report_json.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Json ColmapJson(const ColmapStatistics& colmap) {
@@ -111,4 +111,4 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/model/image_geometry.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 bool RepeatsAnImage(const Model& model, const Point3D& point) {
@@ -69,4 +69,4 @@ ModelReport AnalyzeModel(const Model& model, int num_worst, int num_threads) {
   return report;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/model/contradictions.h"
 #include "krot/model/pose_checks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What EstimateNoise says, in figures; of none where nothing can be told.
 struct NoiseFigures {
@@ -67,4 +67,4 @@ std::string ModelCsv(const ModelReport& report);
 // The same as JSON, with all images; the keys are listed in docs/cli.md.
 std::string ModelJson(const ModelReport& report, const std::string& version);
 
-}  // namespace krot
+}  // namespace krot::internal

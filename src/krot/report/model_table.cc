@@ -6,7 +6,7 @@
 #include "krot/report/model_report.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string ColmapFigures(const ColmapStatistics& colmap) {
@@ -212,4 +212,4 @@ std::string ModelCsv(const ModelReport& report) {
   return csv.str();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

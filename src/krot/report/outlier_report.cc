@@ -12,7 +12,7 @@
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr size_t kShownSuspects = 5;
@@ -390,4 +390,4 @@ std::string ConflictTable(const ConflictVerdict& verdict) {
          " in all, none in two\n";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

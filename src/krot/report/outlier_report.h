@@ -8,7 +8,7 @@
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot outlier_filter` did.
 struct OutlierReport {
@@ -47,4 +47,4 @@ std::string ConflictTable(const ConflictVerdict& verdict);
 // As --OutlierFilter.method takes it.
 std::string OutlierMethodName(OutlierMethod method);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 const char* PairStateName(PairState state) {
@@ -260,4 +260,4 @@ Json PairJson(const PairCheck& check) {
           {"pairs", pairs}};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/database.h"
 #include "krot/report/report_json.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the matches of a database say of a model's poses.
 
@@ -23,4 +23,4 @@ std::string PairTable(const PairCheck& check, int max_rows);
 // An object; docs/cli.md has its keys.
 Json PairJson(const PairCheck& check);
 
-}  // namespace krot
+}  // namespace krot::internal

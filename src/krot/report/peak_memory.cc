@@ -2,7 +2,7 @@
 
 #include <sys/resource.h>
 
-namespace krot {
+namespace krot::internal {
 
 int64_t PeakMemoryBytes() {
   rusage usage = {};
@@ -14,4 +14,4 @@ int64_t PeakMemoryBytes() {
 #endif
 }
 
-}  // namespace krot
+}  // namespace krot::internal

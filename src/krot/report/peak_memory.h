@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-namespace krot {
+namespace krot::internal {
 
 // The largest resident set of this process so far, in bytes.
 int64_t PeakMemoryBytes();
 
-}  // namespace krot
+}  // namespace krot::internal

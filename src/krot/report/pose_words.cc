@@ -2,7 +2,7 @@
 
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // "12.30 degrees in the median and 28.50 at most (img004.jpg)".
@@ -88,4 +88,4 @@ std::string RotationsSentence(const std::string& path,
   return line;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/analysis/rotation_input.h"
 #include "krot/model/pose_checks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a user should know of the poses that were read; empty if nothing is odd.
 std::vector<std::string> PoseSentences(const PoseChecks& poses);
@@ -16,4 +16,4 @@ std::vector<std::string> PoseSentences(const PoseChecks& poses);
 std::string RotationsSentence(const std::string& path,
                               const RotationInput& input);
 
-}  // namespace krot
+}  // namespace krot::internal

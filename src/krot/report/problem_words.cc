@@ -6,7 +6,7 @@
 
 #include "krot/context.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr size_t kNumNamed = 5;
@@ -194,4 +194,4 @@ std::string PointList(const std::vector<Point3DId>& points) {
          FirstFew(points, [](Point3DId id) { return std::to_string(id); });
 }
 
-}  // namespace krot
+}  // namespace krot::internal

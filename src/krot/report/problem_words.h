@@ -10,7 +10,7 @@
 #include "krot/pipeline/settle.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a model of poses alone lacks, and where it comes from.
 inline constexpr char kNoObservations[] =
@@ -65,4 +65,4 @@ std::string CountsWords(const Summary& summary) {
 // line for each kind, that ends in '\n'; empty where everything holds it.
 std::string LooseSentences(const LooseParts& loose, int64_t num_images);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 
 Json FiniteOrNull(double value) {
   return std::isfinite(value) ? Json(value) : Json();
@@ -114,4 +114,4 @@ std::string ReportText(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

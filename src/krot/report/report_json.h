@@ -13,7 +13,7 @@
 #include "krot/model/pose_checks.h"
 #include "krot/report/problem_words.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the JSON writers of this folder share; for its .cc files alone.
 using Json = nlohmann::ordered_json;
@@ -52,4 +52,4 @@ Json NotHeldJson(const LooseParts& loose);
 // is replaced.
 std::string ReportText(const Json& json);
 
-}  // namespace krot
+}  // namespace krot::internal

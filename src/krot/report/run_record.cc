@@ -5,7 +5,7 @@
 #include "krot/report/text_table.h"
 #include "krot/version.h"
 
-namespace krot {
+namespace krot::internal {
 
 void RecordEnd(const Timer& timer, int num_threads, RunRecord* run) {
   run->version = KROT_VERSION;
@@ -22,4 +22,4 @@ std::string RunSentence(const RunRecord& run, const std::string& middle) {
          FormatBytes(run.peak_memory_bytes) + " at most.\n";
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/model/contradictions.h"
 #include "krot/model/pose_checks.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What every run that solves for a model records beside its result.
 struct RunRecord {
@@ -32,4 +32,4 @@ void RecordEnd(const Timer& timer, int num_threads, RunRecord* run);
 // "Read 0.10 s, MIDDLE, wrote 0.20 s; 1.50 s in all on 2 threads, ...\n".
 std::string RunSentence(const RunRecord& run, const std::string& middle);
 
-}  // namespace krot
+}  // namespace krot::internal

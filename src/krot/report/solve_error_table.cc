@@ -6,7 +6,7 @@
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 std::string PolishSentence(const SolveSummary& summary) {
@@ -42,4 +42,4 @@ std::string SolveErrorTable(const SolveSummary& summary) {
   return table.ToString() + PolishSentence(summary);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/report/report_json.h"
 #include "krot/report/solve_report.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 const char* TerminationName(SolveTermination termination) {
@@ -260,4 +260,4 @@ std::string SolveJson(const SolveReport& report) {
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

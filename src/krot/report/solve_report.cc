@@ -6,7 +6,7 @@
 #include "krot/base/numbers.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 LeftOutCounts LeftOutByReason(const SolveSummary& summary) {
   LeftOutCounts counts;
   for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
@@ -110,4 +110,4 @@ std::string NormName(Norm norm) {
   return text;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

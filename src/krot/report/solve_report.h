@@ -8,7 +8,7 @@
 #include "krot/report/problem_words.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot solver` or `krot point_triangulator` did.
 struct SolveReport {
@@ -69,4 +69,4 @@ std::string MethodName(SolveMethod method);
 // As --Solver.norm takes it: "1", "2", "inf", "1.5".
 std::string NormName(Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // How many observations of the support the terminal shows.
@@ -294,4 +294,4 @@ std::string SolveTable(const SolveReport& report) {
   return text.str();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

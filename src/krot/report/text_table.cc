@@ -6,7 +6,7 @@
 #include <sstream>
 #include <utility>
 
-namespace krot {
+namespace krot::internal {
 
 void TextTable::AddRow(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));
@@ -82,4 +82,4 @@ std::string FormatBytes(int64_t bytes) {
   return FormatNumber(value, unit == 0 ? 0 : 1) + " " + kUnits[unit];
 }
 
-}  // namespace krot
+}  // namespace krot::internal

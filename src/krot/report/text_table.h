@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 // A table for a terminal: the first column is flush left, the others flush
 // right, two spaces between columns, one line per row.
@@ -38,4 +38,4 @@ std::string Thousands(int64_t count);
 // With the unit that leaves one to three digits before the point: "1.5 MB".
 std::string FormatBytes(int64_t bytes);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -11,7 +11,7 @@
 #include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr const char* kAxes[] = {"x", "y", "z"};
@@ -227,4 +227,4 @@ std::string ToleranceCsv(const ToleranceSummary& summary) {
   return csv.str();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/report/run_record.h"
 #include "krot/tolerance/tolerance_analysis.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot tolerance_analyzer` found.
 struct ToleranceReport {
@@ -27,4 +27,4 @@ std::string ToleranceJson(const ToleranceReport& report);
 // One line per coordinate behind a line of names (docs/formats.md).
 std::string ToleranceCsv(const ToleranceSummary& summary);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 double MeanTrackLength(const TrackReport& report) {
@@ -86,4 +86,4 @@ std::string TrackJson(const TrackReport& report) {
   return ReportText(json);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 #include "krot/outliers/match_tracks.h"
 #include "krot/report/run_record.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What one run of `krot point_triangulator --database_path` made.
 struct TrackReport {
@@ -29,4 +29,4 @@ std::string TrackTable(const TrackReport& report);
 // report.json; the keys are listed in docs/cli.md.
 std::string TrackJson(const TrackReport& report);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // "44 images (P1180141.JPG to P1180184.JPG) hang on the rest by 14 tracks, of
@@ -86,4 +86,4 @@ Json WeakPartsJson(const OutlierFilterSummary& summary) {
   return parts;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -296,4 +296,4 @@ double BlockSweep::ResectFrame(int64_t f, FastDescent* descent,
       .cost;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

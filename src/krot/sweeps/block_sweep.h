@@ -11,7 +11,7 @@
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The frames that this rank resects, of a problem whose points ranks share:
 // they are consecutive, and every rank has about as many of their observations.
@@ -113,4 +113,4 @@ class BlockSweep {
   std::unique_ptr<BlockSweep> frame_blocks_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // How far coarse sweeps take a block: see res_int.h. With a tolerance of 1e-2
@@ -158,4 +158,4 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   return summary;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/minimax/fast_descent.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Resection-Intersection [Zhang18, Alg. 1]: sweeps that minimise every
 // point's own maximum residual with the frames fixed, then every frame's with
@@ -65,4 +65,4 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
                           const ResIntOptions& options, const Context& context,
                           Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

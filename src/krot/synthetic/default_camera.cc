@@ -5,7 +5,7 @@
 #include "krot/base/check.h"
 #include "krot/camera/camera_model.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // What follows the principal point, by COLMAP's model id.
@@ -64,4 +64,4 @@ Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
   return camera;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A camera of the given COLMAP model with its principal point in the middle
 // of the image and a moderate distortion: fy = 1.01 fx where the model has
@@ -13,4 +13,4 @@ namespace krot {
 Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
                      double focal_length);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,7 +2,7 @@
 
 #include "krot/synthetic/rigid_motion.h"
 
-namespace krot {
+namespace krot::internal {
 
 std::vector<Pose> CamFromWorld(const SceneGeometry& geometry) {
   std::vector<Pose> cam_from_world;
@@ -17,4 +17,4 @@ std::vector<Pose> CamFromWorld(const SceneGeometry& geometry) {
   return cam_from_world;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

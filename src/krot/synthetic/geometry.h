@@ -6,7 +6,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where everything in a scene is: what a solver estimates, and what it keeps.
 struct SceneGeometry {
@@ -19,4 +19,4 @@ struct SceneGeometry {
 // f num_sensors + s.
 std::vector<Pose> CamFromWorld(const SceneGeometry& geometry);
 
-}  // namespace krot
+}  // namespace krot::internal

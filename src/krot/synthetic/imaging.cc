@@ -6,7 +6,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/camera/projection_row.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kMaxTangent = 5.67;  // of 80 degrees
@@ -97,4 +97,4 @@ std::optional<Eigen::Vector3d> Imaging::PointAt(int image,
   return x_world;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

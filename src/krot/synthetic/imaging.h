@@ -8,7 +8,7 @@
 #include "krot/geometry.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The nearest that a point may be to an image that sees it, in viewing
 // distances.
@@ -47,4 +47,4 @@ class Imaging {
   std::vector<RigidTransform> cam_from_world_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

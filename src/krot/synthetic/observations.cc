@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kTwinDistance = 2;  // pixels, per axis
@@ -100,4 +100,4 @@ std::vector<int64_t> WriteObservations(const Structure& structure,
   return ObservationWriter(options, random, model).Write(structure);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

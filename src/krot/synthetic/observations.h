@@ -8,7 +8,7 @@
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/structure.h"
 
-namespace krot {
+namespace krot::internal {
 
 // How far inside the image exact projections should lie, in pixels, so that
 // noise rarely has to be cut at the border.
@@ -22,4 +22,4 @@ std::vector<int64_t> WriteObservations(const Structure& structure,
                                        const SceneOptions& options,
                                        Random* random, Model* model);
 
-}  // namespace krot
+}  // namespace krot::internal

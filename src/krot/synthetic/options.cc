@@ -5,7 +5,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Value>
@@ -47,4 +47,4 @@ void Check(const SceneOptions& options) {
   CheckRange("rotation_noise_deg", options.rotation_noise_deg, 0.0, 2.0);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

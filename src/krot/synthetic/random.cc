@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace krot {
+namespace krot::internal {
 
 double Random::Uniform() {
   return static_cast<double>(engine_() >> 11) * 0x1p-53;
@@ -34,4 +34,4 @@ Eigen::Vector3d Random::GaussianVector() {
 
 bool Random::Chance(double probability) { return Uniform() < probability; }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // Random numbers that are the same on every platform: the engine's bits are
 // fixed by the C++ standard, and the distributions (which the standard leaves
@@ -31,4 +31,4 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

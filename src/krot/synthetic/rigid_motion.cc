@@ -1,6 +1,6 @@
 #include "krot/synthetic/rigid_motion.h"
 
-namespace krot {
+namespace krot::internal {
 
 Pose UnitPose(const RigidTransform& transform) {
   return {ToWxyz(Eigen::Quaterniond(transform.rotation).normalized()),
@@ -12,4 +12,4 @@ Pose PoseFromCenter(const Eigen::Matrix3d& rotation,
   return UnitPose({rotation, -(rotation * center)});
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/geometry.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Poses of the scene, their quaternions of unit norm.
 
@@ -15,4 +15,4 @@ Pose UnitPose(const RigidTransform& transform);
 Pose PoseFromCenter(const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& center);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/synthetic/structure.h"
 #include "krot/synthetic/trajectory.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 Camera SceneCamera(const SceneOptions& options) {
@@ -124,4 +124,4 @@ SyntheticScene SynthesizeScene(const SceneOptions& options) {
   return scene;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Synthetic COLMAP models with ground truth, for tests, benchmarks and demos.
 
@@ -85,4 +85,4 @@ void Check(const SceneOptions& options);
 // microsecond each.
 SyntheticScene SynthesizeScene(const SceneOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace krot {
+namespace krot::internal {
 
 Database DatabaseOf(const Model& model) {
   Database database;
@@ -39,4 +39,4 @@ Database DatabaseOf(const Model& model) {
   return database;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

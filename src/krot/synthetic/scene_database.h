@@ -3,7 +3,7 @@
 #include "krot/database.h"
 #include "krot/model.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The database that a model was made from, if all of its tracks are matches:
 // the 2D points are its keypoints, of scale 1, and two images have a match for
@@ -11,4 +11,4 @@ namespace krot {
 // squared track lengths).
 Database DatabaseOf(const Model& model);
 
-}  // namespace krot
+}  // namespace krot::internal

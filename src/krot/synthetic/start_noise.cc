@@ -8,7 +8,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/synthetic/rigid_motion.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 constexpr double kMaxShareOfDepth = 0.45;
@@ -92,4 +92,4 @@ SceneGeometry PerturbStart(const SceneGeometry& truth,
   return start;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/structure.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A copy of `truth` with the rotations, frame centres and points that
 // `options` perturb. All depths stay positive: with d the smallest depth in
@@ -16,4 +16,4 @@ SceneGeometry PerturbStart(const SceneGeometry& truth,
                            const Structure& structure,
                            const SceneOptions& options, Random* random);
 
-}  // namespace krot
+}  // namespace krot::internal

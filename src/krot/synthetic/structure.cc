@@ -7,7 +7,7 @@
 
 #include "krot/base/check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 class StructureSampler {
@@ -126,4 +126,4 @@ Structure SampleStructure(const SceneOptions& options,
   return structure;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,7 +10,7 @@
 #include "krot/synthetic/scene.h"
 #include "krot/synthetic/trajectory.h"
 
-namespace krot {
+namespace krot::internal {
 
 // One point in one image.
 struct Sighting {
@@ -35,4 +35,4 @@ Structure SampleStructure(const SceneOptions& options,
                           const Trajectory& trajectory, const Imaging& imaging,
                           Random* random);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/base/numbers.h"
 #include "krot/synthetic/rigid_motion.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The rotation of a camera that looks along `forward`; world y points down.
@@ -118,4 +118,4 @@ std::vector<Pose> MakeRigSensors(const SceneOptions& options) {
   return sensor_from_rig;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/synthetic/random.h"
 #include "krot/synthetic/scene.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where the frames of a scene stand, and how far they look.
 struct Trajectory {
@@ -28,4 +28,4 @@ Trajectory MakeTrajectory(const SceneOptions& options, Random* random);
 // the left.
 std::vector<Pose> MakeRigSensors(const SceneOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

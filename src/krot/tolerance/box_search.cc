@@ -7,7 +7,7 @@
 #include "krot/joint/working_set.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // The working set begins with so many ties of every frame
@@ -192,4 +192,4 @@ PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
   return box;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/tolerance/tolerance_problem.h"
 #include "krot/tolerances.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Finds the box by working sets: an end that is proved with some observations
 // holds for all, and it is reached if the other points fit in, too
@@ -19,4 +19,4 @@ namespace krot {
 PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
                     double tolerance, const Context& context);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/conic/interior_point.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // If p'x grows by more than so many times the size of the scene, there is no
@@ -113,4 +113,4 @@ BlockVector CoefficientsOf(const KnownRotationProblem& problem,
   return coefficients;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

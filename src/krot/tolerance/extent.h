@@ -7,10 +7,10 @@
 #include "krot/linear/block_structure.h"
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/proof/extent_check.h"
-#include "krot/proof/pull.h"
+#include "krot/verify/extent_check.h"
+#include "krot/verify/pull.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A row that keeps the scale where nothing else does: direction'x of the view's
 // centre stays what it is at the start.
@@ -42,4 +42,4 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
 BlockVector CoefficientsOf(const KnownRotationProblem& problem,
                            const Pull& pull);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/problem/components.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // A model whose largest error is at most this share of the bound is not solved
@@ -259,4 +259,4 @@ ToleranceResult AnalyzeTolerances(const Model& model,
   return result;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -13,7 +13,7 @@
 #include "krot/tolerance/box_search.h"
 #include "krot/tolerances.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the data allow: all positions that a camera or a point may have in an
 // estimate whose errors are within a bound, with rotations and intrinsics as
@@ -85,4 +85,4 @@ ToleranceResult AnalyzeTolerances(const Model& model,
                                   const ToleranceOptions& options,
                                   const Context& context = {});
 
-}  // namespace krot
+}  // namespace krot::internal

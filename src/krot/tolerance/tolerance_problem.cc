@@ -11,7 +11,7 @@
 #include "krot/problem/cost.h"
 #include "krot/sweeps/block_sweep.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -157,4 +157,4 @@ std::optional<ProblemSubset> ToleranceProblem::UsablePart(
   return std::optional<ProblemSubset>(std::move(part));
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -12,7 +12,7 @@
 #include "krot/problem/subset.h"
 #include "krot/tolerance/extent.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Marks the points whose residuals are all below `bound`, pixels, if the point
 // is infinitely far away in some direction. Wherever the frames are, such a
@@ -81,4 +81,4 @@ class ToleranceProblem {
 std::vector<int64_t> HeldObservations(const KnownRotationProblem& problem,
                                       std::vector<int64_t> observations);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -109,4 +109,4 @@ Estimate PositionByBearings(const KnownRotationProblem& problem,
   return estimate;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Positions from rotations and tracks by robust least squares from random
 // positions, as GLOMAP's global positioning [Pan, Barath, Pollefeys,
@@ -25,4 +25,4 @@ struct BearingPositionsOptions {
 Estimate PositionByBearings(const KnownRotationProblem& problem,
                             const BearingPositionsOptions& options);
 
-}  // namespace krot
+}  // namespace krot::internal

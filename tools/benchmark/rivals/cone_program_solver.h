@@ -10,7 +10,7 @@
 #include "krot/base/context.h"
 #include "krot/conic/cones.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What the rivals of [Zhang18] that need convex optimisation call in every
 // step, in the place of the packages that their authors used:
@@ -212,4 +212,4 @@ class ConeProgramSolver {
   std::vector<NtScaling<Cone>> scalings_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

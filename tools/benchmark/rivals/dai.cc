@@ -5,7 +5,7 @@
 
 #include <Eigen/Dense>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -132,4 +132,4 @@ class Dai : public SubproblemSolver {
 
 std::unique_ptr<SubproblemSolver> MakeDai() { return std::make_unique<Dai>(); }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The Newton-like descent of Dai et al. [2012; 6 of Zhang18]: instead of
 // solving F(gamma) of parametric_program.h for one gamma after another, one
@@ -18,4 +18,4 @@ namespace krot {
 // The Hessian of every ||v_i|| is computed in every step. p = 2.
 std::unique_ptr<SubproblemSolver> MakeDai();
 
-}  // namespace krot
+}  // namespace krot::internal

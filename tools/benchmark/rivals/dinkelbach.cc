@@ -3,7 +3,7 @@
 #include "tools/benchmark/rivals/cone_program_solver.h"
 #include "tools/benchmark/rivals/parametric_program.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 template <typename Cone>
@@ -42,4 +42,4 @@ std::unique_ptr<SubproblemSolver> MakeDinkelbach(Norm norm) {
   return std::make_unique<Dinkelbach<FourHalfLines>>();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Dinkelbach's method [Dinkelbach 1967; Olsson, Eriksson, Kahl 2007; 7 and 28
 // of Zhang18]: F(gamma) of parametric_program.h is solved to its end, and
@@ -12,4 +12,4 @@ namespace krot {
 // infinity.
 std::unique_ptr<SubproblemSolver> MakeDinkelbach(Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

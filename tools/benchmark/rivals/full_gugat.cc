@@ -6,7 +6,7 @@
 #include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/rivals/joint_program.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Where the interval is narrower, or a step gains less, relative: the gap that
@@ -72,4 +72,4 @@ std::unique_ptr<KnownRotationSolver> MakeFullGugat() {
   return std::make_unique<FullGugat>();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -5,7 +5,7 @@
 #include "tools/benchmark/rivals/projection_error.h"
 #include "tools/benchmark/rivals/proximal_operator.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -82,4 +82,4 @@ std::unique_ptr<KnownRotationSolver> MakeFullProximalSplitting(
   return std::make_unique<FullProximalSplitting>(num_threads);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

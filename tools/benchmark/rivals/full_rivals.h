@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/known_rotation_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Least squares over all translations and points, rotations fixed, by Ceres at
 // its default tolerances: what bundle adjustment does with what is free here.
@@ -18,4 +18,4 @@ std::unique_ptr<KnownRotationSolver> MakeFullProximalSplitting(int num_threads);
 // programme per step. One thread.
 std::unique_ptr<KnownRotationSolver> MakeFullGugat();
 
-}  // namespace krot
+}  // namespace krot::internal

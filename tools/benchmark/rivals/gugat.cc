@@ -6,7 +6,7 @@
 #include "tools/benchmark/rivals/cone_program_solver.h"
 #include "tools/benchmark/rivals/parametric_program.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // Where rounding keeps a step from telling whether gamma can be reached, it
@@ -70,4 +70,4 @@ std::unique_ptr<SubproblemSolver> MakeGugat(Norm norm) {
   return std::make_unique<Gugat<FourHalfLines>>();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The method that [Agarwal et al. 2008] found to be the fastest [Gugat 1996; 15
 // of Zhang18]: Newton's method for the zero of F (parametric_program.h,
@@ -17,4 +17,4 @@ namespace krot {
 // replaced by its upper end. p = 2 or infinity.
 std::unique_ptr<SubproblemSolver> MakeGugat(Norm norm);
 
-}  // namespace krot
+}  // namespace krot::internal

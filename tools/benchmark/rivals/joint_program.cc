@@ -5,7 +5,7 @@
 
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -178,4 +178,4 @@ bool JointProgram::Factorize() {
   return factor_.info() == Eigen::Success;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include "krot/conic/cones.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // parametric_program.h for the whole problem, p = 2, with omega_i the depths at
 // the start: y holds all points, all translations but the first, which stays,
@@ -68,4 +68,4 @@ class JointProgram {
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower> factor_;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,7 +1,7 @@
 #include "tools/benchmark/rivals/full_rivals.h"
 #include "tools/benchmark/rivals/projection_error.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 class CancelCallback : public ceres::IterationCallback {
@@ -49,4 +49,4 @@ std::unique_ptr<KnownRotationSolver> MakeLeastSquares(int num_threads) {
   return std::make_unique<LeastSquares>(num_threads);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

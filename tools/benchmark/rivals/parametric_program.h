@@ -7,7 +7,7 @@
 #include "krot/conic/cones.h"
 #include "tools/benchmark/subproblem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The convex programme that the methods of generalised fractional programming
 // solve for one value gamma of the cost:
@@ -142,4 +142,4 @@ inline void ParametricProgram<FourHalfLines>::SetBound(
   h->setConstant(kMaxDepthGrowth - growth[3]);
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 
 #include "krot/math/simplex_qp.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -151,4 +151,4 @@ std::unique_ptr<SubproblemSolver> MakePolyhedronCollapse() {
   return std::make_unique<PolyhedronCollapse>();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Polyhedron collapse [Donne et al. 2015; 8 of Zhang18], p = infinity: the
 // points that cost less than gamma form a polyhedron, whose faces are the
@@ -15,4 +15,4 @@ namespace krot {
 // quadratic equation.
 std::unique_ptr<SubproblemSolver> MakePolyhedronCollapse();
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -92,4 +92,4 @@ ceres::Solver::Options LeastSquaresOptions(const KnownRotationProblem& problem,
   return options;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

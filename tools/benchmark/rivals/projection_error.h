@@ -6,7 +6,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A Ceres problem of the residual vectors r_i = v_i / w_i in pixels, or of
 // r_i - targets[i], over all translations and points, the first translation
@@ -21,4 +21,4 @@ void BuildLeastSquares(const KnownRotationProblem& problem,
 ceres::Solver::Options LeastSquaresOptions(const KnownRotationProblem& problem,
                                            int num_threads, Estimate* estimate);
 
-}  // namespace krot
+}  // namespace krot::internal

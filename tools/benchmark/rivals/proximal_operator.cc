@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace krot {
+namespace krot::internal {
 
 void ApplyMaxNormProx(double rho, std::vector<Eigen::Vector2d>* a) {
   double high = 0;
@@ -27,4 +27,4 @@ void ApplyMaxNormProx(double rho, std::vector<Eigen::Vector2d>* a) {
   }
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace krot {
+namespace krot::internal {
 
 // The proximal operator of the largest norm, in place:
 //
@@ -15,4 +15,4 @@ namespace krot {
 // 2014]; all are zero where that sum is smaller at t = 0. rho > 0.
 void ApplyMaxNormProx(double rho, std::vector<Eigen::Vector2d>* a);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,7 +7,7 @@
 
 #include "tools/benchmark/rivals/proximal_operator.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector2d;
@@ -114,4 +114,4 @@ std::unique_ptr<SubproblemSolver> MakeProximalSplitting() {
   return std::make_unique<ProximalSplitting>();
 }
 
-}  // namespace krot
+}  // namespace krot::internal

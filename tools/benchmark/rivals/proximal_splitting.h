@@ -4,7 +4,7 @@
 
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Proximal splitting [Eriksson, Isaksson 2014; 11 of Zhang18]: copies z_i of
 // the residual vectors and multipliers u_i of their equality,
@@ -17,4 +17,4 @@ namespace krot {
 // damping, by Ceres' TinySolver. p = 2.
 std::unique_ptr<SubproblemSolver> MakeProximalSplitting();
 
-}  // namespace krot
+}  // namespace krot::internal

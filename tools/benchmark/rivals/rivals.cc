@@ -8,7 +8,7 @@
 #include "tools/benchmark/rivals/proximal_splitting.h"
 #include "tools/benchmark/subproblem_solver.h"
 
-namespace krot {
+namespace krot::internal {
 
 std::vector<std::unique_ptr<SubproblemSolver>> RivalSolvers(Norm norm) {
   std::vector<std::unique_ptr<SubproblemSolver>> solvers;
@@ -33,4 +33,4 @@ std::vector<std::unique_ptr<KnownRotationSolver>> RivalFullSolvers(
   return solvers;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -72,20 +72,20 @@ krot::SolveInit ToKrotInit(const KnownRotationInit init) {
                                              : krot::SolveInit::kModel;
 }
 
-krot::Finish ToKrotFinish(const KnownRotationFinish finish) {
+krot::internal::Finish ToKrotFinish(const KnownRotationFinish finish) {
   switch (finish) {
     case KnownRotationFinish::SWEEPS:
-      return krot::Finish::kSweeps;
+      return krot::internal::Finish::kSweeps;
     case KnownRotationFinish::NONE:
-      return krot::Finish::kNone;
+      return krot::internal::Finish::kNone;
     case KnownRotationFinish::LEAST_SQUARES:
       break;
   }
-  return krot::Finish::kLeastSquares;
+  return krot::internal::Finish::kLeastSquares;
 }
 
 // A solve without a new model.
-bool HasResult(const krot::SolveSummary& summary) {
+bool HasResult(const krot::internal::SolveSummary& summary) {
   switch (summary.termination) {
     case krot::SolveTermination::kNothingToSolve:
       LOG(ERROR) << "No observation can be used: tracks of two and more images "
@@ -184,26 +184,26 @@ bool ModelCheckerOptions::Check() const {
 bool SolveKnownRotation(const KnownRotationOptions& options,
                         Reconstruction& reconstruction) {
   if (!options.Check()) return false;
-  krot::TolerantSolveOptions solve_options;
+  krot::internal::TolerantSolveOptions solve_options;
   solve_options.solve.init = ToKrotInit(options.init);
   solve_options.solve.joint.relative_gap = options.relative_gap;
   solve_options.solve.finish.finish = ToKrotFinish(options.finish);
   if (options.max_error > 0) solve_options.max_error = options.max_error;
-  krot::TolerantSolveResult result;
+  krot::internal::TolerantSolveResult result;
   if (!RunStoppable(options.num_threads, options.check_if_stopped,
                     [&](const krot::Context& context) {
-                      result = krot::SolveTolerantly(
+                      result = krot::internal::SolveTolerantly(
                           ToKrotModel(reconstruction), solve_options, context);
                     }) ||
       !HasResult(result.summary)) {
     return false;
   }
   if (result.outliers) {
-    LOG(INFO) << "Observations: " << krot::BracketSentence(*result.outliers);
+    LOG(INFO) << "Observations: " << krot::internal::BracketSentence(*result.outliers);
   }
   LogErrors(result.summary.pixel_error_before,
             result.summary.pixel_error_after);
-  LOG(INFO) << krot::VerdictSentence(result.summary);
+  LOG(INFO) << krot::internal::VerdictSentence(result.summary);
   UpdateFromKrotModel(result.model, reconstruction);
   return true;
 }
@@ -211,26 +211,26 @@ bool SolveKnownRotation(const KnownRotationOptions& options,
 bool FilterOutliers(const OutlierFilterOptions& options,
                     Reconstruction& reconstruction) {
   if (!options.Check()) return false;
-  krot::OutlierFilterOptions filter_options;
+  krot::internal::OutlierFilterOptions filter_options;
   filter_options.max_error = options.max_error;
   filter_options.find_conflicts = options.prove;
-  krot::OutlierFilterResult result;
+  krot::internal::OutlierFilterResult result;
   if (!RunStoppable(options.num_threads, options.check_if_stopped,
                     [&](const krot::Context& context) {
-                      result = krot::FilterOutliers(ToKrotModel(reconstruction),
+                      result = krot::internal::FilterOutliers(ToKrotModel(reconstruction),
                                                     filter_options, context);
                     })) {
     return false;
   }
   if (!options.conflicts_path.empty() && result.summary.conflicts) {
     std::ofstream file(options.conflicts_path, std::ios::binary);
-    file << krot::ConflictJson(*result.summary.conflicts) << std::flush;
+    file << krot::internal::ConflictJson(*result.summary.conflicts) << std::flush;
     if (!file) {
       LOG(ERROR) << "Could not write " << options.conflicts_path;
       return false;
     }
   }
-  LOG(INFO) << "Observations: " << krot::BracketSentence(result.summary);
+  LOG(INFO) << "Observations: " << krot::internal::BracketSentence(result.summary);
   LogErrors(result.summary.pixel_error_before,
             result.summary.pixel_error_after);
   UpdateFromKrotModel(result.model, reconstruction);
@@ -241,7 +241,7 @@ ModelCheckerSummary CheckReconstruction(const ModelCheckerOptions& options,
                                         Reconstruction& reconstruction) {
   ModelCheckerSummary summary;
   if (!options.Check()) return summary;
-  krot::CheckReport report;
+  krot::internal::CheckReport report;
   krot::Model model;
   krot::Model cured;
   if (!RunStoppable(options.num_threads, nullptr,
@@ -258,7 +258,7 @@ ModelCheckerSummary CheckReconstruction(const ModelCheckerOptions& options,
   }
   report.num_observations = static_cast<int64_t>(model.track_elements.size());
   const krot::ModelCheck& check = report.check;
-  LOG(INFO) << krot::CheckSentence(report);
+  LOG(INFO) << krot::internal::CheckSentence(report);
   if (!check.sigma_px) return summary;
   LogImages(check, krot::ImageVerdict::kWrong, "Wrong", options.num_worst);
   LogImages(check, krot::ImageVerdict::kWeaklyHeld, "Weakly determined",
@@ -284,17 +284,17 @@ ModelCheckerSummary CheckReconstruction(const ModelCheckerOptions& options,
 bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
                                  Reconstruction& reconstruction) {
   if (!CanBePositioned(options, reconstruction)) return false;
-  krot::OutlierFilterOptions filter_options;
+  krot::internal::OutlierFilterOptions filter_options;
   filter_options.solve.init = krot::SolveInit::kFeasible;
   filter_options.find_conflicts = false;
   if (options.krot_max_error > 0) {
     filter_options.max_error = options.krot_max_error;
   }
-  krot::OutlierFilterResult result;
+  krot::internal::OutlierFilterResult result;
   if (!RunStoppable(
           options.solver_options.num_threads, options.check_if_stopped,
           [&](const krot::Context& context) {
-            result = krot::FilterOutliers(
+            result = krot::internal::FilterOutliers(
                 ToKrotModel(reconstruction, options.min_num_view_per_track),
                 filter_options, context);
           })) {
@@ -305,7 +305,7 @@ bool RunKnownRotationPositioning(const GlobalPositionerOptions& options,
                   "tracks";
     return false;
   }
-  LOG(INFO) << "Observations: " << krot::BracketSentence(result.summary)
+  LOG(INFO) << "Observations: " << krot::internal::BracketSentence(result.summary)
             << "; largest reprojection error of the others: "
             << result.summary.pixel_error_after.max << "px";
   UpdateFromKrotModel(result.model, reconstruction);

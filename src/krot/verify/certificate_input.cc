@@ -1,4 +1,4 @@
-#include "krot/proof/certificate_input.h"
+#include "krot/verify/certificate_input.h"
 
 #include <cmath>
 #include <sstream>
@@ -6,7 +6,7 @@
 
 #include <Eigen/LU>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = long double;
@@ -82,4 +82,4 @@ std::optional<std::string> RefuseRotations(
   return std::nullopt;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/proof/extent_check.h"
+#include "krot/verify/extent_check.h"
 
 #include <cmath>
 #include <limits>
@@ -7,9 +7,9 @@
 #include "krot/problem/components.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
-#include "krot/proof/certificate_input.h"
+#include "krot/verify/certificate_input.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ForceChecker::Real;
@@ -101,4 +101,4 @@ double BalancingPull(const KnownRotationProblem& problem,
   return static_cast<double>(n.dot(sum) / n.squaredNorm());
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/proof/force_balance.h"
+#include "krot/verify/force_balance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +10,9 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ObservationForce::Real;
@@ -211,4 +211,4 @@ FixedConstants::Part FixedConstants::OfPoint(const View& view,
           SizeOf(x) + origin_size_};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/proof/force_balance.h"
-#include "krot/proof/force_checker.h"
+#include "krot/verify/force_balance.h"
+#include "krot/verify/force_checker.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -161,4 +161,4 @@ TEST(FixedConstants, CountsFromTheFirstFixedPointWhereNoFrameIsFixed) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/proof/extent_check.h"
+#include "krot/verify/extent_check.h"
 
 #include <cmath>
 #include <functional>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -307,4 +307,4 @@ TEST(CheckExtent, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

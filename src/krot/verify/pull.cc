@@ -1,9 +1,9 @@
-#include "krot/proof/pull.h"
+#include "krot/verify/pull.h"
 
 #include "krot/geometry.h"
 #include "krot/problem/cost.h"
 
-namespace krot {
+namespace krot::internal {
 
 using Eigen::Vector3d;
 
@@ -34,4 +34,4 @@ std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull) {
   return Pull{pull.kind, *index, pull.direction};
 }
 
-}  // namespace krot
+}  // namespace krot::internal

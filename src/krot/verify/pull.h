@@ -9,7 +9,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What pulls from outside at the centre of a view or at a point, world
 // coordinates. Forces (force_balance.h) balance with it that add up to the pull
@@ -33,4 +33,4 @@ bool IsFixedPosition(const KnownRotationProblem& problem, const Pull& pull);
 // The same pull in a part of the problem; none if that does not hold it.
 std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull);
 
-}  // namespace krot
+}  // namespace krot::internal

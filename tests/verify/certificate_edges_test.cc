@@ -6,12 +6,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/proof/certificate_check.h"
-#include "tests/proof/point_seen_twice.h"
+#include "krot/verify/certificate_check.h"
+#include "tests/verify/point_seen_twice.h"
 
 // What is accepted just so, and what is refused as the next number.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Matrix3d;
@@ -234,4 +234,4 @@ TEST(CheckCertificate, RefusesConstantsAboveZeroHoweverSmallTheMultipliers) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr double kFocal = 1000;  // pixels
 
@@ -31,4 +31,4 @@ inline Twice MakeTwice(double separation) {
   return twice;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

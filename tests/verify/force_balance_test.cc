@@ -1,4 +1,4 @@
-#include "krot/proof/force_balance.h"
+#include "krot/verify/force_balance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 #include "tests/joint/small_scenes.h"
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = long double;
@@ -168,4 +168,4 @@ TEST(BoundCorrections, SendsForcesAlongTheStrongestWays) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -9,7 +9,7 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // An observation of the support: those with lambda > 0 alone set the maximum.
 struct CertifiedObservation {
@@ -75,4 +75,4 @@ CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
 // product of two such, are this near to the truth.
 inline constexpr double kRotationError = 2e-15;
 
-}  // namespace krot
+}  // namespace krot::internal

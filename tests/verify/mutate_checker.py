@@ -2,9 +2,9 @@
 
 Usage: mutate_checker.py BUILD [--count N] [--skip N] [--seed S] [--jobs N]
                          [--only FILE[:LINE]]...
-BUILD is a build folder with proof_test (Ninja). Each mutant is one operator,
+BUILD is a build folder with verify_test (Ninja). Each mutant is one operator,
 bound or constant of the checker's sources that becomes another; it is compiled,
-linked into proof_test and run. Prints the mutants that no test notices, with
+linked into verify_test and run. Prints the mutants that no test notices, with
 their line, and a summary for docs/history/reliability.md. Those that change
 nothing, or nothing that can be told, stand in equivalent_mutants.txt with the
 reason. The exit code is 0 if no other went unnoticed, and all of that list are mutants.
@@ -21,7 +21,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PROOF = ROOT / "src" / "krot" / "proof"
+VERIFY = ROOT / "src" / "krot" / "verify"
 # What judges, as opposed to what makes certificates.
 CHECKER = ("certificate_check.cc", "certificate_input.cc", "extent_check.cc",
            "force_balance.cc", "force_checker.cc", "pull.cc")
@@ -47,7 +47,7 @@ SKIPPED = re.compile(r"^\s*(//|#|static_assert|using|namespace)")
 def mutants():
     """Every place and change: file, line number, the line as it becomes."""
     for name in CHECKER:
-        for number, line in enumerate((PROOF / name).read_text().splitlines()):
+        for number, line in enumerate((VERIFY / name).read_text().splitlines()):
             code = line.split("//")[0]
             if SKIPPED.match(line) or '"' in code:
                 continue
@@ -60,7 +60,7 @@ def mutants():
 
 def original(mutant):
     name, line, _ = mutant
-    return (PROOF / name).read_text().splitlines()[line].split("//")[0]
+    return (VERIFY / name).read_text().splitlines()[line].split("//")[0]
 
 
 def key(mutant):
@@ -88,17 +88,17 @@ def is_chosen(mutant, places):
 
 
 class Bench:
-    """Compiles and links proof_test with other checkers."""
+    """Compiles and links verify_test with other checkers."""
 
     def __init__(self, build, scratch):
         self.build = build
         self.scratch = scratch
         commands = subprocess.run(
-            ["ninja", "-C", build, "-t", "commands", "tests/proof_test"],
+            ["ninja", "-C", build, "-t", "commands", "tests/verify_test"],
             check=True, capture_output=True, text=True).stdout.splitlines()
         link = commands[-1].removeprefix(": && ").removesuffix(" && :")
         self.link = shlex.split(link)
-        compile_line = next(line for line in commands if "krot_proof.dir" in
+        compile_line = next(line for line in commands if "krot_verify.dir" in
                             line and " -c " in line)
         words = shlex.split(compile_line)
         self.flags = [word for i, word in enumerate(words)
@@ -113,7 +113,7 @@ class Bench:
         self.compile(self.header, scratch / "all.h.gch",
                      ["-x", "c++-header"], [])
         self.objects = {}
-        for source in sorted(PROOF.glob("*.cc")):
+        for source in sorted(VERIFY.glob("*.cc")):
             target = scratch / (source.name + ".o")
             self.compile(source, target)
             self.objects[source.name] = target
@@ -125,9 +125,9 @@ class Bench:
                        capture_output=True)
 
     def is_noticed(self, mutant, number):
-        """Whether proof_test fails; None if it does not compile."""
+        """Whether verify_test fails; None if it does not compile."""
         name, line, text = mutant
-        lines = (PROOF / name).read_text().splitlines()
+        lines = (VERIFY / name).read_text().splitlines()
         lines[line] = text
         source = self.scratch / f"{number}.cc"
         source.write_text("\n".join(lines) + "\n")
@@ -141,7 +141,7 @@ class Bench:
                    if key != name] + [str(target)]
         words = []
         for word in self.link:
-            words += objects if "libkrot_proof.a" in word else [word]
+            words += objects if "libkrot_verify.a" in word else [word]
         words[words.index("-o") + 1] = str(program)
         subprocess.run(words, cwd=self.build, check=True, capture_output=True)
         try:

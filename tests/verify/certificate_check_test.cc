@@ -1,4 +1,4 @@
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,10 +11,10 @@
 
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
-#include "tests/proof/joint_iterate.h"
-#include "tests/proof/point_seen_twice.h"
+#include "tests/verify/joint_iterate.h"
+#include "tests/verify/point_seen_twice.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using ::testing::HasSubstr;
@@ -371,4 +371,4 @@ INSTANTIATE_TEST_SUITE_P(
     });
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/proof/force_checker.h"
+#include "krot/verify/force_checker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ForceChecker::Real;
@@ -185,4 +185,4 @@ TEST(ForceChecker, AllowsForWhatChangesAddToTheConstants) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -10,11 +10,11 @@
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
-#include "krot/proof/certificate_check.h"
-#include "krot/proof/force_balance.h"
-#include "krot/proof/pull.h"
+#include "krot/verify/certificate_check.h"
+#include "krot/verify/force_balance.h"
+#include "krot/verify/pull.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What is proved of multipliers, whatever they are to prove: that others exist
 // beside them whose forces balance exactly, with pulls if there are any, how
@@ -90,4 +90,4 @@ class ForceChecker {
   std::vector<Real> corrections_;  // bound |F_i|
 };
 
-}  // namespace krot
+}  // namespace krot::internal

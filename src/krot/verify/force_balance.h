@@ -8,7 +8,7 @@
 
 #include "krot/problem/known_rotation_problem.h"
 
-namespace krot {
+namespace krot::internal {
 
 // The force of one observation's multipliers on its point and its frame, in its
 // camera: E'(delta lambda; y), in long double.
@@ -113,4 +113,4 @@ class FixedConstants {
   Real origin_size_ = 0;
 };
 
-}  // namespace krot
+}  // namespace krot::internal

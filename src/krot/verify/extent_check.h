@@ -6,10 +6,10 @@
 
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/proof/certificate_check.h"
-#include "krot/proof/force_checker.h"
+#include "krot/verify/certificate_check.h"
+#include "krot/verify/force_checker.h"
 
-namespace krot {
+namespace krot::internal {
 
 // A proof that estimates whose residuals are all at most `bound` do not reach
 // farther than so: of the positions x_n of the pulls p_n,
@@ -53,4 +53,4 @@ double BalancingPull(const KnownRotationProblem& problem,
                      const ExtentCertificate& certificate, int32_t view,
                      const Eigen::Vector3d& direction);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/proof/force_balance.h"
+#include "krot/verify/force_balance.h"
 
 #include <cmath>
 #include <cstdint>
@@ -9,9 +9,9 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ObservationForce::Real;
@@ -133,4 +133,4 @@ TEST(Compliance, IsNoneOfWhatIsNoNumber) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

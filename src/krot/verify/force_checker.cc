@@ -1,4 +1,4 @@
-#include "krot/proof/force_checker.h"
+#include "krot/verify/force_checker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,10 @@
 
 #include <Eigen/LU>
 
-#include "krot/proof/certificate_input.h"
-#include "krot/proof/force_balance.h"
+#include "krot/verify/certificate_input.h"
+#include "krot/verify/force_balance.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Real = ForceChecker::Real;
@@ -255,4 +255,4 @@ std::vector<MultiplierChange> ForceChecker::Changes() const {
   return changes;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,16 +1,16 @@
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
 #include <algorithm>
 #include <optional>
 
-#include "krot/proof/certificate_input.h"
-#include "krot/proof/force_checker.h"
+#include "krot/verify/certificate_input.h"
+#include "krot/verify/force_checker.h"
 
 // Of exact multipliers beside the certificate's (force_checker.h),
 // |y_i|_dual / lambda_i is at most rho for all i: (lambda_i, y_i / rho) is dual
 // feasible and proves delta / rho.
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 // rho, or why there is none.
@@ -52,4 +52,4 @@ CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
   return check;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -1,10 +1,10 @@
-#include "krot/proof/pull.h"
+#include "krot/verify/pull.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/problem/random_problem.h"
 
-namespace krot {
+namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -74,4 +74,4 @@ TEST(Pull, IsAtTheSamePositionInAPart) {
 }
 
 }  // namespace
-}  // namespace krot
+}  // namespace krot::internal

@@ -8,9 +8,9 @@
 
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 inline constexpr double kUnitRoundoff =
     std::numeric_limits<double>::epsilon() / 2;
@@ -33,4 +33,4 @@ std::optional<std::string> RefuseRotations(const KnownRotationProblem& problem);
 std::string Sentence(const std::string& start, double value,
                      const std::string& end);
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -7,9 +7,9 @@
 #include <Eigen/Core>
 #include <Eigen/SVD>
 
-#include "krot/proof/certificate_check.h"
+#include "krot/verify/certificate_check.h"
 
-namespace krot {
+namespace krot::internal {
 
 // What a stranger's pocket script finds, for a connected support without
 // baselines: everything dense, in long double, rows and unknowns in a map, the
@@ -79,4 +79,4 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
   return check;
 }
 
-}  // namespace krot
+}  // namespace krot::internal

@@ -6,7 +6,7 @@
 #include "krot/conic/interior_point.h"
 #include "krot/proof/certificate.h"
 
-namespace krot {
+namespace krot::internal {
 
 // Where an interior point stops on a connected problem.
 struct JointIterate {
@@ -39,4 +39,4 @@ inline std::optional<Certificate> Certify(
                          iterate.multipliers, options, {});
 }
 
-}  // namespace krot
+}  // namespace krot::internal
