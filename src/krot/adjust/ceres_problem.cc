@@ -115,8 +115,8 @@ bool SuitsDirectSolver(const AdjustmentBlocks& blocks) {
   structure.point_begin.assign(1, 0);
   for (const AdjustmentObservation& observation : blocks.observations) {
     if (!structure.frame_of.empty() &&
-        observation.point != blocks.observations[structure.frame_of.size() - 1]
-                                 .point) {
+        observation.point !=
+            blocks.observations[structure.frame_of.size() - 1].point) {
       structure.point_begin.push_back(
           static_cast<int64_t>(structure.frame_of.size()));
     }

@@ -92,7 +92,7 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
         groups.Counts(options.compares_scales);
     const auto is_open = [&](int32_t group) {
       const auto [num_tracks, num_shared] = counts[group];
-      return sizes[group] == 1 || options.max_frames > 0 ||
+      return sizes[group] == 1 ||
              (num_shared >= options.min_tracks &&
               static_cast<double>(num_shared) >=
                   options.min_share * static_cast<double>(num_tracks));
@@ -109,11 +109,6 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
     std::vector<char> is_done(problem.num_frames, 0);
     goes_on = false;
     for (const auto& [a, b, strength] : pairs) {
-      if (options.max_frames > 0 &&
-          sizes[a] + sizes[b] > options.max_frames &&
-          8 * std::min(sizes[a], sizes[b]) >= options.max_frames) {
-        continue;
-      }
       const bool is_best =
           (is_open(a) && !has_best[a]) || (is_open(b) && !has_best[b]);
       has_best[a] = has_best[b] = 1;

@@ -62,9 +62,6 @@ struct PartOptions {
   // these compare the scales.
   bool compares_scales = true;
   double min_share = 0;  // of its tracks
-  // Above 0: groups also become one until they would have more frames than
-  // this; those of fewer than an eighth of it do so even then.
-  int32_t max_frames = 0;
 };
 
 // The part of every frame, numbered from 0 in the order of their first frames;

@@ -47,8 +47,7 @@ Normal NormalOf(const KnownRotationProblem& problem,
 // Either group's, or what both agree on best.
 std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
                                                    const Place& place) const {
-  const Vector3d x_b =
-      place.scale * (place.rotation * track.b.x) + place.shift;
+  const Vector3d x_b = place.scale * (place.rotation * track.b.x) + place.shift;
   const Matrix3d& H_a = track.a.H;
   const Matrix3d H_b = place.rotation * track.b.H * place.rotation.transpose() /
                        (place.scale * place.scale);

@@ -21,13 +21,9 @@
 namespace krot::internal {
 namespace {
 
-double KT(const char* n, double d) { const char* s = getenv(n); return s ? atof(s) : d; }
-
 // So much redundancy that tracks check each frame by, doubled until they hang
 // together. A track of n observations has 2 n - 3, 2 - 3 / n for each of them.
 constexpr double kRedundancyPerFrame = 120;
-// Larger components are placed in parts of so many frames.
-constexpr int32_t kFramesAtOnce = 250;
 // Parts whose programmes are solved on their own.
 constexpr double kStrongShare = 0.2;
 // Programmes after the first, with weights.
@@ -60,8 +56,7 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
     if (!is_needed) continue;
     for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
          ++i) {
-      redundancy[FrameOf(problem, i)] +=
-          2 - 3 / static_cast<double>(length(k));
+      redundancy[FrameOf(problem, i)] += 2 - 3 / static_cast<double>(length(k));
       covering.push_back(i);
     }
   }
@@ -71,7 +66,7 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
 
 // The same with as much per frame as it takes for all to hang together.
 std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
-  for (double per_frame = KT("KT_R", kRedundancyPerFrame);; per_frame *= 2) {
+  for (double per_frame = kRedundancyPerFrame;; per_frame *= 2) {
     std::vector<int64_t> tracks = CoveringTracks(problem, per_frame);
     if (tracks.size() == problem.observations.size() ||
         SplitIntoComponents(problem, tracks).size() == 1) {
@@ -92,7 +87,7 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   SlackOptions options;
   options.norm = norm;
   options.smallest_mu = kStartMu;
-  for (int n = 0; n <= KT("KT_N", kStartReweightings) && !context.IsCancelled(); ++n) {
+  for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
     context.Stage("positions from rotations and tracks, programme", n + 1,
                   kStartReweightings + 1);
     const SlackSolution solution =
@@ -179,16 +174,9 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   options.min_tracks = 1;
   options.compares_scales = false;
   options.min_share = kStrongShare;
-  std::vector<int32_t> part_of = FindParts(problem, options);
-  const bool is_whole =
-      *std::max_element(part_of.begin(), part_of.end()) == 0;
-  const int32_t at_once = static_cast<int32_t>(KT("KT_F", kFramesAtOnce));
-  if (is_whole && problem.num_frames <= at_once) {
+  const std::vector<int32_t> part_of = FindParts(problem, options);
+  if (*std::max_element(part_of.begin(), part_of.end()) == 0) {
     return StartOfPart(problem, norm, level, context);
-  }
-  if (is_whole) {
-    options.max_frames = at_once;
-    part_of = FindParts(problem, options);
   }
   return StartOfParts(problem, part_of, norm, level, context);
 }

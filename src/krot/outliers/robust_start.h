@@ -16,8 +16,7 @@ inline constexpr double kCapOfPoints = 4;
 //
 //   1. parts that share few of their tracks with others (weak_links.h), since
 //      one programme holds one mean scale, and what hangs on it by little
-//      shrinks for free, and parts of several hundred frames where more hang
-//      together, as time grows with their number cubed; and of each part
+//      shrinks for free; and of each part
 //   2. the longest tracks, so many that they check every frame many times over
 //      and all hang together;
 //   3. their slack programme from nothing (conic/slack_program.h), and again
