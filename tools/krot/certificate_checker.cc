@@ -7,7 +7,6 @@
 #include "krot/bridge/certificate_verdict.h"
 #include "krot/bridge/conflict_file.h"
 #include "krot/report/certificate_table.h"
-#include "krot/report/outlier_report.h"
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

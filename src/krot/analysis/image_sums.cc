@@ -194,10 +194,15 @@ double PerMille(size_t share, std::vector<double> values) {
 
 double ImageSums::ShareBelowHalf() const {
   const double half = PerMille(950, squares) / 4;
-  const auto below =
-      std::count_if(squares.begin(), squares.end(),
-                    [half](double one) { return one < half; });
+  const auto below = std::count_if(squares.begin(), squares.end(),
+                                   [half](double one) { return one < half; });
   return static_cast<double>(below) / static_cast<double>(squares.size());
+}
+
+double Divergence(double s, double p) {
+  const double successes = s > 0 ? s * std::log(s / p) : 0;
+  const double failures = s < 1 ? (1 - s) * std::log((1 - s) / (1 - p)) : 0;
+  return successes + failures;
 }
 
 std::vector<ImageSums> AddUpImages(const Model& model,

@@ -55,6 +55,10 @@ struct ImageSums {
 // The value that so many of a thousand are at most; 0 of none.
 double PerMille(size_t share, std::vector<double> values);
 
+// The exponent of Chernoff's bound on the probability that of n trials, each of
+// probability p, a share beyond s succeeds: exp(-n KL(s, p)).
+double Divergence(double s, double p);
+
 // As Model::images; of the observations of which `noise` says that they are
 // tested. Requires a valid model. O(observations).
 std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);

@@ -35,14 +35,6 @@ constexpr double kOwnQuantile = 10;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 
-// The exponent of Chernoff's bound on the probability that of n trials, each of
-// probability p, a share beyond s succeeds: exp(-n KL(s, p)).
-double Divergence(double s, double p) {
-  const double successes = s > 0 ? s * std::log(s / p) : 0;
-  const double failures = s < 1 ? (1 - s) * std::log((1 - s) / (1 - p)) : 0;
-  return successes + failures;
-}
-
 class Checker {
  public:
   Checker(const Model& model, const ModelCheckOptions& options,

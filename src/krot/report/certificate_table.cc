@@ -123,6 +123,18 @@ std::string BaselineTable(const Model& model,
   return text + table.ToString();
 }
 
+std::string ConflictTable(const ConflictVerdict& verdict) {
+  return "The conflicts hold: whatever the translations and points, at least " +
+         Counted(verdict.num_conflicts, "observation") +
+         " must go\nfor all others to be within " +
+         (verdict.has_own_bounds ? "their own bounds in the file, at most "
+                                 : "") +
+         FormatNumber(verdict.max_error, 6) + " px.\n  " +
+         Counted(verdict.num_conflicts, "conflict") + " of " +
+         Counted(verdict.num_observations, "observation") +
+         " in all, none in two\n";
+}
+
 std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<ConflictVerdict>& conflicts,
                       const std::optional<BaselineCertificate>& baselines,

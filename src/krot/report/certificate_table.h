@@ -29,6 +29,9 @@ std::string BaselineTable(const Model& model,
                           const BaselineCertificate& certificate,
                           int max_pairs);
 
+// What certificate_checker says of an accepted file of conflicts.
+std::string ConflictTable(const ConflictVerdict& verdict);
+
 // report.json of certificate_checker for what it accepted: one of the three.
 std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<ConflictVerdict>& conflicts,

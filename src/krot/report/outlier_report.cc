@@ -388,16 +388,4 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
   return csv.str();
 }
 
-std::string ConflictTable(const ConflictVerdict& verdict) {
-  return "The conflicts hold: whatever the translations and points, at least " +
-         Counted(verdict.num_conflicts, "observation") +
-         " must go\nfor all others to be within " +
-         (verdict.has_own_bounds ? "their own bounds in the file, at most "
-                                 : "") +
-         FormatNumber(verdict.max_error, 6) + " px.\n  " +
-         Counted(verdict.num_conflicts, "conflict") + " of " +
-         Counted(verdict.num_observations, "observation") +
-         " in all, none in two\n";
-}
-
 }  // namespace krot::internal

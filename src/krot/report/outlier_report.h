@@ -4,7 +4,6 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "krot/bridge/conflict_file.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/report/run_record.h"
 
@@ -40,9 +39,6 @@ std::string ProfileJson(const OutlierReport& report);
 
 // One line per removed observation, worst first, behind a line of names.
 std::string OutlierCsv(const OutlierFilterSummary& summary);
-
-// What certificate_checker says of an accepted file of conflicts.
-std::string ConflictTable(const ConflictVerdict& verdict);
 
 // As --OutlierFilter.method takes it.
 std::string OutlierMethodName(OutlierMethod method);
