@@ -26,8 +26,7 @@ ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
   };
   const Json& version = member("version");
   if (version != 1 && version != kConflictFileVersion) {
-    reader.Fail("version", version,
-                "1 or " + std::to_string(kConflictFileVersion));
+    reader.Fail("version", version, "1 or 2");
   }
   ConflictFile file;
   file.version = version;
