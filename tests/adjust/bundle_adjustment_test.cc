@@ -23,7 +23,7 @@ namespace krot::internal {
 namespace {
 
 // With more of them the last digits of Ceres differ from run to run.
-const Context kOneThread{1};
+const Context kAdjustAlone{1};
 
 SceneOptions SmallOptions() {
   SceneOptions options;
@@ -134,7 +134,7 @@ double IndependentFixedRotationCost(const Model& model,
 TEST(AdjustBundle, WithFixedRotationsEndsWhereAnIndependentProblemDoes) {
   const Model model = SynthesizeScene(SmallOptions()).model;
   const BundleAdjustmentResult result =
-      AdjustBundle(model, RotationsFixed(), kOneThread);
+      AdjustBundle(model, RotationsFixed(), kAdjustAlone);
   const double expected = IndependentFixedRotationCost(model, nullptr);
   EXPECT_NEAR(result.summary.cost_final, expected, 1e-8 * expected);
   EXPECT_NEAR(CostOf(result.model), expected, 1e-8 * expected);
@@ -159,7 +159,7 @@ TEST(AdjustBundle, WithFixedPartsEndsWhereAnIndependentProblemDoes) {
   BundleAdjustmentOptions options = RotationsFixed();
   options.fixed = SomeFixed(model);
   const BundleAdjustmentResult result =
-      AdjustBundle(model, options, kOneThread);
+      AdjustBundle(model, options, kAdjustAlone);
   const double expected =
       IndependentFixedRotationCost(model, nullptr, options.fixed);
   EXPECT_NEAR(CostOf(result.model), expected, 1e-8 * expected);
@@ -177,7 +177,7 @@ TEST(AdjustBundle, LeavesTheBitsOfWhatIsFixedAndMovesTheRest) {
       options.max_error = 1.05 * Summarize(PixelErrors(model, 1)).max;
     }
     const BundleAdjustmentResult result =
-        AdjustBundle(model, options, kOneThread);
+        AdjustBundle(model, options, kAdjustAlone);
     EXPECT_LT(*result.summary.stationarity, 1e-5);
     EXPECT_LT(CostOf(result.model), 0.9 * CostOf(model));
     Model put_back = model;
@@ -214,7 +214,7 @@ TEST(AdjustBundle, WithARobustLossEndsWhereAnIndependentProblemDoes) {
     options.loss = kind;
     options.loss_scale = 2;
     const double expected = IndependentFixedRotationCost(model, loss);
-    EXPECT_NEAR(AdjustBundle(model, options, kOneThread).summary.cost_final,
+    EXPECT_NEAR(AdjustBundle(model, options, kAdjustAlone).summary.cost_final,
                 expected, 1e-4 * expected);
   };
   ceres::HuberLoss huber(2);
@@ -233,7 +233,7 @@ TEST(AdjustBundle, FindsExactModelsOfEveryCamera) {
     const Model model = SynthesizeScene(scene).model;
     EXPECT_GT(CostOf(model), 10);
     const BundleAdjustmentResult result =
-        AdjustBundle(model, Exact(), kOneThread);
+        AdjustBundle(model, Exact(), kAdjustAlone);
     EXPECT_LT(CostOf(result.model), 1e-6);
     ValidateModel(result.model);
   }
@@ -248,7 +248,7 @@ TEST(AdjustBundle, LeavesTheBitsOfWhatIsHeldStill) {
   options.refine_sensor_from_rig = false;
   options.refine_focal_length = false;
   options.refine_extra_params = false;
-  const Model points_only = AdjustBundle(model, options, kOneThread).model;
+  const Model points_only = AdjustBundle(model, options, kAdjustAlone).model;
   EXPECT_LT(CostOf(points_only), CostOf(model));
   Ignoring ignoring;
   ignoring.coordinates = true;
@@ -256,7 +256,7 @@ TEST(AdjustBundle, LeavesTheBitsOfWhatIsHeldStill) {
 
   options.refine_points3D = false;
   const BundleAdjustmentResult nothing =
-      AdjustBundle(model, options, kOneThread);
+      AdjustBundle(model, options, kAdjustAlone);
   EXPECT_EQ(nothing.summary.termination,
             BundleAdjustmentTermination::kNothingToAdjust);
   EXPECT_EQ(ModelComparison({}).FirstDifference(model, nothing.model), "");
@@ -271,7 +271,7 @@ TEST(AdjustBundle, RefinesOneGroupOfIntrinsicsAtATime) {
     options.refine_extra_params = group == 2;
     const std::vector<double> before = model.cameras[0].params;
     const std::vector<double> after =
-        AdjustBundle(model, options, kOneThread).model.cameras[0].params;
+        AdjustBundle(model, options, kAdjustAlone).model.cameras[0].params;
     // SIMPLE_RADIAL: f, cx, cy, k
     const std::vector<bool> may_move = {group == 0, group == 1, group == 1,
                                         group == 2};
@@ -303,7 +303,7 @@ TEST(AdjustBundle, LeavesShortTracksAndEmptyImagesWhereTheyAre) {
   }
   ValidateModel(model);
   const BundleAdjustmentResult result =
-      AdjustBundle(model, Exact(), kOneThread);
+      AdjustBundle(model, Exact(), kAdjustAlone);
   EXPECT_EQ(result.summary.num_short_track, 1);
   EXPECT_EQ(result.model.points3D[0].xyz, model.points3D[0].xyz);
   EXPECT_EQ(result.model.points3D.size(), model.points3D.size());
@@ -315,14 +315,14 @@ TEST(AdjustBundle, LeavesOutWhatIsBehindItsCamera) {
   const int64_t num_behind =
       static_cast<int64_t>(Summarize(PixelErrors(model, 1)).not_finite);
   ASSERT_GT(num_behind, 0);
-  EXPECT_EQ(AdjustBundle(model, Exact(), kOneThread).summary.num_behind,
+  EXPECT_EQ(AdjustBundle(model, Exact(), kAdjustAlone).summary.num_behind,
             num_behind);
 }
 
 TEST(AdjustBundle, GivesTheSameBitsAgainOnOneThread) {
   const Model model = SynthesizeScene(SmallOptions()).model;
-  const Model a = AdjustBundle(model, Exact(), kOneThread).model;
-  const Model b = AdjustBundle(model, Exact(), kOneThread).model;
+  const Model a = AdjustBundle(model, Exact(), kAdjustAlone).model;
+  const Model b = AdjustBundle(model, Exact(), kAdjustAlone).model;
   EXPECT_EQ(ModelComparison({}).FirstDifference(a, b), "");
 }
 
@@ -330,15 +330,15 @@ TEST(AdjustBundle, ReachesTheSameCostWithEveryLinearSolver) {
   const Model model = SynthesizeScene(SmallOptions()).model;
   BundleAdjustmentOptions options = Exact();
   const BundleAdjustmentSummary dense =
-      AdjustBundle(model, options, kOneThread).summary;
+      AdjustBundle(model, options, kAdjustAlone).summary;
   EXPECT_EQ(dense.linear_solver, "dense_schur");
   options.max_num_images_direct_dense = 0;
   const BundleAdjustmentSummary sparse =
-      AdjustBundle(model, options, kOneThread).summary;
+      AdjustBundle(model, options, kAdjustAlone).summary;
   EXPECT_EQ(sparse.linear_solver, "sparse_schur");
   options.max_num_images_direct_sparse = 0;
   const BundleAdjustmentSummary iterative =
-      AdjustBundle(model, options, kOneThread).summary;
+      AdjustBundle(model, options, kAdjustAlone).summary;
   EXPECT_EQ(iterative.linear_solver, "iterative_schur");
   EXPECT_NEAR(sparse.cost_final, dense.cost_final, 1e-7 * dense.cost_final);
   EXPECT_NEAR(iterative.cost_final, dense.cost_final, 1e-5 * dense.cost_final);
@@ -415,7 +415,7 @@ TEST(AdjustBundle, RefusesPanoramas) {
   Model model = SynthesizeScene(SmallOptions()).model;
   model.cameras[0].model_id = 17;
   model.cameras[0].params = {1024, 512};
-  EXPECT_THROW(AdjustBundle(model, {}, kOneThread), ModelError);
+  EXPECT_THROW(AdjustBundle(model, {}, kAdjustAlone), ModelError);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 namespace krot::internal {
 namespace {
 
-const Context kOneThread{1};
+const Context kLowerAlone{1};
 
 SceneOptions NoisyOptions() {
   SceneOptions options;
@@ -51,7 +51,8 @@ TEST(LowestMaxError, IsBelowWhatFixedRotationsAndWhatACapAllow) {
     SceneOptions scene = NoisyOptions();
     scene.sensors_per_rig = sensors_per_rig;
     const Model model = SynthesizeScene(scene).model;
-    const AdjustModelResult lowered = AdjustModel(model, Lowered(), kOneThread);
+    const AdjustModelResult lowered =
+        AdjustModel(model, Lowered(), kLowerAlone);
     const AdjustModelSummary& summary = lowered.summary;
     EXPECT_EQ(summary.adjustment.termination,
               BundleAdjustmentTermination::kCapConverged);
@@ -65,7 +66,7 @@ TEST(LowestMaxError, IsBelowWhatFixedRotationsAndWhatACapAllow) {
 
     AdjustModelOptions bounded;
     bounded.max_error_factor = 1.02;
-    EXPECT_LE(max, MaxError(AdjustModel(model, bounded, kOneThread).model));
+    EXPECT_LE(max, MaxError(AdjustModel(model, bounded, kLowerAlone).model));
   }
 }
 
@@ -84,7 +85,7 @@ TEST(LowestMaxError, IsTheSameFromOtherStarts) {
       if (f % 3 + 1 == seed) continue;
       model.frames[f].rig_from_world = moved.frames[f].rig_from_world;
     }
-    ends.push_back(*AdjustModel(model, Lowered(), kOneThread)
+    ends.push_back(*AdjustModel(model, Lowered(), kLowerAlone)
                         .summary.adjustment.lowest_max_error);
   }
   EXPECT_NEAR(ends[1], ends[0], 1e-3 * ends[0]);
@@ -94,7 +95,7 @@ TEST(LowestMaxError, IsTheSameFromOtherStarts) {
 TEST(LowestMaxError, LeavesLeastSquaresWhereNothingIsGained) {
   const Model model = SynthesizeScene(NoisyOptions()).model;
   const AdjustModelResult result =
-      AdjustModel(model, RotationsAndCamerasFixed(), kOneThread);
+      AdjustModel(model, RotationsAndCamerasFixed(), kLowerAlone);
   const double lowest = result.summary.start->LowestCost();
   EXPECT_EQ(result.summary.adjustment.termination,
             BundleAdjustmentTermination::kCapConverged);
@@ -125,7 +126,7 @@ TEST(LowestMaxError, EndsWithTheIterationsThatAreAllowed) {
   const Model model = SynthesizeScene(NoisyOptions()).model;
   AdjustModelOptions options = Lowered();
   options.adjustment.max_num_iterations = 4;
-  const AdjustModelResult result = AdjustModel(model, options, kOneThread);
+  const AdjustModelResult result = AdjustModel(model, options, kLowerAlone);
   EXPECT_EQ(result.summary.adjustment.termination,
             BundleAdjustmentTermination::kMaxIterations);
   EXPECT_LE(MaxError(result.model),

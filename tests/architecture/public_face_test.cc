@@ -20,7 +20,7 @@
 #include "krot/solve.h"
 #include "krot/tolerances.h"
 
-namespace krot::internal {
+namespace krot {
 namespace {
 
 using Eigen::Matrix3d;
@@ -314,4 +314,4 @@ TEST(WriteCertificate, GivesBackWhatItTook) {
 }
 
 }  // namespace
-}  // namespace krot::internal
+}  // namespace krot

@@ -90,18 +90,20 @@ TEST(PackConflicts, WithABoundForEachHoldByAnIndependentOracle) {
   }
   ScaleObservations(scales, &built);
   Work work;
-  const std::vector<Conflict> conflicts = PackConflicts(
-      scene.model, built, {Norm::LInf(), kBound}, All(built), {}, &work);
+  const std::vector<Conflict> conflicts =
+      PackConflicts(scene.model, built, {Norm::LInf(), kConflictBound},
+                    All(built), {}, &work);
   ASSERT_GE(conflicts.size(), 2u);
   for (const Conflict& conflict : conflicts) {
     EXPECT_GT(OptimumByOracle(by_hand, Norm::LInf(), conflict.observations),
-              kBound);
+              kConflictBound);
   }
   // Two disjoint ones: whichever single observation goes, it is not enough.
   for (const int64_t gone : All(built)) {
     std::vector<int64_t> others = All(built);
     others.erase(others.begin() + gone);
-    EXPECT_GT(OptimumByOracle(by_hand, Norm::LInf(), others), kBound) << gone;
+    EXPECT_GT(OptimumByOracle(by_hand, Norm::LInf(), others), kConflictBound)
+        << gone;
   }
 }
 
@@ -112,10 +114,11 @@ TEST(PackConflicts, AreThoseOfTwiceTheBoundWhereAllScalesAreAHalf) {
   BuiltProblem built = BuildProblem(scene.model, {});
   Work work;
   const std::vector<Conflict> plain = PackConflicts(
-      scene.model, built, {Norm::L2(), kBound}, All(built), {}, &work);
+      scene.model, built, {Norm::L2(), kConflictBound}, All(built), {}, &work);
   ScaleObservations(std::vector<double>(built.pixels.size(), 0.5), &built);
-  const std::vector<Conflict> scaled = PackConflicts(
-      scene.model, built, {Norm::L2(), 2 * kBound}, All(built), {}, &work);
+  const std::vector<Conflict> scaled =
+      PackConflicts(scene.model, built, {Norm::L2(), 2 * kConflictBound},
+                    All(built), {}, &work);
   ASSERT_GT(plain.size(), 1u);
   ASSERT_EQ(scaled.size(), plain.size());
   for (size_t n = 0; n < plain.size(); ++n) {

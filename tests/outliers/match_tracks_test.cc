@@ -92,7 +92,7 @@ TEST(TriangulateMatches, MakesTheTracksThatMatchesWereMadeFrom) {
 }
 
 TEST(PlaceMatches, FindsPositionsAndPointsFromRotationsAndMatchesAlone) {
-  const Model truth = Scene(0.3);
+  const Model truth = MatchedScene(0.3);
   Database database = DatabaseOf(truth);
   std::mt19937 random(3);
   for (VerifiedPair& pair : database.pairs) {
@@ -128,7 +128,7 @@ TEST(PlaceMatches, FindsPositionsAndPointsFromRotationsAndMatchesAlone) {
 }
 
 TEST(PlaceMatches, TakesNothingButPlaceAndScaleFromTheModelsPositions) {
-  const Model truth = Scene(0.3);
+  const Model truth = MatchedScene(0.3);
   const Database database = DatabaseOf(truth);
   Model poses = PosesOf(truth);
   const PlacedMatches placed = PlaceMatches(poses, database, {}, {});
@@ -142,7 +142,7 @@ TEST(PlaceMatches, TakesNothingButPlaceAndScaleFromTheModelsPositions) {
 }
 
 TEST(PlaceMatches, CountsImagesThatNoMatchesHold) {
-  const Model truth = Scene();
+  const Model truth = MatchedScene();
   Database database = DatabaseOf(truth);
   for (VerifiedPair& pair : database.pairs) {
     if (pair.image1 == 3 || pair.image2 == 3) pair.matches.resize(1);

@@ -20,7 +20,7 @@
 namespace krot::internal {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -65,7 +65,7 @@ TEST(HtmlPage, HoldsTheReportAsItIs) {
       R"({"command":"<!-- </script> {{models}} & \u0022 é","cost_final":0.1})";
   const std::string page = HtmlPage(report, model, model);
   EXPECT_THAT(ElementText(page, "krot-report"), Not(HasSubstr("<")));
-  EXPECT_EQ(json::parse(ElementText(page, "krot-report")), json::parse(report));
+  EXPECT_EQ(Json::parse(ElementText(page, "krot-report")), Json::parse(report));
 }
 
 TEST(HtmlPage, ReplacesAllItsPlaceholdersAndNamesNothingOutside) {
@@ -82,7 +82,7 @@ TEST(HtmlPage, LetsNoImageNameEndItsElement) {
   Model model = SomeScene().model;
   model.images[0].name = "</script><script>alert(1)</script>\xff";
   const std::string page = HtmlPage("{}", model, model);
-  const json models = json::parse(ElementText(page, "krot-models"));
+  const Json models = Json::parse(ElementText(page, "krot-models"));
   EXPECT_EQ(models["after"]["images"][0]["name"],
             "</script><script>alert(1)</script>\xef\xbf\xbd");
 }
@@ -96,8 +96,8 @@ TEST(HtmlPage, IsTheSameAtAnyNumberOfThreads) {
 TEST(ModelViewJson, HoldsEveryPointRelativeToTheOrigin) {
   const Model model = SomeScene().model;
   const Eigen::Vector3d origin(1, -2, 3);
-  const json view = json::parse(ModelViewJson(model, origin));
-  const json& points = view["points"];
+  const Json view = Json::parse(ModelViewJson(model, origin));
+  const Json& points = view["points"];
   const auto ids = Decode<uint64_t>(points["ids"]);
   const auto xyz = Decode<float>(points["xyz"]);
   const auto rgb = Decode<uint8_t>(points["rgb"]);
@@ -117,8 +117,8 @@ TEST(ModelViewJson, HoldsEveryPointRelativeToTheOrigin) {
 
 TEST(ModelViewJson, HoldsTheErrorsOfItsPoints) {
   const Model model = SomeScene().model;
-  const json view =
-      json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()))["points"];
+  const Json view =
+      Json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()))["points"];
   const auto max_error = Decode<float>(view["max_error"]);
   const auto mean_error = Decode<float>(view["mean_error"]);
   Model updated = model;  // its points get their mean errors
@@ -139,7 +139,7 @@ TEST(ModelViewJson, HoldsTheErrorsOfItsPoints) {
 
 TEST(ModelViewJson, HoldsWhereEveryImageStands) {
   const Model model = SomeScene().model;
-  const json view = json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
+  const Json view = Json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (size_t i = 0; i < geometries.size(); ++i) {
     const auto center = view["images"][i]["center"].get<std::vector<double>>();
@@ -161,7 +161,7 @@ TEST(ModelViewJson, SaysNullForAnImageWithoutPose) {
   Model model = SynthesizeScene(options).model;
   model.frames[0].rig_from_world.translation.setConstant(
       std::numeric_limits<double>::quiet_NaN());
-  const json view = json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
+  const Json view = Json::parse(ModelViewJson(model, Eigen::Vector3d::Zero()));
   EXPECT_TRUE(view["images"][0]["center"].is_null());
   EXPECT_TRUE(view["images"][0]["pixel_error"]["max"].is_null());
   EXPECT_FALSE(view["images"][1]["center"].is_null());
@@ -169,8 +169,8 @@ TEST(ModelViewJson, SaysNullForAnImageWithoutPose) {
 
 TEST(ModelViewJson, ThinsItsPointsButNotItsNumbers) {
   const Model model = SomeScene().model;
-  const json view =
-      json::parse(ModelViewJson(model, Eigen::Vector3d::Zero(), 10));
+  const Json view =
+      Json::parse(ModelViewJson(model, Eigen::Vector3d::Zero(), 10));
   EXPECT_EQ(view["points"]["num"], 10);
   EXPECT_EQ(Decode<uint64_t>(view["points"]["ids"]).size(), 10u);
   EXPECT_EQ(view["num_points"], model.points3D.size());

@@ -214,6 +214,12 @@ std::optional<ComparisonSummary> CompareModels(
   return summary;
 }
 
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
+
 std::optional<ComparisonSummary> CompareModels(
     const Model& model1, const Model& model2,
     const CompareModelsOptions& options) {
@@ -221,4 +227,4 @@ std::optional<ComparisonSummary> CompareModels(
                        options);
 }
 
-}  // namespace krot::internal
+}  // namespace krot
