@@ -266,7 +266,8 @@ TEST_F(OnContradiction, TheImagesAreFollowedWhereAskedAndAgreeAfterwards) {
 
 TEST_F(OnContradiction, EveryCommandRefusesWhereAsked) {
   WriteBytes(folder_ / "certificate.json",
-             R"({"version": 1, "norm": "inf", "lower_bound": 1, "defect": 0,
+             R"({"version": 2, "norm": "inf", "lower_bound": 1, "rows_bound": 1,
+                 "defect": 0,
                  "model_sha256": "", "observations": []})");
   const std::vector<std::vector<std::string>> commands = {
       Solve("output"),

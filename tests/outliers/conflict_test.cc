@@ -81,7 +81,7 @@ std::vector<double> Scales(const BuiltProblem& built) {
 
 TEST(PackConflicts, WithABoundForEachHoldByAnIndependentOracle) {
   if (!HasOracle()) GTEST_SKIP() << "built without CLP";
-  const SyntheticScene scene = MakeOutlierScene(1, 0.06, 14, 0.3);
+  const SyntheticScene scene = MakeOutlierScene(1, 0.12, 14, 0.3);
   BuiltProblem built = BuildProblem(scene.model, {});
   const std::vector<double> scales = Scales(built);
   KnownRotationProblem by_hand = built.problem;

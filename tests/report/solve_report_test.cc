@@ -24,7 +24,7 @@ SolveReport SomeReport() {
   summary.method = SolveMethod::kResInt;
   summary.num_frames = 1;
   summary.num_observations = 8;
-  summary.left_out = {2, 0, 0, 3, 0};
+  summary.left_out = {2, 0, 3, 0, 0};
   summary.cost_initial = 4;
   summary.cost_final = 0.1;
   summary.sweeps = {{0.2, 0.5}, {0.1, 0.75}};
@@ -379,7 +379,7 @@ TEST(NothingToSolve, SaysWhy) {
             "nothing to solve: the model has no observations "
             "(2D points that see 3D points); krot point_triangulator makes "
             "them from its poses and a database of matches");
-  summary.left_out = {0, 1, 0, 1000, 0};
+  summary.left_out = {0, 1, 1000, 0, 0};
   EXPECT_EQ(NothingToSolveSentence(summary),
             "nothing to solve: 1001 observations left out (undistortion 1, "
             "short_track 1000)");

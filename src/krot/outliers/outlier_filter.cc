@@ -260,8 +260,10 @@ void OutlierFilter::FilterByConflicts() {
   const RemovalStart start = FindRemovalStart(model_, options_, context_);
   const BuiltProblem& built = start.built;
   summary_.init = start.init;
-  if (options_.spares_what_fits && start.fits) {
+  if (options_.spares_what_fits &&
+      (start.fits_its_positions || start.nearly_fits)) {
     is_given_back_ = summary_.is_spared = true;
+    bound_.max_error = start.fits_its_positions ? 0 : start.max_error;
     return;
   }
   bound_.max_error = start.max_error;

@@ -34,7 +34,7 @@ struct OutlierFilterOptions {
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // the proof, most of the time
   // From nothing, without max_error: whether a model stays as it is, unsolved,
-  // if nothing need go (RemovalStart::fits).
+  // if perhaps nothing need go (RemovalStart).
   bool spares_what_fits = false;
   // Of what is left; its norm is the errors'. Its init kFeasible is from
   // nothing but rotations and tracks, and so is any model whose cameras have no
@@ -84,7 +84,9 @@ struct OutlierFilterSummary {
   // (SolveModelOptions::init_max_error).
   std::vector<WeakPart> weak_parts;
   bool is_bound_beyond_reason = false;
-  bool is_spared = false;  // OutlierFilterOptions::spares_what_fits
+  // As OutlierFilterOptions::spares_what_fits allows; then max_error is what
+  // noise explains, 0 where that does not matter.
+  bool is_spared = false;
 
   int64_t num_observations = 0;  // of the input
   int64_t num_points = 0;

@@ -13,6 +13,10 @@
 namespace krot::internal {
 namespace {
 
+// Errors of a start are larger than the lowest maximum: so many times as large
+// as what noise explains, they say nothing yet.
+constexpr double kNearlyFits = 3;
+
 std::string Pixels(double value) {
   std::ostringstream words;
   words.precision(3);
@@ -31,20 +35,14 @@ void PlaceFromTracks(Norm norm, double level, const Context& context,
                Pixels(MedianError(problem, start->built.start, norm)));
 }
 
-bool FitsAsItIs(const Model& model, const OutlierFilterOptions& options,
-                const Context& context, const RemovalStart& start) {
+// Whether the model has positions at which noise explains half of its errors.
+bool FitsItsPositions(const Model& model, const OutlierFilterOptions& options,
+                      const Context& context, double explained) {
   BuildProblemOptions build = options.solve.problem;
   build.num_threads = context.num_threads;
   const BuiltProblem own = BuildProblem(model, build);
-  if (!HasOwnStart(own)) return false;
-  const Norm norm = options.solve.norm;
-  const double largest =
-      Reprojection(model, start.built)
-          .TrueCost(start.built.start, norm, context.num_threads);
-  return largest <= start.max_error ||
-         (largest <= options.solve.init_max_error &&
-          MedianError(own.problem, own.start, norm) <
-              2 * MedianError(start.built.problem, start.built.start, norm));
+  return HasOwnStart(own) &&
+         MedianError(own.problem, own.start, options.solve.norm) <= explained;
 }
 
 }  // namespace
@@ -72,8 +70,16 @@ RemovalStart FindRemovalStart(const Model& model,
     const NoiseLimit noise =
         NoiseLimitAtStart(model, start.built, norm, context);
     start.max_error = noise.max_error;
-    start.fits = FitsAsItIs(model, options, context, start);
-    if (options.spares_what_fits && start.fits) return start;
+    const double largest =
+        Reprojection(model, start.built)
+            .TrueCost(start.built.start, norm, context.num_threads);
+    start.nearly_fits = largest <= kNearlyFits * start.max_error;
+    start.fits_its_positions =
+        FitsItsPositions(model, options, context, start.max_error);
+    if (options.spares_what_fits &&
+        (start.nearly_fits || start.fits_its_positions)) {
+      return start;
+    }
     context.Note("leaving out what noise of " + Pixels(noise.sigma) +
                  " per axis does not explain: errors above " +
                  Pixels(start.max_error));

@@ -14,11 +14,11 @@ struct RemovalStart {
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
   double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
-  // From nothing: nothing need go from a model with positions of its own. Noise
-  // explains all errors of the start, or the observations have been chosen by
-  // these positions: the median error there is not twice the start's, and no
-  // error of the start is above options.solve.init_max_error.
-  bool fits = false;
+  // From nothing without a bound: the start's errors are not far above what
+  // noise explains, so that no observation may have to go; or the model has
+  // positions of its own, at which noise explains half of its errors.
+  bool nearly_fits = false;
+  bool fits_its_positions = false;
 };
 
 // The model's own start or, if options.solve.init says so or the model has

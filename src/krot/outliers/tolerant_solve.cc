@@ -13,10 +13,11 @@ bool AllowsRemoval(const SolveModelOptions& options) {
 
 TolerantSolveResult SolveWithoutOutliers(const Model& model,
                                          const TolerantSolveOptions& options,
+                                         bool spares_what_fits,
                                          const Context& context) {
   OutlierFilterOptions filter;
   filter.max_error = options.max_error;
-  filter.spares_what_fits = !options.max_error;
+  filter.spares_what_fits = spares_what_fits;
   filter.find_conflicts = options.find_conflicts;
   filter.has_start_from_nothing = options.has_start_from_nothing;
   filter.solve = options.solve;
@@ -44,17 +45,31 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
 TolerantSolveResult SolveTolerantly(const Model& model,
                                     const TolerantSolveOptions& options,
                                     const Context& context) {
-  if (options.max_error) return SolveWithoutOutliers(model, options, context);
-  const bool allows_removal = AllowsRemoval(options.solve);
-  if (allows_removal && options.solve.init == SolveInit::kFeasible &&
-      !options.solve.describe_certificate) {
-    TolerantSolveResult result = SolveWithoutOutliers(model, options, context);
-    if (!result.outliers->is_spared) return result;
+  if (options.max_error) {
+    return SolveWithoutOutliers(model, options, false, context);
   }
-  SolveModelResult solved = SolveModel(model, options.solve, context);
-  if (allows_removal &&
-      solved.summary.termination == SolveTermination::kNothingToSolve) {
-    return SolveWithoutOutliers(model, options, context);
+  SolveModelOptions solve = options.solve;
+  const bool allows_removal = AllowsRemoval(solve);
+  if (!allows_removal || solve.init != SolveInit::kFeasible ||
+      solve.describe_certificate) {
+    SolveModelResult solved = SolveModel(model, solve, context);
+    if (!allows_removal ||
+        solved.summary.termination != SolveTermination::kNothingToSolve) {
+      return {std::move(solved.model), std::move(solved.summary), std::nullopt};
+    }
+  }
+  TolerantSolveResult result =
+      SolveWithoutOutliers(model, options, true, context);
+  if (!result.outliers->is_spared) return result;
+  // Perhaps all observations can stay: the lowest maximum tells.
+  solve.init = SolveInit::kFeasible;
+  SolveModelResult solved = SolveModel(model, solve, context);
+  const SolveTermination ended = solved.summary.termination;
+  const double explained = result.outliers->max_error;
+  if (ended == SolveTermination::kNoStart ||
+      ended == SolveTermination::kInfeasible ||
+      (explained > 0 && solved.summary.lower_bound.value_or(0) > explained)) {
+    return SolveWithoutOutliers(model, options, false, context);
   }
   return {std::move(solved.model), std::move(solved.summary), std::nullopt};
 }
