@@ -1,5 +1,6 @@
 #include "krot/outliers/robust_start.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
