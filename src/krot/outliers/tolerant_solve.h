@@ -16,8 +16,8 @@ struct TolerantSolveOptions {
   SolveModelOptions solve;
   // Few observations are removed so that all others are within so many pixels,
   // > 0. None: all stay, unless the start is from nothing, no certificate is
-  // asked for, and something must go (RemovalStart::fits); then what noise does
-  // not explain is removed.
+  // asked for, and noise does not explain the lowest maximum (RemovalStart);
+  // then what it does not explain is removed.
   std::optional<double> max_error;
   // As OutlierFilterOptions has it.
   bool has_start_from_nothing = false;
