@@ -16,7 +16,7 @@ PYBIND11_MODULE(_core, module) {
   py::register_exception<krot::ModelError>(module, "ModelError",
                                            PyExc_ValueError);
   py::register_exception<krot::internal::OptionError>(module, "OptionError",
-                                            PyExc_ValueError);
+                                                      PyExc_ValueError);
   py::register_exception<krot::WriteError>(module, "WriteError", PyExc_OSError);
   krot::internal::BindModel(&module);
   krot::internal::BindCommands(&module);

@@ -95,7 +95,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (source.Byte() == 'T') {
     krot::internal::Tamper(source);
   } else {
-    krot::internal::JudgeText(std::string(reinterpret_cast<const char*>(data), size));
+    krot::internal::JudgeText(
+        std::string(reinterpret_cast<const char*>(data), size));
   }
   return 0;
 }

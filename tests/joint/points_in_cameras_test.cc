@@ -1,6 +1,6 @@
+#include <gtest/gtest.h>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <gtest/gtest.h>
 
 #include "krot/joint/initializer.h"
 #include "krot/joint/joint.h"
@@ -31,7 +31,8 @@ RandomScene WithAPointInTwoCameras(const RandomScene& scene) {
     problem.observations.push_back(o);
     problem.observations.back().view = twin;
   }
-  // The twin sees the point a tenth off along x, in its first ray's coordinates.
+  // The twin sees the point a tenth off along x, in its first ray's
+  // coordinates.
   const Eigen::Vector2d disparity(0.1, 0);
   Observation near = from.observations[0];
   const Eigen::Matrix2d J = near.E.block<2, 2>(1, 0);

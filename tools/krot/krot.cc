@@ -254,5 +254,6 @@ int main(int argc, char** argv) try {
   krot::internal::SilenceCeres();
   return krot::internal::Main({argv + std::min(argc, 1), argv + argc});
 } catch (const std::bad_alloc&) {
-  return krot::internal::Fail("krot", "out of memory", krot::internal::kExitInternal);
+  return krot::internal::Fail("krot", "out of memory",
+                              krot::internal::kExitInternal);
 }

@@ -81,9 +81,8 @@ std::vector<ImageErrors> ErrorsByImage(const Model& model,
       GroupByImage(model, errors_px);
   std::vector<ImageErrors> by_image;
   for (size_t n = 0; n < groups.size(); ++n) {
-    by_image.push_back(
-        {model.images[n].id, model.images[n].name, model.images[n].camera_id,
-         Summarize(groups[n])});
+    by_image.push_back({model.images[n].id, model.images[n].name,
+                        model.images[n].camera_id, Summarize(groups[n])});
   }
   return by_image;
 }

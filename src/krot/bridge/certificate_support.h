@@ -8,8 +8,8 @@
 #include "krot/bridge/pixel_certificate.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/verify/certificate_check.h"
 #include "krot/solve.h"
+#include "krot/verify/certificate_check.h"
 
 namespace krot::internal {
 

@@ -10,8 +10,8 @@
 #include "krot/conic/interior_point.h"
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/verify/certificate_check.h"
 #include "krot/proof/least_norm.h"
+#include "krot/verify/certificate_check.h"
 
 namespace krot::internal {
 
