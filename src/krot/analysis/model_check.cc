@@ -23,6 +23,8 @@ constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 constexpr double kNoisyImage = 3;
 // Of the squared errors: another pose takes so much of them away.
 constexpr double kExplained = 0.5;
+// Pixels: errors below are those of stored numbers.
+constexpr double kRounding = 1e-3;
 // Of the share of its 2D points that the median image keeps in tracks.
 constexpr double kFewKept = 1.0 / 3;
 // Of the largest error that the model was filtered for: the 95 % quantile of
@@ -187,7 +189,8 @@ class Checker {
           const ImageCheck& image = check_.images[n];
           return static_cast<double>(2 * image.num_wrong - image.num_tested);
         });
-    check_.is_adjusted = MedianOfSound([&](size_t n) {
+    check_.is_adjusted = snooping_.noise.sigma_px.value_or(0) < kRounding ||
+                         MedianOfSound([&](size_t n) {
                            return sums_[n].UnexpectedGainShare();
                          }) < kExplained / 2;
     if (check_.is_adjusted) {

@@ -7,10 +7,10 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/base/check.h"
+#include "krot/finish/robust_least_squares.h"
 #include "krot/outliers/optimum_without.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
-#include "krot/pipeline/polish.h"
 
 namespace krot::internal {
 namespace {
@@ -140,17 +140,11 @@ NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context) {
   const NoiseLimit own = LimitOf(model, norm, context);
   context.Stage("measuring the noise");
-  const Estimate robust = FindRobustStart(
+  Estimate robust = FindRobustStart(
       built.problem, norm, std::min(kLevelOfStart, own.max_error), context);
-  Model moved = ApplyEstimate(model, built, robust);
-  NoiseLimit limit = LimitOf(moved, norm, context);
-  if (limit.sigma > 0) {
-    Context alone = context;
-    alone.num_threads = 1;  // Ceres' sums depend on it
-    PolishModel(Polish::kRotationsFixed,
-                {ErrorLoss::Kind::kCauchy, limit.sigma}, {}, alone, &moved);
-    limit = LimitOf(moved, norm, context);
-  }
+  MinimizeRobustly(built.problem, context, &robust);
+  const NoiseLimit limit =
+      LimitOf(ApplyEstimate(model, built, robust), norm, context);
   const bool is_lower = limit.sigma > 0 && !(limit.sigma >= own.sigma);
   return is_lower || own.sigma == 0 ? limit : own;
 }

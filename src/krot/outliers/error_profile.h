@@ -26,8 +26,8 @@ struct NoiseLimit {
 };
 
 // The sigma that SnoopNoise ends with, at the cameras of the model or of
-// FindRobustStart, moved on to the least of a Cauchy loss, whichever has less:
-// the latter do not mind a start that is off. One of N errors is above
+// FindRobustStart, moved on to a robust least squares, whichever has less: the
+// latter do not mind a start that is off. One of N errors is above
 // sigma sqrt(2 ln(N / 0.05)) with a probability of 5 % at most (Bonferroni).
 // Nothing below a thousandth of a pixel is told from rounding. Takes less than
 // a solve.
