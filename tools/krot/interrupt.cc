@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <csignal>
 
 #include "tools/krot/command_error.h"
@@ -12,6 +13,7 @@ namespace krot::internal {
 namespace {
 
 CancelFlag interrupted{false};
+std::atomic<bool> is_ending{false};
 static_assert(CancelFlag::is_always_lock_free,
               "a signal handler may set lock-free atomics only");
 
@@ -22,6 +24,7 @@ size_t sentence_length = 0;
 void SetInterrupted(int) { interrupted.store(true); }
 
 void End(int) {
+  is_ending.store(true);
   if (::write(STDERR_FILENO, sentence.data(), sentence_length) < 0) {
     // Nobody listens.
   }
@@ -51,6 +54,7 @@ void Interrupt() { interrupted.store(true); }
 
 const CancelFlag& DeferInterrupts() {
   Handle(&SetInterrupted, static_cast<int>(SA_RESETHAND) | SA_RESTART);
+  while (is_ending.load()) ::pause();  // another thread is ending the process
   return interrupted;
 }
 
