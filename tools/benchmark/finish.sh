@@ -5,7 +5,7 @@
 #
 # KROT is the executable, MODELS a folder of model folders. Prints per model the
 # largest error of the input, the lowest that was reached and that of the result;
-# mean errors of the input, with --Solver.finish sweeps and with the default; RMS
+# mean errors of the input, with --Solver.finish none and with the default; RMS
 # errors of the same and of the bounded adjustment with the same unknowns below the
 # same cap (krot bundle_adjuster, from the result of --Solver.finish none, by
 # another barrier, on other derivatives and another start); iterations of
@@ -44,7 +44,6 @@ row() { # NAME MODEL
     value default '.finish.seconds / (.seconds.solve - .finish.seconds)' \
       >>"$work/shares"
   done
-  solve "$2" sweeps --Solver.finish sweeps || return 0
   solve "$2" none --Solver.finish none || return 0
   cap=$(value default .finish.cap)
   bounded=-
@@ -62,17 +61,17 @@ row() { # NAME MODEL
     "$(value default .finish.lowest_cost)" \
     "$(value default .pixel_error.after.max)" \
     "$(value default .pixel_error.before.mean)" \
-    "$(value sweeps .pixel_error.after.mean)" \
+    "$(value none .pixel_error.after.mean)" \
     "$(value default .pixel_error.after.mean)" \
     "$(value default .pixel_error.before.rms)" \
-    "$(value sweeps .pixel_error.after.rms)" \
+    "$(value none .pixel_error.after.rms)" \
     "$(value default .pixel_error.after.rms)" "$bounded" \
     "$(value default .finish.num_iterations)" \
     "$(median <"$work/seconds")" "$(median <"$work/shares")"
 }
 
 cat <<'TABLE'
-| model | max before | lowest | after | mean before | sweeps | finish | RMS before | sweeps | finish | bounded | iterations | s | of the solve |
+| model | max before | lowest | after | mean before | none | finish | RMS before | none | finish | bounded | iterations | s | of the solve |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|---|
 TABLE
 for model in "$models"/*/; do
