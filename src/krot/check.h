@@ -116,6 +116,7 @@ enum class ImageFault {
   kContradicted,  // most of its observations are more than noise
   kMisplaced,     // another pose halves the sum of its squared errors
   kChance,        // its errors are those of chance matches
+  kUnsupported,   // hardly any of its 2D points agrees with a 3D point
 };
 
 struct ImageCheck {

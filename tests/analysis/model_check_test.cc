@@ -1,7 +1,9 @@
 #include "krot/check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 #include <vector>
 
@@ -386,33 +388,71 @@ TEST(CheckModel, KnowsHowFirmlyAnImageIsHeld) {
               1e-4 * one.turn_sigma_deg);
 }
 
-TEST(CheckModel, CallsAnImageOfFewObservationsWeaklyHeld) {
-  Model model = Scene(4, 10, 5);
-  const ImageId id = model.images[7].id;
-  int num_kept = 0;
+// Its tracks keep their other observations.
+Model WithFewObservationsOf(size_t image, int num_kept, const Model& model) {
+  int num = 0;
   std::vector<char> is_removed;
   for (const TrackElement& element : model.track_elements) {
-    is_removed.push_back(element.image_id == id && ++num_kept > 4);
+    is_removed.push_back(element.image_id == model.images[image].id &&
+                         ++num > num_kept);
   }
-  // Its tracks keep their other observations.
-  std::vector<TrackElement> elements;
-  for (Point3D& point : model.points3D) {
-    const uint64_t begin = elements.size();
-    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
-      if (is_removed[e]) {
-        Pixel(&model, e).point3D_id = kInvalidPoint3DId;
-      } else {
-        elements.push_back(model.track_elements[e]);
-      }
-    }
-    point.track_begin = begin;
-    point.track_end = elements.size();
+  return RemoveObservations(model, is_removed).model;
+}
+
+Eigen::Vector2d Position(const Point2D& point) { return {point.x, point.y}; }
+
+TEST(CheckModel, CallsAnImageWeaklyHeldWhoseObservationsAreInOneCorner) {
+  Model model = Scene(4, 10, 5);
+  Image& image = model.images[7];
+  const Eigen::Vector2d corner = Position(image.points2D[0]);
+  std::vector<double> distances;
+  for (const Point2D& point : image.points2D) {
+    distances.push_back((Position(point) - corner).norm());
   }
-  model.track_elements = elements;
-  ValidateModel(model);
+  std::sort(distances.begin(), distances.end());
+  std::vector<char> is_removed;
+  for (const TrackElement& element : model.track_elements) {
+    const Point2D& point = image.points2D[element.point2D_idx];
+    is_removed.push_back(element.image_id == image.id &&
+                         (Position(point) - corner).norm() > distances[16]);
+  }
+  model = RemoveObservations(model, is_removed).model;
   const ModelCheck check = CheckModel(model, {}, {});
-  EXPECT_THAT(Images(check, ImageVerdict::kWeaklyHeld), ElementsAre(id));
+  EXPECT_THAT(Images(check, ImageVerdict::kWeaklyHeld),
+              ElementsAre(model.images[7].id));
   EXPECT_FALSE(check.IsAnythingWrong());
+}
+
+TEST(CheckModel, CallsAnImageWrongThatNothingHolds) {
+  for (const int num_kept : {0, 1, 4}) {
+    const Model model = WithFewObservationsOf(7, num_kept, Scene(4, 10, 5));
+    const ModelCheck check = CheckModel(model, {}, {});
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong),
+                ElementsAre(model.images[7].id));
+    EXPECT_EQ(check.images[7].fault, ImageFault::kUnsupported);
+    EXPECT_THAT(check.observations, IsEmpty());
+  }
+}
+
+TEST(CheckModel, SaysNothingOfImagesWhereAllHaveFewObservations) {
+  Model model = Scene(4, 10, 5);
+  std::map<ImageId, int> num;
+  std::vector<char> is_removed;
+  for (const TrackElement& element : model.track_elements) {
+    is_removed.push_back(++num[element.image_id] > 12);
+  }
+  model = RemoveObservations(model, is_removed).model;
+  EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+              IsEmpty());
+}
+
+// It has contradictions, but so few that three times the noise would have them,
+// and hardly anything else is left of it.
+TEST(CheckModel, NeedsLessEvidenceWhereTracksKeepLittleOfAnImage) {
+  Model model = WithFewObservationsOf(7, 20, Scene(4, 10, 5));
+  Turn(&model, 7, 0.2, {1, 2, 0});
+  EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+              ElementsAre(model.images[7].id));
 }
 
 TEST(CheckModel, HasNoVerdictWithoutPositions) {
@@ -479,24 +519,16 @@ TEST(CureModel, CopiesAModelThatNothingIsWrongWith) {
   }
 }
 
-// As COLMAP's mapper leaves an image whose pose is wrong: without what
-// contradicts that.
-Model WithoutObservationsOf(size_t image, const Model& model) {
-  std::vector<char> is_removed;
-  for (const TrackElement& element : model.track_elements) {
-    is_removed.push_back(element.image_id == model.images[image].id);
-  }
-  return RemoveObservations(model, is_removed).model;
-}
-
 TEST(CheckModel, AsksTheMatchesThatTheModelDoesNotHold) {
-  Model model = WithoutObservationsOf(5, Scene(7));
+  // As COLMAP's mapper leaves an image whose pose is wrong: without what
+  // contradicts that.
+  Model model = WithFewObservationsOf(5, 0, Scene(7));
   const Database database = DatabaseOf(Scene(7));
-  Turn(&model, 5, 3, {1, 2, 0});
-  EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
-              IsEmpty());
   ModelCheckOptions options;
   options.database = &database;
+  EXPECT_THAT(Images(CheckModel(model, options, {}), ImageVerdict::kWrong),
+              IsEmpty());
+  Turn(&model, 5, 3, {1, 2, 0});
   const ModelCheck check = CheckModel(model, options, {});
   EXPECT_THAT(Images(check, ImageVerdict::kWrong),
               ElementsAre(model.images[5].id));

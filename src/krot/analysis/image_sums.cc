@@ -1,5 +1,6 @@
 #include "krot/analysis/image_sums.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -26,8 +27,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 constexpr double kNoDirection = 1e-13;
 // Of a pose's system with ones on the diagonal: what nothing holds.
 constexpr double kSingularPose = 1e-9;
-// Below, the noise of the rest of the track is twice an error's.
-constexpr double kWellControlled = 0.25;
+// Below, series of a density that is nearly even lose nothing.
+constexpr double kFlat = 1e-4;
 // Of an image's median distance: nearer points, in the camera, would drown all
 // others in rounding.
 constexpr double kNearest = 1e-6;
@@ -42,7 +43,6 @@ struct PoseRow {
 void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
   of_R.computeDirect(R);
-  double alone = 0;
   for (int j = 0; j < 2; ++j) {
     const double r = of_R.eigenvalues()[j];
     if (r < kControlled) continue;
@@ -52,10 +52,8 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
     sums->M.noalias() += r * f * f.transpose();
     sums->g.noalias() += along * f;
     sums->square += along * along / r;
-    alone += along * along / (r * r);
     ++sums->num_directions;
   }
-  if (of_R.eigenvalues()[0] > kWellControlled) sums->squares.push_back(alone);
 }
 
 // Rotations and centres have different units: the diagonal becomes 1.
@@ -186,17 +184,43 @@ double ImageSums::TurnSpread() const {
                        M.bottomRightCorner<3, 3>());
 }
 
-double PerMille(size_t share, std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[(share * values.size() - 1) / 1000];
+namespace {
+
+// Of the density lambda exp(-lambda u) / (1 - exp(-lambda)) on [0, 1].
+double MeanInDisc(double lambda) {
+  return lambda < kFlat ? 0.5 - lambda / 12
+                        : 1 / lambda - 1 / std::expm1(lambda);
 }
 
-double ImageSums::ShareBelowHalf() const {
-  const double half = PerMille(950, squares) / 4;
-  const auto below = std::count_if(squares.begin(), squares.end(),
-                                   [half](double one) { return one < half; });
-  return static_cast<double>(below) / static_cast<double>(squares.size());
+// log(lambda / (1 - exp(-lambda))).
+double LogFactor(double lambda) {
+  return lambda < kFlat ? lambda / 2 : std::log(lambda / -std::expm1(-lambda));
+}
+
+}  // namespace
+
+ErrorsInDisc::ErrorsInDisc(const std::vector<double>& errors_px,
+                           double limit_px) {
+  for (const double error : errors_px) {
+    if (!(error <= limit_px) || limit_px == 0) continue;
+    ++num;
+    mean += error * error / (limit_px * limit_px);
+  }
+  if (num == 0) return;
+  mean /= static_cast<double>(num);
+  if (mean >= 0.5) return;
+  double low = 0;
+  double high = 1 / std::max(mean, std::numeric_limits<double>::min());
+  for (double middle = high / 2; low < middle && middle < high;
+       middle = low + (high - low) / 2) {
+    (MeanInDisc(middle) > mean ? low : high) = middle;
+  }
+  lambda = low;
+}
+
+double ErrorsInDisc::Exponent(double other) const {
+  return static_cast<double>(num) *
+         (LogFactor(lambda) - LogFactor(other) + (other - lambda) * mean);
 }
 
 double Divergence(double s, double p) {

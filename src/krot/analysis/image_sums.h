@@ -21,9 +21,6 @@ struct ImageSums {
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();  // F' e
   double square = 0;           // e' R_ii^+ e
   int64_t num_directions = 0;  // of these
-  // |R_ii^-1 e|^2, the error to where the rest of the track leads, where that
-  // is known to less than twice the noise of an observation.
-  std::vector<double> squares;
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
 
   // The standard deviations of the centre, scene units, and of the rotation,
@@ -43,17 +40,22 @@ struct ImageSums {
     const double expected = 6 / static_cast<double>(num_directions);
     return expected < 1 ? (GainShare() - expected) / (1 - expected) : 0;
   }
-  // Of the `squares`, those of errors below half of their 95 % quantile.
-  // Requires some.
-  double ShareBelowHalf() const;
-  double MeanSquare() const {
-    return num_directions > 0 ? square / static_cast<double>(num_directions)
-                              : 0;
-  }
 };
 
-// The value that so many of a thousand are at most; 0 of none.
-double PerMille(size_t share, std::vector<double> values);
+// An image's squared errors up to a limit, as shares u of its square. Gaussian
+// noise of sigma gives u the density lambda exp(-lambda u) / (1 - exp(-lambda))
+// with lambda = limit^2 / (2 sigma^2), whatever is filtered beyond the limit;
+// errors by chance fill the disc evenly: lambda = 0.
+struct ErrorsInDisc {
+  ErrorsInDisc(const std::vector<double>& errors_px, double limit_px);
+
+  int64_t num = 0;
+  double mean = 0;    // of u
+  double lambda = 0;  // the likeliest, not negative
+  // Of Chernoff's bound on the probability of such a mean or one farther from
+  // that of `other`, not negative: num KL(lambda, other).
+  double Exponent(double other) const;
+};
 
 // The exponent of Chernoff's bound on the probability that of n trials, each of
 // probability p, a share beyond s succeeds: exp(-n KL(s, p)).

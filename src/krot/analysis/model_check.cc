@@ -27,13 +27,10 @@ constexpr double kExplained = 0.5;
 constexpr double kRounding = 1e-3;
 // Of the share of its 2D points that the median image keeps in tracks.
 constexpr double kFewKept = 1.0 / 3;
-// Of the largest error that the model was filtered for: the 95 % quantile of
-// errors that fill the disc is near it.
-constexpr double kToTheLimit = 0.7;
-// Chernoff's bound is for a quantile that is known. Taken from the same errors,
-// it passes that of noise by image in three of 200 scenes, and in none with
-// this margin.
-constexpr double kOwnQuantile = 10;
+// Median deviations: three standard deviations of Gaussian values.
+constexpr double kStandsOut = 4.5;
+// Half of what COLMAP asks of an image that it registers.
+constexpr int64_t kFewestAgree = 15;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 
@@ -65,10 +62,15 @@ class Checker {
       of_image[image_of_[e]].push_back(errors[e]);
       all.push_back(errors[e]);
     }
-    const double limit = PerMille(999, std::move(all));
-    for (std::vector<double>& own : of_image) {
-      reaches_limit_.push_back(PerMille(950, std::move(own)) >
-                               kToTheLimit * limit);
+    // What the model was filtered for, but for a thousandth.
+    double limit = 0;
+    if (!all.empty()) {
+      const auto rank = all.begin() + (999 * all.size() - 1) / 1000;
+      std::nth_element(all.begin(), rank, all.end());
+      limit = *rank;
+    }
+    for (const std::vector<double>& own : of_image) {
+      in_disc_.emplace_back(own, limit);
     }
   }
 
@@ -82,8 +84,7 @@ class Checker {
       if (context_.IsCancelled() || !snooping_.noise.sigma_px) return check_;
       Count();
       sums_ = AddUpImages(model_, snooping_.noise);
-      AddRemoved();
-    } while (CallWrong(WorstImage()));
+    } while (CallWrong(WorstImage()) || CallUnsupported());
     Describe();
     FindSecondPoints();
     HowFirmly();
@@ -150,15 +151,6 @@ class Checker {
     }
   }
 
-  // Errors without their largest would have no tails.
-  void AddRemoved() {
-    for (const SnoopedObservation& one : snooping_.removed) {
-      if (one.is_of_two || !std::isfinite(one.error_px)) continue;
-      sums_[image_of_[one.element]].squares.push_back(one.error_px *
-                                                      one.error_px);
-    }
-  }
-
   // -1: none. Sets its fault. Contradictions come first, as they bend what the
   // others see.
   int32_t WorstImage() {
@@ -176,6 +168,7 @@ class Checker {
         most = weight(n);
       }
     };
+    median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
     ask(
         ImageFault::kLens,
         [&](size_t n) {
@@ -198,15 +191,34 @@ class Checker {
           ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
           [&](size_t n) { return sums_[n].Gain(); });
     }
-    median_square_ =
-        MedianOfSound([&](size_t n) { return sums_[n].MeanSquare(); });
-    median_kept_ = MedianOfSound([&](size_t n) { return KeptShare(n); });
     if (check_.is_adjusted) {
+      const double lambda = LeastLambda();
       ask(
-          ImageFault::kChance, [&](size_t n) { return IsChance(n); },
-          [&](size_t n) { return sums_[n].square; });
+          ImageFault::kChance, [&](size_t n) { return IsChance(n, lambda); },
+          [&](size_t n) { return in_disc_[n].Exponent(lambda); });
     }
     return worst;
+  }
+
+  // Those that neither tracks nor matches hold, all at once: so few
+  // observations bend nothing. False if there are none.
+  bool CallUnsupported() {
+    const double spread =
+        MedianOfSound([&](size_t n) { return sums_[n].CenterSpread(); });
+    bool is_any = false;
+    for (size_t n = 0; n < check_.images.size(); ++n) {
+      ImageCheck& image = check_.images[n];
+      if (image.verdict == ImageVerdict::kWrong ||
+          image.num_tested - image.num_wrong >= kFewestAgree ||
+          RelativeKept(n) >= 1 ||
+          (check_.pairs && check_.pairs->images[n].kept_matches > 0) ||
+          sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
+        continue;
+      }
+      image.fault = ImageFault::kUnsupported;
+      is_any = CallWrong(static_cast<int32_t>(n));
+    }
+    return is_any;
   }
 
   // A bound exp(-x) on the probability of a test is low enough, over all
@@ -216,10 +228,16 @@ class Checker {
                     options_.false_alarm);
   }
 
+  // And for one of whose 2D points tracks keep few: the fewer, the less has to
+  // speak against it.
+  double LeastExponent(size_t n) const {
+    return LeastExponent() + std::min(0.0, std::log(RelativeKept(n)));
+  }
+
   bool IsContradicted(size_t n) const {
     const ImageCheck& image = check_.images[n];
     return 2 * image.num_wrong > image.num_tested &&
-           ContradictionExponent(n) > LeastExponent();
+           ContradictionExponent(n) > LeastExponent(n);
   }
 
   // Of the bound on the probability that three times the noise contradicts so
@@ -252,29 +270,25 @@ class Checker {
     return std::min(by_model, by_own) > LeastExponent();
   }
 
-  // Errors that are larger than the median image's, by the bound of Chernoff on
-  // chi^2, and fill a disc evenly: by another such bound or, where few of the
-  // image's 2D points are in tracks, if that is as likely as Gaussian errors;
-  // the fewer, the less likely it may be.
-  bool IsChance(size_t n) const {
-    const ImageSums& sums = sums_[n];
-    const double ratio = sums.MeanSquare() / median_square_;
-    if (!(ratio > 2) || sums.squares.empty()) return false;
-    const auto num = static_cast<double>(sums.num_directions);
-    if (!(num / 2 * (ratio - 1 - std::log(ratio)) > LeastExponent()))
-      return false;
-    // Of Gaussian errors 1 - 20^(-1/4), a half, are below half of their 95 %
-    // quantile, and more if the tails are heavier; of a disc a quarter.
-    const double gaussian = 1 - std::pow(20, -0.25);
-    const double disc = 0.95 / 4;
-    const double share = sums.ShareBelowHalf();
-    if (!(share < gaussian)) return false;
-    const auto size = static_cast<double>(sums.squares.size());
-    const double exponent = size * Divergence(share, gaussian);
-    const double kept = KeptShare(n) / (kFewKept * median_kept_);
-    return exponent > LeastExponent() + std::log(kOwnQuantile) ||
-           (kept < 1 && reaches_limit_[n] &&
-            exponent - size * Divergence(share, disc) > std::log(kept));
+  // Below, an image is noisier than the spread of the others' noise explains.
+  double LeastLambda() const {
+    const auto log_lambda = [&](size_t n) {
+      return std::log(
+          std::max(in_disc_[n].lambda, std::numeric_limits<double>::min()));
+    };
+    const double median = MedianOfSound(log_lambda);
+    const double deviation = MedianOfSound(
+        [&](size_t n) { return std::abs(log_lambda(n) - median); });
+    return std::exp(median - kStandsOut * deviation);
+  }
+
+  // Its errors fill the disc to which the model was filtered, and as evenly as
+  // those of chance matches.
+  bool IsChance(size_t n, double least_lambda) const {
+    const ErrorsInDisc& errors = in_disc_[n];
+    return errors.num > 0 && errors.lambda < least_lambda &&
+           errors.Exponent(least_lambda) > LeastExponent(n) &&
+           errors.Exponent(0) < -std::log(options_.false_alarm);
   }
 
   // Of the image's 2D points, those in tracks.
@@ -282,6 +296,11 @@ class Checker {
     return static_cast<double>(check_.images[n].num_observations) /
            static_cast<double>(
                std::max<size_t>(1, model_.images[n].points2D.size()));
+  }
+
+  // Below 1 where they are few beside the median image's.
+  double RelativeKept(size_t n) const {
+    return median_kept_ > 0 ? KeptShare(n) / (kFewKept * median_kept_) : 1;
   }
 
   template <typename Value>
@@ -370,14 +389,11 @@ class Checker {
   const Model& model_;
   const ModelCheckOptions& options_;
   const Context& context_;
-  std::vector<int32_t> image_of_;  // by track element
-  // By image: its errors in the model are as large as any, as chance matches'
-  // are up to what COLMAP filters.
-  std::vector<char> reaches_limit_;
+  std::vector<int32_t> image_of_;      // by track element
+  std::vector<ErrorsInDisc> in_disc_;  // by image, in the model as it stands
   NoiseOptions noise_options_;
   NoiseSnooping snooping_;
   std::vector<ImageSums> sums_;  // as Model::images
-  double median_square_ = 0;     // of an image's errors, per direction
   double median_kept_ = 0;
   ModelCheck check_;
 };

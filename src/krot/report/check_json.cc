@@ -23,6 +23,8 @@ const char* FaultName(ImageFault fault) {
       return "misplaced";
     case ImageFault::kChance:
       return "chance";
+    case ImageFault::kUnsupported:
+      return "unsupported";
     case ImageFault::kNone:
       break;
   }

@@ -215,6 +215,8 @@ std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
       return "another pose would halve its squared errors";
     case ImageFault::kChance:
       return "they fit no better than chance matches";
+    case ImageFault::kUnsupported:
+      return "too few of its 2D points agree with 3D points to hold its pose";
     case ImageFault::kNone:
       break;
   }
