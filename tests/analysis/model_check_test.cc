@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -13,6 +14,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/analysis/image_sums.h"
 #include "krot/camera/projection_row.h"
 #include "krot/model.h"
 #include "krot/model/image_geometry.h"
@@ -248,6 +250,50 @@ TEST(CheckModel, DoesNotCallANoisyImageChanceThatOthersTookItsTracksFrom) {
     const ModelCheck check =
         CheckModel(RemoveObservations(model, is_removed).model);
     EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
+  }
+}
+
+// Against sums over the density on a grid.
+TEST(ErrorsInDisc, HasTheLikeliestDensityAndItsDivergence) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (const double lambda : {0.0, 0.5, 3.0, 40.0}) {
+    std::vector<double> errors;  // of a disc of 4 pixels, and some beyond
+    for (int n = 0; n < 500; ++n) {
+      const double u =
+          lambda == 0
+              ? uniform(random)
+              : -std::log1p(uniform(random) * std::expm1(-lambda)) / lambda;
+      errors.push_back(4 * std::sqrt(u));
+      if (n % 100 == 0) errors.push_back(4 + n);
+    }
+    const ErrorsInDisc disc(errors, 4);
+    EXPECT_EQ(disc.num, 500);
+    constexpr int kCells = 100000;
+    const auto sum = [&](double l, const auto& value) {
+      double all = 0;
+      double total = 0;
+      for (int n = 0; n < kCells; ++n) {
+        const double u = (n + 0.5) / kCells;
+        all += std::exp(-l * u);
+        total += std::exp(-l * u) * value(u);
+      }
+      return std::make_pair(total / all, std::log(all / kCells));
+    };
+    const auto identity = [](double u) { return u; };
+    const double mean = sum(disc.lambda, identity).first;
+    if (disc.lambda > 0) {
+      EXPECT_NEAR(mean, disc.mean, 1e-6);
+    }
+    EXPECT_NEAR(disc.lambda, lambda, 0.1 * lambda + 0.5);
+    for (const double other : {0.0, 1.0, 10.0}) {
+      const double divergence =
+          sum(disc.lambda, [&](double u) { return (other - disc.lambda) * u; })
+              .first +
+          sum(other, identity).second - sum(disc.lambda, identity).second;
+      EXPECT_NEAR(disc.Exponent(other), 500 * divergence,
+                  1e-3 * (1 + disc.Exponent(other)));
+    }
   }
 }
 

@@ -124,12 +124,25 @@ std::string TrackTable(const ModelCheck& check, size_t max_rows) {
          table.ToString();
 }
 
+bool IsNotAdjusted(const ModelCheck& check) {
+  return check.sigma_px && !check.is_adjusted;
+}
+
+std::string RobustAdjustment(const std::string& model, double scale_px) {
+  return "    krot bundle_adjuster --input_path " + model +
+         " --output_path ADJUSTED --BundleAdjustmentCeres.loss_function_type "
+         "CAUCHY --BundleAdjustmentCeres.loss_function_scale " +
+         FormatLength(scale_px) + "\n";
+}
+
 // In COLMAP's own commands.
 std::string NextSteps(const CheckReport& report) {
   const ModelCheck& check = report.check;
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);
   const int64_t num_weak = check.NumImages(ImageVerdict::kWeaklyHeld);
-  if (!check.IsAnythingWrong() && num_weak == 0) return "";
+  if (!check.IsAnythingWrong() && num_weak == 0 && !IsNotAdjusted(check)) {
+    return "";
+  }
   const auto or_name = [](const std::string& path, const char* name) {
     return path.empty() ? std::string(name) : path;
   };
@@ -137,6 +150,15 @@ std::string NextSteps(const CheckReport& report) {
   const std::string cured = or_name(report.output_path, "CURED");
   const std::string database = or_name(report.database_path, "DATABASE");
   std::string text = "\nNext\n";
+  if (IsNotAdjusted(check)) {
+    return text +
+           "  Adjust the model with a loss that wrong observations do not bend "
+           "(colmap bundle_adjuster of\n  COLMAP 4 has these options, too), "
+           "and "
+           "check it again:\n" +
+           RobustAdjustment(input, check.cauchy_scale_px.value_or(1)) +
+           "    krot model_checker --input_path ADJUSTED\n";
+  }
   std::string model = check.IsAnythingWrong() ? cured : input;
   if (check.IsAnythingWrong() && report.output_path.empty()) {
     text +=
@@ -187,11 +209,8 @@ std::string NextSteps(const CheckReport& report) {
   return text +
          "  Then adjust all that is left, with the loss that suits errors with "
          "such tails\n  (colmap bundle_adjuster of COLMAP 4 has these options, "
-         "too):\n    krot bundle_adjuster --input_path " +
-         model +
-         " --output_path ADJUSTED --BundleAdjustmentCeres.loss_function_type "
-         "CAUCHY --BundleAdjustmentCeres.loss_function_scale " +
-         FormatLength(*check.cauchy_scale_px) + "\n";
+         "too):\n" +
+         RobustAdjustment(model, *check.cauchy_scale_px);
 }
 
 }  // namespace
@@ -290,10 +309,9 @@ std::string ForAdjusted(const CheckReport& report) {
 }  // namespace
 
 std::string CheckSentence(const CheckReport& report) {
-  const bool is_adjusted = !report.check.sigma_px || report.check.is_adjusted;
-  return (is_adjusted ? ""
-                      : "The model is not adjusted, so adjust it first "
-                        "(colmap bundle_adjuster). As it stands: ") +
+  return (IsNotAdjusted(report.check)
+              ? "The model is not adjusted, so adjust it first. As it stands: "
+              : "") +
          ForAdjusted(report);
 }
 
@@ -307,12 +325,10 @@ std::string CheckTable(const CheckReport& report, int max_rows) {
       " weakly held, " + Thousands(check.NumImages(ImageVerdict::kFine)) +
       " fine. Observations that others check: " + Thousands(check.num_tested) +
       ".\n";
-  if (check.sigma_px && !check.is_adjusted) {
+  if (IsNotAdjusted(check)) {
     text +=
         "Not adjusted: most images do not stand where their own errors would "
-        "have them. That alone\nmakes observations and images look wrong; "
-        "check "
-        "the adjusted model again.\n";
+        "have them. That alone\nmakes observations and images look wrong.\n";
   }
   if (check.pairs) text += PairTable(*check.pairs, max_rows);
   return text + ImageTable(check, ImageVerdict::kWrong, num_rows) +
