@@ -265,7 +265,7 @@ TEST(ErrorsInDisc, HasTheLikeliestDensityAndItsDivergence) {
               ? uniform(random)
               : -std::log1p(uniform(random) * std::expm1(-lambda)) / lambda;
       errors.push_back(4 * std::sqrt(u));
-      if (n % 100 == 0) errors.push_back(4 + n);
+      if (n % 100 == 0) errors.push_back(5 + n);
     }
     const ErrorsInDisc disc(errors, 4);
     EXPECT_EQ(disc.num, 500);
