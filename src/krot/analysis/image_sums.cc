@@ -207,8 +207,8 @@ ErrorsInDisc::ErrorsInDisc(const std::vector<double>& errors_px,
     mean += error * error / (limit_px * limit_px);
   }
   if (num == 0) return;
-  mean /= static_cast<double>(num);
-  if (mean >= 0.5) return;
+  mean = std::min(0.5, mean / static_cast<double>(num));
+  if (mean == 0.5) return;
   double low = 0;
   double high = 1 / std::max(mean, std::numeric_limits<double>::min());
   for (double middle = high / 2; low < middle && middle < high;

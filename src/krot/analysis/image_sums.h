@@ -50,7 +50,7 @@ struct ErrorsInDisc {
   ErrorsInDisc(const std::vector<double>& errors_px, double limit_px);
 
   int64_t num = 0;
-  double mean = 0;    // of u
+  double mean = 0;    // of u, at most that of an even disc
   double lambda = 0;  // the likeliest, not negative
   // Of Chernoff's bound on the probability of such a mean or one farther from
   // that of `other`, not negative: num KL(lambda, other).
