@@ -144,6 +144,20 @@ TEST(CheckModel, FindsAnImageWhoseObservationsAgreeOnAnotherPose) {
   }
 }
 
+// As after a minimax solution: more or less, and no image stands out.
+TEST(CheckModel, CallsNoImageMisplacedWhereAllStandOffTheirLeastSquares) {
+  for (int seed = 1; seed <= 20; ++seed) {
+    Model model = Scene(seed, 12, 6);
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> degrees(0, 0.05);
+    for (size_t n = 0; n < model.images.size(); ++n) {
+      Turn(&model, n, degrees(random), {1, 2, 0});
+    }
+    EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
+                IsEmpty());
+  }
+}
+
 // What is left of a turned image whose points have followed it.
 TEST(CheckModel, FindsAMisplacedImageByItsFewObservations) {
   for (int seed = 1; seed <= 10; ++seed) {

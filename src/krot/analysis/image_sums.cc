@@ -199,6 +199,13 @@ double LogFactor(double lambda) {
 
 }  // namespace
 
+double FilterLimit(std::vector<double> errors_px) {
+  if (errors_px.empty()) return 0;
+  const auto rank = errors_px.begin() + (999 * errors_px.size() - 1) / 1000;
+  std::nth_element(errors_px.begin(), rank, errors_px.end());
+  return *rank;
+}
+
 ErrorsInDisc::ErrorsInDisc(const std::vector<double>& errors_px,
                            double limit_px) {
   for (const double error : errors_px) {
@@ -223,10 +230,24 @@ double ErrorsInDisc::Exponent(double other) const {
          (LogFactor(lambda) - LogFactor(other) + (other - lambda) * mean);
 }
 
-double Divergence(double s, double p) {
-  const double successes = s > 0 ? s * std::log(s / p) : 0;
+double ImageSums::GainExponent(double sigma_px) const {
+  const double m = (static_cast<double>(num_directions) - 6) / 2;
+  if (!(m > 0)) return 0;
+  const double x = Gain() / (2 * sigma_px * sigma_px);
+  const double by_model = x - std::log1p(x + x * x / 2);
+  const double share = GainShare();
+  const double by_own = -m * std::log1p(-share) -
+                        std::log1p(m * share + m * (m + 1) / 2 * share * share);
+  return std::min(by_model, by_own);
+}
+
+double SuccessExponent(int64_t num_successes, int64_t num_trials, double p) {
+  if (num_successes == 0) return 0;
+  const auto num = static_cast<double>(num_trials);
+  const double s = static_cast<double>(num_successes) / num;
+  if (s <= p) return 0;
   const double failures = s < 1 ? (1 - s) * std::log((1 - s) / (1 - p)) : 0;
-  return successes + failures;
+  return num * (s * std::log(s / p) + failures);
 }
 
 std::vector<ImageSums> AddUpImages(const Model& model,

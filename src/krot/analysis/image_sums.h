@@ -35,12 +35,21 @@ struct ImageSums {
   double GainShare() const {
     return square > 0 ? std::min(Gain() / square, 1 - 1e-12) : 0;
   }
+  // Of the bound exp(-exponent) on the probability that noise gains as much. Of
+  // noise of one size, `sigma_px` or the image's own, the gain is sigma^2 chi^2
+  // with six degrees of freedom, and its share of all squared errors, in n
+  // directions, has the distribution Beta(3, (n - 6) / 2).
+  double GainExponent(double sigma_px) const;
   // Beyond the share that six parameters take of noise.
   double UnexpectedGainShare() const {
     const double expected = 6 / static_cast<double>(num_directions);
     return expected < 1 ? (GainShare() - expected) / (1 - expected) : 0;
   }
 };
+
+// To which a model of these errors was filtered: their 99.9 % quantile; 0 of
+// none.
+double FilterLimit(std::vector<double> errors_px);
 
 // An image's squared errors up to a limit, as shares u of its square. Gaussian
 // noise of sigma gives u the density lambda exp(-lambda u) / (1 - exp(-lambda))
@@ -57,9 +66,9 @@ struct ErrorsInDisc {
   double Exponent(double other) const;
 };
 
-// The exponent of Chernoff's bound on the probability that of n trials, each of
-// probability p, a share beyond s succeeds: exp(-n KL(s, p)).
-double Divergence(double s, double p);
+// Of Chernoff's bound exp(-exponent) on the probability that of so many trials,
+// each of probability p, so many or more succeed; 0 if that is to be expected.
+double SuccessExponent(int64_t num_successes, int64_t num_trials, double p);
 
 // As Model::images; of the observations of which `noise` says that they are
 // tested. Requires a valid model. O(observations).

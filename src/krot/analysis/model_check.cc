@@ -62,13 +62,7 @@ class Checker {
       of_image[image_of_[e]].push_back(errors[e]);
       all.push_back(errors[e]);
     }
-    // What the model was filtered for, but for a thousandth.
-    double limit = 0;
-    if (!all.empty()) {
-      const auto rank = all.begin() + (999 * all.size() - 1) / 1000;
-      std::nth_element(all.begin(), rank, all.end());
-      limit = *rank;
-    }
+    const double limit = FilterLimit(std::move(all));
     for (const std::vector<double>& own : of_image) {
       in_disc_.emplace_back(own, limit);
     }
@@ -187,11 +181,13 @@ class Checker {
                            return sums_[n].UnexpectedGainShare();
                          }) < kExplained / 2;
     if (check_.is_adjusted) {
+      const double share =
+          std::max(kExplained,
+                   StandsOut([&](size_t n) { return sums_[n].GainShare(); }));
       ask(
-          ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
+          ImageFault::kMisplaced,
+          [&](size_t n) { return IsMisplaced(n, share); },
           [&](size_t n) { return sums_[n].Gain(); });
-    }
-    if (check_.is_adjusted) {
       const double lambda = LeastLambda();
       ask(
           ImageFault::kChance, [&](size_t n) { return IsChance(n, lambda); },
@@ -244,42 +240,22 @@ class Checker {
   // many of its observations; 0: that is to be expected.
   double ContradictionExponent(size_t n) const {
     const ImageCheck& image = check_.images[n];
-    if (image.num_wrong == 0) return 0;
     const double ratio = snooping_.noise.critical_w / kNoisyImage;
-    const double p = std::exp(-ratio * ratio / 2);
-    const auto num = static_cast<double>(image.num_tested);
-    const double share = static_cast<double>(image.num_wrong) / num;
-    return share > p ? num * Divergence(share, p) : 0;
+    return SuccessExponent(image.num_wrong, image.num_tested,
+                           std::exp(-ratio * ratio / 2));
   }
 
-  // Of noise of one size, the model's or the image's own, the gain is sigma^2
-  // chi^2 with six degrees of freedom, and its share of all the image's n
-  // squared errors has the distribution Beta(3, (n - 6) / 2).
-  bool IsMisplaced(size_t n) const {
-    const ImageSums& sums = sums_[n];
-    const double gain = sums.Gain();
-    const double share = sums.GainShare();
-    const double m = (static_cast<double>(sums.num_directions) - 6) / 2;
-    if (!(share > kExplained) || !(m > 0)) return false;
-    const double sigma = *snooping_.noise.sigma_px;
-    const double x = gain / (2 * sigma * sigma);
-    const double by_model = x - std::log1p(x + x * x / 2);
-    const double by_own =
-        -m * std::log1p(-share) -
-        std::log1p(m * share + m * (m + 1) / 2 * share * share);
-    return std::min(by_model, by_own) > LeastExponent();
+  bool IsMisplaced(size_t n, double least_share) const {
+    return sums_[n].GainShare() > least_share &&
+           sums_[n].GainExponent(*snooping_.noise.sigma_px) > LeastExponent();
   }
 
   // Below, an image is noisier than the spread of the others' noise explains.
   double LeastLambda() const {
-    const auto log_lambda = [&](size_t n) {
-      return std::log(
+    return std::exp(-StandsOut([&](size_t n) {
+      return -std::log(
           std::max(in_disc_[n].lambda, std::numeric_limits<double>::min()));
-    };
-    const double median = MedianOfSound(log_lambda);
-    const double deviation = MedianOfSound(
-        [&](size_t n) { return std::abs(log_lambda(n) - median); });
-    return std::exp(median - kStandsOut * deviation);
+    }));
   }
 
   // Its errors fill the disc to which the model was filtered, and as evenly as
@@ -312,6 +288,15 @@ class Checker {
       }
     }
     return values.empty() ? 0 : LowerMedian(std::move(values));
+  }
+
+  // Above, an image's value is not among those of the others.
+  template <typename Value>
+  double StandsOut(const Value& value) const {
+    const double median = MedianOfSound(value);
+    return median + kStandsOut * MedianOfSound([&](size_t n) {
+                      return std::abs(value(n) - median);
+                    });
   }
 
   void Describe() {
