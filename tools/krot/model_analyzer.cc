@@ -52,8 +52,8 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                   "observations that set the maximum");
   parser->AddPath("error_colors_path", &options->error_colors_path, false,
                   "a folder",
-                  "Where a copy of the model goes whose points are coloured by "
-                  "their largest error, for COLMAP's GUI; created if need be");
+                  "Where a copy for COLMAP's GUI goes, with points coloured by "
+                  "their largest error; created if need be");
   parser->AddReal("error_colors_top", &options->error_colors_top,
                   Above(0.0, "pixels"),
                   "The error from which on the copy's points are dark red; "

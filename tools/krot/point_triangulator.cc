@@ -174,10 +174,8 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   AddWriteOnInterrupt(&command.paths, &parser);
   AddSolveOptions(&command.options.solve, &command.context, &parser);
   AddMatchesOptions(&matches, &parser);
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random "
-      "numbers",
-      &command.common, &parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command.common, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;

@@ -71,9 +71,8 @@ int RunSolver(const std::vector<std::string>& arguments) {
   AddFixedPaths(&command.paths, &parser);
   AddPositionsPath(&command.paths, &parser);
   parser.AddPath("database_path", &command.database_path, false, "a file",
-                 "With Solver.init feasible: positions and points from the "
-                 "rotations and this database's verified matches alone; it is "
-                 "only read");
+                 "With Solver.init feasible: use this database's verified "
+                 "matches in place of the model's tracks; it is only read");
   parser.AddOutputFile("certificate_path", &command.certificate_path,
                        "Where the proof of the lower bound goes, as JSON; see "
                        "certificate_checker");
@@ -86,10 +85,8 @@ int RunSolver(const std::vector<std::string>& arguments) {
                        "many observations must be left out, as JSON; it takes "
                        "most of the time");
   AddSolverOptions(&command.options, &command.context, &parser);
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random "
-      "numbers",
-      &command.common, &parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command.common, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;
