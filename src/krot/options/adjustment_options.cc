@@ -83,34 +83,33 @@ void AdjustmentOptions::AddCap(OptionTable* table) {
 
 void AdjustmentOptions::AddCeres(OptionTable* table) {
   BundleAdjustmentOptions* options = &adjustment_;
-  for (const char* group : {kCeres, kPlain}) {
-    const std::string prefix = group;
-    const std::string suffix =
-        prefix == kPlain ? "; COLMAP 3's name" : std::string();
-    table->AddInteger(prefix + kMoved[0], &options->max_num_iterations,
-                      AtLeast(0), "The most iterations" + suffix);
+  for (const std::string group : {kCeres, kPlain}) {
+    const auto text = [&](size_t k, const std::string& meaning) {
+      return group == kCeres ? meaning
+                             : "COLMAP 3's name of " + (kCeres + kMoved[k]);
+    };
+    table->AddInteger(group + kMoved[0], &options->max_num_iterations,
+                      AtLeast(0), text(0, "The most iterations"));
     table->AddInteger(
-        prefix + kMoved[1], &options->max_linear_solver_iterations, AtLeast(1),
-        "The most iterations of conjugate gradients in each" + suffix);
+        group + kMoved[1], &options->max_linear_solver_iterations, AtLeast(1),
+        text(1, "The most iterations of conjugate gradients in each"));
     table->AddReal(
-        prefix + kMoved[2], &options->function_tolerance, AtLeast(0.0),
-        "Stop when the cost changes by less, relative to it" + suffix);
-    table->AddReal(prefix + kMoved[3], &options->gradient_tolerance,
+        group + kMoved[2], &options->function_tolerance, AtLeast(0.0),
+        text(2, "Stop when the cost changes by less, relative to it"));
+    table->AddReal(group + kMoved[3], &options->gradient_tolerance,
                    AtLeast(0.0),
-                   "Stop when no entry of the gradient is larger" + suffix);
-    table->AddReal(prefix + kMoved[4], &options->parameter_tolerance,
-                   AtLeast(0.0),
-                   "Stop when the parameters change by less, relative to "
-                   "them" +
-                       suffix);
+                   text(3, "Stop when no entry of the gradient is larger"));
+    table->AddReal(
+        group + kMoved[4], &options->parameter_tolerance, AtLeast(0.0),
+        text(4, "Stop when the parameters change by less, relative to them"));
     table->AddInteger(
-        prefix + kMoved[5], &options->max_num_images_direct_dense, AtLeast(0),
-        "Up to so many images the reduced camera system is dense" + suffix);
+        group + kMoved[5], &options->max_num_images_direct_dense, AtLeast(0),
+        text(5, "Up to so many images the reduced camera system is dense"));
     table->AddInteger(
-        prefix + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
-        "Up to so many images it is sparse; beyond, and where its factor is "
-        "nearly full, conjugate gradients solve it" +
-            suffix);
+        group + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
+        text(6,
+             "Up to so many images it is sparse; beyond, and where its factor "
+             "is nearly full, conjugate gradients solve it"));
   }
   table->AddNamed<RobustLoss>("BundleAdjustmentCeres.loss_function_type",
                               &options->loss,
