@@ -38,18 +38,16 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                 "Where the model without wrong images and observations goes");
   parser->AddPath("database_path", &command->database_path, false, "a file",
                   "The database that the model was made from: check its "
-                  "verified matches against the poses; it is only read");
+                  "verified matches against the poses");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst observations in "
                   "them and, with database_path, the matches of pairs");
-  parser->AddPath(
-      "suspects_path", &command->suspects_path, false, "a folder",
-      "Where a copy for COLMAP's GUI goes, with points coloured by whether an "
-      "observation of theirs is wrong; created if need be");
-  parser->AddOutputFile(
-      "certificate_path", &command->certificate_path,
-      "With database_path: where the proof goes, as JSON, of how many matches "
-      "any baselines explain; see certificate_checker");
+  parser->AddPath("suspects_path", &command->suspects_path, false, "a folder",
+                  "Where a copy for COLMAP's GUI goes, with points coloured by "
+                  "whether an observation of theirs is wrong");
+  parser->AddOutputFile("certificate_path", &command->certificate_path,
+                        "With database_path: where the proof goes, as JSON, of "
+                        "how many matches any baselines explain");
   parser->AddChoice("fail_on", &command->fail_on, {"never", "wrong"},
                     "When to end with code 9, for scripts: wrong: if an image "
                     "or an observation is wrong");

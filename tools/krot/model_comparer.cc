@@ -62,7 +62,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
                      "list");
   parser->AddPath("output_path", &options->output_path, false, "a folder",
                   "Where errors.csv (per image, as COLMAP's) and "
-                  "errors_summary.txt (the tables) go; created if need be");
+                  "errors_summary.txt (the tables) go");
   parser->AddOutputFile("report_path", &options->report_path,
                         "Where the report goes, as JSON");
   AddHtmlPath(&options->html_path, parser);
@@ -73,8 +73,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
                   "a file",
                   "A certificate of the second model: show what it proves");
   parser->AddPath("overlay_path", &options->overlay_path, false, "a folder",
-                  "Where one model goes that holds both, aligned, in two "
-                  "colours; created if need be");
+                  "Where one model goes that holds both in two colours");
   parser->AddChoice("output_type", &options->output_type, {"BIN", "TXT"},
                     "The format of the overlay");
   AddOverwrite(&options->overwrite, parser);

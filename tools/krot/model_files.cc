@@ -84,8 +84,7 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser,
   const bool is_required = output_meaning == nullptr;
   parser->AddPath(
       "output_path", &paths->output_path, is_required, "a folder",
-      std::string(is_required ? "Where the model goes" : output_meaning) +
-          "; created if need be");
+      std::string(is_required ? "Where the model goes" : output_meaning) + "");
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);
@@ -175,10 +174,8 @@ void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
       "Model.on_contradiction", on_contradiction,
       {"auto", "follow_tracks", "follow_images", "refuse"},
       "What counts where tracks and images name different observations: auto: "
-      "the side that fits the model's positions, and both are made to agree; "
-      "follow_tracks: the tracks, and both are written as they are; "
-      "follow_images: the images, and tracks are made anew; refuse: such a "
-      "model is not read");
+      "the side that fits the model's positions; follow_tracks: the tracks; "
+      "follow_images: the images; refuse: such a model is not read");
 }
 
 ValidModel ReadValidModel(const std::string& path,

@@ -96,7 +96,7 @@ void AddImperfections(SceneOptions* scene, OptionParser* parser) {
 
 void AddSynthesizerOptions(SynthesizerOptions* options, OptionParser* parser) {
   parser->AddPath("output_path", &options->output_path, true, "a folder",
-                  "Where the model to solve goes; created if need be");
+                  "Where the model to solve goes");
   parser->AddPath("ground_truth_path", &options->ground_truth_path, false,
                   "a folder",
                   "Where the same model with exact poses and points goes");

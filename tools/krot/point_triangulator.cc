@@ -30,7 +30,7 @@ struct MatchesCommand {
 void AddMatchesOptions(MatchesCommand* command, OptionParser* parser) {
   parser->AddPath("database_path", &command->database_path, false, "a file",
                   "As COLMAP's command: make the points anew, from the "
-                  "verified matches of this database; it is only read");
+                  "verified matches of this database");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "With database_path: the photos, for the points' colours");
   parser->AddBool("clear_points", &command->clear_points,

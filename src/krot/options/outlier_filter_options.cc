@@ -26,8 +26,8 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
        {"threshold", OutlierMethod::kThreshold},
        {"snooping", OutlierMethod::kSnooping}},
       "conflicts: remove few for the bound; threshold: remove what is above "
-      "the bound, solve, and repeat, for comparison; snooping, the default "
-      "without max_error and profile_path: remove what noise does not explain");
+      "it, solve, and repeat, for comparison; snooping, the default without "
+      "max_error and profile_path: remove what noise does not explain");
   AddFinishLoss(&options->solve, table);
   table->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
                  Above(0.0),

@@ -77,9 +77,9 @@ void AddSameImage(BuildProblemOptions* options, OptionTable* table) {
   table->AddNamed<SameImage>(
       "Problem.same_image", &options->same_image,
       {{"keep", SameImage::kKeep}, {"closest", SameImage::kClosest}},
-      "Of an image's observations in one track: keep all, or leave out all but "
-      "the one closest to the model's point; they stay in the model and count "
-      "in no maximum");
+      "Of an image's observations in one track: keep all, or only the one "
+      "closest to the model's point; the others stay in the model but count in "
+      "no maximum");
 }
 
 void CheckSolveOptions(const SolveModelOptions& options,

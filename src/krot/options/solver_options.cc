@@ -47,8 +47,8 @@ void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
                  Above(0.0, "pixels"),
                  "With a feasible start: the largest error that it may have");
   AddPixels("Problem.inflate_positions",
-            "Multiply all radii of known positions by the smallest factor, at "
-            "least 1, at which the largest error can be at most this",
+            "Multiply all radii of known positions by the smallest factor at "
+            "which the largest error can be at most this",
             "radii are as the files have them", &options->inflate_positions_to,
             table);
   table->AddInteger("Joint.max_iterations", &options->joint.max_iterations,
