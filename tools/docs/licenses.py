@@ -20,8 +20,6 @@ of SuiteSparse (CHOLMOD's supernodal code): binaries linked with it fall under t
 
 Made by `tools/docs/licenses.py`.
 
-| package | linked | licence |
-|---|---|---|
 """
 
 # Of which headers or static libraries go into the binary.
@@ -46,7 +44,7 @@ def shared_packages(executable):
                 packages.add(found.stdout.split(":")[0].split(",")[0])
                 break
         else:
-            print(f"| `{path}` | dynamically | of no package |")
+            print(f"* `{path}`, dynamically: of no package")
     return packages
 
 
@@ -75,7 +73,7 @@ def main():
     linked = {package: "dynamically" for package in shared_packages(sys.argv[1])}
     linked.update({package: "statically" for package in COMPILED})
     for package, how in sorted(linked.items()):
-        print(f"| {package} | {how} | {licence(package)} |")
+        print(f"* {package}, {how}: {licence(package)}")
 
 
 if __name__ == "__main__":
