@@ -144,18 +144,19 @@ TEST(CheckModel, FindsAnImageWhoseObservationsAgreeOnAnotherPose) {
   }
 }
 
-// As after a minimax solution: more or less, and no image stands out.
+// As after a minimax solution.
 TEST(CheckModel, CallsNoImageMisplacedWhereAllStandOffTheirLeastSquares) {
+  int num_alarms = 0;
   for (int seed = 1; seed <= 20; ++seed) {
     Model model = Scene(seed, 12, 6);
     std::mt19937_64 random(seed);
-    std::uniform_real_distribution<double> degrees(0, 0.05);
+    std::normal_distribution<double> normal;
     for (size_t n = 0; n < model.images.size(); ++n) {
-      Turn(&model, n, degrees(random), {1, 2, 0});
+      Turn(&model, n, 0.04 * normal(random), {1, 2, 0});
     }
-    EXPECT_THAT(Images(CheckModel(model, {}, {}), ImageVerdict::kWrong),
-                IsEmpty());
+    num_alarms += CheckModel(model, {}, {}).NumImages(ImageVerdict::kWrong) > 0;
   }
+  EXPECT_LE(num_alarms, 1);  // the farthest off may stand out
 }
 
 // What is left of a turned image whose points have followed it.

@@ -15,7 +15,7 @@ import signal
 import subprocess
 
 TIMEOUT = 60  # seconds: a run that takes longer hangs
-# What only a SIGKILL may leave behind, as docs/cli.md says.
+# What only a SIGKILL may leave behind, as docs/reliability.md says.
 LEFTOVER = re.compile(r"^(\..+\.krot-\d+-\d+(-old)?|.+\.new-\d+)$")
 
 

@@ -14,15 +14,12 @@ HEAD = """# Licences
 
 KROT's own code is under the [BSD 3-Clause licence](../LICENSE), and nothing of others
 is in the repository. A binary is linked with these packages of Debian {release}. Named is
-the main licence; parts of a package (tests, build scripts, alternatives) may have others,
-which its own file under `/usr/share/doc` lists. The GPL of GCC's runtime has an exception
-for what is linked with it. Debian's Ceres links GPL parts of SuiteSparse (CHOLMOD's
-supernodal code): binaries linked with it fall under the GPL.
+the main licence; a package's file under `/usr/share/doc` lists those of its parts. The GPL
+of GCC's runtime has an exception for what is linked with it. Debian's Ceres links GPL parts
+of SuiteSparse (CHOLMOD's supernodal code): binaries linked with it fall under the GPL.
 
 Made by `tools/docs/licenses.py`.
 
-| package | version | linked | licence |
-|---|---|---|---|
 """
 
 # Of which headers or static libraries go into the binary.
@@ -47,7 +44,7 @@ def shared_packages(executable):
                 packages.add(found.stdout.split(":")[0].split(",")[0])
                 break
         else:
-            print(f"| `{path}` | | dynamically | of no package |")
+            print(f"* `{path}`, dynamically: of no package")
     return packages
 
 
@@ -76,9 +73,7 @@ def main():
     linked = {package: "dynamically" for package in shared_packages(sys.argv[1])}
     linked.update({package: "statically" for package in COMPILED})
     for package, how in sorted(linked.items()):
-        version = output("dpkg-query", "-W", "-f=${Version}\\n",
-                         package).split()[0]
-        print(f"| {package} | {version} | {how} | {licence(package)} |")
+        print(f"* {package}, {how}: {licence(package)}")
 
 
 if __name__ == "__main__":

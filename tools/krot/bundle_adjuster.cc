@@ -110,9 +110,8 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
   AddFixedPaths(&paths, &parser);
   AddWriteOnInterrupt(&paths, &parser);
   options.AddTo(&parser);
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random numbers", &common,
-      &parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &common, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(common.log, parser.Help());
     return kExitDone;

@@ -30,9 +30,9 @@ void AddCheckerOptions(CheckerOptions* options, OptionParser* parser) {
                   "The COLMAP model that the certificate speaks of");
   parser->AddPath("certificate_path", &options->certificate_path, true,
                   "a file", "The certificate, conflicts or baselines, as JSON");
-  parser->AddPath("database_path", &options->database_path, false, "a file",
-                  "With baselines: the database whose verified matches they "
-                  "speak of; it is only read");
+  parser->AddPath(
+      "database_path", &options->database_path, false, "a file",
+      "With baselines: the database whose verified matches they speak of");
   parser->AddOutputFile("report_path", &options->report_path,
                         "Where the report goes, as JSON");
   AddOnContradiction(&options->on_contradiction, parser);

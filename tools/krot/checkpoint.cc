@@ -61,16 +61,14 @@ std::string RunDigest(const CheckpointOptions& options, const ModelPaths& paths,
 }  // namespace
 
 void AddCheckpointPath(CheckpointOptions* options, OptionParser* parser) {
-  parser->AddOutputFile(
-      "checkpoint_path", &options->path,
-      "Where the steps that are done are kept until the output is written: the "
-      "same command goes on from there if it was killed, to the same bits");
+  parser->AddOutputFile("checkpoint_path", &options->path,
+                        "Where completed steps are kept, so that the same "
+                        "command goes on from there after a kill");
 }
 
 void AddCheckpointOnly(CheckpointOptions* options, OptionParser* parser) {
   parser->AddBool("checkpoint_only", &options->is_all,
-                  "Write the best estimate of the checkpoint, and solve "
-                  "nothing beyond it");
+                  "Only write the best estimate of the checkpoint");
 }
 
 void ResolveCheckpoint(const OptionParser& parser, CheckpointOptions* options) {

@@ -13,7 +13,7 @@ void AddLogLevel(LogOptions* log, OptionParser* parser) {
 void AddProjectPath(std::string* project_path, OptionParser* parser) {
   parser->AddPath("project_path", project_path, false, "an .ini file",
                   "Options in COLMAP's manner: name = value, groups in "
-                  "[Sections]; explicit flags win");
+                  "[Sections]; the command line wins");
 }
 
 void AddCommonOptions(const std::string& seed_description,
@@ -24,12 +24,12 @@ void AddCommonOptions(const std::string& seed_description,
                  return ParseInteger(text, &options->random_seed);
                }});
   AddLogLevel(&options->log, parser);
-  parser->AddOutputFile("log_path", &options->log.path,
-                        "Where a log of this run goes, whatever the level: "
-                        "version, machine, every option, the digests of what "
-                        "was read, each line; all that is needed to repeat it");
+  parser->AddOutputFile(
+      "log_path", &options->log.path,
+      "Where a log goes with all that is needed to repeat the run: version, "
+      "machine, options, digests of the inputs, every line");
   parser->AddBool("log_to_stderr", &options->log.to_stderr,
-                  "Send the tables to stderr, too, and leave stdout empty");
+                  "Print the tables on stderr, not on stdout");
   AddProjectPath(&options->project_path, parser);
   parser->OnParsed([options, parser] {
     if (!options->log.path.empty()) BeginRunLog(options->log.path, *parser);

@@ -47,17 +47,14 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                         "Where the errors of all cameras and images go, as "
                         "CSV");
   parser->AddPath("certificate_path", &options->certificate_path, false,
-                  "a file",
-                  "A certificate of this model: show what it proves, and the "
-                  "observations that set the maximum");
+                  "a file", "A certificate of this model: show what it proves");
   parser->AddPath("error_colors_path", &options->error_colors_path, false,
                   "a folder",
-                  "Where a copy of the model goes whose points are coloured by "
-                  "their largest error, for COLMAP's GUI; created if need be");
+                  "Where a copy for COLMAP's GUI goes, with points coloured by "
+                  "their largest error");
   parser->AddReal("error_colors_top", &options->error_colors_top,
                   Above(0.0, "pixels"),
-                  "The error from which on the copy's points are dark red; "
-                  "those without error are blue");
+                  "The error from which on the copy's points are dark red");
   AddOverwrite(&options->overwrite, parser);
   AddOnContradiction(&options->on_contradiction, parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",

@@ -37,19 +37,17 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
   AddModelPaths(&command->paths, parser,
                 "Where the model without wrong images and observations goes");
   parser->AddPath("database_path", &command->database_path, false, "a file",
-                  "The database that the model was made from: hold its "
-                  "verified matches against the poses; it is only read");
+                  "The database that the model was made from: check its "
+                  "verified matches against the poses");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst observations in "
                   "them and, with database_path, the matches of pairs");
   parser->AddPath("suspects_path", &command->suspects_path, false, "a folder",
-                  "Where a copy of the input goes whose points are coloured by "
-                  "whether an observation of their track is wrong, for "
-                  "COLMAP's GUI; created if need be");
+                  "Where a copy for COLMAP's GUI goes, with points coloured by "
+                  "whether an observation of theirs is wrong");
   parser->AddOutputFile("certificate_path", &command->certificate_path,
                         "With database_path: where the proof goes, as JSON, of "
-                        "how many matches of each contradictory pair any "
-                        "baselines explain; see certificate_checker");
+                        "how many matches any baselines explain");
   parser->AddChoice("fail_on", &command->fail_on, {"never", "wrong"},
                     "When to end with code 9, for scripts: wrong: if an image "
                     "or an observation is wrong");
@@ -58,9 +56,8 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                      "to list");
   parser->AddThreads("num_threads", &command->context.num_threads,
                      "the result is the same, bit by bit");
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random numbers",
-      &command->common, parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command->common, parser);
 }
 
 // What can be known before the model is read.

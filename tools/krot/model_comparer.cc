@@ -54,15 +54,15 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
       {{"frame", AlignmentKind::kFrame},
        {"similarity", AlignmentKind::kSimilarity},
        {"none", AlignmentKind::kNone}},
-      "How the second model is brought to the first: frame: mean rotation, "
-      "centroid and radius of the cameras; similarity: least squares on the "
-      "camera centres; none: as stored");
+      "How the second model is aligned: frame: by mean rotation, centroid and "
+      "radius of the cameras; similarity: by least squares of the camera "
+      "centres; none: as stored");
   parser->AddInteger("num_worst", &options->num_worst, AtLeast(0),
                      "How many of the worst cameras, images and points to "
                      "list");
   parser->AddPath("output_path", &options->output_path, false, "a folder",
                   "Where errors.csv (per image, as COLMAP's) and "
-                  "errors_summary.txt (the tables) go; created if need be");
+                  "errors_summary.txt (the tables) go");
   parser->AddOutputFile("report_path", &options->report_path,
                         "Where the report goes, as JSON");
   AddHtmlPath(&options->html_path, parser);
@@ -73,8 +73,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
                   "a file",
                   "A certificate of the second model: show what it proves");
   parser->AddPath("overlay_path", &options->overlay_path, false, "a folder",
-                  "Where one model that holds both, aligned and in two "
-                  "colours, goes; created if need be");
+                  "Where one model goes that holds both in two colours");
   parser->AddChoice("output_type", &options->output_type, {"BIN", "TXT"},
                     "The format of the overlay");
   AddOverwrite(&options->overwrite, parser);

@@ -84,8 +84,7 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser,
   const bool is_required = output_meaning == nullptr;
   parser->AddPath(
       "output_path", &paths->output_path, is_required, "a folder",
-      std::string(is_required ? "Where the model goes" : output_meaning) +
-          "; created if need be");
+      std::string(is_required ? "Where the model goes" : output_meaning) + "");
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);
@@ -97,15 +96,14 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser,
 
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser) {
   parser->AddPath("rotations_path", &paths->rotations_path, false, "a file",
-                  "Rotations that take the place of the model's: per line an "
-                  "image's name and QW QX QY QZ, camera from world");
+                  "Rotations to use in place of the model's: lines of NAME QW "
+                  "QX QY QZ, camera from world");
 }
 
 void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
   parser->AddPath("fixed_images_path", &paths->fixed_images_path, false,
                   "a file",
-                  "Images that must not move, by name or id, one per line: "
-                  "place and scale come from what is fixed");
+                  "Images that must not move, by name or id, one per line");
   parser->AddPath("fixed_points_path", &paths->fixed_points_path, false,
                   "a file",
                   "3D points that must not move, by id, one per line");
@@ -113,12 +111,11 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
 
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
   parser->AddPath("positions_path", &paths->positions_path, false, "a file",
-                  "Where cameras are known to be: per line an image's name and "
-                  "X Y Z RADIUS, in the model's frame and unit");
+                  "Known positions of cameras: lines of NAME X Y Z RADIUS, in "
+                  "the model's frame and unit");
   parser->AddPath("point_positions_path", &paths->point_positions_path, false,
                   "a file",
-                  "Where 3D points are known to be: per line an id and X Y Z "
-                  "RADIUS");
+                  "Known positions of 3D points: lines of ID X Y Z RADIUS");
   parser->Add({"Problem.position_radius",
                "The radius of known positions whose lines have none",
                "a number > 0, in the model's unit", "every line has its own",
@@ -130,9 +127,9 @@ void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
 }
 
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
-  parser->AddBool("write_on_interrupt", &paths->write_on_interrupt,
-                  "On the first SIGINT or SIGTERM write the best estimate so "
-                  "far; without, nothing");
+  parser->AddBool(
+      "write_on_interrupt", &paths->write_on_interrupt,
+      "On the first SIGINT or SIGTERM write the best estimate so far");
 }
 
 void AddOverwrite(bool* overwrite, OptionParser* parser) {
@@ -176,14 +173,9 @@ void AddOnContradiction(std::string* on_contradiction, OptionParser* parser) {
   parser->AddChoice(
       "Model.on_contradiction", on_contradiction,
       {"auto", "follow_tracks", "follow_images", "refuse"},
-      "Where tracks and images name different observations: auto: the side "
-      "that "
-      "fits the model's own positions counts, and both are written so that "
-      "they "
-      "agree; follow_tracks: the tracks count, and both are written as they "
-      "are; "
-      "follow_images: tracks are made anew from the images' 2D points; refuse: "
-      "such a model is not read");
+      "What counts where tracks and images name different observations: auto: "
+      "the side that fits the model's positions; follow_tracks: the tracks; "
+      "follow_images: the images; refuse: such a model is not read");
 }
 
 ValidModel ReadValidModel(const std::string& path,

@@ -43,10 +43,10 @@ void AddContents(SynthesizerOptions* options, OptionParser* parser) {
                      Between(2, 10000000), "Frames");
   parser->AddInteger("Scene.num_points", &scene->num_points,
                      Between(1, 1000000000), "Points");
-  parser->AddReal("Scene.track_length", &scene->track_length,
-                  AtLeast(2.0, "at most the number of images"),
-                  "Mean number of images that see a point; missed where fewer "
-                  "have it in view");
+  parser->AddReal(
+      "Scene.track_length", &scene->track_length,
+      AtLeast(2.0, "at most the number of images"),
+      "Mean number of images that see a point, where enough have it in view");
   parser->AddChoice("Scene.camera_model", &options->camera_model,
                     CameraModelNames(), "The model of every camera");
   parser->AddInteger("Scene.image_width", &scene->image_width,
@@ -96,13 +96,13 @@ void AddImperfections(SceneOptions* scene, OptionParser* parser) {
 
 void AddSynthesizerOptions(SynthesizerOptions* options, OptionParser* parser) {
   parser->AddPath("output_path", &options->output_path, true, "a folder",
-                  "Where the model to solve goes; created if need be");
+                  "Where the model to solve goes");
   parser->AddPath("ground_truth_path", &options->ground_truth_path, false,
                   "a folder",
                   "Where the same model with exact poses and points goes");
-  parser->AddOutputFile("database_path", &options->database_path,
-                        "Where a database goes that the model could have been "
-                        "made from, with its tracks as matches");
+  parser->AddOutputFile(
+      "database_path", &options->database_path,
+      "Where a database goes with the model's tracks as matches");
   parser->AddChoice("output_type", &options->output_type, {"BIN", "TXT"},
                     "The format to write");
   AddOverwrite(&options->overwrite, parser);

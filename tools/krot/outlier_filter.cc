@@ -38,30 +38,26 @@ struct OutlierCommand {
 void AddOutlierOptions(OutlierCommand* command, OptionParser* parser) {
   AddModelPaths(&command->paths, parser);
   AddRotationsPath(&command->paths, parser);
-  parser->AddOutputFile("conflicts_path", &command->conflicts_path,
-                        "Where the conflicts go, as JSON: the proof of how "
-                        "many must go; see certificate_checker");
+  parser->AddOutputFile(
+      "conflicts_path", &command->conflicts_path,
+      "Where the conflicts go, as JSON: the proof of how many must go");
   parser->AddOutputFile("outliers_path", &command->outliers_path,
                         "Where the list of removed observations goes, as CSV");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "The photos: the page then shows the worst of what was "
                   "removed in them");
   parser->AddPath("suspects_path", &command->suspects_path, false, "a folder",
-                  "Where a copy of the input goes whose points are coloured by "
-                  "whether they lost observations or take part in conflicts, "
-                  "for COLMAP's GUI; created if need be");
-  parser->AddPath("overlay_path", &command->overlay_path, false, "a folder",
-                  "Where one model that holds both, input and result, in two "
-                  "colours, goes; created if need be");
+                  "Where a copy for COLMAP's GUI goes, with points coloured by "
+                  "whether they lost observations or take part in conflicts");
+  parser->AddPath(
+      "overlay_path", &command->overlay_path, false, "a folder",
+      "Where one model goes that holds input and result in two colours");
   AddOutlierFilterOptions(&command->options, &command->context, parser);
-  parser->AddOutputFile(
-      "OutlierFilter.profile_path", &command->profile_path,
-      "Where the error profile goes, as JSON: the largest error against the "
-      "number removed, down to max_error or, without it, half of the first or "
-      "what noise explains; also on the page");
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random numbers",
-      &command->common, parser);
+  parser->AddOutputFile("OutlierFilter.profile_path", &command->profile_path,
+                        "Where the error profile goes, as JSON: the largest "
+                        "error against the number removed; also on the page");
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command->common, parser);
 }
 
 void CheckPairs(const OptionParser& parser, OutlierCommand* resolved) {

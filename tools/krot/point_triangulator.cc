@@ -30,7 +30,7 @@ struct MatchesCommand {
 void AddMatchesOptions(MatchesCommand* command, OptionParser* parser) {
   parser->AddPath("database_path", &command->database_path, false, "a file",
                   "As COLMAP's command: make the points anew, from the "
-                  "verified matches of this database; it is only read");
+                  "verified matches of this database");
   parser->AddPath("image_path", &command->image_path, false, "a folder",
                   "With database_path: the photos, for the points' colours");
   parser->AddBool("clear_points", &command->clear_points,
@@ -174,10 +174,8 @@ int RunPointTriangulator(const std::vector<std::string>& arguments) {
   AddWriteOnInterrupt(&command.paths, &parser);
   AddSolveOptions(&command.options.solve, &command.context, &parser);
   AddMatchesOptions(&matches, &parser);
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random "
-      "numbers",
-      &command.common, &parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command.common, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;

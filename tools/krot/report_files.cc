@@ -6,10 +6,9 @@
 namespace krot::internal {
 
 void AddHtmlPath(std::string* html_path, OptionParser* parser) {
-  parser->AddOutputFile(
-      "html_path", html_path,
-      "Where the report goes as a page to look at: figures, charts "
-      "and both models in 3D, in one HTML file");
+  parser->AddOutputFile("html_path", html_path,
+                        "Where the report goes as one HTML file, with charts "
+                        "and both models in 3D");
 }
 
 void WriteReports(const std::string& report_path, const std::string& html_path,

@@ -71,25 +71,20 @@ int RunSolver(const std::vector<std::string>& arguments) {
   AddFixedPaths(&command.paths, &parser);
   AddPositionsPath(&command.paths, &parser);
   parser.AddPath("database_path", &command.database_path, false, "a file",
-                 "With Solver.init feasible: positions and points from the "
-                 "rotations and this database's verified matches alone; it is "
-                 "only read");
+                 "With Solver.init feasible: use this database's verified "
+                 "matches in place of the model's tracks");
   parser.AddOutputFile("certificate_path", &command.certificate_path,
-                       "Where the proof of the lower bound goes, as JSON; see "
-                       "certificate_checker");
+                       "Where the proof of the lower bound goes, as JSON");
   parser.AddOutputFile("factor_certificate_path",
                        &command.factor_certificate_path,
                        "With Problem.inflate_positions: where the proof goes "
                        "that no smaller factor is enough, as JSON");
   parser.AddOutputFile("conflicts_path", &command.conflicts_path,
                        "With Solver.max_error: where the proof goes of how "
-                       "many observations must be left out, as JSON; it takes "
-                       "most of the time");
+                       "many observations must be left out, as JSON");
   AddSolverOptions(&command.options, &command.context, &parser);
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random "
-      "numbers",
-      &command.common, &parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command.common, &parser);
   if (!parser.Parse(arguments)) {
     PrintTable(command.common.log, parser.Help());
     return kExitDone;

@@ -42,9 +42,8 @@ void AddCommandOptions(ToleranceCommand* command, OptionParser* parser) {
                      "How many boxes to list at most, the widest");
   AddHtmlPath(&paths->html_path, parser);
   AddOnContradiction(&paths->on_contradiction, parser);
-  AddCommonOptions(
-      "Recorded in the report; this command draws no random numbers",
-      &command->common, parser);
+  AddCommonOptions("Accepted everywhere; this command draws no random numbers",
+                   &command->common, parser);
 }
 
 void CheckPairs(const OptionParser& parser) {

@@ -65,9 +65,8 @@ void AdjustmentOptions::AddRefined(OptionTable* table) {
 
 void AdjustmentOptions::AddCap(OptionTable* table) {
   table->Add({"BundleAdjustment.max_error",
-              "Bounded bundle adjustment: every error stays below this; "
-              "minimum: first the largest error is lowered over all that "
-              "moves, to a local minimum",
+              "Keep every error below this; minimum: first lower the largest "
+              "error over all that moves, to a local minimum",
               "a number > 0, pixels, or minimum", "", false,
               [this](const std::string& text) {
                 adjustment_.lower_max_error = text == "minimum";
@@ -75,7 +74,7 @@ void AdjustmentOptions::AddCap(OptionTable* table) {
                        (ParseReal(text, &max_error_) && max_error_ > 0);
               }});
   table->Add({"BundleAdjustment.max_error_factor",
-              "The same, times the lowest maximum of krot solver",
+              "The same, as a multiple of the lowest maximum of krot solver",
               "a number > 1", "", false, [this](const std::string& text) {
                 return ParseReal(text, &max_error_factor_) &&
                        max_error_factor_ > 1;
@@ -84,35 +83,33 @@ void AdjustmentOptions::AddCap(OptionTable* table) {
 
 void AdjustmentOptions::AddCeres(OptionTable* table) {
   BundleAdjustmentOptions* options = &adjustment_;
-  for (const char* group : {kCeres, kPlain}) {
-    const std::string prefix = group;
-    const std::string suffix =
-        prefix == kPlain ? "; COLMAP 3's name" : std::string();
-    table->AddInteger(prefix + kMoved[0], &options->max_num_iterations,
-                      AtLeast(0),
-                      "Iterations after which to stop in any case" + suffix);
-    table->AddInteger(prefix + kMoved[1],
-                      &options->max_linear_solver_iterations, AtLeast(1),
-                      "Those of conjugate gradients within one" + suffix);
+  for (const std::string group : {kCeres, kPlain}) {
+    const auto text = [&](size_t k, const std::string& meaning) {
+      return group == kCeres ? meaning
+                             : "COLMAP 3's name of " + (kCeres + kMoved[k]);
+    };
+    table->AddInteger(group + kMoved[0], &options->max_num_iterations,
+                      AtLeast(0), text(0, "The most iterations"));
+    table->AddInteger(
+        group + kMoved[1], &options->max_linear_solver_iterations, AtLeast(1),
+        text(1, "The most iterations of conjugate gradients in each"));
     table->AddReal(
-        prefix + kMoved[2], &options->function_tolerance, AtLeast(0.0),
-        "Stop when the cost changes by less, relative to it" + suffix);
-    table->AddReal(prefix + kMoved[3], &options->gradient_tolerance,
+        group + kMoved[2], &options->function_tolerance, AtLeast(0.0),
+        text(2, "Stop when the cost changes by less, relative to it"));
+    table->AddReal(group + kMoved[3], &options->gradient_tolerance,
                    AtLeast(0.0),
-                   "Stop when no entry of the gradient is larger" + suffix);
-    table->AddReal(prefix + kMoved[4], &options->parameter_tolerance,
-                   AtLeast(0.0),
-                   "Stop when the parameters change by less, relative to "
-                   "them" +
-                       suffix);
+                   text(3, "Stop when no entry of the gradient is larger"));
+    table->AddReal(
+        group + kMoved[4], &options->parameter_tolerance, AtLeast(0.0),
+        text(4, "Stop when the parameters change by less, relative to them"));
     table->AddInteger(
-        prefix + kMoved[5], &options->max_num_images_direct_dense, AtLeast(0),
-        "Up to so many images the reduced camera system is dense" + suffix);
+        group + kMoved[5], &options->max_num_images_direct_dense, AtLeast(0),
+        text(5, "Up to so many images the reduced camera system is dense"));
     table->AddInteger(
-        prefix + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
-        "Up to so many images it is sparse; beyond them, and where its factor "
-        "has hardly a zero, conjugate gradients solve it" +
-            suffix);
+        group + kMoved[6], &options->max_num_images_direct_sparse, AtLeast(0),
+        text(6,
+             "Up to so many images it is sparse; beyond, and where its factor "
+             "is nearly full, conjugate gradients solve it"));
   }
   table->AddNamed<RobustLoss>("BundleAdjustmentCeres.loss_function_type",
                               &options->loss,

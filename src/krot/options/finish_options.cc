@@ -8,9 +8,9 @@ void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
       "Solver.finish", &finish->finish,
       {{FinishName(Finish::kLeastSquares), Finish::kLeastSquares},
        {FinishName(Finish::kNone), Finish::kNone}},
-      "With method auto, what the room above the lowest maximum is for: "
-      "least_squares: the least squares of all estimates within finish_slack "
-      "of it; none: nothing");
+      "With method auto: least_squares: end at the least squares of all "
+      "estimates within finish_slack of the lowest maximum; none: end at the "
+      "lowest maximum");
   table->AddReal("Solver.finish_slack", &finish->slack,
                  Above(0.0, "relative to the lowest maximum"),
                  "With finish least_squares: how far above the lowest maximum "
@@ -21,9 +21,8 @@ void AddFinishOptions(SolveModelOptions* options, OptionTable* table) {
       {{PolishName(Polish::kNone), Polish::kNone},
        {PolishName(Polish::kRotationsFixed), Polish::kRotationsFixed},
        {PolishName(Polish::kFull), Polish::kFull}},
-      "A least squares step at the end, after which the maximum is no longer "
-      "the lowest: rotations_fixed: translations and points; full: as "
-      "bundle_adjuster");
+      "A bundle adjustment at the end, which gives up the lowest maximum: "
+      "rotations_fixed: of translations and points; full: as bundle_adjuster");
 }
 
 void AddFinishLoss(SolveModelOptions* options, OptionTable* table) {
@@ -33,10 +32,9 @@ void AddFinishLoss(SolveModelOptions* options, OptionTable* table) {
       {{LossName(ErrorLoss::Kind::kTrivial), ErrorLoss::Kind::kTrivial},
        {LossName(ErrorLoss::Kind::kHuber), ErrorLoss::Kind::kHuber},
        {LossName(ErrorLoss::Kind::kCauchy), ErrorLoss::Kind::kCauchy}},
-      "What the least squares sum of the squared errors; huber and cauchy "
-      "count large ones less");
+      "The loss of the squared errors; huber and cauchy count large ones less");
   table->AddReal("Solver.finish_loss_scale", &loss->scale, Above(0.0, "pixels"),
-                 "With finish_loss huber or cauchy: which errors are large");
+                 "With huber or cauchy: the error above which it counts less");
 }
 
 void CheckFinishLoss(const SolveModelOptions& options,

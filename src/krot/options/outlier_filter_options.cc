@@ -11,8 +11,8 @@ namespace krot::internal {
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
   table->Add({"OutlierFilter.max_error",
-              "The bound that all errors are to be within; without it, what "
-              "noise does not explain is removed",
+              "The bound for all errors; without it, what noise does not "
+              "explain is removed",
               "a number > 0, pixels", "", false,
               [options](const std::string& text) {
                 double value = 0;
@@ -25,11 +25,9 @@ void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
       {{"conflicts", OutlierMethod::kConflicts},
        {"threshold", OutlierMethod::kThreshold},
        {"snooping", OutlierMethod::kSnooping}},
-      "conflicts: few, by the least sum of excesses, and a proof of how many "
-      "must go; threshold: what is above the bound, solve, and again, to "
-      "compare with; snooping, the default without max_error and "
-      "profile_path: what noise does not explain, then least squares, and a "
-      "proof of how many must go");
+      "conflicts: remove few for the bound; threshold: remove what is above "
+      "it, solve, and repeat, for comparison; snooping, the default without "
+      "max_error and profile_path: remove what noise does not explain");
   AddFinishLoss(&options->solve, table);
   table->AddReal("Solver.relative_gap", &options->solve.joint.relative_gap,
                  Above(0.0),

@@ -25,16 +25,16 @@ bool ParseNorm(const std::string& text, Norm* norm) {
 void AddFastDescentOptions(FastDescentOptions* options, OptionTable* table) {
   table->AddReal("FastDescent.stationarity_tolerance",
                  &options->stationarity_tolerance, AtLeast(0.0),
-                 "With paper settings: epsilon_0, the norm of the centre of "
-                 "the smallest ball around the normals at which to stop");
+                 "With paper settings: epsilon_0, how near to 0 the centre of "
+                 "the smallest ball has to be");
   table->AddReal("FastDescent.step_tolerance", &options->step_tolerance,
                  Above(0.0, "scene units"),
                  "With paper settings: epsilon_1, the interval at which the "
-                 "search for the step ends");
-  table->AddReal("FastDescent.slope_probe", &options->slope_probe,
-                 Above(0.0, "scene units"),
-                 "With paper settings: epsilon_2, how far to look for the "
-                 "sign of the slope");
+                 "line search ends");
+  table->AddReal(
+      "FastDescent.slope_probe", &options->slope_probe,
+      Above(0.0, "scene units"),
+      "With paper settings: epsilon_2, how far away the slope's sign is taken");
   table->AddReal("FastDescent.active_tolerance", &options->active_tolerance,
                  InHalfOpen(0.0, 1.0, "relative to the cost"),
                  "With paper settings: residuals this close to the largest "
@@ -58,12 +58,12 @@ void AddSolveOptions(SolveModelOptions* options, Context* context,
               }});
   table->AddThreads("Solver.num_threads", &context->num_threads,
                     "the result is the same, bit by bit");
-  table->AddNamed<FastDescentSettings>(
-      "Solver.settings", &res_int->fast_descent.settings,
-      {{"fast", FastDescentSettings::kFast},
-       {"paper", FastDescentSettings::kPaper}},
-      "paper: Algorithms 2 to 4 to the letter; fast: the same optima by better "
-      "means");
+  table->AddNamed<FastDescentSettings>("Solver.settings",
+                                       &res_int->fast_descent.settings,
+                                       {{"fast", FastDescentSettings::kFast},
+                                        {"paper", FastDescentSettings::kPaper}},
+                                       "paper: Algorithms 2 to 4 as published; "
+                                       "fast: the same optima in less time");
   AddFastDescentOptions(&res_int->fast_descent, table);
   table->AddInteger("Problem.min_track_length",
                     &options->problem.min_track_length,
@@ -77,9 +77,9 @@ void AddSameImage(BuildProblemOptions* options, OptionTable* table) {
   table->AddNamed<SameImage>(
       "Problem.same_image", &options->same_image,
       {{"keep", SameImage::kKeep}, {"closest", SameImage::kClosest}},
-      "Of an image's observations in the same track: keep all, or leave out "
-      "all but the one closest to the model's own point, as wrong; they stay "
-      "in the model and count in no maximum");
+      "Of an image's observations in one track: keep all, or only the one "
+      "closest to the model's point; the others stay in the model but count in "
+      "no maximum");
 }
 
 void CheckSolveOptions(const SolveModelOptions& options,

@@ -31,9 +31,9 @@ void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
       {{"auto", SolveMethod::kAuto},
        {"res_int", SolveMethod::kResInt},
        {"joint", SolveMethod::kJoint}},
-      "auto: sweeps while they pay, the joint solver to the gap, the finish; "
-      "res_int: Resection-Intersection sweeps alone [Zhang18, Alg. 1], "
-      "without a bound; joint: the joint solver alone");
+      "auto: sweeps, the joint solver, the finish; res_int: "
+      "Resection-Intersection sweeps alone [Zhang18, Alg. 1], without a bound; "
+      "joint: the joint solver alone");
   table->AddReal("Solver.relative_gap", &options->joint.relative_gap,
                  Above(0.0),
                  "How far the largest error may be above the proved bound, "
@@ -47,28 +47,27 @@ void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
                  Above(0.0, "pixels"),
                  "With a feasible start: the largest error that it may have");
   AddPixels("Problem.inflate_positions",
-            "Multiply all radii of known positions by the smallest factor, at "
-            "least 1, at which the largest error can be at most this",
+            "Multiply all radii of known positions by the smallest factor at "
+            "which the largest error can be at most this",
             "radii are as the files have them", &options->inflate_positions_to,
             table);
-  table->AddInteger(
-      "Joint.max_iterations", &options->joint.max_iterations, AtLeast(1),
-      "Iterations per connected component and round after which to "
-      "stop in any case");
+  table->AddInteger("Joint.max_iterations", &options->joint.max_iterations,
+                    AtLeast(1),
+                    "The most iterations per connected component and round");
 }
 
 void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
                       OptionTable* table) {
-  table->Add({"ResInt.max_sweeps",
-              "Sweeps after which to stop in any case; with method auto, "
-              "those in front of the joint solver",
-              "an integer >= 0",
-              std::to_string(options->max_sweeps) + ", with method auto " +
-                  std::to_string(defaults.max_leading_sweeps),
-              false, [options](const std::string& text) {
-                return ParseInteger(text, &options->max_sweeps) &&
-                       options->max_sweeps >= 0;
-              }});
+  table->Add(
+      {"ResInt.max_sweeps",
+       "The most sweeps; with method auto, those before the joint solver",
+       "an integer >= 0",
+       std::to_string(options->max_sweeps) + ", with method auto " +
+           std::to_string(defaults.max_leading_sweeps),
+       false, [options](const std::string& text) {
+         return ParseInteger(text, &options->max_sweeps) &&
+                options->max_sweeps >= 0;
+       }});
   table->Add({"ResInt.sweep_tolerance",
               "Stop when a sweep lowers the cost by less",
               "a number >= 0, relative to the cost",
@@ -168,8 +167,8 @@ void AddSolverOptions(TolerantSolveOptions* options, Context* context,
   SolveModelOptions* solve = &options->solve;
   AddScheduleOptions(solve, table);
   AddPixels("Solver.max_error",
-            "The error that no observation may have: few are removed, as by "
-            "outlier_filter, so that all others are within it",
+            "Remove few observations, as outlier_filter does, so that all "
+            "others are within this error",
             "none is removed", &options->max_error, table);
   AddFinishOptions(solve, table);
   AddSolveOptions(solve, context, table);

@@ -97,18 +97,16 @@ void AddToleranceOptions(ToleranceArguments* arguments, Context* context,
   AddList("ToleranceAnalyzer.points", &arguments->points,
           "The 3D points that are asked for, by id", "a list with commas",
           "none", table);
-  AddList(
-      "ToleranceAnalyzer.gauge_images", &arguments->gauge_images,
-      "What holds place and scale, unless paths say what is fixed: the first "
-      "image stands still, the second keeps its distance along the line "
-      "between the two",
-      "two images, with a comma",
-      "the one with the most observations and the one farthest from it", table);
-  table->AddReal(
-      "ToleranceAnalyzer.tolerance", &options->tolerance,
-      Above(0.0, "relative to how far an end is away"),
-      "How far the proved end may be beyond the one that an estimate "
-      "reaches");
+  AddList("ToleranceAnalyzer.gauge_images", &arguments->gauge_images,
+          "What holds place and scale unless something is fixed: the first "
+          "image stands still, the second keeps its distance along the line "
+          "between the two",
+          "two images, with a comma",
+          "the one with the most observations and the one farthest from it",
+          table);
+  table->AddReal("ToleranceAnalyzer.tolerance", &options->tolerance,
+                 Above(0.0, "relative to how far an end is away"),
+                 "How far a proved end may be beyond a reached one");
   table->AddNamed<double>("Solver.norm", &options->solve.norm.p,
                           {{"1", 1}, {"2", 2}, {"inf", Norm::LInf().p}},
                           "The p of the errors' norm");

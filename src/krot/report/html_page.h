@@ -15,7 +15,7 @@ namespace krot::internal {
 // most kMaxShownPoints points each, and the distribution of all true pixel
 // errors. Byte sequences that are not UTF-8 are replaced.
 //
-// `crops_json` goes into #krot-crops: photos of suspects (docs/formats.md), []
+// `crops_json` goes into #krot-crops: photos of suspects (SuspectCropsJson), []
 // without. `pairs_json` goes into #krot-pairs: PairViewJson's text, with photos
 // where there are some, null without.
 //

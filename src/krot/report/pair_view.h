@@ -9,10 +9,11 @@ namespace krot::internal {
 // Images on the report page: their longer side, pixels.
 inline constexpr int kPairViewSide = 480;
 
-// What the page draws of the matches of pairs of images (docs/formats.md): all
-// images with the size that they have there, without photos, and of every pair
-// some of its matches, evenly from its list, with whether they agree with the
-// poses. `check` is CheckPairs' of the two. O(matches).
+// What the page draws of the matches of pairs of images. `images`, in the order
+// of the report's: width and height there, and jpeg, null until a photo comes.
+// `matches`, of each pair a list of up to 100 (of kept pairs 30), evenly from
+// all: x and y in both images, and 1 if the match agrees with the poses, else
+// 0. `check` is CheckPairs' of the two. O(matches).
 Json PairViewJson(const Model& model, const Database& database,
                   const PairCheck& check);
 
