@@ -144,21 +144,6 @@ TEST(CheckModel, FindsAnImageWhoseObservationsAgreeOnAnotherPose) {
   }
 }
 
-// As after a minimax solution.
-TEST(CheckModel, CallsNoImageMisplacedWhereAllStandOffTheirLeastSquares) {
-  int num_alarms = 0;
-  for (int seed = 1; seed <= 20; ++seed) {
-    Model model = Scene(seed, 12, 6);
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal;
-    for (size_t n = 0; n < model.images.size(); ++n) {
-      Turn(&model, n, 0.04 * normal(random), {1, 2, 0});
-    }
-    num_alarms += CheckModel(model, {}, {}).NumImages(ImageVerdict::kWrong) > 0;
-  }
-  EXPECT_LE(num_alarms, 1);  // the farthest off may stand out
-}
-
 // What is left of a turned image whose points have followed it.
 TEST(CheckModel, FindsAMisplacedImageByItsFewObservations) {
   for (int seed = 1; seed <= 10; ++seed) {
@@ -177,15 +162,18 @@ TEST(CheckModel, FindsAMisplacedImageByItsFewObservations) {
   }
 }
 
+// Minimax solutions stand off their least squares by half of the noise.
 TEST(CheckModel, AsksForAnAdjustmentWhereMostImagesAreMisplaced) {
-  Model model = Scene(1, 12, 6);
-  EXPECT_TRUE(CheckModel(model, {}, {}).is_adjusted);
-  for (size_t n = 0; n < model.images.size(); ++n) {
-    Turn(&model, n, 0.2, {1, n % 2 == 0 ? -0.5 : 0.5, 0});
+  EXPECT_TRUE(CheckModel(Scene(1, 12, 6), {}, {}).is_adjusted);
+  for (const double degrees : {0.06, 0.2}) {
+    Model model = Scene(1, 12, 6);
+    for (size_t n = 0; n < model.images.size(); ++n) {
+      Turn(&model, n, degrees, {1, n % 2 == 0 ? -0.5 : 0.5, 0});
+    }
+    const ModelCheck check = CheckModel(model, {}, {});
+    EXPECT_FALSE(check.is_adjusted);
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
   }
-  const ModelCheck check = CheckModel(model, {}, {});
-  EXPECT_FALSE(check.is_adjusted);
-  EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty());
 }
 
 // What COLMAP keeps of an image with a wrong pose. Of noise of 0.3 pixels most
