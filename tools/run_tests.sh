@@ -25,9 +25,13 @@ install_missing "${build_needs[@]}" libgtest-dev libgmock-dev libssl-dev \
   CartConvert:geographiclib-tools \
   pkg-config:pkgconf shellcheck:shellcheck pybind11-dev python3-dev python3-numpy python3-pytest
 browser_page=
+browser_log=$root/build/browser.log
 if command -v emcc >/dev/null && command -v esbuild >/dev/null; then
   install_missing firefox-esr:firefox-esr
-  "$root/tools/build_browser.sh"
+  say "Building krot.html at the same time, with its words in $browser_log"
+  mkdir -p "$root/build"
+  trap 'kill %1 2>/dev/null || true' EXIT
+  "$root/tools/build_browser.sh" >"$browser_log" 2>&1 &
   browser_page=$root/build-wasm/krot.html
 else
   say "No emscripten here: krot.html is neither built nor tested"
@@ -35,6 +39,10 @@ fi
 build_krot "$root/build" -DKROT_BUILD_TESTS=ON -DKROT_BUILD_BENCHMARKS=OFF \
   -DKROT_BUILD_PYTHON=ON -DPYTHON_EXECUTABLE=/usr/bin/python3 \
   -DKROT_BROWSER_PAGE="$browser_page"
+if [[ -n $browser_page ]]; then
+  say "Waiting for krot.html"
+  wait %1 || { cat "$browser_log" >&2; die "krot.html could not be built"; }
+fi
 
 say "Testing"
 closing=$root/build/ctest.out
