@@ -32,8 +32,6 @@ constexpr double kMultiplierRange = 100;
 // all further steps would be short.
 constexpr double kCentring = 0.2;
 constexpr double kFallingStep = 0.5;
-// A step that leads too far is shortened by this factor.
-constexpr double kBacktracking = 0.7;
 // The trust region shrinks after a step of less than this share of the one that
 // the linearised errors allow. Its radius stays between the other two.
 constexpr double kPoorShare = 0.3;
@@ -97,9 +95,8 @@ class BarrierPath {
         BarrierCost(errors_, cap2()) + kCostRounding * Objective();
     for (; radius_ >= kLeastRadius; radius_ /= 100) {
       const double longest = FindNewtonDirection() ? LongestStep() : 0;
-      const double step = Backtrack(longest, kBacktracking, [&](double length) {
-        return TryStep(length, highest);
-      });
+      const double step = Backtrack(
+          longest, [&](double length) { return TryStep(length, highest); });
       if (step == 0) continue;
       UpdateRadius(step / longest);
       return step;

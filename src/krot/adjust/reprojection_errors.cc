@@ -17,7 +17,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int64_t kObservationsPerChunk = 1024;
 constexpr int32_t kHeld = AdjustmentColumns::kHeld;
 
 std::vector<Eigen::Matrix3d> Rotations(const std::vector<PoseBlock>& poses) {
@@ -162,15 +161,13 @@ std::optional<std::vector<ProjectedError>> ProjectErrors(
   const auto count = static_cast<int64_t>(blocks.observations.size());
   std::vector<ProjectedError> errors(count);
   std::atomic<bool> is_feasible{true};
-  ParallelFor(count, kObservationsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t i = begin; i < end && is_feasible; ++i) {
-                  errors[i] = project(blocks.observations[i]);
-                  if (!(errors[i].w > 0 && errors[i].r.norm() < max_error)) {
-                    is_feasible = false;
-                  }
-                }
-              });
+  ParallelForEach(count, num_threads, [&](int64_t i) {
+    if (!is_feasible) return;
+    errors[i] = project(blocks.observations[i]);
+    if (!(errors[i].w > 0 && errors[i].r.norm() < max_error)) {
+      is_feasible = false;
+    }
+  });
   if (!is_feasible) return std::nullopt;
   return errors;
 }
@@ -255,13 +252,9 @@ void ErrorJacobians::Evaluate(const AdjustmentBlocks& blocks, int num_threads) {
     by_point->noalias() = D_rig * frame.transform.rotation;
     StorePose(frame_columns, *by_point, x - frame.center, by_frame);
   };
-  ParallelFor(static_cast<int64_t>(blocks.observations.size()),
-              kObservationsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t i = begin; i < end; ++i) {
-                  evaluate(blocks.observations[i], &D_[begin_[i]]);
-                }
-              });
+  ParallelForEach(
+      static_cast<int64_t>(blocks.observations.size()), num_threads,
+      [&](int64_t i) { evaluate(blocks.observations[i], &D_[begin_[i]]); });
 }
 
 }  // namespace krot::internal

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/numbers.h"
 #include "krot/model/id_index.h"
 #include "krot/model/image_geometry.h"
 
@@ -17,7 +18,6 @@ using Eigen::Vector3d;
 
 constexpr double kDegenerate = 1e-6;
 constexpr double kFall = 0.01;  // of what it was before
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Projection centres by the index of the image; none without a pose.
 using Centres = std::vector<std::optional<Vector3d>>;

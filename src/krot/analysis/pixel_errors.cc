@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/projection_row.h"
 #include "krot/minimax/residual.h"
@@ -21,7 +22,6 @@ using namespace internal;
 namespace {
 
 constexpr int64_t kPointsPerChunk = 1024;
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // x_cam = q x q^-1 + t.
 struct CameraPose {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@ namespace krot::internal {
 inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr double kHalfPi = kPi / 2;
 inline constexpr double kDegreesPerRadian = 180 / kPi;
+inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
+inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // The median, and of an even number of values the larger of the middle two.
 // Requires at least one value.

@@ -83,6 +83,18 @@ class ChunkBody {
 void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
                  const ChunkBody& body);
 
+// A chunk of cheap work.
+inline constexpr int64_t kItemsPerChunk = 256;
+
+// body(i) for every i of [0, count); it writes only what belongs to i.
+template <typename Body>
+void ParallelForEach(int64_t count, int num_threads, const Body& body) {
+  ParallelFor(count, kItemsPerChunk, num_threads,
+              [&](int64_t begin, int64_t end, int) {
+                for (int64_t i = begin; i < end; ++i) body(i);
+              });
+}
+
 // The number of chunks that ParallelFor makes.
 inline int64_t NumChunks(int64_t count, int64_t chunk_size) {
   return (count + chunk_size - 1) / chunk_size;

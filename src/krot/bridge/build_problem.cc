@@ -23,7 +23,6 @@ namespace {
 using Eigen::Vector3d;
 using LeftOutCounts = std::array<int64_t, kNumLeftOutReasons>;
 
-constexpr int64_t kPointsPerChunk = 256;
 // Depths below this, relative to the coordinates that they are the difference
 // of, may be rounding.
 constexpr double kDepthRounding = 1e-14;
@@ -217,9 +216,9 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
     num_slots += model.points3D[k].track_end - model.points3D[k].track_begin;
   }
   const int64_t count = static_cast<int64_t>(outcomes.size());
-  std::vector<LeftOutCounts> chunk_left_out(NumChunks(count, kPointsPerChunk),
+  std::vector<LeftOutCounts> chunk_left_out(NumChunks(count, kItemsPerChunk),
                                             LeftOutCounts{});
-  ParallelFor(count, kPointsPerChunk, options.num_threads,
+  ParallelFor(count, kItemsPerChunk, options.num_threads,
               [&](int64_t begin, int64_t end, int) {
                 for (int64_t n = begin; n < end; ++n) {
                   const uint64_t first = outcomes[n].slots;
@@ -228,7 +227,7 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
                                 built->point2D_of.data() + first,
                                 built->pixels.data() + first},
                                &outcomes[n],
-                               &chunk_left_out[begin / kPointsPerChunk]);
+                               &chunk_left_out[begin / kItemsPerChunk]);
                 }
               });
   for (const LeftOutCounts& counts : chunk_left_out) {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
@@ -15,7 +16,6 @@
 namespace krot::internal {
 namespace {
 
-constexpr double kNoRegion = std::numeric_limits<double>::infinity();
 // Corrections of gamma that MakePixelCertificate takes; two mostly do.
 constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
@@ -51,7 +51,7 @@ double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
   const std::optional<double> largest = SupportBound(
       source.model_id, source.params, built.pixels[o.observation], bearings[n],
       o.y / scale, scale * gamma, norm.p, sufficient * unit);
-  return largest ? *largest / unit : kNoRegion;
+  return largest ? *largest / unit : kInfinity;
 }
 
 // The highest of them, or one that is at most `sufficient`: those that are
@@ -70,7 +70,7 @@ double HighestLine(const Reprojection& reprojection, const BuiltProblem& built,
                                     begin + n, gamma, highest);
                 });
     highest = std::max(highest, *std::max_element(lines.begin(), lines.end()));
-    if (highest == kNoRegion) break;
+    if (highest == kInfinity) break;
   }
   return highest;
 }

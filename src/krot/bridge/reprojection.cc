@@ -1,10 +1,12 @@
 #include "krot/bridge/reprojection.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/camera/models.h"
@@ -17,10 +19,8 @@
 namespace krot::internal {
 namespace {
 
-constexpr int64_t kObservationsPerChunk = 4096;
 // Of a coordinate that is computed in a few operations, relative.
 constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -71,10 +71,10 @@ double Reprojection::Resolution(const Estimate& estimate, int64_t i,
 double Reprojection::TrueCost(const Estimate& estimate, Norm norm,
                               int num_threads) const {
   const auto count = static_cast<int64_t>(built_.problem.observations.size());
-  std::vector<double> largest(NumChunks(count, kObservationsPerChunk), 0);
-  ParallelFor(count, kObservationsPerChunk, num_threads,
+  std::vector<double> largest(NumChunks(count, kItemsPerChunk), 0);
+  ParallelFor(count, kItemsPerChunk, num_threads,
               [&](int64_t begin, int64_t end, int) {
-                double& cost = largest[begin / kObservationsPerChunk];
+                double& cost = largest[begin / kItemsPerChunk];
                 for (int64_t i = begin; i < end; ++i) {
                   if (!built_.HasPixel(i)) continue;
                   cost = std::max(cost, Error(estimate, norm, i));
@@ -97,32 +97,27 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
   if (is_linear_) return true;
   TakePositionRows(built_, estimate, problem);
   const auto count = static_cast<int64_t>(problem->observations.size());
-  std::vector<char> do_project(NumChunks(count, kObservationsPerChunk), 1);
-  ParallelFor(count, kObservationsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t i = begin; i < end; ++i) {
-                  if (!built_.HasPixel(i)) continue;
-                  Observation& observation = problem->observations[i];
-                  const Source& source = sources_[observation.view];
-                  const auto row =
-                      RowAtProjection(source.model_id, source.params,
-                                      built_.pixels[i], InCamera(estimate, i));
-                  if (row) {
-                    observation.E = *row;
-                    observation.E.bottomRows<2>() /= built_.ScaleOf(i);
-                  } else {
-                    do_project[begin / kObservationsPerChunk] = 0;
-                  }
-                }
-              });
-  return std::count(do_project.begin(), do_project.end(), 0) == 0;
+  std::atomic<bool> do_project{true};
+  ParallelForEach(count, num_threads, [&](int64_t i) {
+    if (!built_.HasPixel(i)) return;
+    Observation& observation = problem->observations[i];
+    const Source& source = sources_[observation.view];
+    const auto row = RowAtProjection(source.model_id, source.params,
+                                     built_.pixels[i], InCamera(estimate, i));
+    if (row) {
+      observation.E = *row;
+      observation.E.bottomRows<2>() /= built_.ScaleOf(i);
+    } else {
+      do_project = false;
+    }
+  });
+  return do_project;
 }
 
 namespace {
 
 // Above the relative error of the operations that make a row.
 constexpr double kRowRounding = 1e-13;
-constexpr int64_t kRowsAtOnce = 64;
 
 std::optional<Eigen::Matrix3d> OuterRow(const Reprojection::Source& source,
                                         const Eigen::Vector2d& pixel, Norm norm,
@@ -147,16 +142,13 @@ std::vector<char> TakeOuterRows(const Model& model, const BuiltProblem& built,
   const Reprojection reprojection(model, built);
   const auto count = static_cast<int64_t>(problem->observations.size());
   std::vector<char> has_row(count, 0);
-  ParallelFor(
-      count, kRowsAtOnce, num_threads, [&](int64_t begin, int64_t end, int) {
-        for (int64_t i = begin; i < end; ++i) {
-          const auto row =
-              OuterRow(reprojection.SourceOf(i), built.pixels[i], norm, level);
-          if (!row) continue;
-          problem->observations[i].E = *row;
-          has_row[i] = 1;
-        }
-      });
+  ParallelForEach(count, num_threads, [&](int64_t i) {
+    const auto row =
+        OuterRow(reprojection.SourceOf(i), built.pixels[i], norm, level);
+    if (!row) return;
+    problem->observations[i].E = *row;
+    has_row[i] = 1;
+  });
   return has_row;
 }
 

@@ -8,19 +8,38 @@
 namespace krot::internal {
 namespace {
 
-template <typename Model>
-CameraModelInfo Info(bool has_image_plane) {
-  return {Model::kId, Model::kName, Model::kParamNames, Model::kNumParams,
-          has_image_plane};
-}
+// Name and parameters, in the order of the ids.
+constexpr std::string_view kNames[][2] = {
+    {"SIMPLE_PINHOLE", "f, cx, cy"},
+    {"PINHOLE", "fx, fy, cx, cy"},
+    {"SIMPLE_RADIAL", "f, cx, cy, k"},
+    {"RADIAL", "f, cx, cy, k1, k2"},
+    {"OPENCV", "fx, fy, cx, cy, k1, k2, p1, p2"},
+    {"OPENCV_FISHEYE", "fx, fy, cx, cy, k1, k2, k3, k4"},
+    {"FULL_OPENCV", "fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6"},
+    {"FOV", "fx, fy, cx, cy, omega"},
+    {"SIMPLE_RADIAL_FISHEYE", "f, cx, cy, k"},
+    {"RADIAL_FISHEYE", "f, cx, cy, k1, k2"},
+    {"THIN_PRISM_FISHEYE", "fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1"},
+    {"RAD_TAN_THIN_PRISM_FISHEYE",
+     "fx, fy, cx, cy, k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3"},
+    {"SIMPLE_DIVISION", "f, cx, cy, k"},
+    {"DIVISION", "fx, fy, cx, cy, k"},
+    {"SIMPLE_FISHEYE", "f, cx, cy"},
+    {"FISHEYE", "fx, fy, cx, cy"},
+    {"EUCM", "fx, fy, cx, cy, alpha, beta"},
+    {"EQUIRECTANGULAR", "w, h"},
+};
 
 std::vector<CameraModelInfo> ListCameraModels() {
   std::vector<CameraModelInfo> models;
-  for (int id = 0; id < Equirectangular::kId; ++id) {
-    models.push_back(VisitCameraModel(
-        id, [](auto model) { return Info<decltype(model)>(true); }));
+  for (const auto& [name, param_names] : kNames) {
+    const auto id = static_cast<int>(models.size());
+    const int num_params = VisitEveryCameraModel(
+        id, [](auto model) { return decltype(model)::kNumParams; });
+    models.push_back(
+        {id, name, param_names, num_params, id != Equirectangular::kId});
   }
-  models.push_back(Info<Equirectangular>(false));
   return models;
 }
 

@@ -28,7 +28,7 @@ inline constexpr double kEndOfAtanSeries = 1e-3;
 
 // Encloses S(t) for one t >= -1e-3. The series leaves out less than 1e-19.
 inline Interval EncloseAtanOverRoot(double t) {
-  if (!(t >= -kEndOfAtanSeries)) return {kNotANumber, kNotANumber};
+  if (!(t >= -kEndOfAtanSeries)) return {kNaN, kNaN};
   double value =
       1 -
       t * (1.0 / 3 - t * (1.0 / 5 - t * (1.0 / 7 - t * (1.0 / 9 - t / 11))));
@@ -40,7 +40,7 @@ inline Interval EncloseAtanOverRoot(double t) {
 // Encloses S'(t) = (1 / (1 + t) - S) / (2 t) for one t >= -1e-3. The series
 // leaves out less than 1e-18.
 inline Interval EncloseAtanOverRootSlope(double t) {
-  if (!(t >= -kEndOfAtanSeries)) return {kNotANumber, kNotANumber};
+  if (!(t >= -kEndOfAtanSeries)) return {kNaN, kNaN};
   if (t < kEndOfAtanSeries) {
     const double value =
         -1.0 / 3 +

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "krot/base/numbers.h"
+
 namespace krot::internal {
 
 // All numbers in [lo, hi]: arithmetic on sets, so that a function evaluated on
@@ -15,8 +17,6 @@ struct Interval {
   double lo = 0;
   double hi = 0;
 };
-
-inline constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
 // [lo, hi] made wider by 4 `ulps` units of the last place on each side: more
 // than what `ulps` roundings to nearest and those of this function take.
@@ -54,12 +54,12 @@ inline Interval operator*(const Interval& a, const Interval& b) {
   const double hl = a.hi * b.lo;
   const double hh = a.hi * b.hi;
   // min and max would lose a NaN.
-  if (std::isnan((ll + lh) + (hl + hh))) return {kNotANumber, kNotANumber};
+  if (std::isnan((ll + lh) + (hl + hh))) return {kNaN, kNaN};
   return RoundOutwards(std::min(std::min(ll, lh), std::min(hl, hh)),
                        std::max(std::max(ll, lh), std::max(hl, hh)));
 }
 inline Interval operator*(const Interval& a, double b) {
-  if (std::isnan(a.lo * b + a.hi * b)) return {kNotANumber, kNotANumber};
+  if (std::isnan(a.lo * b + a.hi * b)) return {kNaN, kNaN};
   return RoundOutwards(std::min(a.lo * b, a.hi * b),
                        std::max(a.lo * b, a.hi * b));
 }
@@ -67,7 +67,6 @@ inline Interval operator*(double a, const Interval& b) { return b * a; }
 
 inline Interval operator/(const Interval& a, const Interval& b) {
   if (b.lo > 0 || b.hi < 0) return a * RoundOutwards(1 / b.hi, 1 / b.lo);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return {-kInfinity, kInfinity};
 }
 inline Interval operator/(const Interval& a, double b) {
@@ -85,7 +84,7 @@ inline bool operator<(const Interval& a, const Interval& b) {
 
 // Not a number if some number of a has no root.
 inline Interval sqrt(const Interval& a) {
-  if (!(a.lo >= 0)) return {kNotANumber, kNotANumber};
+  if (!(a.lo >= 0)) return {kNaN, kNaN};
   const Interval root = RoundOutwards(std::sqrt(a.lo), std::sqrt(a.hi));
   return {std::max(root.lo, 0.0), root.hi};
 }
@@ -98,7 +97,7 @@ inline Interval atan(const Interval& a) {
 
 // Not a number unless a lies between two poles, around 0.
 inline Interval tan(const Interval& a) {
-  if (!(a.lo > -1.57 && a.hi < 1.57)) return {kNotANumber, kNotANumber};
+  if (!(a.lo > -1.57 && a.hi < 1.57)) return {kNaN, kNaN};
   return RoundOutwards(std::tan(a.lo), std::tan(a.hi), 4);
 }
 
@@ -120,7 +119,7 @@ inline Interval atan2(const Interval& y, const Interval& x) {
   const Interval half_pi = RoundOutwards(kHalf, kHalf);
   if (y.lo > 0) return half_pi - atan(x / y);
   if (y.hi < 0) return -half_pi - atan(x / y);
-  return {kNotANumber, kNotANumber};
+  return {kNaN, kNaN};
 }
 
 }  // namespace krot::internal

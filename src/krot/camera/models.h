@@ -2,7 +2,6 @@
 
 #include <stdexcept>
 #include <string>
-#include <string_view>
 
 #include "krot/camera/distortion.h"
 #include "krot/camera/lens.h"
@@ -19,8 +18,9 @@ namespace krot::internal {
 // Parameters stand in COLMAP's order: focal length(s), cx, cy, then those of
 // the lens or of the distortion (no model has both). P is double, or T where
 // the parameters themselves are differentiated.
-template <int kNumFocal, typename LensType, typename DistortionType>
+template <int id, int kNumFocal, typename LensType, typename DistortionType>
 struct ImagePlaneModel {
+  static constexpr int kId = id;  // COLMAP's
   using Lens = LensType;
   using Distortion = DistortionType;
   static constexpr int kNumParams =
@@ -87,125 +87,35 @@ struct ImagePlaneModel {
   }
 };
 
-struct SimplePinhole : ImagePlaneModel<1, PerspectiveLens, NoDistortion> {
-  static constexpr int kId = 0;
-  static constexpr std::string_view kName = "SIMPLE_PINHOLE";
-  static constexpr std::string_view kParamNames = "f, cx, cy";
-};
-
-struct Pinhole : ImagePlaneModel<2, PerspectiveLens, NoDistortion> {
-  static constexpr int kId = 1;
-  static constexpr std::string_view kName = "PINHOLE";
-  static constexpr std::string_view kParamNames = "fx, fy, cx, cy";
-};
-
-struct SimpleRadial : ImagePlaneModel<1, PerspectiveLens, RadialDistortion<1>> {
-  static constexpr int kId = 2;
-  static constexpr std::string_view kName = "SIMPLE_RADIAL";
-  static constexpr std::string_view kParamNames = "f, cx, cy, k";
-};
-
-struct Radial : ImagePlaneModel<1, PerspectiveLens, RadialDistortion<2>> {
-  static constexpr int kId = 3;
-  static constexpr std::string_view kName = "RADIAL";
-  static constexpr std::string_view kParamNames = "f, cx, cy, k1, k2";
-};
-
-struct OpenCv : ImagePlaneModel<2, PerspectiveLens, BrownDistortion> {
-  static constexpr int kId = 4;
-  static constexpr std::string_view kName = "OPENCV";
-  static constexpr std::string_view kParamNames =
-      "fx, fy, cx, cy, k1, k2, p1, p2";
-};
-
-struct OpenCvFisheye
-    : ImagePlaneModel<2, EquidistantLens, RadialDistortion<4>> {
-  static constexpr int kId = 5;
-  static constexpr std::string_view kName = "OPENCV_FISHEYE";
-  static constexpr std::string_view kParamNames =
-      "fx, fy, cx, cy, k1, k2, k3, k4";
-};
-
-struct FullOpenCv : ImagePlaneModel<2, PerspectiveLens, RationalDistortion> {
-  static constexpr int kId = 6;
-  static constexpr std::string_view kName = "FULL_OPENCV";
-  static constexpr std::string_view kParamNames =
-      "fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6";
-};
-
-struct Fov : ImagePlaneModel<2, FovLens, NoDistortion> {
-  static constexpr int kId = 7;
-  static constexpr std::string_view kName = "FOV";
-  static constexpr std::string_view kParamNames = "fx, fy, cx, cy, omega";
-};
-
-struct SimpleRadialFisheye
-    : ImagePlaneModel<1, EquidistantLens, RadialDistortion<1>> {
-  static constexpr int kId = 8;
-  static constexpr std::string_view kName = "SIMPLE_RADIAL_FISHEYE";
-  static constexpr std::string_view kParamNames = "f, cx, cy, k";
-};
-
-struct RadialFisheye
-    : ImagePlaneModel<1, EquidistantLens, RadialDistortion<2>> {
-  static constexpr int kId = 9;
-  static constexpr std::string_view kName = "RADIAL_FISHEYE";
-  static constexpr std::string_view kParamNames = "f, cx, cy, k1, k2";
-};
-
-struct ThinPrismFisheye
-    : ImagePlaneModel<2, EquidistantLens, ThinPrismDistortion> {
-  static constexpr int kId = 10;
-  static constexpr std::string_view kName = "THIN_PRISM_FISHEYE";
-  static constexpr std::string_view kParamNames =
-      "fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, sx1, sy1";
-};
-
-struct RadTanThinPrismFisheye
-    : ImagePlaneModel<2, EquidistantLens, RadTanThinPrismDistortion> {
-  static constexpr int kId = 11;
-  static constexpr std::string_view kName = "RAD_TAN_THIN_PRISM_FISHEYE";
-  static constexpr std::string_view kParamNames =
-      "fx, fy, cx, cy, k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3";
-};
-
-struct SimpleDivision : ImagePlaneModel<1, DivisionLens, NoDistortion> {
-  static constexpr int kId = 12;
-  static constexpr std::string_view kName = "SIMPLE_DIVISION";
-  static constexpr std::string_view kParamNames = "f, cx, cy, k";
-};
-
-struct Division : ImagePlaneModel<2, DivisionLens, NoDistortion> {
-  static constexpr int kId = 13;
-  static constexpr std::string_view kName = "DIVISION";
-  static constexpr std::string_view kParamNames = "fx, fy, cx, cy, k";
-};
-
-struct SimpleFisheye : ImagePlaneModel<1, EquidistantLens, NoDistortion> {
-  static constexpr int kId = 14;
-  static constexpr std::string_view kName = "SIMPLE_FISHEYE";
-  static constexpr std::string_view kParamNames = "f, cx, cy";
-};
-
-struct Fisheye : ImagePlaneModel<2, EquidistantLens, NoDistortion> {
-  static constexpr int kId = 15;
-  static constexpr std::string_view kName = "FISHEYE";
-  static constexpr std::string_view kParamNames = "fx, fy, cx, cy";
-};
-
-struct Eucm : ImagePlaneModel<2, EucmLens, NoDistortion> {
-  static constexpr int kId = 16;
-  static constexpr std::string_view kName = "EUCM";
-  static constexpr std::string_view kParamNames = "fx, fy, cx, cy, alpha, beta";
-};
+using SimplePinhole = ImagePlaneModel<0, 1, PerspectiveLens, NoDistortion>;
+using Pinhole = ImagePlaneModel<1, 2, PerspectiveLens, NoDistortion>;
+using SimpleRadial =
+    ImagePlaneModel<2, 1, PerspectiveLens, RadialDistortion<1>>;
+using Radial = ImagePlaneModel<3, 1, PerspectiveLens, RadialDistortion<2>>;
+using OpenCv = ImagePlaneModel<4, 2, PerspectiveLens, BrownDistortion>;
+using OpenCvFisheye =
+    ImagePlaneModel<5, 2, EquidistantLens, RadialDistortion<4>>;
+using FullOpenCv = ImagePlaneModel<6, 2, PerspectiveLens, RationalDistortion>;
+using Fov = ImagePlaneModel<7, 2, FovLens, NoDistortion>;
+using SimpleRadialFisheye =
+    ImagePlaneModel<8, 1, EquidistantLens, RadialDistortion<1>>;
+using RadialFisheye =
+    ImagePlaneModel<9, 1, EquidistantLens, RadialDistortion<2>>;
+using ThinPrismFisheye =
+    ImagePlaneModel<10, 2, EquidistantLens, ThinPrismDistortion>;
+using RadTanThinPrismFisheye =
+    ImagePlaneModel<11, 2, EquidistantLens, RadTanThinPrismDistortion>;
+using SimpleDivision = ImagePlaneModel<12, 1, DivisionLens, NoDistortion>;
+using Division = ImagePlaneModel<13, 2, DivisionLens, NoDistortion>;
+using SimpleFisheye = ImagePlaneModel<14, 1, EquidistantLens, NoDistortion>;
+using Fisheye = ImagePlaneModel<15, 2, EquidistantLens, NoDistortion>;
+using Eucm = ImagePlaneModel<16, 2, EucmLens, NoDistortion>;
 
 // The sphere of directions on a w x h panorama, which has no image plane z = 1:
 //   pixel = (w (1/2 + azimuth / 2 pi), h (1/2 + elevation / pi)),
 // azimuth the angle of (Z, X), elevation that of (|(X, Z)|, Y).
 struct Equirectangular {
   static constexpr int kId = 17;
-  static constexpr std::string_view kName = "EQUIRECTANGULAR";
-  static constexpr std::string_view kParamNames = "w, h";
   static constexpr int kNumParams = 2;
 
   template <typename P, typename T>
@@ -236,51 +146,28 @@ struct Equirectangular {
   static bool Sees(const double*, double, double, double) { return true; }
 };
 
+template <typename First, typename... Rest, typename Visitor>
+decltype(auto) VisitFirst(int model_id, Visitor& visitor) {
+  if (model_id == First::kId) return visitor(First{});
+  if constexpr (sizeof...(Rest) > 0) {
+    return VisitFirst<Rest...>(model_id, visitor);
+  } else {
+    throw std::invalid_argument(
+        "model_id = " + std::to_string(model_id) +
+        ", must be a camera model of COLMAP with an image plane");
+  }
+}
+
 // visitor(Model{}) for the model of this id, so that a loop over observations
 // is compiled for each model and dispatches once per image. Throws
 // std::invalid_argument for an id that is unknown or has no image plane.
 template <typename Visitor>
 decltype(auto) VisitCameraModel(int model_id, Visitor&& visitor) {
-  switch (model_id) {
-    case SimplePinhole::kId:
-      return visitor(SimplePinhole{});
-    case Pinhole::kId:
-      return visitor(Pinhole{});
-    case SimpleRadial::kId:
-      return visitor(SimpleRadial{});
-    case Radial::kId:
-      return visitor(Radial{});
-    case OpenCv::kId:
-      return visitor(OpenCv{});
-    case OpenCvFisheye::kId:
-      return visitor(OpenCvFisheye{});
-    case FullOpenCv::kId:
-      return visitor(FullOpenCv{});
-    case Fov::kId:
-      return visitor(Fov{});
-    case SimpleRadialFisheye::kId:
-      return visitor(SimpleRadialFisheye{});
-    case RadialFisheye::kId:
-      return visitor(RadialFisheye{});
-    case ThinPrismFisheye::kId:
-      return visitor(ThinPrismFisheye{});
-    case RadTanThinPrismFisheye::kId:
-      return visitor(RadTanThinPrismFisheye{});
-    case SimpleDivision::kId:
-      return visitor(SimpleDivision{});
-    case Division::kId:
-      return visitor(Division{});
-    case SimpleFisheye::kId:
-      return visitor(SimpleFisheye{});
-    case Fisheye::kId:
-      return visitor(Fisheye{});
-    case Eucm::kId:
-      return visitor(Eucm{});
-    default:
-      throw std::invalid_argument(
-          "model_id = " + std::to_string(model_id) +
-          ", must be a camera model of COLMAP with an image plane");
-  }
+  return VisitFirst<SimplePinhole, Pinhole, SimpleRadial, Radial, OpenCv,
+                    OpenCvFisheye, FullOpenCv, Fov, SimpleRadialFisheye,
+                    RadialFisheye, ThinPrismFisheye, RadTanThinPrismFisheye,
+                    SimpleDivision, Division, SimpleFisheye, Fisheye, Eucm>(
+      model_id, visitor);
 }
 
 // The same, EQUIRECTANGULAR included.

@@ -14,7 +14,6 @@ constexpr int kMaxBoundaryDepth = 8;
 constexpr double kRelativeSlack = 0.1;  // of max |m| - 1
 constexpr double kAbsoluteSlack = 1e-6;
 constexpr double kAlongSlack = 1e-7;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct Box {
   Interval q[2];
@@ -24,7 +23,7 @@ double Middle(const Interval& a) { return 0.5 * a.lo + 0.5 * a.hi; }
 
 // The numbers |x| for x in a; not a number if a is.
 Interval Absolute(const Interval& a) {
-  if (!(a.lo <= a.hi)) return {kNotANumber, kNotANumber};
+  if (!(a.lo <= a.hi)) return {kNaN, kNaN};
   if (a.lo >= 0) return a;
   if (a.hi <= 0) return -a;
   return {0, std::max(-a.lo, a.hi)};
@@ -43,7 +42,7 @@ Interval IntervalNorm(const Interval& x, const Interval& y, double p) {
     const Interval square = a * a + b * b;
     return sqrt(Interval{std::max(square.lo, 0.0), square.hi});
   }
-  if (!(a.hi + b.hi >= 0)) return {kNotANumber, kNotANumber};
+  if (!(a.hi + b.hi >= 0)) return {kNaN, kNaN};
   return {std::max(a.lo, b.lo), std::max(a.hi, b.hi)};
 }
 
@@ -94,14 +93,14 @@ double BoundLinearError(const Enclosure& enclosure, double p) {
     const Interval square =
         1.0 - (r[0] * (f[0] * 2.0 - r[0]) + r[1] * (f[1] * 2.0 - r[1]));
     bound = sqrt(Interval{0, std::max(square.hi, 0.0)}).hi;
-    if (!(square.hi < kInfinity)) return kNotANumber;
+    if (!(square.hi < kInfinity)) return kNaN;
   } else if (p == 1) {
     for (const double s : {-1.0, 1.0}) {
       for (const double t : {-1.0, 1.0}) {
         const Interval sf = f[0] * s + f[1] * t;
         const Interval sr = r[0] * s + r[1] * t;
         const Interval sm = Interval{0, std::min(sf.hi, 1.0)} - sr;
-        if (!(sm.hi < kInfinity)) return kNotANumber;
+        if (!(sm.hi < kInfinity)) return kNaN;
         bound = std::max(bound, sm.hi);
       }
     }
@@ -109,7 +108,7 @@ double BoundLinearError(const Enclosure& enclosure, double p) {
     for (int i = 0; i < 2; ++i) {
       for (const double s : {-1.0, 1.0}) {
         const Interval sm = Interval{0, (f[i] * s).hi} - r[i] * s;
-        if (!(sm.hi < kInfinity)) return kNotANumber;
+        if (!(sm.hi < kInfinity)) return kNaN;
         bound = std::max(bound, sm.hi);
       }
     }
@@ -178,7 +177,7 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
     const Enclosure enclosure = Enclose(map, box);
     if (IsOutside(enclosure, p)) return;
     const double bound =
-        enclosure.determinant.lo > 0 ? bound_on(enclosure) : kNotANumber;
+        enclosure.determinant.lo > 0 ? bound_on(enclosure) : kNaN;
     heap.push_back({box, bound < kInfinity ? bound : kInfinity});
     std::push_heap(heap.begin(), heap.end(), ComesLater);
   };

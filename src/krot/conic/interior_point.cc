@@ -61,7 +61,7 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   void FindDirection(double step) {
     if (program_.IsLinear() && !is_stationary_) {
       Base::Centre(1);
-    } else if (step < Base::kShortStep) {
+    } else if (step < kShortStep) {
       Base::Centre(Base::kCentring);
     } else {
       Base::PredictAndCorrect();

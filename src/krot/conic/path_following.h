@@ -52,18 +52,21 @@ inline double MehrotraSigma(double share_left, double least) {
   return std::min(1.0, std::max(least, left * left * left));
 }
 
+// After a step shorter than this the next one only centres.
+inline constexpr double kShortStep = 0.1;
+
 // What rounding may add to a barrier cost, relative.
 inline constexpr double kCostRounding = 1e-12;
 // Multipliers above this count as active where the weight of a squared error
 // is 1.
 inline constexpr double kActiveMultiplier = 1e-3;
 
-// The first of the lengths `longest`, factor * longest, ... for which
+// The first of the lengths `longest`, 0.7 of it, 0.7 of that, ... for which
 // try_step(length) is true; 0 if none is.
 template <typename TryStep>
-double Backtrack(double longest, double factor, const TryStep& try_step) {
+double Backtrack(double longest, const TryStep& try_step) {
   constexpr double kLeastStep = 1e-8;
-  for (double step = longest; step >= kLeastStep; step *= factor) {
+  for (double step = longest; step >= kLeastStep; step *= 0.7) {
     if (try_step(step)) return step;
   }
   return 0;
@@ -92,10 +95,9 @@ class ConePath {
   using State = typename System::State;
   using Vector = typename Cone::Vector;
 
-  // After a step shorter than this the next one only centres, by this sigma.
-  // Scaling or leaving out the corrector instead took more iterations
-  // (docs/history/journal.md, "The interior point, variants without effect").
-  static constexpr double kShortStep = 0.1;
+  // Sigma after a short step. Scaling or leaving out the corrector instead took
+  // more iterations (docs/history/journal.md, "The interior point, variants
+  // without effect").
   static constexpr double kCentring = 0.8;
 
   template <typename... Arguments>
@@ -117,7 +119,7 @@ class ConePath {
       std::swap(now_, trial_);
       return true;
     };
-    return longest.Least() * Backtrack(1, kBacktracking, try_share);
+    return longest.Least() * Backtrack(1, try_share);
   }
 
  protected:
@@ -132,10 +134,8 @@ class ConePath {
   // larger share shortens steps, a smaller one lets the next ones become short.
   static constexpr double kNeighbourhood = 1e-3;
   static constexpr double kLeastSigma = 1e-6;
-  // A step goes so far of the way to the boundary, and so far of a step that
-  // left the neighbourhood.
+  // A step goes so far of the way to the boundary.
   static constexpr double kDamping = 0.98;
-  static constexpr double kBacktracking = 0.7;
 
   // Only centres, with this sigma, or aims at the end.
   // Of lambda o f = sigma mu e.

@@ -89,7 +89,7 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
   }
   bool IsThere() const { return system_.mu() <= options_.smallest_mu * bound_; }
   void FindDirection(double step) {
-    if (step < Base::kShortStep) return Base::Centre(Base::kCentring);
+    if (step < kShortStep) return Base::Centre(Base::kCentring);
     Base::PredictAndCorrect();
   }
   std::optional<InteriorPointTermination> Report(int, double) {

@@ -21,17 +21,13 @@ constexpr double kStartWeight = 10;
 // itself in a step.
 constexpr double kStartSlack = 0.01;
 // A step goes so far of the way to the boundary: one that all but reached it
-// would leave a slack that the next direction cannot predict. One that does not
-// lower the barrier cost is shortened by the second factor.
+// would leave a slack that the next direction cannot predict.
 constexpr double kDamping = 0.95;
-constexpr double kBacktracking = 0.5;
 // No pair's product is less than this share of mu: what the step leaves of a
 // multiplier may be too little to keep its error off the cap in the next one,
 // and a single pair holds back the step of all. Nor is it more than the second.
 constexpr double kLeastProduct = 0.3;
 constexpr double kLargestProduct = 1e5;
-// After a step shorter than this, the next one only centres.
-constexpr double kShortStep = 0.03;
 // With a gap this near to that asked for, in such gaps, so many steps in a row
 // that are shorter than kIdleStep and gain less of the cost end it: lenses near
 // their fold follow no linear row far.
@@ -119,7 +115,7 @@ class BoundedPath {
     const double highest =
         before + kCostRounding * (now_.cost + target_mu_ * Count());
     const auto search = [&] {
-      return Backtrack(system_.MaxStep(kDamping), kBacktracking,
+      return Backtrack(system_.MaxStep(kDamping),
                        [&](double step) { return TryStep(step, highest); });
     };
     double step = search();

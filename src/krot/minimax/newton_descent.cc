@@ -5,14 +5,13 @@
 #include <limits>
 #include <optional>
 
+#include "krot/base/numbers.h"
 #include "krot/minimax/descent_constants.h"
 
 namespace krot::internal {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // Residuals become members so many at a time, the largest first. More make
 // every step dearer, fewer take more trials to find those that matter.

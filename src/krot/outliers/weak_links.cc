@@ -8,6 +8,7 @@
 
 #include <Eigen/Geometry>
 
+#include "krot/base/numbers.h"
 #include "krot/outliers/place_search.h"
 #include "krot/outliers/robust_points.h"
 #include "krot/problem/components.h"
@@ -20,7 +21,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // The scales that are tried, against the ratio of the median depths, and the
 // steps of the grid.
 constexpr double kLargestScale = 30;

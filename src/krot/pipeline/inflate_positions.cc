@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/bridge/position_rows.h"
 
 namespace krot::internal {
@@ -23,7 +24,6 @@ constexpr double kFirstStep = 2;
 constexpr double kLargestStep = 16;
 constexpr double kLargestFactor = 1e6;
 constexpr int kMaxFactors = 30;
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
 
 // All in logarithms: what is known of the lowest maximum as a function of the
 // factor, less that of the bound asked for.
@@ -81,7 +81,7 @@ class FactorBracket {
   }
 
   double lowest_ = 0;
-  double highest_ = kUnknown;
+  double highest_ = kInfinity;
   double slope_ = 0;
   std::optional<std::pair<double, double>> last_;
   std::vector<double> open_;
@@ -141,7 +141,7 @@ class PositionInflater {
     const SolveSummary& summary = result.summary;
     const bool has_estimate = HasEstimate(summary);
     const double bound = summary.lower_bound.value_or(0);
-    const double cost = has_estimate ? summary.cost_final : kUnknown;
+    const double cost = has_estimate ? summary.cost_final : kInfinity;
     bracket_.Add(x, std::log(bound / max_error_), std::log(cost / max_error_));
     if (bound > max_error_ && x == bracket_.lowest()) {
       refutation_ = summary.certificate;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/base/timer.h"
 #include "krot/bridge/position_rows.h"
 #include "krot/bridge/reprojection.h"
@@ -21,7 +22,6 @@ constexpr double kShareOfSlack = 0.5;
 constexpr double kRounding = 1e-7;
 // How much of what positions may be off by the finish takes: more than rounds.
 constexpr double kShareOfKept = 0.75;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 void FinishByLeastSquares(const Reprojection& reprojection,
                           const SolveModelOptions& options,

@@ -12,7 +12,6 @@ namespace {
 // Steps tried: 1, then shorter ones by this factor, until they get worse.
 constexpr double kShorter = 0.7;
 constexpr double kShortestStep = 1e-3;
-constexpr int64_t kPointsPerChunk = 256;
 
 }  // namespace
 
@@ -53,22 +52,18 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
     }
     return cost;
   };
-  ParallelFor(problem.num_points, kPointsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                for (int64_t k = begin; k < end; ++k) {
-                  best.points[k] = from.points[k];
-                  const double before = cost_of(k);
-                  double step = 1;
-                  do {
-                    best.points[k] =
-                        step == 1 ? to.points[k]
-                                  : from.points[k] +
-                                        step * (to.points[k] - from.points[k]);
-                    step *= kShorter;
-                  } while (cost_of(k) > before && step >= kShortestStep);
-                  if (cost_of(k) > before) best.points[k] = from.points[k];
-                }
-              });
+  ParallelForEach(problem.num_points, num_threads, [&](int64_t k) {
+    best.points[k] = from.points[k];
+    const double before = cost_of(k);
+    double step = 1;
+    do {
+      best.points[k] =
+          step == 1 ? to.points[k]
+                    : from.points[k] + step * (to.points[k] - from.points[k]);
+      step *= kShorter;
+    } while (cost_of(k) > before && step >= kShortestStep);
+    if (cost_of(k) > before) best.points[k] = from.points[k];
+  });
   return best;
 }
 

@@ -22,8 +22,6 @@ constexpr double kAsGood = 9;
 constexpr double kRoundingError = 1e-9;
 // So many times as far away as anything is infinitely far.
 constexpr double kFarAway = 1e6;
-constexpr int64_t kPointsAtATime = 256;
-constexpr int64_t kObservationsAtATime = 4096;
 
 }  // namespace
 
@@ -48,13 +46,11 @@ void Settling::Measure() {
   level_ = MaxOfRanks(context_, reprojection_.TrueCost(estimate_, options_.norm,
                                                        context_.num_threads));
   squared_.assign(problem_.observations.size(), -1);
-  ParallelFor(static_cast<int64_t>(squared_.size()), kObservationsAtATime,
-              context_.num_threads, [&](int64_t begin, int64_t end, int) {
-                for (int64_t i = begin; i < end; ++i) {
-                  if (!reprojection_.IsOfModel(i)) continue;
-                  squared_[i] = Squared(i, kNoLevel);
-                }
-              });
+  ParallelForEach(static_cast<int64_t>(squared_.size()), context_.num_threads,
+                  [&](int64_t i) {
+                    if (reprojection_.IsOfModel(i))
+                      squared_[i] = Squared(i, kNoLevel);
+                  });
   const auto num_errors =
       static_cast<double>(2 * SumOfRanks(context_, built_.NumPixels()));
   const auto num_unknowns = static_cast<double>(
@@ -140,14 +136,12 @@ void Settling::SettlePoint(int32_t k, double distance) {
 
 void Settling::SettlePoints() {
   const std::vector<double> distances = TypicalDistances();
-  ParallelFor(static_cast<int64_t>(built_.point_of.size()), kPointsAtATime,
-              context_.num_threads, [&](int64_t begin, int64_t end, int) {
-                for (int64_t n = begin; n < end; ++n) {
-                  const auto k = static_cast<int32_t>(n);
-                  const int32_t c = components_.of_point[k];
-                  if (c >= 0) SettlePoint(k, distances[c]);
-                }
-              });
+  ParallelForEach(static_cast<int64_t>(built_.point_of.size()),
+                  context_.num_threads, [&](int64_t n) {
+                    const auto k = static_cast<int32_t>(n);
+                    const int32_t c = components_.of_point[k];
+                    if (c >= 0) SettlePoint(k, distances[c]);
+                  });
 }
 
 LooseParts Settling::Describe() const {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/bridge/reprojection.h"
 #include "krot/pipeline/settle.h"
@@ -14,7 +15,7 @@
 
 namespace krot::internal {
 
-inline constexpr double kNoLevel = std::numeric_limits<double>::infinity();
+inline constexpr double kNoLevel = kInfinity;
 
 inline constexpr int kBisections = 50;
 

@@ -31,8 +31,6 @@ namespace {
 
 // A joint solver's stall is an answer only with a bound so near, relative.
 constexpr double kGapOfAnswer = 1e-2;
-// What rounding may add to the largest error, relative.
-constexpr double kErrorRounding = 1e-9;
 // Of the bound of a start, the level at which it keeps positions.
 constexpr double kShareOfStart = 0.99;
 

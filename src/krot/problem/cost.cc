@@ -9,13 +9,6 @@
 #include "krot/base/parallel_for.h"
 
 namespace krot::internal {
-namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr int64_t kObservationsPerChunk = 16384;
-
-}  // namespace
-
 ViewedPoint ViewPoint(const KnownRotationProblem& problem,
                       const Observation& observation,
                       const Estimate& estimate) {
@@ -77,17 +70,15 @@ bool AllDepthsPositive(const KnownRotationProblem& problem,
   const std::vector<AffineMap> cameras =
       CamerasFromWorld(problem, estimate.translations);
   std::atomic<bool> all_positive{true};
-  ParallelFor(
-      static_cast<int64_t>(problem.observations.size()), kObservationsPerChunk,
-      num_threads, [&](int64_t begin, int64_t end, int) {
-        bool positive = all_positive;
-        for (int64_t i = begin; i < end && positive; ++i) {
-          const Observation& observation = problem.observations[i];
-          const AffineMap& camera = cameras[observation.view];
-          const Eigen::Vector3d& point = estimate.points[observation.point];
-          positive = camera.row(2).head<3>().dot(point) + camera(2, 3) > 0;
+  ParallelForEach(
+      static_cast<int64_t>(problem.observations.size()), num_threads,
+      [&](int64_t i) {
+        const Observation& observation = problem.observations[i];
+        const AffineMap& camera = cameras[observation.view];
+        const Eigen::Vector3d& point = estimate.points[observation.point];
+        if (!(camera.row(2).head<3>().dot(point) + camera(2, 3) > 0)) {
+          all_positive = false;
         }
-        if (!positive) all_positive = false;
       });
   return all_positive;
 }
@@ -106,13 +97,12 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
   const std::vector<AffineMap> cameras =
       CamerasFromWorld(problem, estimate.translations);
   const int64_t count = static_cast<int64_t>(problem.observations.size());
-  std::vector<double> chunk_max(NumChunks(count, kObservationsPerChunk), 0);
-  ParallelFor(count, kObservationsPerChunk, num_threads,
-              [&](int64_t begin, int64_t end, int) {
-                chunk_max[begin / kObservationsPerChunk] =
-                    ResidualAbove(kInfinity, problem, cameras, estimate.points,
-                                  norm, begin, end);
-              });
+  std::vector<double> chunk_max(NumChunks(count, kItemsPerChunk), 0);
+  ParallelFor(
+      count, kItemsPerChunk, num_threads, [&](int64_t begin, int64_t end, int) {
+        chunk_max[begin / kItemsPerChunk] = ResidualAbove(
+            kInfinity, problem, cameras, estimate.points, norm, begin, end);
+      });
   return chunk_max.empty()
              ? 0.0
              : *std::max_element(chunk_max.begin(), chunk_max.end());

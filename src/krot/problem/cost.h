@@ -1,17 +1,20 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "krot/base/numbers.h"
 #include "krot/math/norm.h"
 #include "krot/minimax/residual.h"
 #include "krot/minimax/residual_kernel.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
+
+// What rounding may add to an error, relative.
+inline constexpr double kErrorRounding = 1e-9;
 
 // x -> R x + o as the matrix [R o].
 using AffineMap = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
@@ -58,7 +61,6 @@ ViewedPoint ViewPoint(const KnownRotationProblem& problem,
 
 // r = ||v||_p / w in pixels; infinity unless w > 0 and r is finite.
 inline double ResidualOf(const ViewedPoint& viewed, Norm norm) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   if (!(viewed.depth > 0)) return kInfinity;
   const double residual = NormOf(viewed.v, norm) / viewed.depth;
   return residual < kInfinity ? residual : kInfinity;

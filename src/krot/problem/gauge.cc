@@ -16,9 +16,6 @@
 namespace krot::internal {
 namespace {
 
-// What a change of coordinates may add to the cost, relative.
-constexpr double kHarmless = 1e-9;
-
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -291,7 +288,7 @@ void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
   const auto cost = [&](const Estimate& x) {
     return MaxOfRanks(context, Cost(problem, x, norm, context.num_threads));
   };
-  if (cost(moved) <= (1 + kHarmless) * cost(*estimate)) {
+  if (cost(moved) <= (1 + kErrorRounding) * cost(*estimate)) {
     *estimate = std::move(moved);
   }
 }

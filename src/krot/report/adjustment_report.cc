@@ -195,8 +195,6 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
       {"num_observations", adjustment.num_observations},
       {"num_parameters", adjustment.num_parameters},
       {"left_out", LeftOutJson(LeftOutBy(adjustment))},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
       {"cost_initial", adjustment.cost_initial},
       {"cost_final", adjustment.cost_final},
       {"num_iterations", adjustment.num_iterations},
@@ -212,17 +210,9 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"start", ErrorJson(summary.pixel_error_start)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"start", start_seconds},
-        {"adjust", adjustment.seconds},
-        {"write", report.run.seconds_write},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
   };
-  return ReportText(json);
+  return ReportText(json, report.run,
+                    {{"start", start_seconds}, {"adjust", adjustment.seconds}});
 }
 
 }  // namespace krot::internal

@@ -90,8 +90,6 @@ std::string CheckJson(const CheckReport& report) {
       {"cauchy_scale_px", NumberOrNull(check.cauchy_scale_px)},
       {"median_scale_px", NumberOrNull(check.median_scale_px)},
       {"critical_w", check.critical_w},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
       {"pixel_error",
        {{"before", ErrorJson(report.pixel_error_before)},
         {"after", ErrorJson(report.pixel_error_after)}}},
@@ -100,16 +98,8 @@ std::string CheckJson(const CheckReport& report) {
       {"images", images},
       {"observations", observations},
       {"tracks", tracks},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"check", report.seconds_check},
-        {"write", report.run.seconds_write},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
   };
-  return ReportText(json);
+  return ReportText(json, report.run, {{"check", report.seconds_check}});
 }
 
 }  // namespace krot::internal

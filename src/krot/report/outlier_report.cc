@@ -323,8 +323,6 @@ std::string OutlierJson(const OutlierReport& report) {
       {"num_irreducible",
        summary.conflicts ? Json(summary.num_irreducible) : Json()},
       {"is_search_complete", summary.is_search_complete},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},
       {"pixel_error",
        {{"before", ErrorJson(summary.pixel_error_before)},
@@ -341,19 +339,13 @@ std::string OutlierJson(const OutlierReport& report) {
         {"images", SuspectsJson(summary.images, "image_id", summary)},
         {"cameras", SuspectsJson(summary.cameras, "camera_id", summary)}}},
       {"rotation_suspect", RotationSuspectJson(summary)},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"profile", summary.profile ? Json(summary.profile->seconds) : Json()},
-        {"removal", summary.seconds_removal},
-        {"conflicts", summary.seconds_conflicts},
-        {"solve", summary.seconds_solve},
-        {"write", report.run.seconds_write},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
   };
-  return ReportText(json);
+  return ReportText(
+      json, report.run,
+      {{"profile", summary.profile ? Json(summary.profile->seconds) : Json()},
+       {"removal", summary.seconds_removal},
+       {"conflicts", summary.seconds_conflicts},
+       {"solve", summary.seconds_solve}});
 }
 
 std::string ProfileJson(const OutlierReport& report) {

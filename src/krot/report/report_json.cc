@@ -113,4 +113,17 @@ std::string ReportText(const Json& json) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+std::string ReportText(Json json, const RunRecord& run, const Json& seconds) {
+  json["contradictions"] = ContradictionsJson(run.contradictions);
+  json["poses"] = PosesJson(run.poses);
+  Json& all = json["seconds"] = {{"read", run.seconds_read}};
+  all.update(seconds);
+  all["write"] = run.seconds_write;
+  all["total"] = run.seconds_total;
+  json["peak_memory_bytes"] = run.peak_memory_bytes;
+  json["threads"] = run.threads;
+  json["seed"] = run.seed;
+  return ReportText(json);
+}
+
 }  // namespace krot::internal

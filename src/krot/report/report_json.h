@@ -12,6 +12,7 @@
 #include "krot/model/contradictions.h"
 #include "krot/model/pose_checks.h"
 #include "krot/report/problem_words.h"
+#include "krot/report/run_record.h"
 
 namespace krot::internal {
 
@@ -51,5 +52,9 @@ Json NotHeldJson(const LooseParts& loose);
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.
 std::string ReportText(const Json& json);
+
+// The same, with what every run that solves records: `seconds` are those
+// between reading and writing.
+std::string ReportText(Json json, const RunRecord& run, const Json& seconds);
 
 }  // namespace krot::internal

@@ -210,8 +210,6 @@ std::string SolveJson(const SolveReport& report) {
         {"largest_left_out", NumberOrNull(LargestTwin(summary))}}},
       {"outliers", OutliersJson(report.outliers)},
       {"matches", report.matches ? MatchesJson(*report.matches) : Json()},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
       {"rotations", RotationsJson(report.run.rotations)},
       {"fixed",
        {{"num_frames", summary.num_fixed_frames},
@@ -246,19 +244,12 @@ std::string SolveJson(const SolveReport& report) {
       {"iterations", JointIterationsJson(summary.iterations)},
       {"support", SupportJson(summary.support)},
       {"support_positions", PositionsJson(summary.support_positions)},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"build", summary.seconds_build},
-        {"solve", summary.seconds_solve},
-        {"certify", NumberOrNull(summary.seconds_certify)},
-        {"write", report.run.seconds_write},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
       {"announced_memory_bytes", summary.needed_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
   };
-  return ReportText(json);
+  return ReportText(json, report.run,
+                    {{"build", summary.seconds_build},
+                     {"solve", summary.seconds_solve},
+                     {"certify", NumberOrNull(summary.seconds_certify)}});
 }
 
 }  // namespace krot::internal

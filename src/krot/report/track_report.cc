@@ -82,19 +82,10 @@ std::string TrackJson(const TrackReport& report) {
       {"num_observations", report.num_observations},
       {"mean_track_length", MeanTrackLength(report)},
       {"pixel_error", ErrorJson(report.pixel_error)},
-      {"contradictions", ContradictionsJson(report.run.contradictions)},
-      {"poses", PosesJson(report.run.poses)},
-      {"seconds",
-       {{"read", report.run.seconds_read},
-        {"triangulate", report.seconds_triangulate},
-        {"write", report.run.seconds_write},
-        {"total", report.run.seconds_total}}},
-      {"peak_memory_bytes", report.run.peak_memory_bytes},
-      {"threads", report.run.threads},
-      {"seed", report.run.seed},
   };
   json.update(MatchesJson(report.summary));
-  return ReportText(json);
+  return ReportText(json, report.run,
+                    {{"triangulate", report.seconds_triangulate}});
 }
 
 }  // namespace krot::internal

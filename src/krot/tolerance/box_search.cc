@@ -16,8 +16,6 @@ constexpr int kFirstTies = 20;
 // A round adds at most so many times the points that the set has.
 constexpr int kGrowth = 2;
 constexpr int kMaxRounds = 12;
-// The relative rounding error of residuals at the bound.
-constexpr double kLevelRounding = 1e-9;
 // Bisection along the segment from the centre ends with this share of it.
 constexpr double kSegmentStep = 1.0 / 1024;
 
@@ -78,7 +76,7 @@ class BoxSearch {
       if (round == kMaxRounds) {
         set_.AddAll();
       } else if (set_.AddAbove(of_usable, shared_.norm(),
-                               (1 + kLevelRounding) * shared_.bound(),
+                               (1 + kErrorRounding) * shared_.bound(),
                                kGrowth * set_.num_points()) == 0) {
         break;
       }

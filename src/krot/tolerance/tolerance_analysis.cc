@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/base/timer.h"
 #include "krot/model/local_frame.h"
@@ -211,7 +212,6 @@ ToleranceResult AnalyzeInFrame(const Model& model,
 // Moves a box by a vector, rounding the proved ends outwards, except those of
 // what cannot move.
 void Shift(const Eigen::Vector3d& by, ToleranceBox* box) {
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (int axis = 0; axis < 3; ++axis) {
     const double at = box->position[axis];
     box->position[axis] += by[axis];
