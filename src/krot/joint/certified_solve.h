@@ -68,7 +68,7 @@ class CertifiedSolve {
                                    const TakeEstimate& take,
                                    const IterationReport& report);
   FeasibleStartOptions OptionsForStart(const IterationReport& report);
-  void LeaveCameras(const IterationReport& report, Estimate* start);
+  bool LeaveCameras(const IterationReport& report, Estimate* start);
   bool FindFreshStart(const IterationReport& report);
   bool Bisect(double width, const IterationReport& report);
   bool TryBelow(double bound, const IterationReport& report);
