@@ -63,6 +63,16 @@ CertificateOptions Sufficient(double bound) {
 
 }  // namespace
 
+bool HasPointsInCameras(const KnownRotationProblem& problem,
+                        const Estimate& estimate) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const Observation& observation : problem.observations) {
+    smallest =
+        std::min(smallest, ViewPoint(problem, observation, estimate).depth);
+  }
+  return smallest < kDepthInCamera * MedianDepth(problem, estimate);
+}
+
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
                                const Context& context, const Estimate& start,
@@ -168,12 +178,7 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
 // Whether there is one.
 bool CertifiedSolve::LeaveCameras(const IterationReport& report,
                                   Estimate* start) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const Observation& observation : problem_.observations) {
-    smallest =
-        std::min(smallest, ViewPoint(problem_, observation, *start).depth);
-  }
-  if (smallest >= kDepthInCamera * MedianDepth(problem_, *start)) return false;
+  if (!HasPointsInCameras(problem_, *start)) return false;
   std::vector<Multiplier> multipliers;
   return FindEstimateBelow(problem_, (1 + kFreshStartMargin) * cost_,
                            OptionsForStart(report), context_, start,
