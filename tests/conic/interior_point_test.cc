@@ -176,6 +176,32 @@ TEST_P(InteriorPoint, DoesNotMoveTheScaleOrTheFrameThatSeesMost) {
   EXPECT_NEAR(log_growth, 0, 0.05);
 }
 
+// However far away some of it is: else nothing holds it near the rest.
+TEST_P(InteriorPoint, KeepsTheMeanDepthOfAScene) {
+  RandomScene scene = MakeScene(7, 30);
+  const auto mean_depth = [&](const Estimate& estimate) {
+    double sum = 0;
+    for (const Observation& o : scene.problem.observations) {
+      sum += ViewPoint(scene.problem, o, estimate).depth;
+    }
+    return sum / static_cast<double>(scene.problem.observations.size());
+  };
+  const Eigen::Vector3d centre =
+      -scene.problem.views[0].cam_from_world_rotation.transpose() *
+      scene.estimate.translations[0];
+  Eigen::Vector3d& far = scene.estimate.points[0];
+  far = centre + 100 * (far - centre);
+  ASSERT_TRUE(std::isfinite(Cost(scene.problem, scene.estimate, norm(), 1)));
+  const double before = mean_depth(scene.estimate);
+  InteriorPointOptions options = Options(norm());
+  options.stop = [&](const ConicIterate& iterate) {
+    EXPECT_NEAR(mean_depth(*iterate.estimate), before, 1e-9 * before);
+    return false;
+  };
+  std::vector<Multiplier> multipliers;
+  MinimizeJointly(scene.problem, options, {}, &scene.estimate, &multipliers);
+}
+
 TEST_P(InteriorPoint, TellsWhyItEnded) {
   const RandomScene scene = MakeScene(8, 30);
   const auto run = [&](const InteriorPointOptions& options,

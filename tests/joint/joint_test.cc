@@ -294,6 +294,24 @@ TEST(SolveJoint, KeepsWhatItHasWhenInterrupted) {
   }
 }
 
+// Fourteen on average; five starts in a hundred take more than sixty.
+TEST(SolveJoint, IsThereSoonFromStartsThatHugTheBoundary) {
+  size_t num_iterations = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    SCOPED_TRACE(seed);
+    const RandomScene scene = MakeSmallScene(seed);
+    JointOptions options;
+    options.relative_gap = 1e-4;
+    Estimate estimate = HugTheBoundary(scene, options.norm);
+    const JointSummary summary =
+        SolveJoint(scene.problem, options, {}, &estimate);
+    EXPECT_EQ(summary.termination, JointTermination::kGapReached);
+    EXPECT_LE(summary.iterations.size(), 100u);
+    num_iterations += summary.iterations.size();
+  }
+  EXPECT_LE(num_iterations, 1550u);
+}
+
 // With starts from most of which the interior point gets nowhere.
 TEST(SolveJoint, ReportsAFreshStartAndItsInterruption) {
   int num_interrupted = 0;

@@ -80,15 +80,19 @@ INSTANTIATE_TEST_SUITE_P(
                       Near("task41_rigs_frames", 3.5041)),
     [](const auto& test) { return std::string(test.param.folder); });
 
-TEST(TryOtherWays, ProvesRealModelsWhoseRoundsStall) {
+// One has points in cameras, one several optima at a fold of its lens, and of
+// one a fifth of the cameras is within a millionth of the others' distances.
+TEST(SolveModel, ProvesHardRealModelsWithinAHundredIterations) {
   const char* root = std::getenv("KROT_REAL_MODELS");
   if (root == nullptr) GTEST_SKIP() << "KROT_REAL_MODELS is not set";
-  for (const char* name : {"drone72_rig", "bandgap10"}) {
+  for (const char* name : {"drone72_rig", "bandgap10", "hard_endo"}) {
+    SCOPED_TRACE(name);
     const std::filesystem::path folder = std::filesystem::path(root) / name;
     const SolveSummary summary =
         SolveModel(ReadModel(folder, DetectModelFormat(folder)), {}).summary;
-    ASSERT_TRUE(summary.is_certified) << name;
-    EXPECT_GE(*summary.lower_bound, 0.999 * summary.cost_final) << name;
+    ASSERT_TRUE(summary.is_certified);
+    EXPECT_GE(*summary.lower_bound, 0.9999 * summary.LowestCost());
+    EXPECT_LE(summary.iterations.size(), 100u);
   }
 }
 

@@ -244,17 +244,18 @@ class NewtonSystem {
 
  private:
   static constexpr int kDim = Cone::kDim;
-  // Depths below this share of the median depth are small: they count as much
-  // in the gauge, and may grow by any factor.
+  // Depths below this share of the median depth are small: they may grow by any
+  // factor.
   static constexpr double kSmallDepth = 0.1;
   // No other depth grows by more than this factor in a step: far beyond,
   // neither the gauge nor the linearised top = g w holds.
   static constexpr double kMaxDepthGrowth = 3;
 
-  // e = mean of c_i / w_i, w_i at least the small depth: e'dx is the mean
-  // relative change of the depths. Its multiplier is as large as the gap, so
-  // that with depths that fall like the gap alone the dual residual would not
-  // vanish.
+  // e = mean of c_i, in units of the median depth: e'dx is the change of the
+  // mean depth, so that e is the same throughout. With weights that follow the
+  // iterate, as of relative changes of the depths, no depth is held near the
+  // others: points would drift towards infinity, or a part of the scene into
+  // one place, and from there back no force leads.
   void FindGauge(const std::vector<ViewedPoint>& viewed) {
     if (!program_.IsCost()) {
       gauge_.SetZero(problem_.num_points, problem_.num_frames);
@@ -264,10 +265,11 @@ class NewtonSystem {
     }
     std::vector<double> depths;
     for (const ViewedPoint& v : viewed) depths.push_back(v.depth);
-    small_depth_ = kSmallDepth * Median(std::move(depths));
-    gauge_ = GradientOf(problem_, structure_, [&](int64_t i) -> Vector3d {
-      const double depth = std::max(viewed[i].depth, small_depth_);
-      return {1 / (static_cast<double>(loop_.count()) * depth), 0, 0};
+    const double median = Median(std::move(depths));
+    small_depth_ = kSmallDepth * median;
+    const double per_depth = 1 / (static_cast<double>(loop_.count()) * median);
+    gauge_ = GradientOf(problem_, structure_, [&](int64_t) -> Vector3d {
+      return {per_depth, 0, 0};
     });
   }
 

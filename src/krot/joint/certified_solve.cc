@@ -42,7 +42,8 @@ constexpr double kLeastWarmMargin = 1e-3;
 // of positions' rows at another level.
 constexpr double kFarFromKnown = 0.5;
 constexpr double kFarMargin = 0.03;
-constexpr double kFreshStartMargin = 1e-2;
+// Of an estimate that is found near the cost, and of the start from it.
+constexpr double kFreshStartMargin = 1e-3;
 // Smaller depths, of the median, are those of points in a camera.
 constexpr double kDepthInCamera = 1e-6;
 // In the unit of depth, of the median.
@@ -61,6 +62,16 @@ CertificateOptions Sufficient(double bound) {
 }
 
 }  // namespace
+
+bool HasPointsInCameras(const KnownRotationProblem& problem,
+                        const Estimate& estimate) {
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const Observation& observation : problem.observations) {
+    smallest =
+        std::min(smallest, ViewPoint(problem, observation, estimate).depth);
+  }
+  return smallest < kDepthInCamera * MedianDepth(problem, estimate);
+}
 
 CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
                                const JointOptions& options,
@@ -164,17 +175,14 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
 // multipliers are as large as the depth is small: the interior point would
 // settle far from balance. An estimate from the middle of the cones, where
 // points and cameras have come apart, takes its place, be it a little worse.
-void CertifiedSolve::LeaveCameras(const IterationReport& report,
+// Whether there is one.
+bool CertifiedSolve::LeaveCameras(const IterationReport& report,
                                   Estimate* start) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const Observation& observation : problem_.observations) {
-    smallest =
-        std::min(smallest, ViewPoint(problem_, observation, *start).depth);
-  }
-  if (smallest >= kDepthInCamera * MedianDepth(problem_, *start)) return;
+  if (!HasPointsInCameras(problem_, *start)) return false;
   std::vector<Multiplier> multipliers;
-  FindEstimateBelow(problem_, (1 + kStartMargin) * cost_,
-                    OptionsForStart(report), context_, start, &multipliers);
+  return FindEstimateBelow(problem_, (1 + kFreshStartMargin) * cost_,
+                           OptionsForStart(report), context_, start,
+                           &multipliers) == InteriorPointTermination::kFeasible;
 }
 
 // Either an estimate below `bound`, pixels, far from the boundary of the cones,
@@ -213,16 +221,16 @@ bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
   return is_fresh;
 }
 
-// Whether there is a new estimate. Where the interior point believes that there
-// is none, a proof of that is sought first.
+// Whether there is a new estimate. One just below the cost is sought first, or
+// the proof that there is none: cost and what is known to be infeasible are
+// only brought together where neither is found.
 bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
-  bool is_fresh = false;
-  if (gap_ <= kLargeGap) {
-    is_fresh = TryBelow((1 - kShareOfGapBelow * options_.relative_gap) * cost_,
-                        report);
-    if (IsGapReached()) return false;
+  if (TryBelow((1 - kShareOfGapBelow * options_.relative_gap) * cost_,
+               report)) {
+    return true;
   }
-  is_fresh |= Bisect(width_, report);
+  if (IsGapReached()) return false;
+  const bool is_fresh = Bisect(width_, report);
   width_ *= kShareOfWidth;
   return is_fresh;
 }
@@ -235,7 +243,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
   if (IsLowEnough()) return JointTermination::kGapReached;
   double start_margin = are_multipliers_known_ ? WarmMargin() : kStartMargin;
   Estimate start = estimate_;
-  LeaveCameras(report, &start);
+  if (LeaveCameras(report, &start)) start_margin = kFreshStartMargin;
   for (;;) {
     const InteriorPointTermination termination =
         RunFrom(start, start_margin, take, report);

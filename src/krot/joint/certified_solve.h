@@ -16,6 +16,11 @@ namespace krot::internal {
 // Told of every iteration, of which only gap and target are filled in.
 using IterationReport = std::function<void(const JointIteration&)>;
 
+// Whether some depth is so small beside the median that coordinates do not
+// resolve it. O(observations).
+bool HasPointsInCameras(const KnownRotationProblem& problem,
+                        const Estimate& estimate);
+
 // The interior point on a connected problem, from an estimate to the certified
 // gap: it tries certificates on the way and leaves starts that hold it back.
 // Internal to SolveJoint.
@@ -68,7 +73,7 @@ class CertifiedSolve {
                                    const TakeEstimate& take,
                                    const IterationReport& report);
   FeasibleStartOptions OptionsForStart(const IterationReport& report);
-  void LeaveCameras(const IterationReport& report, Estimate* start);
+  bool LeaveCameras(const IterationReport& report, Estimate* start);
   bool FindFreshStart(const IterationReport& report);
   bool Bisect(double width, const IterationReport& report);
   bool TryBelow(double bound, const IterationReport& report);

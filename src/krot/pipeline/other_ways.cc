@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "krot/joint/certified_solve.h"
 #include "krot/pipeline/iteration_log.h"
 #include "krot/pipeline/rounds.h"
 
@@ -47,14 +48,16 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
   other_options.joint.max_iterations = std::min(
       options.joint.max_iterations,
       static_cast<int>(std::max(kFewIterations, summary->iterations.size())));
-  for (const SolveInit init : {SolveInit::kModel, SolveInit::kFeasible}) {
+  // Sweeps leave points in cameras, and with them depths that are rounding.
+  const bool is_own_first =
+      HasPointsInCameras(start->built.problem, start->built.start);
+  for (const bool is_own : {is_own_first, !is_own_first}) {
     if (summary->termination != SolveTermination::kStalled ||
         IsWithin(kGapsOfAnswer * options.joint.relative_gap, *certificate,
                  summary->cost_final)) {
       return;
     }
-    other_options.init = init;
-    const bool is_own = init == SolveInit::kModel;
+    other_options.init = is_own ? SolveInit::kModel : SolveInit::kFeasible;
     context.Stage(is_own ? "that stalled; joint iterations from the model"
                          : "that stalled; from a start from nothing");
     Start other =

@@ -12,7 +12,8 @@ namespace krot::internal {
 
 // After SolveInRounds, where that stalled far from any bound: the other ways to
 // the optimum, joint iterations alone from the model's own start and rounds
-// from a start that is found from nothing, until one is proved. Leaves the
+// from a start that is found from nothing, until one is proved; the former come
+// first where that start has points in cameras. Leaves the
 // estimate of the least true cost, its problem, and the highest certificate;
 // appends to the summary's rounds, sweeps and iterations. Each way may take a
 // hundred iterations, or as many as the solve has taken.

@@ -59,22 +59,25 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               std::vector<int64_t> support,
                                               double sufficient,
                                               const Context& context) {
-  KnownRotationProblem rows = built.problem;
-  std::vector<double> widths(rows.observations.size(), 1);
+  std::vector<double> widths(support.size(), 1);
   std::optional<PixelCertificate> best;
   JointOptions options;
   options.norm = norm;
   options.relative_gap = kGap;
   for (int solve = 0; solve < kMaxSolves && !support.empty(); ++solve) {
-    const ProblemSubset part(rows, support);
+    const ProblemSubset part(built.problem, support);
+    KnownRotationProblem rows = part.problem();
+    for (size_t n = 0; n < support.size(); ++n) {
+      rows.observations[n].E.bottomRows<2>() /= widths[n];
+    }
     Estimate estimate = part.Restrict(x_hat);
-    const JointSummary summary =
-        SolveJoint(part.problem(), options, context, &estimate);
+    const JointSummary summary = SolveJoint(rows, options, context, &estimate);
     if (!summary.certificate) return best;
-    Certificate certificate = InWhole(part, *summary.certificate);
+    Certificate certificate = *summary.certificate;
     for (CertifiedObservation& o : certificate.observations) {
       o.y /= widths[o.observation];
     }
+    certificate = InWhole(part, std::move(certificate));
     if (!LevelPositions(built, &certificate)) return best;
     const std::vector<Eigen::Vector3d> bearings =
         BearingsOfPoints(model, built, x_hat, certificate);
@@ -93,20 +96,21 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
     const std::vector<double> lines =
         SupportLines(model, built, norm, certificate, bearings, level,
                      level / certificate.lower_bound, context);
-    support.clear();
+    std::vector<int64_t> left;
+    std::vector<double> widths_left;
     for (size_t n = 0; n < lines.size(); ++n) {
       if (!std::isfinite(lines[n])) continue;
       const int64_t i = certificate.observations[n].observation;
-      if (!built.HasPixel(i)) {  // whatever the bound, its row is the ball's
-        support.push_back(i);
-        continue;
+      const auto place = std::lower_bound(support.begin(), support.end(), i);
+      double width = widths[place - support.begin()];
+      if (built.HasPixel(i)) {  // else, whatever the bound, it is the ball's
+        width *= std::max(1.0, lines[n] * certificate.lower_bound / level);
       }
-      const double wider =
-          std::max(1.0, lines[n] * certificate.lower_bound / level);
-      widths[i] *= wider;
-      rows.observations[i].E.bottomRows<2>() /= wider;
-      support.push_back(i);
+      left.push_back(i);
+      widths_left.push_back(width);
     }
+    support = std::move(left);
+    widths = std::move(widths_left);
   }
   return best;
 }
