@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/joint/initializer.h"
 #include "krot/joint/joint.h"
 #include "krot/known_rotation.h"
 #include "krot/math/norm.h"

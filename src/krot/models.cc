@@ -8,9 +8,7 @@
 
 #include "krot/adjust.h"
 #include "krot/base/write_file.h"
-#include "krot/bridge/certificate_file.h"
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_file.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/certificate.h"
 #include "krot/outliers.h"
 #include "krot/outliers/outlier_filter.h"

@@ -2,8 +2,8 @@
 
 #include <pybind11/pybind11.h>
 
-#include "krot/analysis/rotation_input.h"
-#include "krot/model/file_bytes.h"
+#include "krot/analysis/model_input.h"
+#include "krot/model/model_io.h"
 
 namespace krot::internal {
 namespace {

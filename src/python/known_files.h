@@ -7,10 +7,9 @@
 
 #include "krot/database.h"
 #include "krot/model.h"
-#include "krot/model/fixed_parts.h"
-#include "krot/model/positions_file.h"
+#include "krot/model/model_io.h"
 #include "krot/options/option_table.h"
-#include "krot/report/run_record.h"
+#include "krot/report/sentences.h"
 
 namespace krot::internal {
 

@@ -6,7 +6,7 @@
 #include "krot/base/check.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -12,14 +12,14 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "krot/analysis/noise.h"
-#include "krot/analysis/settle_contradictions.h"
+#include "krot/analysis/model_input.h"
 #include "krot/context.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/model/model_io.h"
-#include "krot/options/option_error.h"
-#include "krot/report/problem_words.h"
+#include "krot/options/option_table.h"
+#include "krot/report/sentences.h"
 #include "python/bindings.h"
 #include "python/model_arrays.h"
 

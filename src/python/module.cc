@@ -5,7 +5,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/write_file.h"
 #include "krot/context.h"
-#include "krot/options/option_error.h"
+#include "krot/options/option_table.h"
 #include "krot/version.h"
 #include "python/bindings.h"
 

@@ -9,7 +9,7 @@
 
 #include "krot/camera/camera_model.h"
 #include "krot/camera/models.h"
-#include "krot/synthetic/default_camera.h"
+#include "krot/synthetic/scene.h"
 
 // The oracle knows no derivative: central differences of a projection written
 // with Eigen's quaternions and the camera's own ProjectRay.

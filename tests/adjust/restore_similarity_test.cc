@@ -1,4 +1,4 @@
-#include "krot/adjust/restore_similarity.h"
+#include "krot/adjust/adjustment_blocks.h"
 
 #include <utility>
 #include <vector>

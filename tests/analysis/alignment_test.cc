@@ -1,4 +1,4 @@
-#include "krot/analysis/alignment.h"
+#include "krot/analysis/model_comparison.h"
 
 #include <cmath>
 #include <limits>
@@ -11,7 +11,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

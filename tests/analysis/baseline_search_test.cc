@@ -1,4 +1,4 @@
-#include "krot/analysis/baseline_search.h"
+#include "krot/analysis/epipolar.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

@@ -1,4 +1,4 @@
-#include "krot/analysis/error_colors.h"
+#include "krot/analysis/colors.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "krot/analysis/geometry_statistics.h"
+#include "krot/analysis/model_statistics.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -14,14 +14,13 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/analysis/image_sums.h"
-#include "krot/camera/projection_row.h"
+#include "krot/analysis/noise.h"
+#include "krot/camera/camera_model.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
-#include "krot/model/pose_checks.h"
-#include "krot/model/remove_observations.h"
+#include "krot/model/rigs.h"
+#include "krot/model/model_checks.h"
+#include "krot/model/derived_models.h"
 #include "krot/synthetic/scene.h"
-#include "krot/synthetic/scene_database.h"
 
 namespace krot::internal {
 namespace {

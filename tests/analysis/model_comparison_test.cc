@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/base/numbers.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

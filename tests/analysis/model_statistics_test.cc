@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "krot/camera/camera_model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

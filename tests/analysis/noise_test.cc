@@ -10,9 +10,8 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
-#include "krot/camera/projection_row.h"
-#include "krot/model/image_geometry.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

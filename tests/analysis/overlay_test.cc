@@ -1,4 +1,4 @@
-#include "krot/analysis/overlay.h"
+#include "krot/analysis/colors.h"
 
 #include <string>
 #include <utility>
@@ -8,9 +8,8 @@
 
 #include "krot/context.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/model/model_io.h"
-#include "krot/model/trivial_rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

@@ -11,12 +11,11 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "krot/analysis/explain_contradictions.h"
+#include "krot/analysis/epipolar.h"
 #include "krot/base/numbers.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
-#include "krot/synthetic/scene_database.h"
 #include "tests/testing/model_matchers.h"
 
 namespace krot::internal {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "krot/camera/camera_model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

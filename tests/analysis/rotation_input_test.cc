@@ -1,4 +1,4 @@
-#include "krot/analysis/rotation_input.h"
+#include "krot/analysis/model_input.h"
 
 #include <sstream>
 #include <string>
@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

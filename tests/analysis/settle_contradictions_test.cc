@@ -1,4 +1,4 @@
-#include "krot/analysis/settle_contradictions.h"
+#include "krot/analysis/model_input.h"
 
 #include <algorithm>
 #include <limits>

@@ -34,8 +34,8 @@ const std::map<std::string, std::set<std::string>>& DirectDependencies() {
       {"analysis", {"model", "minimax"}},
       {"synthetic", {"model"}},
       {"adjust", {"model", "conic"}},
-      {"bridge", {"model", "proof"}},
-      {"pipeline", {"bridge", "joint", "finish", "analysis", "adjust"}},
+      {"convert", {"model", "proof"}},
+      {"pipeline", {"convert", "joint", "finish", "analysis", "adjust"}},
       {"outliers", {"pipeline"}},
       {"tolerance", {"pipeline"}},
       {"options", {"outliers", "tolerance"}},
@@ -155,8 +155,8 @@ TEST(IncludeRule, TheCertificatesCheckerSeesNothingOfTheSolvers) {
   }
   EXPECT_EQ(included.count("krot/problem/known_rotation_problem.h"), 1u);
   std::set<std::string> of_baselines;
-  AddIncluded("krot/bridge/baseline_certificate.h", &of_baselines);
-  AddIncluded("krot/bridge/baseline_certificate.cc", &of_baselines);
+  AddIncluded("krot/convert/baseline_certificate.h", &of_baselines);
+  AddIncluded("krot/convert/baseline_certificate.cc", &of_baselines);
   for (const std::string& file : of_baselines) {
     EXPECT_NE(file.rfind("krot/analysis/", 0), 0u)
         << "the checker of baselines must not include " << file;

@@ -1,4 +1,4 @@
-#include "krot/base/folder_swap.h"
+#include "krot/base/write_file.h"
 
 #include <string>
 #include <vector>
@@ -6,7 +6,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/base/write_file.h"
 #include "tests/testing/temp_folder.h"
 
 namespace krot::internal {

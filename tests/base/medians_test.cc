@@ -1,4 +1,4 @@
-#include "krot/base/medians.h"
+#include "krot/base/numbers.h"
 
 #include <algorithm>
 #include <cmath>

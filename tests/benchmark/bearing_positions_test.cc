@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/alignment.h"
-#include "krot/bridge/bridge.h"
+#include "krot/analysis/model_comparison.h"
+#include "krot/convert/build_problem.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

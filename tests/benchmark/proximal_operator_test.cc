@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/synthetic/random.h"
+#include "krot/synthetic/scene_steps.h"
 
 namespace krot::internal {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 
 namespace krot::internal {
 namespace {

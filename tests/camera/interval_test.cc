@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/camera/enclosure.h"
 
 namespace krot::internal {
 namespace {

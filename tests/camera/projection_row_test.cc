@@ -1,4 +1,4 @@
-#include "krot/camera/projection_row.h"
+#include "krot/camera/camera_model.h"
 
 #include <cmath>
 #include <limits>
@@ -10,8 +10,6 @@
 #include <Eigen/LU>
 
 #include "krot/base/numbers.h"
-#include "krot/camera/camera_model.h"
-#include "krot/camera/chart.h"
 #include "tests/camera/random_camera.h"
 
 namespace krot::internal {

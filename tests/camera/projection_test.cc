@@ -5,7 +5,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
-#include "krot/camera/dual.h"
+#include "krot/camera/interval.h"
 #include "krot/camera/models.h"
 #include "tests/camera/random_camera.h"
 

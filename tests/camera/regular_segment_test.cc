@@ -1,4 +1,4 @@
-#include "krot/camera/regular_segment.h"
+#include "krot/camera/undistort.h"
 
 #include <algorithm>
 #include <cmath>

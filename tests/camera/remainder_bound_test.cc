@@ -12,8 +12,7 @@
 #include <Eigen/LU>
 
 #include "krot/base/numbers.h"
-#include "krot/camera/chart.h"
-#include "krot/camera/projection_row.h"
+#include "krot/camera/camera_model.h"
 #include "tests/camera/random_camera.h"
 
 namespace krot::internal {

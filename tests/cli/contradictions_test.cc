@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model.h"
-#include "krot/model/contradictions.h"
+#include "krot/model/model_checks.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

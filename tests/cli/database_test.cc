@@ -8,7 +8,7 @@
 
 #include "krot/database.h"
 #include "krot/model.h"
-#include "krot/synthetic/scene_database.h"
+#include "krot/synthetic/scene.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

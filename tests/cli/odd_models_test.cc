@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
 

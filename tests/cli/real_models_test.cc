@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

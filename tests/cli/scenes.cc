@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "krot/bridge/bridge.h"
+#include "krot/convert/build_problem.h"
 #include "krot/model.h"
 
 namespace krot::internal {

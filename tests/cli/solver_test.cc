@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 

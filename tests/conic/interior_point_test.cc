@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 

@@ -1,11 +1,11 @@
-#include "krot/conic/slack_program.h"
+#include "krot/conic/interior_point.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 #include "krot/problem/cost.h"
 #include "tests/problem/random_problem.h"
 

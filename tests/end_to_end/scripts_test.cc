@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/model.h"
-#include "krot/synthetic/random.h"
+#include "krot/synthetic/scene_steps.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"

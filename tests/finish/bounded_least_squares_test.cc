@@ -1,4 +1,4 @@
-#include "krot/finish/bounded_least_squares.h"
+#include "krot/finish/least_squares.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_file.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/context.h"
 #include "krot/pipeline/solve_model.h"
 #include "tests/fuzz/fuzz.h"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "krot/model.h"
-#include "krot/model/file_bytes.h"
+#include "krot/model/model_io.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

@@ -2,9 +2,7 @@
 
 #include "krot/context.h"
 #include "krot/model.h"
-#include "krot/model/fixed_parts.h"
-#include "krot/model/positions_file.h"
-#include "krot/model/rotations_file.h"
+#include "krot/model/model_io.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot::internal {

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 
-#include "krot/bridge/bridge.h"
-#include "krot/bridge/model_digest.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/model_digest.h"
 #include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/binary_io.h"
-#include "krot/model/contradictions.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/model_checks.h"
+#include "krot/model/rigs.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot::internal {

@@ -9,7 +9,7 @@
 
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
-#include "krot/options/solver_options.h"
+#include "krot/options/command_options.h"
 #include "tests/fuzz/fuzz.h"
 #include "tools/krot/option_parser.h"
 

@@ -1,4 +1,4 @@
-#include "krot/geometry/consensus.h"
+#include "krot/geometry/transform.h"
 
 #include <numeric>
 #include <random>

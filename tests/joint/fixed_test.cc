@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/joint/initializer.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"

@@ -1,4 +1,4 @@
-#include "krot/joint/initializer.h"
+#include "krot/joint/joint.h"
 
 #include <algorithm>
 #include <limits>
@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/bridge.h"
-#include "krot/joint/joint.h"
+#include "krot/convert/build_problem.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/joint/small_scenes.h"

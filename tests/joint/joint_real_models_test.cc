@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/bridge.h"
-#include "krot/joint/initializer.h"
+#include "krot/convert/build_problem.h"
 #include "krot/joint/joint.h"
 #include "krot/model/model_io.h"
 #include "krot/problem/cost.h"

@@ -7,7 +7,6 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/joint/initializer.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
 #include "tests/joint/small_scenes.h"

@@ -1,4 +1,4 @@
-#include "krot/joint/known_multipliers.h"
+#include "krot/joint/joint.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "krot/bridge/bridge.h"
+#include "krot/convert/build_problem.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"

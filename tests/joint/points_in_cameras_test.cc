@@ -2,7 +2,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/joint/initializer.h"
 #include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 #include "tests/joint/small_scenes.h"

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/linear/block_structure.h"
+#include "krot/linear/blocks.h"
 
 namespace krot::internal {
 

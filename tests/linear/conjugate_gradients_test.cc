@@ -1,4 +1,4 @@
-#include "krot/linear/conjugate_gradients.h"
+#include "krot/linear/reduced_camera_system.h"
 
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>

@@ -1,4 +1,4 @@
-#include "krot/linear/triangle.h"
+#include "krot/linear/blocks.h"
 
 #include <cmath>
 #include <random>

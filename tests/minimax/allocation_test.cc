@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/minimax/fast_descent.h"
-#include "krot/minimax/side_by_side_descent.h"
 #include "tests/testing/random_residuals.h"
 
 namespace {

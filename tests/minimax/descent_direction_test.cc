@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/math/simplex_qp.h"
-#include "krot/minimax/descent_step.h"
 #include "krot/minimax/fast_descent.h"
 #include "tests/testing/random_residuals.h"
 

@@ -1,6 +1,6 @@
 // The kernel's derivatives against those of single residuals.
 
-#include "krot/minimax/residual_kernel.h"
+#include "krot/minimax/kernels.h"
 
 #include <algorithm>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 
 #include <cmath>
 #include <limits>
@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/minimax/residual_set.h"
 #include "tests/testing/random_residuals.h"
 
 namespace krot::internal {

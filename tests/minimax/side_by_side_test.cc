@@ -1,6 +1,6 @@
 // Problems solved eight at a time against the same ones solved alone.
 
-#include "krot/minimax/side_by_side_descent.h"
+#include "krot/minimax/fast_descent.h"
 
 #include <algorithm>
 #include <cmath>

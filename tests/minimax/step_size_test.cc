@@ -1,4 +1,4 @@
-#include "krot/minimax/descent_step.h"
+#include "krot/minimax/fast_descent.h"
 
 #include <cmath>
 

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/model/model_io.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 

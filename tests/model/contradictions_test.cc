@@ -1,4 +1,4 @@
-#include "krot/model/contradictions.h"
+#include "krot/model/model_checks.h"
 
 #include <algorithm>
 #include <filesystem>

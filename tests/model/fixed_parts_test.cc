@@ -1,4 +1,4 @@
-#include "krot/model/fixed_parts.h"
+#include "krot/model/model_io.h"
 
 #include <string>
 #include <vector>

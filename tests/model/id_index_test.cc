@@ -1,4 +1,4 @@
-#include "krot/model/id_index.h"
+#include "krot/model/validate.h"
 
 #include <limits>
 #include <optional>

@@ -1,4 +1,4 @@
-#include "krot/model/local_frame.h"
+#include "krot/model/derived_models.h"
 
 #include <cmath>
 #include <limits>
@@ -6,8 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/image_geometry.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 

@@ -1,4 +1,4 @@
-#include "krot/model/pose_checks.h"
+#include "krot/model/model_checks.h"
 
 #include <cmath>
 #include <random>
@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "tests/model/tiny_model.h"
 
 namespace krot::internal {

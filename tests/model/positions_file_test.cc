@@ -1,4 +1,4 @@
-#include "krot/model/positions_file.h"
+#include "krot/model/model_io.h"
 
 #include <optional>
 #include <string>

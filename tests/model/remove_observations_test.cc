@@ -1,10 +1,10 @@
-#include "krot/model/remove_observations.h"
+#include "krot/model/derived_models.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "krot/model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

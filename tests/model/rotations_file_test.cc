@@ -1,4 +1,4 @@
-#include "krot/model/rotations_file.h"
+#include "krot/model/model_io.h"
 
 #include <cmath>
 #include <sstream>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 

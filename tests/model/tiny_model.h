@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "krot/model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 

@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
 

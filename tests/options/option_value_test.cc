@@ -1,4 +1,4 @@
-#include "krot/options/option_value.h"
+#include "krot/options/option_table.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "krot/math/norm.h"
-#include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 
 namespace krot::internal {
 

@@ -1,4 +1,4 @@
-#include "krot/bridge/conflict_file.h"
+#include "krot/convert/certificate_file.h"
 
 #include <functional>
 #include <numeric>

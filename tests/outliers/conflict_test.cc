@@ -6,8 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/built_part.h"
-#include "krot/problem/components.h"
+#include "krot/convert/build_problem.h"
 #include "krot/problem/subset.h"
 #include "tests/oracle/lp_oracle.h"
 #include "tests/outliers/outlier_scenes.h"

@@ -1,4 +1,4 @@
-#include "krot/outliers/error_profile.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
 #include <iterator>
@@ -9,8 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/problem/components.h"
+#include "krot/convert/reprojection.h"
 #include "krot/problem/subset.h"
 #include "tests/oracle/lp_oracle.h"
 #include "tests/outliers/outlier_scenes.h"

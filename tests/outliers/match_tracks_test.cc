@@ -13,9 +13,8 @@
 #include <Eigen/Geometry>
 
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
-#include "krot/synthetic/scene_database.h"
 #include "tests/testing/model_matchers.h"
 
 namespace krot::internal {

@@ -1,4 +1,4 @@
-#include "krot/outliers/near_set.h"
+#include "krot/outliers/removal.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/conflict_file.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/check.h"
 #include "krot/model.h"
 #include "tests/outliers/outlier_scenes.h"

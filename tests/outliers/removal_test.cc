@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/reprojection.h"
+#include "krot/convert/reprojection.h"
 #include "krot/outliers/packing.h"
 #include "tests/outliers/outlier_scenes.h"
 

@@ -7,10 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/analysis/alignment.h"
-#include "krot/model/image_geometry.h"
+#include "krot/analysis/model_comparison.h"
+#include "krot/model/rigs.h"
 #include "krot/outliers/outlier_filter.h"
-#include "krot/outliers/weak_links.h"
+#include "krot/outliers/parts.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/weakly_tied.h"
 

@@ -1,10 +1,9 @@
-#include "krot/outliers/rotation_suspect.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/reprojection.h"
-#include "krot/model/image_geometry.h"
-#include "krot/outliers/outlier_filter.h"
+#include "krot/convert/reprojection.h"
+#include "krot/model/rigs.h"
 #include "tests/outliers/outlier_scenes.h"
 
 namespace krot::internal {

@@ -1,4 +1,4 @@
-#include "krot/outliers/suspect_colors.h"
+#include "krot/outliers/filter_steps.h"
 
 #include <set>
 

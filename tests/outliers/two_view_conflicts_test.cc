@@ -1,4 +1,4 @@
-#include "krot/outliers/two_view_conflicts.h"
+#include "krot/outliers/packing.h"
 
 #include <algorithm>
 #include <set>

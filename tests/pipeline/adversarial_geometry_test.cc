@@ -7,9 +7,9 @@
 
 #include "krot/geometry.h"
 #include "krot/model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"
-#include "krot/synthetic/random.h"
+#include "krot/synthetic/scene_steps.h"
 #include "krot/synthetic/scene.h"
 
 // Scenes in which something that solvers like to take for granted is missing:

@@ -12,9 +12,9 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
-#include "krot/bridge/reprojection.h"
+#include "krot/convert/reprojection.h"
 #include "krot/pipeline/solve_model.h"
-#include "tests/bridge/lens_model.h"
+#include "tests/convert/lens_model.h"
 
 namespace krot::internal {
 namespace {

@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/model_digest.h"
+#include "krot/convert/certificate_file.h"
+#include "krot/convert/model_digest.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 

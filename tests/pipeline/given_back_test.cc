@@ -8,12 +8,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/bridge/reprojection.h"
-#include "krot/camera/projection_row.h"
+#include "krot/convert/reprojection.h"
+#include "krot/camera/camera_model.h"
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
-#include "tests/bridge/lens_model.h"
+#include "tests/convert/lens_model.h"
 #include "tests/testing/model_matchers.h"
 
 namespace krot::internal {

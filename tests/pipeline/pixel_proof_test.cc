@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/reprojection.h"
+#include "krot/convert/reprojection.h"
 #include "krot/conic/interior_point.h"
-#include "krot/proof/certificate_search.h"
+#include "krot/proof/certificate.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

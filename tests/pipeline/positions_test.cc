@@ -12,14 +12,13 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/bridge.h"
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/position_rows.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/camera/projection_row.h"
-#include "krot/model/id_index.h"
-#include "krot/model/image_geometry.h"
-#include "krot/model/local_frame.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/certificate_file.h"
+#include "krot/convert/reprojection.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
+#include "krot/model/derived_models.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"

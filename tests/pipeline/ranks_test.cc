@@ -9,11 +9,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/bridge/certificate_file.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/joint/working_set.h"
-#include "krot/linear/block_structure.h"
+#include "krot/linear/blocks.h"
 #include "krot/linear/ordered_sums.h"
-#include "krot/model/model_share.h"
+#include "krot/model/derived_models.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"

@@ -1,4 +1,4 @@
-#include "krot/pipeline/rounds.h"
+#include "krot/pipeline/stages.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -8,11 +8,11 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/bridge/reprojection.h"
+#include "krot/convert/reprojection.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "krot/problem/cost.h"
-#include "tests/bridge/lens_model.h"
+#include "tests/convert/lens_model.h"
 
 namespace krot::internal {
 namespace {

@@ -1,7 +1,7 @@
 // The finish through full cameras, beside Ceres, which shares no solver with
 // it.
 
-#include "krot/pipeline/run_finish.h"
+#include "krot/pipeline/stages.h"
 
 #include <cmath>
 

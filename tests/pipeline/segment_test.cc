@@ -1,12 +1,11 @@
-#include "krot/pipeline/segment.h"
+#include "krot/pipeline/trust_regions.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-#include "krot/pipeline/trust_regions.h"
 #include "krot/problem/cost.h"
-#include "tests/bridge/lens_model.h"
+#include "tests/convert/lens_model.h"
 
 namespace krot::internal {
 namespace {

@@ -1,7 +1,7 @@
 // Cameras that run away and points that are not determined, and all the others
 // beside them.
 
-#include "krot/pipeline/settle.h"
+#include "krot/pipeline/solve_model.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,11 +11,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/camera/projection_row.h"
-#include "krot/model/image_geometry.h"
-#include "krot/model/remove_observations.h"
-#include "krot/model/trivial_rigs.h"
-#include "krot/pipeline/solve_model.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/rigs.h"
+#include "krot/model/derived_models.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
 

@@ -8,7 +8,7 @@
 
 #include "krot/base/checkpoint.h"
 #include "krot/model/binary_io.h"
-#include "krot/model/model_share.h"
+#include "krot/model/derived_models.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/thread_ranks.h"

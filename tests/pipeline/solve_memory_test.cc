@@ -1,4 +1,4 @@
-#include "krot/pipeline/solve_memory.h"
+#include "krot/pipeline/stages.h"
 
 #include <sys/resource.h>
 #include <sys/wait.h>

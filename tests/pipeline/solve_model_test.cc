@@ -10,10 +10,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/camera/projection_row.h"
+#include "krot/convert/certificate_file.h"
+#include "krot/camera/camera_model.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/problem/cost.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"

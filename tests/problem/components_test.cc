@@ -1,4 +1,4 @@
-#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

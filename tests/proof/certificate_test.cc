@@ -8,11 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/joint/initializer.h"
+#include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
-#include "krot/proof/certificate_search.h"
 #include "krot/proof/dual_repair.h"
-#include "krot/proof/support.h"
 #include "tests/problem/random_problem.h"
 #include "tests/verify/joint_iterate.h"
 #include "tests/verify/naive_certificate_check.h"

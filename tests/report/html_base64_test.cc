@@ -1,4 +1,4 @@
-#include "krot/report/html_base64.h"
+#include "krot/report/html_page.h"
 
 #include <cstdint>
 #include <string>

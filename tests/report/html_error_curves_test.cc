@@ -1,4 +1,4 @@
-#include "krot/report/html_error_curves.h"
+#include "krot/report/html_page.h"
 
 #include <algorithm>
 #include <cmath>

@@ -13,8 +13,7 @@
 
 #include "krot/analysis/model_statistics.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
-#include "krot/report/html_model_view.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

@@ -1,4 +1,4 @@
-#include "krot/report/model_report.h"
+#include "krot/report/reports.h"
 
 #include <algorithm>
 

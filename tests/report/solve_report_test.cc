@@ -1,4 +1,4 @@
-#include "krot/report/solve_report.h"
+#include "krot/report/reports.h"
 
 #include <optional>
 

@@ -4,7 +4,7 @@
 #include <Eigen/Geometry>
 
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
+#include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
 namespace {

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
 #include "tests/problem/random_problem.h"
 
 namespace krot::internal {

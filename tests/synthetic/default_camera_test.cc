@@ -1,4 +1,4 @@
-#include "krot/synthetic/default_camera.h"
+#include "krot/synthetic/scene.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "krot/synthetic/random.h"
+#include "krot/synthetic/scene_steps.h"
 
 #include <gtest/gtest.h>
 

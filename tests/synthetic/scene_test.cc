@@ -9,7 +9,7 @@
 
 #include "krot/camera/camera_model.h"
 #include "krot/model.h"
-#include "krot/model/trivial_rigs.h"
+#include "krot/model/rigs.h"
 #include "tests/synthetic/scene_geometry.h"
 #include "tests/testing/model_matchers.h"
 

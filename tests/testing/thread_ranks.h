@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/ranks.h"
+#include "krot/base/context.h"
 
 namespace krot::internal {
 

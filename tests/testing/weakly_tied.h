@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "krot/model.h"
-#include "krot/model/remove_observations.h"
+#include "krot/model/derived_models.h"
 
 namespace krot::internal {
 

@@ -1,4 +1,4 @@
-#include "krot/tolerance/extent.h"
+#include "krot/tolerance/tolerance_analysis.h"
 
 #include <cmath>
 #include <random>

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/oracle/lp_oracle.h"
 

@@ -1,4 +1,4 @@
-#include "krot/verify/force_balance.h"
+#include "krot/verify/force_checker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/QR>
 
-#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
 #include "tests/joint/small_scenes.h"
 #include "tests/problem/random_problem.h"
 

@@ -1,4 +1,4 @@
-#include "krot/verify/force_balance.h"
+#include "krot/verify/force_checker.h"
 
 #include <cmath>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "krot/verify/pull.h"
+#include "krot/verify/force_checker.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/verify/force_balance.h"
 #include "krot/verify/force_checker.h"
 #include "tests/problem/random_problem.h"
 

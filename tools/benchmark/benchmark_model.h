@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "krot/bridge/bridge.h"
+#include "krot/convert/build_problem.h"
 
 namespace krot::internal {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "krot/base/parallel_for.h"
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_model.h"
 #include "tools/benchmark/benchmark_report.h"

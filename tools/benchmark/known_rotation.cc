@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "krot/base/parallel_for.h"
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/problem/cost.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"

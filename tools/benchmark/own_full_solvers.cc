@@ -1,8 +1,8 @@
 #include <utility>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/joint/joint.h"
-#include "krot/pipeline/schedule.h"
+#include "krot/pipeline/stages.h"
 #include "krot/sweeps/res_int.h"
 #include "tools/benchmark/known_rotation_solver.h"
 

@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "krot/minimax/fast_descent.h"
-#include "krot/minimax/side_by_side_descent.h"
 #include "tools/benchmark/subproblem_solver.h"
 
 namespace krot::internal {

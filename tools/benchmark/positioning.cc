@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/bridge/bridge.h"
+#include "krot/convert/build_problem.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
 #include "tools/benchmark/benchmark_command.h"

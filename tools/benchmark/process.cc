@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 
 namespace krot::internal {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/synthetic/random.h"
+#include "krot/synthetic/scene_steps.h"
 
 namespace krot::internal {
 

@@ -2,10 +2,10 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/timer.h"
-#include "krot/options/adjustment_options.h"
+#include "krot/base/context.h"
+#include "krot/options/command_options.h"
 #include "krot/pipeline/adjust_model.h"
-#include "krot/report/adjustment_report.h"
+#include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

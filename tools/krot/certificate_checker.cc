@@ -3,10 +3,9 @@
 #include <vector>
 
 #include "krot/base/write_file.h"
-#include "krot/bridge/baseline_certificate.h"
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/bridge/conflict_file.h"
-#include "krot/report/certificate_table.h"
+#include "krot/convert/baseline_certificate.h"
+#include "krot/convert/certificate_file.h"
+#include "krot/report/reports.h"
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <optional>
 
-#include "krot/bridge/model_digest.h"
-#include "krot/model/file_bytes.h"
+#include "krot/convert/model_digest.h"
+#include "krot/model/model_io.h"
 #include "krot/pipeline/checkpoint_file.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "krot/options/option_error.h"
+#include "krot/options/option_table.h"
 
 namespace krot::internal {
 

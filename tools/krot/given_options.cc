@@ -10,8 +10,8 @@
 #include <boost/program_options.hpp>
 
 #include "krot/context.h"
-#include "krot/model/text_reader.h"
-#include "krot/options/option_error.h"
+#include "krot/model/text_io.h"
+#include "krot/options/option_table.h"
 
 namespace krot::internal {
 namespace {

@@ -1,6 +1,6 @@
 // Where there is no Boost: by hand, and no project files.
 
-#include "krot/options/option_error.h"
+#include "krot/options/option_table.h"
 #include "tools/krot/given_options.h"
 
 namespace krot::internal {

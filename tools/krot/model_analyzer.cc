@@ -1,14 +1,13 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/error_colors.h"
+#include "krot/analysis/colors.h"
 #include "krot/base/write_file.h"
-#include "krot/bridge/certificate_verdict.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/context.h"
 #include "krot/model.h"
-#include "krot/report/certificate_table.h"
-#include "krot/report/model_report.h"
-#include "krot/report/problem_words.h"
+#include "krot/report/reports.h"
+#include "krot/report/sentences.h"
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

@@ -3,13 +3,13 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/base/write_file.h"
-#include "krot/bridge/baseline_certificate.h"
+#include "krot/convert/baseline_certificate.h"
 #include "krot/check.h"
 #include "krot/database.h"
-#include "krot/outliers/suspect_colors.h"
-#include "krot/report/check_report.h"
+#include "krot/outliers/filter_steps.h"
+#include "krot/report/reports.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "krot/analysis/model_comparison.h"
-#include "krot/analysis/overlay.h"
+#include "krot/analysis/colors.h"
 #include "krot/base/write_file.h"
-#include "krot/bridge/certificate_verdict.h"
-#include "krot/report/comparison_report.h"
+#include "krot/convert/certificate_file.h"
+#include "krot/report/reports.h"
 #include "krot/version.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

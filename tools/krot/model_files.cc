@@ -8,14 +8,13 @@
 #include <utility>
 
 #include "krot/analysis/collapse.h"
-#include "krot/analysis/settle_contradictions.h"
-#include "krot/base/timer.h"
+#include "krot/analysis/model_input.h"
+#include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/context.h"
 #include "krot/model.h"
-#include "krot/model/file_bytes.h"
-#include "krot/report/pose_words.h"
-#include "krot/report/problem_words.h"
+#include "krot/model/model_io.h"
+#include "krot/report/sentences.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/run_log.h"

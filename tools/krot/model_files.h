@@ -5,12 +5,9 @@
 #include <vector>
 
 #include "krot/model.h"
-#include "krot/model/contradictions.h"
-#include "krot/model/fixed_parts.h"
+#include "krot/model/model_checks.h"
 #include "krot/model/model_io.h"
-#include "krot/model/pose_checks.h"
-#include "krot/model/positions_file.h"
-#include "krot/report/run_record.h"
+#include "krot/report/sentences.h"
 #include "tools/krot/log.h"
 #include "tools/krot/option_parser.h"
 

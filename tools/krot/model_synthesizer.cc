@@ -5,7 +5,6 @@
 #include "krot/database.h"
 #include "krot/report/text_table.h"
 #include "krot/synthetic/scene.h"
-#include "krot/synthetic/scene_database.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"

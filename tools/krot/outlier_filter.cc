@@ -2,13 +2,13 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/overlay.h"
-#include "krot/base/timer.h"
+#include "krot/analysis/colors.h"
+#include "krot/base/context.h"
 #include "krot/base/write_file.h"
-#include "krot/options/outlier_filter_options.h"
+#include "krot/options/command_options.h"
 #include "krot/outliers/outlier_filter.h"
-#include "krot/outliers/suspect_colors.h"
-#include "krot/report/outlier_report.h"
+#include "krot/outliers/filter_steps.h"
+#include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"

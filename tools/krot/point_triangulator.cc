@@ -4,12 +4,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/database.h"
-#include "krot/options/solve_options.h"
+#include "krot/options/command_options.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/report/text_table.h"
-#include "krot/report/track_report.h"
+#include "krot/report/pair_report.h"
 #include "tools/krot/command.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/photo.h"

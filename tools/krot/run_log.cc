@@ -11,11 +11,10 @@
 #include <system_error>
 #include <vector>
 
-#include "krot/base/folder_swap.h"
-#include "krot/base/timer.h"
 #include "krot/base/write_file.h"
-#include "krot/bridge/model_digest.h"
-#include "krot/model/file_bytes.h"
+#include "krot/base/context.h"
+#include "krot/convert/model_digest.h"
+#include "krot/model/model_io.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"
 #include "tools/krot/log.h"

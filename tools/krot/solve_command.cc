@@ -5,13 +5,12 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/base/write_file.h"
 #include "krot/database.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/problem/cost.h"
-#include "krot/report/outlier_report.h"
-#include "krot/report/solve_report.h"
+#include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/free_memory.h"
 #include "tools/krot/interrupt.h"

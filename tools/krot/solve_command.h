@@ -3,7 +3,7 @@
 #include <functional>
 #include <string>
 
-#include "krot/outliers/tolerant_solve.h"
+#include "krot/outliers/filter_steps.h"
 #include "tools/krot/checkpoint.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/model_files.h"

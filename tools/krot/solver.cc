@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/options/solver_options.h"
+#include "krot/options/command_options.h"
 #include "krot/outliers/match_tracks.h"
 #include "tools/krot/command.h"
 #include "tools/krot/solve_command.h"

@@ -11,11 +11,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "krot/camera/projection_row.h"
-#include "krot/model/id_index.h"
-#include "krot/model/image_geometry.h"
-#include "krot/report/html_base64.h"
-#include "krot/report/pair_view.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
+#include "krot/report/html_page.h"
+#include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/photo.h"
 

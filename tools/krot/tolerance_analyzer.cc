@@ -3,11 +3,11 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/base/write_file.h"
-#include "krot/options/tolerance_options.h"
+#include "krot/options/command_options.h"
 #include "krot/report/text_table.h"
-#include "krot/report/tolerance_report.h"
+#include "krot/report/reports.h"
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"

@@ -13,7 +13,7 @@
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/write_file.h"
 #include "krot/context.h"
-#include "krot/options/solver_options.h"
+#include "krot/options/command_options.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"
 #include "tools/krot/command_error.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "krot/base/ranks.h"
+#include "krot/base/context.h"
 
 namespace krot::internal {
 

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "krot/bridge/model_digest.h"
+#include "krot/convert/model_digest.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

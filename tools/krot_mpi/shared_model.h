@@ -1,7 +1,7 @@
 #pragma once
 
-#include "krot/base/ranks.h"
-#include "krot/model/model_share.h"
+#include "krot/base/context.h"
+#include "krot/model/derived_models.h"
 #include "krot/pipeline/solve_model.h"
 #include "tools/krot/model_files.h"
 

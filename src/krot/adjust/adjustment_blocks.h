@@ -3,13 +3,17 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "krot/adjust/bundle_adjustment.h"
+#include "krot/base/context.h"
+#include "krot/linear/blocks.h"
 #include "krot/model.h"
-#include "krot/model/fixed_parts.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/model_io.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 
@@ -67,5 +71,150 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
 // frames.
 Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
                   const AdjustmentBlocks& after);
+
+// The indices of the camera parameters that the options refine, in COLMAP's
+// order. Each group is refined as a whole: focal length(s), principal point,
+// others.
+std::vector<int> RefinedParams(int camera_model,
+                               const BundleAdjustmentOptions& options);
+
+// The unknowns that move. Points aside, they are in blocks of three columns,
+// which are numbered in the order frames, sensors, cameras, cap. Nothing that
+// is fixed or takes part in no observation moves.
+struct AdjustmentColumns {
+  static constexpr int32_t kHeld = -1;
+  // The blocks of theta and c, where x -> R exp([theta]x) (x - c).
+  struct Pose {
+    int32_t rotation = kHeld;
+    int32_t center = kHeld;
+  };
+  // As many blocks as the refined parameters need. Columns that are left over
+  // in the last block stand for nothing.
+  struct Camera {
+    int32_t first_block = kHeld;
+    std::vector<int> params;
+
+    int32_t num_blocks() const {
+      return static_cast<int32_t>(params.size() + 2) / 3;
+    }
+  };
+
+  AdjustmentColumns(const BundleAdjustmentOptions& options,
+                    const AdjustmentBlocks& blocks);
+
+  std::vector<char> point_moves;  // as AdjustmentBlocks::points
+  std::vector<Pose> frames;       // as AdjustmentBlocks::frames
+  std::vector<Pose> sensors;      // as sensors
+  std::vector<Camera> cameras;
+  int32_t cap = kHeld;  // one column
+  int32_t num_blocks = 0;
+  int64_t num_unknowns = 0;  // including points, without the cap
+
+  void AddCap() { cap = num_blocks++; }
+};
+
+// Sets the unknowns of `*to` to those of `from`, moved by `step` along a
+// direction of points and blocks. Unknowns that do not move keep their bits.
+// Both are blocks of the same model.
+void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
+               const BlockVector& direction, double step, AdjustmentBlocks* to);
+
+// Moves every connected component of `after` by a similarity that gives it the
+// centroid of its camera centres, their RMS distance to it, and the mean
+// rotation that it has in `before`, all of those cameras that keep their place
+// among the others (krot/geometry/transform.h). Errors change only by rounding.
+// The scale stays if a constant sensor_from_rig with a translation fixes it,
+// and the rotation if rotations are constant. Nothing is done if frames or
+// points are constant, or to a component with anything fixed. O(observations).
+void RestoreSimilarity(const BundleAdjustmentOptions& options,
+                       const AdjustmentBlocks& before, AdjustmentBlocks* after);
+
+// The error and the depth of an observation.
+struct ProjectedError {
+  Eigen::Vector2d r;  // projected minus measured, pixels
+  double w;           // depth, > 0
+};
+
+// Those of all observations. None if a point is not in front of its camera, or
+// an error not below `max_error`. O(observations).
+std::optional<std::vector<ProjectedError>> ProjectErrors(
+    const AdjustmentBlocks& blocks, double max_error, int num_threads);
+
+// Half the sum of the squared errors.
+double HalfSquaredNorm(const std::vector<ProjectedError>& errors);
+
+// The norm of the largest error; 0 if there are no errors.
+double LargestError(const std::vector<ProjectedError>& errors);
+
+// No camera model has more parameters.
+constexpr int kMaxCameraParams = 16;
+
+// The pixel of a ray (u, v, 1) and its derivatives by (u, v).
+struct DifferentiatedPixel {
+  Eigen::Vector2d pixel;
+  Eigen::Matrix2d J_ray;
+};
+
+// Differentiates forwards through lens and distortion, and in closed form by
+// focal lengths and principal point, in which the pixel is affine. If
+// `J_params` is not null it gets the derivatives by the camera's parameters, 2
+// x num_params, row by row. Throws as ProjectRay does; not finite where that is
+// not.
+DifferentiatedPixel DifferentiatePixel(int model_id, const double* params,
+                                       const Eigen::Vector2d& ray,
+                                       double* J_params);
+
+// The derivatives D of (error x, error y, depth) of every observation, 3x3 by
+// its point and by each block of columns that it depends on:
+//
+//   x_cam = R_s d_s,  d_s = x_rig - c_s,  x_rig = R_f d_f,  d_f = x - c_f
+//
+// with R exp([theta]x) in place of R (AdjustmentColumns::Pose).
+class ErrorJacobians {
+ public:
+  // Keeps a reference to `columns`. Reads only the observations of the blocks.
+  ErrorJacobians(const AdjustmentColumns& columns,
+                 const AdjustmentBlocks& blocks);
+
+  // Evaluates at blocks with the same observations, whose points are in front
+  // of their cameras.
+  void Evaluate(const AdjustmentBlocks& blocks, int num_threads);
+
+  const Eigen::Matrix3d& by_point(int64_t i) const { return D_[begin_[i]]; }
+  // By the block blocks(i)[n]. For the cap, which is the last, it is 0.
+  const Eigen::Matrix3d& by_block(int64_t i, int n) const {
+    return D_[begin_[i] + 1 + n];
+  }
+  // Ascending.
+  const int32_t* blocks(int64_t i) const {
+    return blocks_.data() + begin_[i] + 1;
+  }
+  int num_blocks(int64_t i) const {
+    return static_cast<int>(begin_[i + 1] - begin_[i] - 1);
+  }
+
+ private:
+  const AdjustmentColumns& columns_;
+  std::vector<int64_t> begin_;   // num_observations + 1
+  std::vector<int32_t> blocks_;  // kHeld for a point
+  std::vector<Eigen::Matrix3d> D_;
+};
+
+// Minimises the squared errors below the cap blocks->cap2, by following the
+// minima of barrier problems. All errors of the start must be below the cap;
+// those of every iterate are. Sets termination, num_iterations, stationarity,
+// duality_gap, num_active and linear_solver of the summary.
+void AdjustBelowCap(const BundleAdjustmentOptions& options,
+                    const Context& context, const AdjustmentColumns& columns,
+                    AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);
+
+// Moves nearly to a local minimum of the largest error. The cap is one more
+// unknown for that, with a weight beside which the squared errors hardly count.
+// Counts iterations in the summary and sets its lowest_max_error, which is that
+// of the start if it cannot be lowered, and blocks->cap2, 5e-4 above that. In
+// the end all errors are below this cap.
+void LowerMaxError(const BundleAdjustmentOptions& options,
+                   const Context& context, const AdjustmentColumns& columns,
+                   AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);
 
 }  // namespace krot::internal

@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/adjust/adjustment_columns.h"
-#include "krot/adjust/reprojection_errors.h"
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/schur_complement.h"
 
@@ -24,7 +22,7 @@ inline double Slack(double cap2, double squared_error) {
 //   h = (cap2 - |r|^2) / 2,
 //
 // at an iterate with multipliers lambda of h >= 0. An observation with depth w
-// and derivatives D of (r, w), reprojection_errors.h, has the rows of least
+// and derivatives D of (r, w), adjustment_blocks.h, has the rows of least
 // squares
 //
 //   K D,   K = [ sqrt(1 + lambda) I2                             ]

@@ -1,4 +1,4 @@
-#include "krot/adjust/bounded_adjustment.h"
+#include "krot/adjust/adjustment_blocks.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "krot/adjust/barrier_system.h"
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/conic/path_following.h"
 
 namespace krot::internal {

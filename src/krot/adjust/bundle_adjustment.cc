@@ -12,14 +12,10 @@
 #include <glog/logging.h>
 
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/adjust/adjustment_columns.h"
-#include "krot/adjust/bounded_adjustment.h"
 #include "krot/adjust/ceres_problem.h"
-#include "krot/adjust/reprojection_errors.h"
-#include "krot/adjust/restore_similarity.h"
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 
 namespace krot::internal {
 namespace {

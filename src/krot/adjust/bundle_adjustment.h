@@ -9,7 +9,7 @@
 #include "krot/adjust.h"
 #include "krot/base/context.h"
 #include "krot/model.h"
-#include "krot/model/fixed_parts.h"
+#include "krot/model/model_io.h"
 
 namespace krot::internal {
 
@@ -23,7 +23,7 @@ struct BundleAdjustmentResult {
 // After it, every connected component without anything fixed is moved so that
 // it has its former centroid of camera centres, their former RMS distance to it
 // (unless a constant rig baseline fixes the scale) and its former mean
-// rotation, without the runaways (krot/geometry/consensus.h). Stored point
+// rotation, without the runaways (krot/geometry/transform.h). Stored point
 // errors are not updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a

@@ -11,12 +11,11 @@
 #include <ceres/product_manifold.h>
 #include <Eigen/Geometry>
 
-#include "krot/adjust/adjustment_columns.h"
-#include "krot/adjust/reprojection_errors.h"
+#include "krot/adjust/adjustment_blocks.h"
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
-#include "krot/linear/block_structure.h"
+#include "krot/linear/blocks.h"
 
 namespace krot::internal {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 
 namespace krot::internal {
 

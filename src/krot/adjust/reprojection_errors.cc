@@ -1,4 +1,4 @@
-#include "krot/adjust/reprojection_errors.h"
+#include "krot/adjust/adjustment_blocks.h"
 
 #include <algorithm>
 #include <atomic>

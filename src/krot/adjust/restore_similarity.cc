@@ -1,13 +1,13 @@
-#include "krot/adjust/restore_similarity.h"
+#include "krot/adjust/adjustment_blocks.h"
 
 #include <cmath>
 #include <map>
 #include <vector>
 
 #include "krot/base/disjoint_sets.h"
-#include "krot/base/medians.h"
+#include "krot/base/numbers.h"
 #include "krot/geometry.h"
-#include "krot/geometry/consensus.h"
+#include "krot/geometry/transform.h"
 
 namespace krot::internal {
 namespace {

@@ -1,11 +1,16 @@
-#include "krot/analysis/alignment.h"
+#include "krot/analysis/model_comparison.h"
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string_view>
+#include <tuple>
+#include <unordered_map>
 
 #include "krot/base/numbers.h"
 #include "krot/geometry.h"
-#include "krot/geometry/consensus.h"
+#include "krot/geometry/transform.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {
@@ -140,6 +145,194 @@ std::optional<Similarity> Align(AlignmentKind kind,
       kind == AlignmentKind::kFrame ? AlignFrames(poses) : AlignCenters(poses);
   const bool is_same = std::all_of(poses.begin(), poses.end(), &AreEqual);
   return similarity && is_same ? Similarity() : similarity;
+}
+
+namespace {
+
+// Features do not lie this close to each other; files rounded to a few digits
+// do not move them this far.
+constexpr double kSamePixel = 0.01;
+
+// Where the 2D points of a model stand in its tracks.
+class TrackIndex {
+ public:
+  explicit TrackIndex(const Model& model)
+      : model_(model),
+        points_(model.track_elements.size()),
+        others_(model.track_elements.size()) {
+    for (const Image& image : model.images) {
+      elements_.emplace_back(image.points2D.size());
+    }
+    const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
+    for (size_t k = 0; k < model.points3D.size(); ++k) {
+      const Point3D& point = model.points3D[k];
+      for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+        const TrackElement& element = model.track_elements[e];
+        std::optional<uint64_t>& last =
+            elements_[indices.at(element.image_id)][element.point2D_idx];
+        others_[e] = last;
+        last = e;
+        points_[e] = static_cast<int32_t>(k);
+      }
+    }
+  }
+
+  // A track element of this 2D point, none if no track holds it.
+  std::optional<uint64_t> Element(int32_t image, size_t point2D_idx) const {
+    return elements_[image][point2D_idx];
+  }
+
+  // Another track element of the same 2D point; following these shows all.
+  std::optional<uint64_t> Other(uint64_t element) const {
+    return others_[element];
+  }
+
+  // Index in Model::points3D.
+  int32_t Point(uint64_t element) const { return points_[element]; }
+
+  Point3DId PointId(uint64_t element) const {
+    return model_.points3D[points_[element]].id;
+  }
+
+ private:
+  const Model& model_;
+  std::vector<std::vector<std::optional<uint64_t>>> elements_;
+  std::vector<int32_t> points_;
+  std::vector<std::optional<uint64_t>> others_;
+};
+
+// Pairs the track elements of a 2D point, in which e1 and e2 are the last:
+// whatever their points are if there is one on either side, those of points
+// with the same id otherwise.
+void PairElements(const TrackIndex& index1, const TrackIndex& index2,
+                  uint64_t e1, uint64_t e2, std::vector<ElementPair>* pairs) {
+  if (!index1.Other(e1) && !index2.Other(e2)) {
+    pairs->push_back({e1, e2});
+    return;
+  }
+  for (std::optional<uint64_t> a = e1; a; a = index1.Other(*a)) {
+    for (std::optional<uint64_t> b = e2; b; b = index2.Other(*b)) {
+      if (index1.PointId(*a) != index2.PointId(*b)) continue;
+      pairs->push_back({*a, *b});
+      break;
+    }
+  }
+}
+
+std::vector<IndexPair> MatchImages(const Model& model1, const Model& model2) {
+  std::unordered_map<std::string_view, int32_t> by_name;
+  for (size_t n = 0; n < model2.images.size(); ++n) {
+    by_name.emplace(model2.images[n].name, static_cast<int32_t>(n));
+  }
+  std::vector<IndexPair> pairs;
+  for (size_t n = 0; n < model1.images.size(); ++n) {
+    const auto found = by_name.find(model1.images[n].name);
+    if (found == by_name.end()) continue;
+    pairs.push_back({static_cast<int32_t>(n), found->second});
+    by_name.erase(found);
+  }
+  return pairs;
+}
+
+bool IsSamePixel(const Point2D& a, const Point2D& b) {
+  return std::abs(a.x - b.x) <= kSamePixel && std::abs(a.y - b.y) <= kSamePixel;
+}
+
+std::vector<ElementPair> MatchObservations(const Model& model1,
+                                           const Model& model2,
+                                           const std::vector<IndexPair>& images,
+                                           const TrackIndex& index1,
+                                           const TrackIndex& index2) {
+  std::vector<ElementPair> pairs;
+  for (const IndexPair& pair : images) {
+    const std::vector<Point2D>& a = model1.images[pair.first].points2D;
+    const std::vector<Point2D>& b = model2.images[pair.second].points2D;
+    for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
+      if (!IsSamePixel(a[i], b[i])) continue;
+      const std::optional<uint64_t> e1 = index1.Element(pair.first, i);
+      const std::optional<uint64_t> e2 = index2.Element(pair.second, i);
+      if (e1 && e2) PairElements(index1, index2, *e1, *e2, &pairs);
+    }
+  }
+  return pairs;
+}
+
+// Two points, and how many observations they share.
+struct Vote {
+  IndexPair points;
+  int64_t count = 0;
+  bool has_same_id = false;
+};
+
+// One for each two points that share any, ordered by both indices.
+std::vector<Vote> CountVotes(const Model& model1, const Model& model2,
+                             const std::vector<ElementPair>& observations,
+                             const TrackIndex& index1,
+                             const TrackIndex& index2) {
+  std::vector<std::pair<int32_t, int32_t>> pairs;
+  pairs.reserve(observations.size());
+  for (const ElementPair& observation : observations) {
+    pairs.emplace_back(index1.Point(observation.first),
+                       index2.Point(observation.second));
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<Vote> votes;
+  for (const auto& [first, second] : pairs) {
+    if (votes.empty() || votes.back().points.first != first ||
+        votes.back().points.second != second) {
+      votes.push_back(
+          {{first, second},
+           0,
+           model1.points3D[first].id == model2.points3D[second].id});
+    }
+    ++votes.back().count;
+  }
+  return votes;
+}
+
+// The position of the best vote for every point of one model: the earliest of
+// those that nothing beats.
+std::unordered_map<int32_t, size_t> BestVotes(const std::vector<Vote>& votes,
+                                              int32_t IndexPair::*point) {
+  std::unordered_map<int32_t, size_t> best;
+  for (size_t n = 0; n < votes.size(); ++n) {
+    const Vote& vote = votes[n];
+    const auto [it, is_first] = best.emplace(vote.points.*point, n);
+    const Vote& leader = votes[it->second];
+    if (!is_first && std::tie(vote.count, vote.has_same_id) >
+                         std::tie(leader.count, leader.has_same_id)) {
+      it->second = n;
+    }
+  }
+  return best;
+}
+
+std::vector<IndexPair> MatchPoints(const std::vector<Vote>& votes) {
+  const auto best1 = BestVotes(votes, &IndexPair::first);
+  const auto best2 = BestVotes(votes, &IndexPair::second);
+  std::vector<IndexPair> pairs;
+  for (size_t n = 0; n < votes.size(); ++n) {
+    const IndexPair& points = votes[n].points;
+    if (best1.at(points.first) == n && best2.at(points.second) == n) {
+      pairs.push_back(points);
+    }
+  }
+  return pairs;
+}
+
+}  // namespace
+
+ModelCorrespondence FindCorrespondence(const Model& model1,
+                                       const Model& model2) {
+  const TrackIndex index1(model1);
+  const TrackIndex index2(model2);
+  ModelCorrespondence correspondence;
+  correspondence.images = MatchImages(model1, model2);
+  correspondence.observations =
+      MatchObservations(model1, model2, correspondence.images, index1, index2);
+  correspondence.points = MatchPoints(
+      CountVotes(model1, model2, correspondence.observations, index1, index2));
+  return correspondence;
 }
 
 }  // namespace krot::internal

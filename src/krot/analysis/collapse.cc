@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 
 #include "krot/base/numbers.h"
-#include "krot/model/id_index.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/analysis/explain_contradictions.h"
+#include "krot/analysis/epipolar.h"
 
 #include <algorithm>
 #include <iterator>

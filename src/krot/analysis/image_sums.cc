@@ -1,4 +1,4 @@
-#include "krot/analysis/image_sums.h"
+#include "krot/analysis/noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <Eigen/Eigenvalues>
 
 #include "krot/base/numbers.h"
-#include "krot/camera/projection_row.h"
-#include "krot/model/image_geometry.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {
@@ -72,14 +72,13 @@ void Solve(ImageSums* sums) {
 
 // 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'.
 double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
-  constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
   const Matrix3d S = A - B * C.ldlt().solve(B.transpose());
-  if (!S.allFinite()) return kNothingHolds;
+  if (!S.allFinite()) return kInfinity;
   const Vector3d values =
       Eigen::SelfAdjointEigenSolver<Matrix3d>(S, Eigen::EigenvaluesOnly)
           .eigenvalues();
   const bool is_held = values[0] > kNoDirection * A.trace();
-  return is_held ? 1 / std::sqrt(values[0]) : kNothingHolds;
+  return is_held ? 1 / std::sqrt(values[0]) : kInfinity;
 }
 
 class ImageAdder {

@@ -5,12 +5,11 @@
 #include <limits>
 #include <utility>
 
-#include "krot/analysis/geometry_statistics.h"
-#include "krot/analysis/image_sums.h"
+#include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 
 namespace krot {
 
@@ -26,8 +25,6 @@ constexpr double kExplained = 0.5;
 // The same, of the median image, where the model is adjusted: 0.005 at most of
 // real ones, and 0.1 to 0.2 of their minimax solutions.
 constexpr double kNotAdjusted = 0.1;
-// Pixels: errors below are those of stored numbers.
-constexpr double kRounding = 1e-3;
 // Of the share of its 2D points that the median image keeps in tracks.
 constexpr double kFewKept = 1.0 / 3;
 // Median deviations: three standard deviations of Gaussian values.
@@ -179,7 +176,7 @@ class Checker {
           const ImageCheck& image = check_.images[n];
           return static_cast<double>(2 * image.num_wrong - image.num_tested);
         });
-    check_.is_adjusted = snooping_.noise.sigma_px.value_or(0) < kRounding ||
+    check_.is_adjusted = snooping_.noise.sigma_px.value_or(0) < kLeastNoisePx ||
                          MedianOfSound([&](size_t n) {
                            return sums_[n].UnexpectedGainShare();
                          }) < kNotAdjusted;

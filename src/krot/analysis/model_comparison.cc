@@ -6,9 +6,9 @@
 
 #include "krot/analysis/model_statistics.h"
 #include "krot/base/check.h"
-#include "krot/base/medians.h"
-#include "krot/model/id_index.h"
-#include "krot/model/image_geometry.h"
+#include "krot/base/numbers.h"
+#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -1,13 +1,89 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "krot/analysis/alignment.h"
-#include "krot/analysis/model_correspondence.h"
+#include <Eigen/Core>
+
 #include "krot/compare.h"
+#include "krot/model.h"
 
 namespace krot::internal {
+
+// The angle between two rotations, in [0, 180] degrees; exact for small ones.
+double AngleDeg(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B);
+
+// Where one image stands in two models.
+struct PosePair {
+  Eigen::Matrix3d cam_from_world1_rotation = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d cam_from_world2_rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d center1 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center2 = Eigen::Vector3d::Zero();
+  // From the points that it sees, the median; 0 if it sees none.
+  double distance1 = 0;
+  double distance2 = 0;
+};
+
+// Those that keep their place among the others from one model to the other
+// (krot/geometry/transform.h): a runaway says nothing about the frame that the
+// models have in common. All of them where they have none. O(images).
+std::vector<PosePair> HeldPoses(const std::vector<PosePair>& poses);
+
+// The RMS distance of the first model's camera centres from their centroid: a
+// length that differences can be compared with, and the one that KROT's gauge
+// keeps if they are HeldPoses. 0 if there are none.
+double SceneRadius(const std::vector<PosePair>& poses);
+
+// The frame in which KROT keeps a model (problem/gauge.h), made the same in
+// both: of HeldPoses, the rotation is the chordal mean of those that the images
+// name (R1' R2), then the centroids of the camera centres coincide, and their
+// RMS distances from it, too. Where one of the two radii is zero the scale
+// is 1. None if there are no poses, or if the rotations point in all directions
+// and have no mean. O(images).
+std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses);
+
+// The similarity that minimises the sum of squares of the distances between
+// the camera centres [Umeyama, PAMI 13(4), 1991]. None if there are fewer than
+// three, or if those of one model lie on a line, to 3e-5 of its length: the
+// rotation about it could not be told. O(images).
+std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses);
+
+// The identity for kNone, the above otherwise. Where all poses are equal, bit
+// by bit, every kind gives the identity to the bit, if it gives anything.
+std::optional<Similarity> Align(AlignmentKind kind,
+                                const std::vector<PosePair>& poses);
+
+// What two models of the same images have in common.
+
+struct IndexPair {
+  int32_t first = 0;   // index in the first model's list
+  int32_t second = 0;  // index in the second's
+};
+
+struct ElementPair {
+  uint64_t first = 0;  // index in the first model's track_elements
+  uint64_t second = 0;
+};
+
+struct ModelCorrespondence {
+  // Images of the same name, whatever their ids, in the order of the first
+  // model. Of images that share a name within one model the first counts.
+  std::vector<IndexPair> images;
+  // 2D points of these images that both models list under the same index, not
+  // more than 0.01 px apart, and that belong to a 3D point in both; where
+  // several tracks hold a 2D point, those of 3D points with the same id.
+  std::vector<ElementPair> observations;
+  // 3D points that share more of these observations with each other than
+  // with any third point, whatever their ids; among equals the one with the
+  // same id, else the one that comes first. In the order of the first model.
+  std::vector<IndexPair> points;
+};
+
+// Requires valid models (ValidateModel).
+// O(2D points + observations log observations).
+ModelCorrespondence FindCorrespondence(const Model& model1,
+                                       const Model& model2);
 
 // The poses of the shared images that have one in both models, in their order.
 std::vector<PosePair> SharedPoses(const Model& model1, const Model& model2,

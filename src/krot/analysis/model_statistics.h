@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,5 +63,47 @@ struct WorstObservation {
 // the tracks. Requires count >= 0 and errors as above. O(observations).
 std::vector<WorstObservation> WorstObservations(
     const Model& model, const std::vector<double>& errors_px, int count);
+
+// How well a model's tracks hold its points.
+
+// Track length -> number of points that have it.
+std::map<int64_t, int64_t> TrackLengthHistogram(const Model& model);
+
+// The focal length of a camera that one image has for itself, and the median
+// one of such cameras of the same kind and size, pixels.
+struct OddFocalLength {
+  double own = 0;
+  double others = 0;
+};
+// As Model::images: of those whose focal length stands out among at least five,
+// by a tenth and by three times the median deviation; none of the others. A
+// model with a camera for each image, though one camera took them, has such
+// where the focal length was fitted to too little.
+std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
+    const Model& model);
+
+// Of all observations whose image has a pose. Zero if there are none.
+struct DepthStatistics {
+  double min = 0;     // scene units
+  double median = 0;  // the lower one of two
+  double max = 0;
+  int64_t count = 0;
+  int64_t not_positive = 0;  // points in or behind the plane of their camera
+};
+// Requires a valid model. O(observations).
+DepthStatistics ComputeDepthStatistics(const Model& model);
+
+// Per point the largest angle between two of its rays, from the point to the
+// camera centres: how well its depth is determined. Points with fewer than two
+// observations by images with a pose have none.
+struct TriangulationAngleStatistics {
+  double min_deg = 0;
+  double median_deg = 0;  // the lower one of two
+  double max_deg = 0;
+  int64_t count = 0;  // points that have an angle
+};
+// Requires a valid model. O(sum of squared track lengths).
+TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
+    const Model& model, int num_threads = -1);
 
 }  // namespace krot::internal

@@ -7,15 +7,13 @@
 #include <string>
 #include <utility>
 
-#include "krot/analysis/track_noise.h"
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
+#include "krot/base/numbers.h"
 
 namespace krot::internal {
 namespace {
 
-constexpr int64_t kTracksPerChunk = 256;
-constexpr double kNothingControlled = std::numeric_limits<double>::quiet_NaN();
 
 // The medians of chi^2 with one and two degrees of freedom.
 constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
@@ -24,7 +22,7 @@ constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
 // be exceeded, exp(-w^2 / 2).
 double StandardizedError(double chi2, int num_directions) {
   if (num_directions == 2) return std::sqrt(chi2);
-  if (num_directions == 0) return kNothingControlled;
+  if (num_directions == 0) return kNaN;
   const double probability = std::erfc(std::sqrt(chi2 / 2));
   if (probability > 1e-300) return std::sqrt(-2 * std::log(probability));
   // erfc(x) ~ exp(-x^2) / (x sqrt(pi))
@@ -137,7 +135,7 @@ class Snooper {
 };
 
 void Snooper::Fit(const std::vector<int64_t>& points) {
-  ParallelFor(static_cast<int64_t>(points.size()), kTracksPerChunk,
+  ParallelFor(static_cast<int64_t>(points.size()), kItemsPerChunk,
               context_.num_threads, [&](int64_t begin, int64_t end, int) {
                 for (int64_t n = begin; n < end; ++n) tracks_.Fit(points[n]);
               });

@@ -7,14 +7,11 @@
 
 #include <Eigen/Geometry>
 
-#include "krot/analysis/baseline_search.h"
-#include "krot/analysis/epipolar_pose.h"
-#include "krot/analysis/explain_contradictions.h"
-#include "krot/analysis/match_noise.h"
+#include "krot/analysis/epipolar.h"
 #include "krot/base/disjoint_sets.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 
 namespace krot {
 

@@ -11,9 +11,9 @@
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/projection_row.h"
-#include "krot/minimax/residual.h"
-#include "krot/model/image_geometry.h"
+#include "krot/camera/camera_model.h"
+#include "krot/minimax/residual_set.h"
+#include "krot/model/rigs.h"
 
 namespace krot {
 
@@ -21,7 +21,6 @@ using namespace internal;
 
 namespace {
 
-constexpr int64_t kPointsPerChunk = 1024;
 
 // x_cam = q x q^-1 + t.
 struct CameraPose {
@@ -79,7 +78,7 @@ std::vector<double> PixelErrors(const Model& model, int num_threads,
 
   std::vector<double> errors_px(model.track_elements.size(), kNaN);
   ParallelFor(
-      static_cast<int64_t>(model.points3D.size()), kPointsPerChunk, num_threads,
+      static_cast<int64_t>(model.points3D.size()), kItemsPerChunk, num_threads,
       [&](int64_t begin, int64_t end, int) {
         for (int64_t k = begin; k < end; ++k) {
           const Point3D& point = model.points3D[k];

@@ -1,4 +1,4 @@
-#include "krot/analysis/track_noise.h"
+#include "krot/analysis/noise.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
-#include "krot/camera/projection_row.h"
-#include "krot/model/image_geometry.h"
+#include "krot/camera/camera_model.h"
+#include "krot/model/rigs.h"
+#include "krot/base/numbers.h"
 
 namespace krot::internal {
 namespace {
@@ -19,8 +20,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-constexpr double kNotSeen = std::numeric_limits<double>::infinity();
-constexpr double kUntested = std::numeric_limits<double>::quiet_NaN();
 constexpr int kMaxIterations = 50;
 // Of the sum of squares, that a step may still promise.
 constexpr double kTolerance = 1e-8;
@@ -60,7 +59,7 @@ class TrackNoise::Track {
   void Run() {
     if (elements_.size() < 2) {
       for (const uint64_t e : elements_)
-        all_.observations_[e] = NotTested(kUntested);
+        all_.observations_[e] = NotTested(kNaN);
       return;
     }
     Begin();
@@ -120,7 +119,7 @@ class TrackNoise::Track {
         rows_.push_back(*row);
         elements_[num++] = e;
       } else {
-        all_.observations_[e] = NotTested(kNotSeen);
+        all_.observations_[e] = NotTested(kInfinity);
       }
     }
     elements_.resize(num);
@@ -158,7 +157,7 @@ class TrackNoise::Track {
         is_seen = row.has_value();
         if (is_seen) trial[n] = *row;
       }
-      const double cost = is_seen ? CostOf(trial) : kNotSeen;
+      const double cost = is_seen ? CostOf(trial) : kInfinity;
       if (cost < cost_) {
         X_ = X;
         rows_.swap(trial);
@@ -241,7 +240,7 @@ TrackNoise::TrackNoise(const Model& model,
   for (size_t e = 0; e < model.track_elements.size(); ++e) {
     image_of_.push_back(image_indices.at(model.track_elements[e].image_id));
     takes_part_[e] = views_[image_of_[e]].camera != nullptr;
-    observations_[e] = NotTested(kUntested);
+    observations_[e] = NotTested(kNaN);
   }
   for (size_t k = 0; k < model.points3D.size(); ++k) {
     const Point3D& point = model.points3D[k];
@@ -254,7 +253,7 @@ void TrackNoise::Fit(int64_t k) { Track(this, k).Run(); }
 
 void TrackNoise::Remove(uint64_t e) {
   takes_part_[e] = 0;
-  observations_[e] = NotTested(kUntested);
+  observations_[e] = NotTested(kNaN);
 }
 
 Vector2d TrackNoise::ErrorOf(uint64_t e) const {
@@ -266,7 +265,7 @@ Vector2d TrackNoise::ErrorOf(uint64_t e) const {
              view.camera->model_id, view.camera->params.data(),
              {pixel.x, pixel.y},
              view.cam_from_world_rotation * (X.head<3>() - X[3] * view.center))
-      .value_or(Vector2d::Constant(kUntested));
+      .value_or(Vector2d::Constant(kNaN));
 }
 
 Vector3d TrackNoise::Point(int64_t k) const {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/base/ranks.h"
 #include "krot/base/write_file.h"
 
 namespace krot::internal {

@@ -1,4 +1,4 @@
-#include "krot/base/folder_swap.h"
+#include "krot/base/write_file.h"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -13,7 +13,6 @@
 #include <string_view>
 #include <utility>
 
-#include "krot/base/write_file.h"
 
 namespace krot::internal {
 namespace {

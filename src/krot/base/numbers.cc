@@ -4,7 +4,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+#include <functional>
 #include <limits>
+#include <numeric>
 
 namespace krot::internal {
 namespace {
@@ -53,6 +56,67 @@ std::string ShortestTextByC(double value) {
   const std::string fixed =
       Print("%.*f", decimals > exponent ? decimals - exponent : 0, value);
   return fixed.size() <= scientific.size() ? fixed : scientific;
+}
+
+namespace {
+
+// The bits of doubles that are not negative have the order of their values, so
+// the median's bits are found eight at a time: by how many values have which.
+constexpr int kBits = 8;
+constexpr int kNumDigits = 1 << kBits;
+
+uint64_t BitsOf(double value) {
+  uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  return bits;
+}
+
+double FromBits(uint64_t bits) {
+  double value = 0;
+  std::memcpy(&value, &bits, sizeof(value));
+  return value;
+}
+
+}  // namespace
+
+std::vector<double> GroupMedians(const std::vector<double>& values,
+                                 const std::vector<int32_t>& group_of,
+                                 int32_t num_groups, const Context& context) {
+  std::vector<uint64_t> found(num_groups, 0);       // the leading bits
+  std::vector<int64_t> num_before(num_groups, -1);  // of those with these bits
+  for (int shift = 64 - kBits; shift >= 0; shift -= kBits) {
+    std::vector<int64_t> counts(static_cast<size_t>(num_groups) * kNumDigits);
+    for (size_t n = 0; n < values.size(); ++n) {
+      const int32_t group = group_of[n];
+      if (group < 0 || !std::isfinite(values[n]) || values[n] < 0) continue;
+      // -0 has the bits of 0 here.
+      const uint64_t digits = BitsOf(std::abs(values[n])) >> shift;
+      if (digits >> kBits != found[group]) continue;
+      ++counts[group * kNumDigits + (digits & (kNumDigits - 1))];
+    }
+    ReduceRanks(context, std::plus<int64_t>(), &counts);
+    for (int32_t group = 0; group < num_groups; ++group) {
+      const int64_t* count = &counts[group * kNumDigits];
+      int64_t& before = num_before[group];
+      if (shift == 64 - kBits) {
+        before =
+            (std::accumulate(count, count + kNumDigits, int64_t{0}) - 1) / 2;
+      }
+      uint64_t digit = 0;
+      while (digit + 1 < kNumDigits && before >= count[digit]) {
+        before -= count[digit++];
+      }
+      found[group] = found[group] << kBits | digit;
+    }
+  }
+  std::vector<double> medians;
+  for (const uint64_t bits : found) medians.push_back(FromBits(bits));
+  return medians;
+}
+
+double MedianOf(const std::vector<double>& values, const Context& context) {
+  return GroupMedians(values, std::vector<int32_t>(values.size(), 0), 1,
+                      context)[0];
 }
 
 }  // namespace krot::internal

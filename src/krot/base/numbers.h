@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -10,6 +11,8 @@
 #include <system_error>
 #include <type_traits>
 #include <vector>
+
+#include "krot/base/context.h"
 
 namespace krot::internal {
 
@@ -75,5 +78,16 @@ void AppendNumber(Number value, std::string* text) {
     text->append(digits, result.ptr);
   }
 }
+
+// The lower median of each group's values. Values that are negative or not
+// finite, or whose group is -1, do not count; a group without values has NaN.
+// Where ranks share the values it is that of all of them, to the bit.
+// O(values + 256 groups), eight times.
+std::vector<double> GroupMedians(const std::vector<double>& values,
+                                 const std::vector<int32_t>& group_of,
+                                 int32_t num_groups, const Context& context);
+
+// The same of a single group.
+double MedianOf(const std::vector<double>& values, const Context& context);
 
 }  // namespace krot::internal

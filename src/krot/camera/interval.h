@@ -122,4 +122,173 @@ inline Interval atan2(const Interval& y, const Interval& x) {
   return {kNaN, kNaN};
 }
 
+// A value with its derivatives by two variables, for forward differentiation
+// of the camera models: f(Dual{u, 1, 0}, Dual{v, 0, 1}) carries df/du, df/dv.
+//
+// Scalar is double, or Interval (interval.h) to bound derivatives on a set.
+// Only what the camera models use is defined. No allocation, no branches.
+template <typename Scalar>
+struct Dual {
+  Scalar value{};
+  Scalar du{};
+  Scalar dv{};
+};
+
+template <typename S>
+inline Dual<S> operator-(const Dual<S>& a) {
+  return {-a.value, -a.du, -a.dv};
+}
+
+template <typename S>
+inline Dual<S> operator+(const Dual<S>& a, const Dual<S>& b) {
+  return {a.value + b.value, a.du + b.du, a.dv + b.dv};
+}
+
+template <typename S>
+inline Dual<S> operator-(const Dual<S>& a, const Dual<S>& b) {
+  return {a.value - b.value, a.du - b.du, a.dv - b.dv};
+}
+
+template <typename S>
+inline Dual<S> operator*(const Dual<S>& a, const Dual<S>& b) {
+  return {a.value * b.value, a.du * b.value + a.value * b.du,
+          a.dv * b.value + a.value * b.dv};
+}
+
+// (a / b)' = (a' - (a / b) b') / b
+template <typename S>
+inline Dual<S> operator/(const Dual<S>& a, const Dual<S>& b) {
+  const S ratio = a.value / b.value;
+  return {ratio, (a.du - ratio * b.du) / b.value,
+          (a.dv - ratio * b.dv) / b.value};
+}
+
+template <typename S>
+inline Dual<S> operator+(const Dual<S>& a, double b) {
+  return {a.value + b, a.du, a.dv};
+}
+template <typename S>
+inline Dual<S> operator+(double a, const Dual<S>& b) {
+  return b + a;
+}
+
+template <typename S>
+inline Dual<S> operator-(const Dual<S>& a, double b) {
+  return {a.value - b, a.du, a.dv};
+}
+template <typename S>
+inline Dual<S> operator-(double a, const Dual<S>& b) {
+  return -b + a;
+}
+
+template <typename S>
+inline Dual<S> operator*(const Dual<S>& a, double b) {
+  return {a.value * b, a.du * b, a.dv * b};
+}
+template <typename S>
+inline Dual<S> operator*(double a, const Dual<S>& b) {
+  return b * a;
+}
+
+template <typename S>
+inline Dual<S> operator/(const Dual<S>& a, double b) {
+  return {a.value / b, a.du / b, a.dv / b};
+}
+template <typename S>
+inline Dual<S> operator/(double a, const Dual<S>& b) {
+  const S ratio = a / b.value;
+  const S slope = -ratio / b.value;
+  return {ratio, slope * b.du, slope * b.dv};
+}
+
+template <typename S>
+inline bool operator<(const Dual<S>& a, double b) {
+  return a.value < b;
+}
+template <typename S>
+inline bool operator<(const Dual<S>& a, const Dual<S>& b) {
+  return a.value < b.value;
+}
+
+// sqrt' = 1 / (2 sqrt)
+template <typename S>
+inline Dual<S> sqrt(const Dual<S>& a) {
+  using std::sqrt;
+  const S root = sqrt(a.value);
+  const S slope = 0.5 / root;
+  return {root, slope * a.du, slope * a.dv};
+}
+
+// atan'(a) = 1 / (1 + a^2)
+template <typename S>
+inline Dual<S> atan(const Dual<S>& a) {
+  using std::atan;
+  const S slope = 1.0 / (1.0 + a.value * a.value);
+  return {atan(a.value), slope * a.du, slope * a.dv};
+}
+
+// atan2(y, x)' = (x y' - y x') / (x^2 + y^2)
+template <typename S>
+inline Dual<S> atan2(const Dual<S>& y, const Dual<S>& x) {
+  using std::atan2;
+  const S norm2 = x.value * x.value + y.value * y.value;
+  return {atan2(y.value, x.value), (x.value * y.du - y.value * x.du) / norm2,
+          (x.value * y.dv - y.value * x.dv) / norm2};
+}
+
+// What the camera models (models.h) need to be evaluated on intervals, with
+// parameters that are intervals too: P = Interval, T = Interval or
+// Dual<Interval>. What comes out encloses the exact values and derivatives.
+
+inline Dual<Interval> operator+(const Dual<Interval>& a, const Interval& b) {
+  return {a.value + b, a.du, a.dv};
+}
+inline Dual<Interval> operator-(const Dual<Interval>& a, const Interval& b) {
+  return {a.value - b, a.du, a.dv};
+}
+inline Dual<Interval> operator*(const Dual<Interval>& a, const Interval& b) {
+  return {a.value * b, a.du * b, a.dv * b};
+}
+
+// S(t) = atan(z) / z with z^2 = t is the integral of 1 / (1 + t y^2) over
+// [0, 1]: decreasing and convex for t > -1, so that the ends of an interval
+// enclose S and S' on it.
+inline constexpr double kEndOfAtanSeries = 1e-3;
+
+// Encloses S(t) for one t >= -1e-3. The series leaves out less than 1e-19.
+inline Interval EncloseAtanOverRoot(double t) {
+  if (!(t >= -kEndOfAtanSeries)) return {kNaN, kNaN};
+  double value =
+      1 -
+      t * (1.0 / 3 - t * (1.0 / 5 - t * (1.0 / 7 - t * (1.0 / 9 - t / 11))));
+  if (t < kEndOfAtanSeries) return RoundOutwards(value, value, 16);
+  value = std::atan(std::sqrt(t)) / std::sqrt(t);
+  return RoundOutwards(value, value, 4);
+}
+
+// Encloses S'(t) = (1 / (1 + t) - S) / (2 t) for one t >= -1e-3. The series
+// leaves out less than 1e-18.
+inline Interval EncloseAtanOverRootSlope(double t) {
+  if (!(t >= -kEndOfAtanSeries)) return {kNaN, kNaN};
+  if (t < kEndOfAtanSeries) {
+    const double value =
+        -1.0 / 3 +
+        t * (2.0 / 5 -
+             t * (3.0 / 7 - t * (4.0 / 9 - t * (5.0 / 11 - t * (6.0 / 13)))));
+    return RoundOutwards(value, value, 16);
+  }
+  return (1.0 / (1.0 + Interval{t, t}) - EncloseAtanOverRoot(t)) /
+         Interval{2 * t, 2 * t};
+}
+
+inline Interval AtanOverRoot(const Interval& t) {
+  return {EncloseAtanOverRoot(t.hi).lo, EncloseAtanOverRoot(t.lo).hi};
+}
+
+inline Dual<Interval> AtanOverRoot(const Dual<Interval>& t) {
+  const Interval slope = {EncloseAtanOverRootSlope(t.value.lo).lo,
+                          EncloseAtanOverRootSlope(t.value.hi).hi};
+  return {AtanOverRoot(t.value), slope * t.du, slope * t.dv};
+}
+
 }  // namespace krot::internal

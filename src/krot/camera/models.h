@@ -5,7 +5,6 @@
 
 #include "krot/camera/distortion.h"
 #include "krot/camera/lens.h"
-#include "krot/camera/root_lens.h"
 
 namespace krot::internal {
 

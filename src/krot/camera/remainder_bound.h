@@ -1,8 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include <Eigen/Core>
+
+#include "krot/camera/interval.h"
 
 namespace krot::internal {
 
@@ -53,5 +56,57 @@ std::optional<double> SupportBound(int model_id, const double* params,
                                    const Eigen::Vector3d& x_hat,
                                    const Eigen::Vector2d& y, double level_px,
                                    double p, double sufficient = 0);
+
+// What ErrorMap evaluates at a point, or encloses on a set.
+template <typename T>
+struct ErrorPair {
+  T f[2];  // true error over the level
+  T m[2];  // linear error over the level
+};
+
+// An observation's true and linear errors, over a level in pixels, as functions
+// of q: the rays X(q) = X0 + G q. With P = f'(0)^-1 in G, f(q) is near q.
+class ErrorMap {
+ public:
+  struct Geometry {
+    Eigen::Vector2d pixel;
+    Eigen::Matrix3d E;  // the row: linear error v / w, (w; v) = E X
+    Eigen::Vector3d X0;
+    Eigen::Matrix<double, 3, 2> G;
+    bool on_image_plane;  // X_3 = 1 for all q
+    double level_px;
+  };
+
+  virtual ~ErrorMap() = default;
+
+  // Enclosures on the box q1 x q2, of the values, or with the derivatives by q
+  // as well.
+  virtual ErrorPair<Interval> Values(const Interval& q1,
+                                     const Interval& q2) const = 0;
+  virtual ErrorPair<Dual<Interval>> Derivatives(const Interval& q1,
+                                                const Interval& q2) const = 0;
+};
+
+std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
+                                       const ErrorMap::Geometry& geometry);
+
+// Branch and bound over the box |q|_inf <= reach of an ErrorMap, in the norm
+// p = 1, 2 or infinity: what remainder_bound.h is proved with.
+
+// Whether |f| > 1 is proved on all of the box's boundary.
+bool BoundaryIsOutside(const ErrorMap& map, double p, double reach);
+
+// An upper bound of max |m| over the points of the box with |f| <= 1, near it:
+// at most 10 % of (max |m| - 1), or 1e-6, too large unless the budget of cells
+// ends, or any that is at most `sufficient`. nullopt if det f' > 0 cannot be
+// proved at all these points.
+std::optional<double> LargestLinearError(const ErrorMap& map, double p,
+                                         double reach, double sufficient);
+
+// An upper bound of max -y'm over the points of the box with |f| <= 1, near it:
+// at most 1e-7 too large unless the budget of cells ends, or any that is at
+// most `sufficient`. Requires a dual norm of y of 1. nullopt as above.
+std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
+                                   const Eigen::Vector2d& y, double sufficient);
 
 }  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/camera/remainder_search.h"
+#include "krot/camera/remainder_bound.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "krot/conic/slack_program.h"
+#include "krot/conic/interior_point.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "krot/base/numbers.h"
 #include "krot/conic/path_following.h"
 #include "krot/conic/slack_system.h"
-#include "krot/minimax/residual.h"
+#include "krot/minimax/residual_set.h"
 
 namespace krot::internal {
 namespace {

@@ -13,7 +13,7 @@
 
 namespace krot::internal {
 
-// The slack programme (slack_program.h) and its Newton system at an iterate.
+// The slack programme (interior_point.h) and its Newton system at an iterate.
 // Every observation has two pairs: T (b w_i + sigma_i; v_i) in the cone, and
 // sigma_i in the half-line; s_i and z_i are both together. A direction
 // minimises

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/finish/bounded_least_squares.h"
+#include "krot/finish/least_squares.h"
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/schur_complement.h"
 #include "krot/math/norm.h"

@@ -1,4 +1,4 @@
-#include "krot/joint/certified_solve.h"
+#include "krot/joint/component_solve.h"
 
 #include <algorithm>
 #include <cmath>

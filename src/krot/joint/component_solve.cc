@@ -3,12 +3,11 @@
 #include <numeric>
 #include <utility>
 
-#include "krot/joint/step_values.h"
+#include "krot/joint/joint.h"
 #include "krot/joint/working_set.h"
-#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
 
 namespace krot::internal {

@@ -1,4 +1,4 @@
-#include "krot/joint/frame_ties.h"
+#include "krot/joint/working_set.h"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,17 +1,15 @@
-#include "krot/joint/initializer.h"
+#include "krot/joint/joint.h"
 
 #include <algorithm>
 #include <utility>
 #include <vector>
 
 #include "krot/base/check.h"
-#include "krot/base/timer.h"
-#include "krot/joint/joint.h"
-#include "krot/problem/components.h"
+#include "krot/base/context.h"
+#include "krot/problem/subset.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/problem/subset.h"
 
 namespace krot::internal {
 namespace {

@@ -8,9 +8,8 @@
 #include <utility>
 
 #include "krot/base/parallel_for.h"
-#include "krot/joint/frame_ties.h"
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
+#include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
 namespace {

@@ -10,6 +10,16 @@
 
 namespace krot::internal {
 
+// Of `others`, ascending, the longest tracks first, every point that sees a
+// frame of which fewer than `count` observations are tied so far: `tied`, per
+// frame, and those of the points before it. Where ranks share the points all
+// call it, with the same `tied`, and each gets its own of those that one
+// process takes. O(observations).
+std::vector<int32_t> FindTies(const KnownRotationProblem& problem,
+                              std::vector<int32_t> others, int count,
+                              std::vector<int64_t> tied,
+                              const Context& context);
+
 // The observations of a problem that the joint solver looks at: of points whose
 // residuals come near the maximum those that do, and enough others to tie every
 // frame. The optimum of a working set is a lower bound on that of the whole,

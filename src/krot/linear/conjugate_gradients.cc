@@ -1,11 +1,11 @@
-#include "krot/linear/conjugate_gradients.h"
+#include "krot/linear/reduced_camera_system.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "krot/base/parallel_for.h"
-#include "krot/linear/triangle.h"
+#include "krot/linear/blocks.h"
 
 namespace krot::internal {
 namespace {

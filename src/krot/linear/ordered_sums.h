@@ -8,7 +8,6 @@
 
 #include "krot/base/context.h"
 #include "krot/base/parallel_for.h"
-#include "krot/base/ranks.h"
 
 namespace krot::internal {
 

@@ -6,10 +6,9 @@
 #include <Eigen/Core>
 
 #include "krot/base/context.h"
-#include "krot/linear/block_structure.h"
+#include "krot/linear/blocks.h"
 #include "krot/linear/ordered_sums.h"
 #include "krot/linear/reduced_camera_system.h"
-#include "krot/linear/triangle.h"
 
 namespace krot::internal {
 

@@ -1,8 +1,7 @@
-#include "krot/minimax/lane_descent.h"
+#include "krot/minimax/kernels.h"
 
 #include <limits>
 
-#include "krot/minimax/descent_constants.h"
 #include "krot/minimax/lane_model.h"
 
 namespace krot::internal {

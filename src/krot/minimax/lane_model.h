@@ -2,15 +2,14 @@
 
 #include <limits>
 
-#include "krot/minimax/descent_constants.h"
+#include "krot/minimax/kernels.h"
 #include "krot/minimax/lane_hull.h"
-#include "krot/minimax/lane_matrix.h"
 #include "krot/minimax/lanes.h"
 
 namespace krot::internal {
 
 // What the residuals of all lanes do around x, for p = 2: passes over their
-// rows. The model is that of local_model.h with all residuals as members. For
+// rows. The model is that of newton_descent.h with all residuals as members. For
 // kernels alone.
 
 // One residual of every lane: v = A x + b, w = c'x + d.

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "krot/minimax/lane_memory.h"
+#include "krot/minimax/kernels.h"
 
 namespace krot::internal {
 
@@ -165,6 +165,74 @@ inline void Store(const Lanes3& lanes, LaneDoubles (*memory)[3]) {
   Store(lanes.x, &(*memory)[0]);
   Store(lanes.y, &(*memory)[1]);
   Store(lanes.z, &(*memory)[2]);
+}
+
+// A 3 x 3 matrix in every lane, symmetric or lower triangular. For kernels
+// alone.
+struct LaneMatrix {
+  Lanes m00, m10, m20, m11, m21, m22;
+};
+
+inline LaneMatrix operator+(const LaneMatrix& a, const LaneMatrix& b) {
+  return {a.m00 + b.m00, a.m10 + b.m10, a.m20 + b.m20,
+          a.m11 + b.m11, a.m21 + b.m21, a.m22 + b.m22};
+}
+inline LaneMatrix operator*(const Lanes& s, const LaneMatrix& a) {
+  return {s * a.m00, s * a.m10, s * a.m20, s * a.m11, s * a.m21, s * a.m22};
+}
+inline LaneMatrix Select(const LaneMask& mask, const LaneMatrix& yes,
+                         const LaneMatrix& no) {
+  return {Select(mask, yes.m00, no.m00), Select(mask, yes.m10, no.m10),
+          Select(mask, yes.m20, no.m20), Select(mask, yes.m11, no.m11),
+          Select(mask, yes.m21, no.m21), Select(mask, yes.m22, no.m22)};
+}
+
+// a a'.
+inline LaneMatrix Square(const Lanes3& a) {
+  return {a.x * a.x, a.y * a.x, a.z * a.x, a.y * a.y, a.z * a.y, a.z * a.z};
+}
+
+// d'Md, M symmetric.
+inline Lanes QuadraticForm(const LaneMatrix& M, const Lanes3& d) {
+  return d.x * (M.m00 * d.x + 2 * (M.m10 * d.y + M.m20 * d.z)) +
+         d.y * (M.m11 * d.y + 2 * M.m21 * d.z) + d.z * M.m22 * d.z;
+}
+
+// Lg and L'g, L lower triangular.
+inline Lanes3 Times(const LaneMatrix& L, const Lanes3& g) {
+  return {L.m00 * g.x, L.m10 * g.x + L.m11 * g.y,
+          L.m20 * g.x + L.m21 * g.y + L.m22 * g.z};
+}
+inline Lanes3 TransposedTimes(const LaneMatrix& L, const Lanes3& g) {
+  return {L.m00 * g.x + L.m10 * g.y + L.m20 * g.z, L.m11 * g.y + L.m21 * g.z,
+          L.m22 * g.z};
+}
+
+// The inverse of the Cholesky factor L of H = L L'. Pivots below
+// `rounding` times the trace are that.
+inline LaneMatrix InverseCholesky(const LaneMatrix& H, double rounding) {
+  const Lanes floor = rounding * (H.m00 + H.m11 + H.m22);
+  const Lanes i00 = 1 / Sqrt(H.m00);
+  const Lanes l10 = H.m10 * i00;
+  const Lanes l20 = H.m20 * i00;
+  const Lanes i11 = 1 / Sqrt(Max(H.m11 - l10 * l10, floor));
+  const Lanes l21 = (H.m21 - l20 * l10) * i11;
+  const Lanes i22 = 1 / Sqrt(Max(H.m22 - l20 * l20 - l21 * l21, floor));
+  const Lanes i10 = -l10 * i00 * i11;
+  return {i00, i10, -(l20 * i00 + l21 * i10) * i22, i11, -l21 * i11 * i22, i22};
+}
+
+inline LaneMatrix Load(const LaneDoubles (&memory)[6]) {
+  return {Load(memory[0]), Load(memory[1]), Load(memory[2]),
+          Load(memory[3]), Load(memory[4]), Load(memory[5])};
+}
+inline void Store(const LaneMatrix& lanes, LaneDoubles (*memory)[6]) {
+  Store(lanes.m00, &(*memory)[0]);
+  Store(lanes.m10, &(*memory)[1]);
+  Store(lanes.m20, &(*memory)[2]);
+  Store(lanes.m11, &(*memory)[3]);
+  Store(lanes.m21, &(*memory)[4]);
+  Store(lanes.m22, &(*memory)[5]);
 }
 
 }  // namespace krot::internal

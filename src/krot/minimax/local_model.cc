@@ -1,10 +1,10 @@
-#include "krot/minimax/local_model.h"
+#include "krot/minimax/newton_descent.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "krot/linear/triangle.h"
-#include "krot/minimax/descent_constants.h"
+#include "krot/linear/blocks.h"
+#include "krot/minimax/kernels.h"
 
 namespace krot::internal {
 namespace {

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "krot/base/numbers.h"
-#include "krot/minimax/descent_constants.h"
+#include "krot/minimax/kernels.h"
 
 namespace krot::internal {
 namespace {

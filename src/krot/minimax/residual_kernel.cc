@@ -1,4 +1,4 @@
-#include "krot/minimax/residual_kernel.h"
+#include "krot/minimax/kernels.h"
 
 #include <cmath>
 #include <limits>

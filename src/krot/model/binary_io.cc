@@ -3,7 +3,6 @@
 #include <type_traits>
 
 #include "krot/camera/camera_model.h"
-#include "krot/model/binary_reader.h"
 
 namespace krot::internal {
 namespace {

@@ -1,12 +1,11 @@
-#include "krot/model/contradictions.h"
+#include "krot/model/model_checks.h"
 
 #include <algorithm>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "krot/model/id_index.h"
-#include "krot/model/validate_parts.h"
+#include "krot/model/validate.h"
 
 namespace krot::internal {
 namespace {

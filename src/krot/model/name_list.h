@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "krot/model.h"
-#include "krot/model/id_index.h"
-#include "krot/model/text_reader.h"
+#include "krot/model/validate.h"
+#include "krot/model/text_io.h"
 
 namespace krot::internal {
 

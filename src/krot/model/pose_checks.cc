@@ -1,4 +1,4 @@
-#include "krot/model/pose_checks.h"
+#include "krot/model/model_checks.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "krot/base/numbers.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/model/rotations_file.h"
+#include "krot/model/model_io.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,9 +11,9 @@
 
 #include "krot/base/numbers.h"
 #include "krot/context.h"
-#include "krot/model/image_geometry.h"
+#include "krot/model/rigs.h"
 #include "krot/model/name_list.h"
-#include "krot/model/pose_checks.h"
+#include "krot/model/model_checks.h"
 
 namespace krot::internal {
 namespace {

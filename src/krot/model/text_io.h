@@ -1,10 +1,19 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "krot/base/numbers.h"
+#include "krot/context.h"
 #include "krot/model.h"
-#include "krot/model/file_bytes.h"
+#include "krot/model/model_io.h"
 
 namespace krot::internal {
 
@@ -30,5 +39,158 @@ std::string FormatRigsText(const Model& model);
 std::string FormatFramesText(const Model& model);
 std::string FormatImagesText(const Model& model);
 std::string FormatPoints3DText(const Model& model);
+
+// The text without the byte order mark that editors of Windows put in front.
+// Throws ModelError for UTF-16, which PowerShell writes.
+inline std::string_view WithoutByteOrderMark(const FileBytes& file) {
+  std::string_view text = file.bytes;
+  const std::string_view mark = text.substr(0, 2);
+  if (mark == "\xff\xfe" || mark == "\xfe\xff") {
+    throw ModelError(file.path +
+                     ": found UTF-16, expected UTF-8; save it as UTF-8 text");
+  }
+  if (text.substr(0, 3) == "\xef\xbb\xbf") text.remove_prefix(3);
+  return text;
+}
+
+// Walks over the lines of a text file in memory and over the words of the
+// current line. Words are separated by spaces and tabs; a line may end with
+// CR LF; a byte order mark is skipped. Errors are ModelErrors that name the
+// file, the line, the word found and, from `what`, what was expected ("the x of
+// a 2D point").
+class TextReader {
+ public:
+  // Keeps a reference to `file`.
+  explicit TextReader(const FileBytes& file)
+      : file_(file), remaining_(WithoutByteOrderMark(file)) {}
+
+  // Moves to the next line; false at the end of the file.
+  bool NextLine() {
+    if (remaining_.empty()) return false;
+    const size_t end = remaining_.find('\n');
+    line_ = remaining_.substr(0, end);
+    remaining_.remove_prefix(end == std::string_view::npos ? remaining_.size()
+                                                           : end + 1);
+    ++line_number_;
+    SkipBlanks();
+    return true;
+  }
+
+  // Moves to the next line that holds a record: neither blank nor a comment.
+  bool NextRecord() {
+    while (NextLine()) {
+      if (!AtEnd() && !IsComment()) return true;
+    }
+    return false;
+  }
+
+  // Whether this line is a comment.
+  bool IsComment() const { return !AtEnd() && line_.front() == '#'; }
+
+  // Whether no word is left on this line.
+  bool AtEnd() const { return line_.empty(); }
+
+  std::string_view Word(const char* what) {
+    if (AtEnd()) Fail("the end of the line", what);
+    size_t length = 0;
+    while (length < line_.size() && !IsBlank(line_[length])) ++length;
+    const std::string_view word = line_.substr(0, length);
+    line_.remove_prefix(length);
+    SkipBlanks();
+    return word;
+  }
+
+  // The next word as a number; exact for what std::to_chars or 17 digits
+  // wrote. Throws if it is none or out of range of T.
+  template <typename T>
+  T Number(const char* what) {
+    const std::string_view word = Word(what);
+    const std::optional<T> value = ParseNumber<T>(word);
+    if (!value) FailAtNumber<T>(word, what);
+    return *value;
+  }
+
+  // As Number does for a word that is none.
+  template <typename T>
+  [[noreturn]] void FailAtNumber(std::string_view word,
+                                 const std::string& what) const {
+    const bool has_comma = word.find(',') != std::string_view::npos;
+    std::string range;
+    if constexpr (std::is_integral_v<T>) {
+      using Limits = std::numeric_limits<T>;
+      if (ParseNumber<double>(word)) {
+        range = ", an integer from " + std::to_string(Limits::min()) + " to " +
+                std::to_string(Limits::max());
+      }
+    }
+    Fail("\"" + std::string(word) + "\"",
+         what + range +
+             (has_comma ? "; write numbers with a decimal point, without commas"
+                        : ""));
+  }
+
+  // The rest of the line without the blanks at its ends.
+  std::string_view Rest() {
+    while (!line_.empty() && IsBlank(line_.back())) line_.remove_suffix(1);
+    return std::exchange(line_, {});
+  }
+
+  void ExpectEndOfLine(const char* after) {
+    if (AtEnd()) return;
+    Fail("\"" + std::string(Word(after)) + "\"",
+         std::string("the end of the line after ") + after);
+  }
+
+  // Of the current line, from 1.
+  size_t line_number() const { return line_number_; }
+
+  // "images.txt:12: found ..., expected ...".
+  [[noreturn]] void Fail(const std::string& found,
+                         const std::string& expected) const {
+    throw ModelError(file_.path + ":" + std::to_string(line_number_) +
+                     ": found " + found + ", expected " + expected);
+  }
+
+  template <typename T>
+  static std::optional<T> ParseNumber(std::string_view word) {
+    // Streams take a plus sign.
+    if (word.size() > 1 && word[0] == '+' && word[1] != '-') {
+      word.remove_prefix(1);
+    }
+    const std::optional<T> value = internal::ParseNumber<T>(word);
+    if constexpr (std::is_integral_v<T>) {
+      if (!value) return ParseWhole<T>(word);
+    }
+    return value;
+  }
+
+ private:
+  // The integer that stands there as a real number, "1000.0", if a double holds
+  // it exactly.
+  template <typename T>
+  static std::optional<T> ParseWhole(std::string_view word) {
+    constexpr double kExact = 9007199254740992.0;  // 2^53
+    const std::optional<double> real = internal::ParseNumber<double>(word);
+    if (!real || std::trunc(*real) != *real || std::abs(*real) >= kExact ||
+        *real < static_cast<double>(std::numeric_limits<T>::min()) ||
+        *real > static_cast<double>(std::numeric_limits<T>::max())) {
+      return std::nullopt;
+    }
+    return static_cast<T>(*real);
+  }
+
+  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+  void SkipBlanks() {
+    size_t count = 0;
+    while (count < line_.size() && IsBlank(line_[count])) ++count;
+    line_.remove_prefix(count);
+  }
+
+  const FileBytes& file_;
+  std::string_view remaining_;
+  std::string_view line_;
+  size_t line_number_ = 0;
+};
 
 }  // namespace krot::internal

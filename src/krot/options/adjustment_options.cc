@@ -1,4 +1,4 @@
-#include "krot/options/adjustment_options.h"
+#include "krot/options/command_options.h"
 
 #include <functional>
 #include <string>

@@ -1,4 +1,4 @@
-#include "krot/outliers/error_profile.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/base/check.h"
-#include "krot/finish/robust_least_squares.h"
-#include "krot/outliers/optimum_without.h"
+#include "krot/finish/least_squares.h"
+#include "krot/outliers/removal.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/robust_start.h"
 
@@ -17,8 +17,6 @@ namespace {
 
 // That noise alone exceeds the limit.
 constexpr double kFalseAlarm = 0.05;
-// Smaller errors are not told from rounding, pixels.
-constexpr double kLeastNoise = 1e-3;
 // Few are enough where the last level's weights are at hand.
 constexpr int kFirstProgrammes = 4;
 constexpr int kNextProgrammes = 2;
@@ -87,7 +85,7 @@ void Profiler::Append(ProfileLevel level) {
 
 NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   NoiseLimit limit;
-  limit.max_error = kLeastNoise;
+  limit.max_error = kLeastNoisePx;
   const ModelNoise noise = SnoopNoise(model, {}, context).noise;
   if (!noise.sigma_px) return limit;
   limit.sigma = *noise.sigma_px;
@@ -95,7 +93,7 @@ NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   const double factor = norm.p == 1 ? std::sqrt(2.0) : 1;
   const auto count = static_cast<double>(noise.num_tested);
   limit.max_error =
-      std::max(kLeastNoise, factor * limit.sigma *
+      std::max(kLeastNoisePx, factor * limit.sigma *
                                 std::sqrt(2 * std::log(count / kFalseAlarm)));
   return limit;
 }

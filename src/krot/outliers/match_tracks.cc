@@ -6,15 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/baseline_search.h"
-#include "krot/analysis/epipolar_match.h"
+#include "krot/analysis/epipolar.h"
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
-#include "krot/bridge/bridge.h"
-#include "krot/bridge/point_repair.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/build_steps.h"
 #include "krot/model.h"
-#include "krot/model/image_geometry.h"
-#include "krot/outliers/track_fit.h"
+#include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"
 
 namespace krot::internal {

@@ -6,15 +6,11 @@
 #include <utility>
 
 #include "krot/base/parallel_for.h"
-#include "krot/bridge/built_part.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/outliers/neighbourhood.h"
-#include "krot/outliers/scarce.h"
-#include "krot/outliers/two_view_conflicts.h"
-#include "krot/problem/components.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/reprojection.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
-#include "krot/sweeps/block_sweep.h"
+#include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
 namespace {

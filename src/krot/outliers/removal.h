@@ -1,17 +1,43 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "krot/base/context.h"
-#include "krot/bridge/bridge.h"
-#include "krot/bridge/reprojection.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/pixel_certificate.h"
+#include "krot/convert/reprojection.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/outliers/decision.h"
-#include "krot/outliers/near_set.h"
+#include "krot/outliers/conflict.h"
+#include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
+
+// The observations that a slack programme looks at: those that come near the
+// bound, and enough others to tie their points and every frame. An optimum of
+// theirs is one of all as long as no other exceeds the bound there.
+class NearSet {
+ public:
+  // Empty. Keeps a reference to `problem`.
+  explicit NearSet(const KnownRotationProblem& problem);
+
+  // Adds the observations whose error, one each, is above `level`, and ties.
+  // O(observations).
+  void AddAbove(const std::vector<double>& errors, double level);
+
+  bool Contains(int64_t i) const { return contains_[i] != 0; }
+  // By connected component, each ascending.
+  std::vector<std::vector<int64_t>> Parts() const;
+
+ private:
+  void TiePoint(int32_t point);
+  void TieFrames();
+
+  const KnownRotationProblem* problem_;
+  std::vector<char> contains_;  // per observation
+};
 
 // Observations without which all others are within a bound.
 struct Removal {
@@ -23,7 +49,7 @@ struct Removal {
   std::vector<int64_t> tight;
 };
 
-// Few observations to remove, by the slack programme (conic/slack_program.h):
+// Few observations to remove, by the slack programme (conic/interior_point.h):
 // solved with weights that make those dear that exceed the bound by little at
 // the start, and again with those of the solution, as long as that makes them
 // fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. It looks at
@@ -72,5 +98,23 @@ inline constexpr int kMaxProgrammes = 16;
 Removal FindRemoval(const Model& model, const BuiltProblem& built,
                     const ErrorBound& bound, const Context& context,
                     int max_programmes = kMaxProgrammes);
+
+// The lowest largest error of some observations, proved.
+struct OptimumWithout {
+  Estimate estimate;     // of the whole
+  double max_error = 0;  // there, true pixels
+  // That no translations and points bring them below; true pixels, 0 without a
+  // proof, which CheckPixelCertificate accepted otherwise.
+  double lower_bound = 0;
+  std::optional<PixelCertificate> proof;  // of the built problem
+};
+
+// Of all observations but the `removed` (ascending), by SolveInRounds from
+// `start`, where the depths of the others must be positive. Those that alone
+// hold a point or a frame bound nothing and have no part.
+OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
+                            const std::vector<int64_t>& removed,
+                            const Estimate& start, Norm norm,
+                            double relative_gap, const Context& context);
 
 }  // namespace krot::internal

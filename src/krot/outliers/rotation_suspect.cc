@@ -1,4 +1,4 @@
-#include "krot/outliers/rotation_suspect.h"
+#include "krot/outliers/outlier_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@
 #include <Eigen/Geometry>
 
 #include "krot/base/numbers.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/camera/projection_row.h"
-#include "krot/minimax/residual.h"
-#include "krot/outliers/optimum_without.h"
+#include "krot/convert/reprojection.h"
+#include "krot/camera/camera_model.h"
+#include "krot/minimax/residual_set.h"
+#include "krot/outliers/removal.h"
 
 namespace krot::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/outliers/snooping_filter.h"
+#include "krot/outliers/filter_steps.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,14 +10,12 @@
 #include <Eigen/Eigenvalues>
 
 #include "krot/analysis/noise.h"
-#include "krot/base/timer.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/model/remove_observations.h"
-#include "krot/outliers/element_index.h"
-#include "krot/outliers/list_removed.h"
+#include "krot/base/context.h"
+#include "krot/convert/reprojection.h"
+#include "krot/model/derived_models.h"
+#include "krot/outliers/conflict.h"
 #include "krot/outliers/packing.h"
-#include "krot/outliers/suspects.h"
-#include "krot/pipeline/polish.h"
+#include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 
 namespace krot::internal {

@@ -1,8 +1,94 @@
-#include "krot/outliers/tolerant_solve.h"
+#include "krot/outliers/filter_steps.h"
 
+#include <algorithm>
+#include <sstream>
+#include <string>
 #include <utility>
 
+#include "krot/convert/reprojection.h"
+#include "krot/finish/least_squares.h"
+#include "krot/outliers/outlier_filter.h"
+#include "krot/outliers/robust_start.h"
+#include "krot/pipeline/stages.h"
+
 namespace krot::internal {
+namespace {
+
+// Errors of a start are larger than the lowest maximum: so many times as large
+// as what noise explains, they say nothing yet.
+constexpr double kNearlyFits = 3;
+
+std::string Pixels(double value) {
+  std::ostringstream words;
+  words.precision(3);
+  words << value << " px";
+  return words.str();
+}
+
+// From nothing; an error is what is above `level`.
+void PlaceFromTracks(Norm norm, double level, const Context& context,
+                     RemovalStart* start) {
+  start->init = SolveInit::kFeasible;
+  const KnownRotationProblem& problem = start->built.problem;
+  start->built.start = FindRobustStart(problem, norm, level, context);
+  MinimizeRobustly(problem, context, &start->built.start);
+  context.Note("positions from rotations and tracks: the median error is " +
+               Pixels(MedianError(problem, start->built.start, norm)));
+}
+
+// Whether the model has positions at which noise explains half of its errors.
+bool FitsItsPositions(const Model& model, const OutlierFilterOptions& options,
+                      const Context& context, double explained) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  const BuiltProblem own = BuildProblem(model, build);
+  return HasOwnStart(own) &&
+         MedianError(own.problem, own.start, options.solve.norm) <= explained;
+}
+
+}  // namespace
+
+RemovalStart FindRemovalStart(const Model& model,
+                              const OutlierFilterOptions& options,
+                              const Context& context) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  build.ignore_translations = options.solve.init == SolveInit::kFeasible;
+  RemovalStart start;
+  start.max_error = options.max_error.value_or(0);
+  start.built = BuildProblem(model, build);
+  if (!build.ignore_translations && !HasOwnStart(start.built)) {
+    build.ignore_translations = true;
+    start.built = BuildProblem(model, build);
+  }
+  const Norm norm = options.solve.norm;
+  if (build.ignore_translations) {
+    const double level = options.max_error.value_or(kLevelOfStart);
+    PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
+  }
+  if (start.init == SolveInit::kFeasible && !options.max_error &&
+      !options.make_profile) {
+    const NoiseLimit noise =
+        NoiseLimitAtStart(model, start.built, norm, context);
+    start.max_error = noise.max_error;
+    const double largest =
+        Reprojection(model, start.built)
+            .TrueCost(start.built.start, norm, context.num_threads);
+    start.nearly_fits = largest <= kNearlyFits * start.max_error;
+    start.fits_its_positions =
+        FitsItsPositions(model, options, context, start.max_error);
+    if (options.spares_what_fits &&
+        (start.nearly_fits || start.fits_its_positions)) {
+      return start;
+    }
+    context.Note("leaving out what noise of " + Pixels(noise.sigma) +
+                 " per axis does not explain: errors above " +
+                 Pixels(start.max_error));
+  }
+  if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
+  return start;
+}
+
 namespace {
 
 // Whether observations may go where no start has them all.

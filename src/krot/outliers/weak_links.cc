@@ -1,4 +1,4 @@
-#include "krot/outliers/weak_links.h"
+#include "krot/outliers/parts.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,12 +9,11 @@
 #include <Eigen/Geometry>
 
 #include "krot/base/numbers.h"
-#include "krot/outliers/place_search.h"
-#include "krot/outliers/robust_points.h"
-#include "krot/problem/components.h"
+#include "krot/outliers/robust_start.h"
+#include "krot/problem/subset.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
-#include "krot/problem/subset.h"
+#include "krot/analysis/noise.h"
 
 namespace krot::internal {
 namespace {
@@ -29,7 +28,6 @@ constexpr int kFineSteps = 10;      // to each side, within a step of the grid
 constexpr size_t kMaxTracks = 200;  // that a place is found by, about
 // Errors of two observations of a point, in standard deviations.
 constexpr double kAgreeing = 4;
-constexpr double kLeastNoise = 1e-3;  // pixels
 
 std::vector<double> ScalesAround(double scale, double step, int num_steps) {
   std::vector<double> scales;
@@ -57,11 +55,11 @@ double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
     errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
                      std::sqrt(rows / (rows - 3)));
   }
-  if (errors.empty()) return kLeastNoise;
+  if (errors.empty()) return kLeastNoisePx;
   const auto middle =
       errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
   std::nth_element(errors.begin(), middle, errors.end());
-  return std::max(kLeastNoise, *middle / std::sqrt(2 * std::log(2.0)));
+  return std::max(kLeastNoisePx, *middle / std::sqrt(2 * std::log(2.0)));
 }
 
 // Groups of parts, which joins make fewer.

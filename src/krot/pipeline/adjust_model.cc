@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "krot/base/check.h"
-#include "krot/model/local_frame.h"
+#include "krot/model/derived_models.h"
 
 namespace krot::internal {
 namespace {

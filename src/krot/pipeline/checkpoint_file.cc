@@ -9,7 +9,7 @@
 #include <cstring>
 #include <system_error>
 
-#include "krot/bridge/model_digest.h"
+#include "krot/convert/model_digest.h"
 
 namespace krot::internal {
 namespace {

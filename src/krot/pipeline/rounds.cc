@@ -1,4 +1,4 @@
-#include "krot/pipeline/rounds.h"
+#include "krot/pipeline/stages.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "krot/bridge/reprojection.h"
-#include "krot/pipeline/kept_positions.h"
+#include "krot/convert/reprojection.h"
+#include "krot/pipeline/known_positions.h"
 #include "krot/pipeline/pixel_proof.h"
-#include "krot/pipeline/round_bounds.h"
-#include "krot/pipeline/schedule.h"
-#include "krot/pipeline/segment.h"
 #include "krot/pipeline/trust_regions.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"

@@ -1,10 +1,8 @@
-#include "krot/pipeline/schedule.h"
+#include "krot/pipeline/stages.h"
 
 #include <utility>
 
-#include "krot/joint/step_values.h"
-#include "krot/pipeline/iteration_log.h"
-#include "krot/pipeline/start.h"
+#include "krot/joint/joint.h"
 #include "krot/problem/cost.h"
 
 namespace krot::internal {

@@ -8,10 +8,10 @@
 
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/pipeline/settle.h"
-#include "krot/problem/components.h"
-#include "krot/problem/frame_geometry.h"
+#include "krot/convert/reprojection.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/problem/subset.h"
+#include "krot/problem/gauge.h"
 
 namespace krot::internal {
 

@@ -1,4 +1,4 @@
-#include "krot/pipeline/solve_in_frame.h"
+#include "krot/pipeline/stages.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,22 +7,15 @@
 #include <vector>
 
 #include "krot/analysis/collapse.h"
-#include "krot/analysis/settle_contradictions.h"
+#include "krot/analysis/model_input.h"
 #include "krot/base/check.h"
-#include "krot/base/timer.h"
-#include "krot/bridge/carry_left_out.h"
-#include "krot/bridge/point_repair.h"
-#include "krot/bridge/position_rows.h"
-#include "krot/bridge/reprojection.h"
-#include "krot/pipeline/certify.h"
-#include "krot/pipeline/iteration_log.h"
-#include "krot/pipeline/other_ways.h"
-#include "krot/pipeline/rounds.h"
-#include "krot/pipeline/run_finish.h"
-#include "krot/pipeline/settle.h"
-#include "krot/pipeline/solve_memory.h"
-#include "krot/pipeline/start.h"
-#include "krot/problem/components.h"
+#include "krot/base/context.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/build_steps.h"
+#include "krot/convert/reprojection.h"
+#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/solve_model.h"
+#include "krot/problem/subset.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 

@@ -1,14 +1,114 @@
 #include "krot/pipeline/solve_model.h"
 
+#include <algorithm>
 #include <vector>
 
-#include "krot/model/id_index.h"
-#include "krot/model/image_geometry.h"
-#include "krot/model/local_frame.h"
-#include "krot/pipeline/inflate_positions.h"
-#include "krot/pipeline/solve_in_frame.h"
+#include "krot/joint/working_set.h"
+#include "krot/linear/reduced_camera_system.h"
+#include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
+#include "krot/model/validate.h"
+#include "krot/pipeline/stages.h"
+#include "krot/problem/centre_unknowns.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
+namespace {
+
+int64_t Size(size_t count, size_t bytes) {
+  return static_cast<int64_t>(count * bytes);
+}
+
+int64_t ModelBytes(const Model& model) {
+  int64_t bytes = Size(model.images.size(), sizeof(Image)) +
+                  Size(model.points3D.size(), sizeof(Point3D)) +
+                  Size(model.track_elements.size(), sizeof(TrackElement));
+  for (const Image& image : model.images) {
+    bytes += Size(image.points2D.size(), sizeof(Point2D));
+  }
+  return bytes;
+}
+
+// The observations and two indices to them; views, points and frames.
+int64_t ProblemBytes(const KnownRotationProblem& problem) {
+  return Size(problem.observations.size(), sizeof(Observation) + 8) +
+         Size(problem.views.size(), sizeof(View)) +
+         8 * (int64_t{problem.num_points} + problem.num_frames);
+}
+
+int64_t EstimateBytes(const KnownRotationProblem& problem) {
+  return 24 * (int64_t{problem.num_points} + problem.num_frames);
+}
+
+// Some of a problem's observations, as a problem, and their indices.
+int64_t PartBytes(const KnownRotationProblem& problem) {
+  return ProblemBytes(problem) + Size(problem.observations.size(), 8);
+}
+
+// What the joint solver looks at first.
+ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm,
+                                  const Context& context) {
+  const KnownRotationProblem& problem = built.problem;
+  const double cost = Cost(problem, built.start, norm, context.num_threads);
+  const WorkingSet set =
+      FirstWorkingSet(problem, built.start, norm, cost, context);
+  return ProblemSubset(problem, set.Observations());
+}
+
+// What an interior point on these observations takes: so many bytes for each,
+// and the reduced camera system.
+int64_t InteriorPointBytes(const KnownRotationProblem& problem,
+                           size_t bytes_per_observation) {
+  return Size(problem.observations.size(), bytes_per_observation) +
+         ReducedCameraSystem(AnchoredStructure(problem)).MemoryBytes();
+}
+
+}  // namespace
+
+int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
+                            const SolveSummary& summary,
+                            const Context& context) {
+  constexpr int64_t kProcess = 14000000;  // code and libraries
+  // The record of a block, in sweeps.
+  constexpr int64_t kBytesPerBlock = 200;
+  // The start, the estimate, and those that sweeps and iterations compare.
+  constexpr int64_t kEstimates = 5;
+  // Counted in the code of the joint solver and of the finish.
+  constexpr size_t kJointBytes = 600;
+  constexpr size_t kFinishBytes = 300;
+  // What the allocator keeps beside what is in use.
+  constexpr double kAllocated = 1.05;
+  const KnownRotationProblem& problem = built.problem;
+  const int64_t held = kProcess + ModelBytes(model) + ProblemBytes(problem) +
+                       kEstimates * EstimateBytes(problem);
+  const int64_t sweeps =
+      kBytesPerBlock * (int64_t{problem.num_points} + problem.num_frames);
+  // In the end, the model that is given back and the pixel errors.
+  const int64_t result =
+      ModelBytes(model) + Size(model.track_elements.size(), 2 * sizeof(double));
+  int64_t most = std::max(sweeps, result);
+  // The lists of which observation is in which component and working set, and
+  // the largest component, which is a copy unless there is but one.
+  const int64_t component =
+      Size(problem.observations.size(), 16) +
+      (summary.num_components > 1 ? PartBytes(problem) : 0);
+  if (summary.init == SolveInit::kFeasible) {
+    most = std::max(most, component + InteriorPointBytes(problem, kJointBytes));
+  } else if (summary.method != SolveMethod::kResInt) {
+    // Beside the interior point, sweeps place what it does not look at.
+    const ProblemSubset working =
+        FirstWorkingProblem(built, summary.norm, context);
+    most =
+        std::max(most, component + PartBytes(working.problem()) + sweeps +
+                           InteriorPointBytes(working.problem(), kJointBytes));
+    if (summary.method == SolveMethod::kAuto) {
+      most = std::max(most, InteriorPointBytes(problem, kFinishBytes));
+    }
+  }
+  return static_cast<int64_t>(kAllocated * static_cast<double>(held + most));
+}
+
 namespace {
 
 // Of a certificate's fixed positions, those that the model has.

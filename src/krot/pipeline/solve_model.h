@@ -8,20 +8,108 @@
 #include <utility>
 #include <vector>
 
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/analysis/collapse.h"
 #include "krot/base/context.h"
-#include "krot/bridge/bridge.h"
-#include "krot/bridge/certificate_file.h"
-#include "krot/bridge/certificate_support.h"
+#include "krot/convert/build_problem.h"
+#include "krot/convert/certificate_file.h"
+#include "krot/finish/least_squares.h"
 #include "krot/joint/joint.h"
+#include "krot/math/norm.h"
 #include "krot/model.h"
-#include "krot/pipeline/finish.h"
-#include "krot/pipeline/polish.h"
-#include "krot/pipeline/settle.h"
 #include "krot/solve.h"
 #include "krot/sweeps/res_int.h"
 
 namespace krot::internal {
+
+// What becomes of the room that the lowest maximum leaves: it is set by a few
+// observations, and the others may be anywhere below.
+enum class Finish {
+  kNone,
+  kLeastSquares,  // the least squares of all estimates below the cap
+};
+
+// As --Solver.finish takes it: "none", "least_squares".
+const char* FinishName(Finish finish);
+
+struct FinishOptions {
+  Finish finish = Finish::kLeastSquares;
+  // eta: every error stays below (1 + slack) times the lowest maximum.
+  double slack = 5e-4;  // > 0
+  // Pixels; > 0: the cap instead; no finish if the lowest maximum is above it.
+  std::optional<double> max_error;
+  ErrorLoss loss;
+  // Told of every iteration; may be empty.
+  std::function<void(const BoundedIterate&)> callback;
+};
+
+// Of a finish by least squares.
+struct FinishSummary {
+  double cap = 0;          // pixels
+  double lowest_cost = 0;  // the largest error before it, pixels
+  ErrorLoss loss;
+  BoundedSummary solve;
+  double seconds = 0;
+};
+
+// Least squares after the known rotation problem: a lower mean error, for a
+// maximum that is no longer the lowest.
+enum class Polish {
+  kNone,
+  kRotationsFixed,  // translations and points
+  kFull,            // bundle adjustment with its default options
+};
+
+struct PolishSummary {
+  Polish polish = Polish::kNone;
+  BundleAdjustmentSummary adjustment;
+  PixelErrorStatistics pixel_error;  // over all observations, afterwards
+};
+
+// Adjusts the model in place, by least squares or the least of a robust loss,
+// and updates its stored point errors; what is fixed stays. `polish` must not
+// be kNone.
+PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
+                          const FixedParts& fixed, const Context& context,
+                          Model* model);
+
+// As --Solver.polish takes it: "none", "rotations_fixed", "full".
+const char* PolishName(Polish polish);
+
+// Images and points that do not hold their place (docs/method/positions.md,
+// "What is not determined").
+
+// A point of which its observations do not say whether it is in the scene or
+// infinitely far away.
+struct LoosePoint {
+  Point3DId point3D_id = 0;
+  double moved = 0;
+};
+
+struct LooseParts {
+  std::vector<LooseImage> images;
+  std::vector<LoosePoint> points;  // of all ranks
+  bool have_moved = false;  // whether any, or any other point, was taken back
+};
+
+struct SettleOptions {
+  Norm norm;                  // of the largest error
+  bool update_frames = true;  // else frames stay, and there is no gauge
+};
+
+// Gives the estimate of a problem that was built from `model` the place and
+// scale of the model, as its held frames have them, and then moves what is not
+// determined as near to where the model has it as is equally good: no largest
+// error rises, and the sum of an image's or a point's squared errors by no more
+// than noise explains. Frames and points that are fixed or have known positions
+// stay. The same bits at any number of threads and ranks. O(observations).
+LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
+                          const SettleOptions& options, const Context& context,
+                          Estimate* estimate);
+
+// Sets how far the images and points have moved between two models that hold
+// the same of both. O(images + points).
+void MeasureMoves(const Model& before, const Model& after, LooseParts* loose);
 
 // From a COLMAP model to a COLMAP model with a smaller largest reprojection
 // error: what `krot solver` and `krot point_triangulator` do between reading
@@ -134,7 +222,7 @@ struct SolveSummary {
   std::optional<PolishSummary> polish;
 
   // What a process that holds the model is likely to need at its peak; see
-  // solve_memory.h.
+  // stages.h.
   int64_t needed_bytes = 0;
 
   double seconds_build = 0;  // wall clock
@@ -199,7 +287,7 @@ struct SolveModelResult {
 // the input.
 //
 // Models far from the origin are solved in a local frame
-// (krot/model/local_frame.h); costs and errors are those before the
+// (krot/model/derived_models.h); costs and errors are those before the
 // coordinates are rounded to the model's own.
 //
 // kAuto takes a feasible start by itself where the model's own would leave out
@@ -209,7 +297,7 @@ struct SolveModelResult {
 //
 // Requires a valid model (ValidateModel); throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range. Memory:
-// see solve_memory.h.
+// see stages.h.
 SolveModelResult SolveModel(const Model& model,
                             const SolveModelOptions& options,
                             const Context& context = {});

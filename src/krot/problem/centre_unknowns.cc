@@ -1,6 +1,6 @@
 #include "krot/problem/centre_unknowns.h"
 
-#include "krot/problem/components.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "krot/base/context.h"
-#include "krot/linear/block_structure.h"
+#include "krot/linear/blocks.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

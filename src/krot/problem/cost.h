@@ -7,8 +7,8 @@
 
 #include "krot/base/numbers.h"
 #include "krot/math/norm.h"
-#include "krot/minimax/residual.h"
-#include "krot/minimax/residual_kernel.h"
+#include "krot/minimax/residual_set.h"
+#include "krot/minimax/kernels.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
@@ -110,7 +110,7 @@ inline bool IsZeroUpToRounding(double cost) { return cost < 1e-9; }
 //
 //   (c'; A) = E R,   (d; b) = E o.
 //
-// In the layout of residual_kernel.h:
+// In the layout of kernels.h:
 //   {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
 
 namespace detail {

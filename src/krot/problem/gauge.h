@@ -2,11 +2,30 @@
 
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "krot/base/context.h"
 #include "krot/math/norm.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
+
+// Centres closer than this, relative to the size of their coordinates and of
+// the component, coincide: rounding is a thousand times smaller.
+inline constexpr double kCoincident = 1e-12;
+
+// Where a frame's camera sits, once for all its views.
+struct FrameGeometry {
+  Eigen::Matrix3d world_from_rig = Eigen::Matrix3d::Identity();  // R_rw'
+  Eigen::Vector3d centre_in_rig = Eigen::Vector3d::Zero();       // -R_sr' t_sr
+  int num_views = 0;                                             // that count
+  bool is_seen_through = false;  // it has an observation
+  bool has_two_centres = false;  // its observations fix the scale
+};
+
+// Of every frame; of the whole where ranks share the points. O(observations).
+std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
+                                          const Context& context);
 
 // The freedom that the known rotation problem leaves: every connected
 // component may be translated and, unless a baseline fixes its size, scaled
@@ -20,7 +39,7 @@ namespace krot::internal {
 
 // The frames that place and scale of their components come from: those that
 // have a position in `reference` and keep their place among the others from
-// there to `estimate` (krot/geometry/consensus.h). What `is_loose` marks, if it
+// there to `estimate` (krot/geometry/transform.h). What `is_loose` marks, if it
 // is not empty, does not count unless all frames of its component are loose.
 // 1 or 0 per frame. O(observations).
 std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,

@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 
 #include "krot/problem/known_rotation_problem.h"
-#include "krot/verify/force_balance.h"
+#include "krot/verify/force_checker.h"
 
 namespace krot::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/proof/least_norm.h"
+#include "krot/proof/dual_repair.h"
 
 #include <algorithm>
 #include <limits>

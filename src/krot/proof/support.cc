@@ -1,4 +1,4 @@
-#include "krot/proof/support.h"
+#include "krot/proof/certificate.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,14 +1,13 @@
-#include "krot/report/adjustment_report.h"
+#include "krot/report/reports.h"
 
 #include <cmath>
 #include <optional>
 #include <sstream>
 #include <vector>
 
-#include "krot/report/error_rows.h"
-#include "krot/report/problem_words.h"
-#include "krot/report/report_json.h"
 #include "krot/report/text_table.h"
+#include "krot/report/sentences.h"
+#include "krot/report/report_json.h"
 
 namespace krot::internal {
 namespace {

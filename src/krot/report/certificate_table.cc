@@ -1,4 +1,4 @@
-#include "krot/report/certificate_table.h"
+#include "krot/report/reports.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "krot/report/check_report.h"
+#include "krot/report/reports.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
 

@@ -1,76 +1,82 @@
-#include "krot/report/outlier_report.h"
+#include "krot/report/reports.h"
 
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <string>
 #include <vector>
 
 #include "krot/outliers/robust_start.h"
-#include "krot/report/csv_text.h"
-#include "krot/report/error_rows.h"
 #include "krot/report/report_json.h"
-#include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {
 namespace {
 
+// "44 images (P1180141.JPG to P1180184.JPG) hang on the rest by 14 tracks, of
+// which 9 agree; their scale against the rest is held to a factor of 1.80
+// only", of a part that is not held.
+std::string WeakPartWords(const WeakPart& part) {
+  const auto count = static_cast<int64_t>(part.image_names.size());
+  const auto [first, last] =
+      std::minmax_element(part.image_names.begin(), part.image_names.end());
+  return Counted(count, "image") + " (" + *first +
+         (count == 1 ? std::string()
+                     : (count == 2 ? " and " : " to ") + *last) +
+         ") " + (count == 1 ? "hangs" : "hang") + " on the rest by " +
+         Counted(part.num_tracks, "track") + ", of which " +
+         std::to_string(part.num_agreeing) +
+         (part.num_agreeing == 1 ? " agrees" : " agree") + "; their " +
+         (part.scale_factor <= 1.1 ? "place and " : "") +
+         "scale against the rest " +
+         (part.scale_factor <= 1.1 ? "are not known"
+          : std::isfinite(part.scale_factor)
+              ? "is held to a factor of " + FormatNumber(part.scale_factor, 2) +
+                    " only"
+              : std::string("is not held at all")) +
+         (part.turn_deg > 0
+              ? "; if all their rotations were turned against the rest's by " +
+                    FormatNumber(part.turn_deg, 2) + " degrees, " +
+                    std::to_string(part.num_agreeing_turned) +
+                    " tracks would agree: look at the rotations"
+              : std::string());
+}
+
+}  // namespace
+
+std::string UnreliableSentence(const OutlierFilterSummary& summary) {
+  if (summary.init != SolveInit::kFeasible) return "";
+  std::string words;
+  const auto add = [&](const std::string& reason) {
+    words += (words.empty() ? "" : "; ") + reason;
+  };
+  for (const WeakPart& part : summary.weak_parts) {
+    if (!part.is_held) add(WeakPartWords(part));
+  }
+  if (!words.empty()) {
+    words +=
+        "; match more pairs of images across, or take the parts as models of "
+        "their own";
+  }
+  const auto num_removed = static_cast<int64_t>(summary.removed.size());
+  if (summary.is_bound_beyond_reason) {
+    add("hardly anything fits: half of all errors are so large that noise "
+        "would explain " +
+        FormatNumber(summary.max_error, 4) +
+        " px; look at rotations, intrinsics and matches");
+  } else if (2 * num_removed > summary.num_observations) {
+    add(Thousands(num_removed) + " of " + Thousands(summary.num_observations) +
+        " observations, more than half, are not within " +
+        FormatNumber(summary.max_error, 4) +
+        " px; look at rotations, intrinsics and matches");
+  }
+  return words.empty() ? words
+                       : "the positions are not to be relied on: " + words;
+}
+
+namespace {
+
 constexpr size_t kShownSuspects = 5;
-
-Json RemovedJson(const std::vector<RemovedObservation>& removed) {
-  Json json = Json::array();
-  for (const RemovedObservation& o : removed) {
-    json.push_back({{"image_id", o.image_id},
-                    {"image_name", o.image_name},
-                    {"point2D_idx", o.point2D_idx},
-                    {"point3D_id", o.point3D_id},
-                    {"error_before_px", FiniteOrNull(o.error_before_px)},
-                    {"error_after_px", FiniteOrNull(o.error_after_px)},
-                    {"conflict", o.conflict ? Json(*o.conflict) : Json()},
-                    {"w", o.w ? FiniteOrNull(*o.w) : Json()}});
-  }
-  return json;
-}
-
-// The share of the conflicts that would vanish without it.
-Json ConflictShare(int64_t num_conflicts, const OutlierFilterSummary& summary) {
-  if (summary.num_proved == 0) return {};
-  return static_cast<double>(num_conflicts) /
-         static_cast<double>(summary.num_proved);
-}
-
-Json SuspectsJson(const std::vector<Suspect>& suspects, const char* id,
-                  const OutlierFilterSummary& summary) {
-  Json json = Json::array();
-  for (const Suspect& suspect : suspects) {
-    Json one = {{id, suspect.id}};
-    if (!suspect.name.empty()) one["image_name"] = suspect.name;
-    one["num_observations"] = suspect.num_observations;
-    one["num_removed"] = suspect.num_removed;
-    one["num_conflicts"] = suspect.num_conflicts;
-    one["conflict_share"] = ConflictShare(suspect.num_conflicts, summary);
-    json.push_back(std::move(one));
-  }
-  return json;
-}
-
-Json RotationSuspectJson(const OutlierFilterSummary& summary) {
-  if (!summary.rotation_suspect) return {};
-  const RotationSuspect& suspect = *summary.rotation_suspect;
-  return {{"image_id", suspect.image_id},
-          {"image_name", suspect.image_name},
-          {"num_conflicts", suspect.num_conflicts},
-          {"conflict_share", ConflictShare(suspect.num_conflicts, summary)},
-          {"angle_deg", suspect.angle_deg},
-          {"axis_in_cam",
-           {suspect.axis_in_cam.x(), suspect.axis_in_cam.y(),
-            suspect.axis_in_cam.z()}},
-          {"num_observations", suspect.num_observations},
-          {"num_above", suspect.num_above},
-          {"num_above_turned", suspect.num_above_turned},
-          {"lower_bound_with", suspect.lower_bound_with},
-          {"max_error_without", suspect.max_error_without}};
-}
 
 std::string RotationSentence(const OutlierFilterSummary& summary) {
   if (!summary.rotation_suspect) return "";
@@ -88,28 +94,6 @@ std::string RotationSentence(const OutlierFilterSummary& summary) {
          FormatNumber(suspect.lower_bound_with, 4) +
          " px (proved); without it they come down to " +
          FormatNumber(suspect.max_error_without, 4) + " px.\n";
-}
-
-Json SolveOfRestJson(const std::optional<SolveSummary>& solve) {
-  if (!solve) return {};
-  return {{"num_observations", solve->num_observations},
-          {"cost_initial", solve->cost_initial},
-          {"cost_final", solve->cost_final},
-          {"certified", solve->is_certified},
-          {"lower_bound", NumberOrNull(solve->lower_bound)},
-          {"relative_gap", NumberOrNull(solve->relative_gap)},
-          {"not_held", NotHeldJson(solve->loose)}};
-}
-
-Json SnoopingJson(const std::optional<SnoopingSummary>& snooping) {
-  if (!snooping) return {};
-  return {{"sigma_before_px", NumberOrNull(snooping->sigma_before_px)},
-          {"sigma_px", NumberOrNull(snooping->sigma_px)},
-          {"critical_w", snooping->critical_w},
-          {"num_tested", snooping->num_tested},
-          {"num_rounds", snooping->num_rounds},
-          {"max_error_px", snooping->max_error_px},
-          {"kept_error_before", ErrorJson(snooping->kept_error_before)}};
 }
 
 // What noise there is and, as little is worse than not to know, whether what is
@@ -153,27 +137,6 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
   rises("mean", before.mean, after.mean);
   rises("RMS", before.rms, after.rms);
   return text;
-}
-
-Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
-  Json levels = Json::array();
-  for (const ErrorProfileSummary::Level& level : profile.levels) {
-    levels.push_back({{"num_removed", level.num_removed},
-                      {"max_error", level.max_error},
-                      {"lower_bound", NumberOrNull(level.lower_bound)},
-                      {"num_must_go", level.num_proved},
-                      {"point3D_ids", level.point_ids}});
-  }
-  return {{"levels", std::move(levels)},
-          {"elbow", profile.elbow ? Json(*profile.elbow) : Json()}};
-}
-
-Json NoiseJson(const std::optional<NoiseSummary>& noise) {
-  if (!noise) return {};
-  return {{"sigma", noise->limit.sigma},
-          {"max_error", noise->limit.max_error},
-          {"lowest_max_error", noise->lowest_max_error},
-          {"lower_bound", NumberOrNull(noise->lower_bound)}};
 }
 
 // What noise explains, and what follows from that.
@@ -302,82 +265,6 @@ std::string OutlierTable(const OutlierReport& report) {
              "chose " + FormatNumber(summary.seconds_removal, 2) +
                  " s, proved " + FormatNumber(summary.seconds_conflicts, 2) +
                  " s, solved " + FormatNumber(summary.seconds_solve, 2) + " s");
-}
-
-std::string OutlierJson(const OutlierReport& report) {
-  const OutlierFilterSummary& summary = report.summary;
-  const Json json = {
-      {"version", report.run.version},
-      {"command", "outlier_filter"},
-      {"method", OutlierMethodName(summary.method)},
-      {"norm", NormName(summary.norm)},
-      {"max_error", summary.max_error > 0 ? Json(summary.max_error) : Json()},
-      {"noise", NoiseJson(summary.noise)},
-      {"is_within", summary.is_within},
-      {"num_observations", summary.num_observations},
-      {"num_points", summary.num_points},
-      {"num_removed", summary.removed.size()},
-      {"num_left_alone", summary.num_left_alone},
-      {"num_points_removed", summary.num_points_removed},
-      {"num_must_go", summary.conflicts ? Json(summary.num_proved) : Json()},
-      {"num_irreducible",
-       summary.conflicts ? Json(summary.num_irreducible) : Json()},
-      {"is_search_complete", summary.is_search_complete},
-      {"rotations", RotationsJson(report.run.rotations)},
-      {"pixel_error",
-       {{"before", ErrorJson(summary.pixel_error_before)},
-        {"after", ErrorJson(summary.pixel_error_after)}}},
-      {"profile",
-       summary.profile ? ProfileLevelsJson(*summary.profile) : Json()},
-      {"snooping", SnoopingJson(summary.snooping)},
-      {"solve", SolveOfRestJson(summary.solve)},
-      {"num_solves", summary.num_solves},
-      {"weak_parts", WeakPartsJson(summary)},
-      {"removed", RemovedJson(summary.removed)},
-      {"suspects",
-       {{"tracks", SuspectsJson(summary.tracks, "point3D_id", summary)},
-        {"images", SuspectsJson(summary.images, "image_id", summary)},
-        {"cameras", SuspectsJson(summary.cameras, "camera_id", summary)}}},
-      {"rotation_suspect", RotationSuspectJson(summary)},
-  };
-  return ReportText(
-      json, report.run,
-      {{"profile", summary.profile ? Json(summary.profile->seconds) : Json()},
-       {"removal", summary.seconds_removal},
-       {"conflicts", summary.seconds_conflicts},
-       {"solve", summary.seconds_solve}});
-}
-
-std::string ProfileJson(const OutlierReport& report) {
-  const OutlierFilterSummary& summary = report.summary;
-  Json json = {{"version", report.run.version},
-               {"command", "outlier_filter"},
-               {"norm", NormName(summary.norm)},
-               {"num_observations", summary.num_observations}};
-  json.update(ProfileLevelsJson(*summary.profile));
-  json["noise"] = NoiseJson(summary.noise);
-  json["seconds"] = summary.profile->seconds;
-  return ReportText(json);
-}
-
-std::string OutlierCsv(const OutlierFilterSummary& summary) {
-  std::ostringstream csv;
-  csv.precision(9);
-  csv << "image_id,image_name,point2D_idx,point3D_id,error_before_px,"
-         "error_after_px,conflict,w\n";
-  for (const RemovedObservation& o : summary.removed) {
-    csv << o.image_id << ',' << CsvText(o.image_name) << ',' << o.point2D_idx
-        << ',' << o.point3D_id << ',';
-    if (std::isfinite(o.error_before_px)) csv << o.error_before_px;
-    csv << ',';
-    if (std::isfinite(o.error_after_px)) csv << o.error_after_px;
-    csv << ',';
-    if (o.conflict) csv << *o.conflict;
-    csv << ',';
-    if (o.w) csv << *o.w;
-    csv << '\n';
-  }
-  return csv.str();
 }
 
 }  // namespace krot::internal

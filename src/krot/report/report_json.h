@@ -6,13 +6,11 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
-#include "krot/analysis/rotation_input.h"
-#include "krot/bridge/certificate_verdict.h"
+#include "krot/analysis/model_input.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model.h"
-#include "krot/model/contradictions.h"
-#include "krot/model/pose_checks.h"
-#include "krot/report/problem_words.h"
-#include "krot/report/run_record.h"
+#include "krot/model/model_checks.h"
+#include "krot/report/sentences.h"
 
 namespace krot::internal {
 

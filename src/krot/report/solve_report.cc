@@ -1,12 +1,15 @@
-#include "krot/report/solve_report.h"
-
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "krot/base/numbers.h"
+#include "krot/report/pair_report.h"
+#include "krot/report/report_json.h"
+#include "krot/report/reports.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {
+
 LeftOutCounts LeftOutByReason(const SolveSummary& summary) {
   LeftOutCounts counts;
   for (int reason = 0; reason < kNumLeftOutReasons; ++reason) {
@@ -108,6 +111,251 @@ std::string NormName(Norm norm) {
   std::string text;
   AppendNumber(norm.p, &text);
   return text;
+}
+
+namespace {
+
+const char* TerminationName(SolveTermination termination) {
+  switch (termination) {
+    case SolveTermination::kGapReached:
+      return "gap_reached";
+    case SolveTermination::kZeroCost:
+      return "zero_cost";
+    case SolveTermination::kStalled:
+      return "stalled";
+    case SolveTermination::kUnproved:
+      return "unproved";
+    case SolveTermination::kMaxSweeps:
+      return "max_sweeps";
+    case SolveTermination::kMaxIterations:
+      return "max_iterations";
+    case SolveTermination::kInfeasible:
+      return "infeasible";
+    case SolveTermination::kNoStart:
+      return "no_start";
+    case SolveTermination::kInterrupted:
+      return "interrupted";
+    case SolveTermination::kNothingToSolve:
+      return "nothing_to_solve";
+    case SolveTermination::kWithinBound:
+      return "within_bound";
+    case SolveTermination::kCollapsed:
+      return "collapsed";
+    case SolveTermination::kNotRun:
+      break;
+  }
+  return "not_run";
+}
+
+// Of the observations that are left out as another's twins.
+std::optional<double> LargestTwin(const SolveSummary& summary) {
+  const int64_t count =
+      summary.left_out[static_cast<size_t>(LeftOut::kSameImage)];
+  if (count == 0 || !std::isfinite(summary.largest_twin_error)) return {};
+  return summary.largest_twin_error;
+}
+
+Json JointIterationsJson(const std::vector<JointIteration>& iterations) {
+  Json json = Json::array();
+  for (const JointIteration& iteration : iterations) {
+    json.push_back({{"method", iteration.target ? "feasible_start" : "joint"},
+                    {"cost", NumberOrNull(iteration.cost)},
+                    {"lower_bound", NumberOrNull(iteration.lower_bound)},
+                    {"gap", NumberOrNull(iteration.gap)},
+                    {"target", NumberOrNull(iteration.target)},
+                    {"seconds", iteration.seconds}});
+  }
+  return json;
+}
+
+Json RoundsJson(const std::vector<Round>& rounds) {
+  Json json = Json::array();
+  for (const Round& round : rounds) {
+    json.push_back(
+        {{"linear_cost", round.linear_cost},
+         {"linear_lower_bound", NumberOrNull(round.linear_lower_bound)},
+         {"step", round.step},
+         {"cost", round.cost},
+         {"lower_bound", NumberOrNull(round.lower_bound)},
+         {"seconds", round.seconds}});
+  }
+  return json;
+}
+
+Json SupportJson(const std::vector<SupportObservation>& support) {
+  Json json = Json::array();
+  for (const SupportObservation& observation : support) {
+    json.push_back({{"image_id", observation.image_id},
+                    {"image_name", observation.image_name},
+                    {"point2D_idx", observation.point2D_idx},
+                    {"point3D_id", observation.point3D_id},
+                    {"multiplier", observation.multiplier},
+                    {"error_px", observation.error_px}});
+  }
+  return json;
+}
+
+Json FactorJson(const std::optional<PositionFactor>& factor) {
+  if (!factor) return nullptr;
+  return {{"value", factor->factor},
+          {"lower_bound", factor->lower_bound},
+          {"max_error", factor->max_error}};
+}
+
+Json PositionsJson(const std::vector<SupportPosition>& positions) {
+  Json json = Json::array();
+  for (const SupportPosition& position : positions) {
+    Json entry = position.image_name.empty()
+                     ? Json({{"point3D_id", position.point3D_id}})
+                     : Json({{"image_id", position.image_id},
+                             {"image_name", position.image_name}});
+    entry.update({{"share", position.share},
+                  {"distance", position.distance},
+                  {"radius", position.radius}});
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+Json PolishJson(const std::optional<PolishSummary>& polish) {
+  if (!polish) return {};
+  const BundleAdjustmentSummary& adjustment = polish->adjustment;
+  return {{"polish", PolishName(polish->polish)},
+          {"termination", AdjustmentTerminationName(adjustment.termination)},
+          {"cost_initial", adjustment.cost_initial},
+          {"cost_final", adjustment.cost_final},
+          {"num_iterations", adjustment.num_iterations},
+          {"pixel_error", ErrorJson(polish->pixel_error)},
+          {"seconds", adjustment.seconds}};
+}
+
+const char* FinishTerminationName(InteriorPointTermination termination) {
+  switch (termination) {
+    case InteriorPointTermination::kConverged:
+      return "converged";
+    case InteriorPointTermination::kMaxIterations:
+      return "max_iterations";
+    case InteriorPointTermination::kNoProgress:
+      return "no_progress";
+    case InteriorPointTermination::kSingular:
+      return "singular";
+    case InteriorPointTermination::kInterrupted:
+      return "interrupted";
+    default:
+      return "not_run";
+  }
+}
+
+Json FinishJson(const std::optional<FinishSummary>& finish) {
+  if (!finish) return {};
+  const BoundedSummary& solve = finish->solve;
+  return {{"finish", FinishName(Finish::kLeastSquares)},
+          {"loss", LossName(finish->loss.kind)},
+          {"termination", FinishTerminationName(solve.termination)},
+          {"cap", finish->cap},
+          {"lowest_cost", finish->lowest_cost},
+          {"cost_initial", solve.cost_initial},
+          {"cost_final", solve.cost_final},
+          {"duality_gap", NumberOrNull(solve.duality_gap)},
+          {"stationarity", NumberOrNull(solve.stationarity)},
+          {"num_active", solve.num_active},
+          {"num_iterations", solve.iterations},
+          {"seconds", finish->seconds}};
+}
+
+Json OutliersJson(const std::optional<OutlierFilterSummary>& outliers) {
+  if (!outliers) return {};
+  return {{"max_error", outliers->max_error},
+          {"is_within", outliers->is_within},
+          {"num_observations", outliers->num_observations},
+          {"num_points", outliers->num_points},
+          {"num_removed", outliers->removed.size()},
+          {"num_left_alone", outliers->num_left_alone},
+          {"num_points_removed", outliers->num_points_removed},
+          {"num_must_go",
+           outliers->conflicts ? Json(outliers->num_proved) : Json()},
+          {"is_search_complete", outliers->is_search_complete},
+          {"weak_parts", WeakPartsJson(*outliers)},
+          {"seconds",
+           {{"removal", outliers->seconds_removal},
+            {"conflicts", outliers->seconds_conflicts},
+            {"solve", outliers->seconds_solve}}}};
+}
+
+}  // namespace
+
+std::string SolveJson(const SolveReport& report) {
+  const SolveSummary& summary = report.summary;
+  const Json left_out = LeftOutJson(LeftOutByReason(summary));
+  Json sweeps = Json::array();
+  for (const Sweep& sweep : summary.sweeps) {
+    sweeps.push_back({{"cost", sweep.cost}, {"seconds", sweep.seconds}});
+  }
+  std::optional<double> linear_cost, linear_lower_bound;  // of the last round
+  if (!summary.rounds.empty()) {
+    linear_cost = summary.rounds.back().linear_cost;
+    linear_lower_bound = summary.rounds.back().linear_lower_bound;
+  }
+  const Json json = {
+      {"version", report.run.version},
+      {"command", report.command},
+      {"method", report.method},
+      {"norm", NormName(summary.norm)},
+      {"termination", TerminationName(summary.termination)},
+      {"num_frames", summary.num_frames},
+      {"num_images", summary.num_images},
+      {"num_points", summary.num_points},
+      {"num_observations", summary.num_observations},
+      {"working_observations", summary.num_working_observations
+                                   ? Json(*summary.num_working_observations)
+                                   : Json()},
+      {"left_out", left_out},
+      {"same_image",
+       {{"num_tracks", summary.num_same_image_tracks},
+        {"support_point3D_ids", SameImageInSupport(summary)},
+        {"largest_left_out", NumberOrNull(LargestTwin(summary))}}},
+      {"outliers", OutliersJson(report.outliers)},
+      {"matches", report.matches ? MatchesJson(*report.matches) : Json()},
+      {"rotations", RotationsJson(report.run.rotations)},
+      {"fixed",
+       {{"num_frames", summary.num_fixed_frames},
+        {"num_points", summary.num_fixed_points}}},
+      {"positions",
+       {{"num_known", summary.num_positions},
+        {"largest_ratio", summary.largest_position_ratio},
+        {"factor", FactorJson(summary.position_factor)}}},
+      {"not_held", NotHeldJson(summary.loose)},
+      {"cost_initial", summary.cost_initial},
+      {"cost_final", summary.cost_final},
+      {"lower_bound", NumberOrNull(summary.lower_bound)},
+      {"relative_gap", NumberOrNull(summary.relative_gap)},
+      {"linear_cost", NumberOrNull(linear_cost)},
+      {"linear_lower_bound", NumberOrNull(linear_lower_bound)},
+      {"linear_relative_gap", NumberOrNull(LinearRelativeGap(summary))},
+      {"certified", summary.is_certified},
+      {"is_given_back", summary.is_given_back},
+      {"verdict", VerdictSentence(summary)},
+      {"collapse",
+       {{"in_camera", summary.collapse.in_camera},
+        {"at_infinity", summary.collapse.at_infinity},
+        {"is_in_one_place", summary.collapse.is_in_one_place}}},
+      {"is_underdetermined", summary.is_underdetermined},
+      {"pixel_error",
+       {{"before", ErrorJson(summary.pixel_error_before)},
+        {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"finish", FinishJson(summary.finish)},
+      {"polish", PolishJson(summary.polish)},
+      {"rounds", RoundsJson(summary.rounds)},
+      {"sweeps", sweeps},
+      {"iterations", JointIterationsJson(summary.iterations)},
+      {"support", SupportJson(summary.support)},
+      {"support_positions", PositionsJson(summary.support_positions)},
+      {"announced_memory_bytes", summary.needed_bytes},
+  };
+  return ReportText(json, report.run,
+                    {{"build", summary.seconds_build},
+                     {"solve", summary.seconds_solve},
+                     {"certify", NumberOrNull(summary.seconds_certify)}});
 }
 
 }  // namespace krot::internal

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "krot/model.h"
+
 namespace krot::internal {
 
 // A table for a terminal: the first column is flush left, the others flush
@@ -37,5 +39,29 @@ std::string Thousands(int64_t count);
 
 // With the unit that leaves one to three digits before the point: "1.5 MB".
 std::string FormatBytes(int64_t bytes);
+
+// In quotes, with those that it holds twice.
+inline std::string CsvText(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += c;
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+// One set of observations per row: how many, and their errors.
+void AddErrorHead(const std::string& name, TextTable* table);
+void AddErrorRow(const std::string& name, const PixelErrorStatistics& errors,
+                 TextTable* table);
+
+// The same observations, one estimate per column: rows for the maximum, P99,
+// mean and RMS of each.
+void AddErrorColumns(const std::vector<PixelErrorStatistics>& estimates,
+                     TextTable* table);
+
+// "3 observations without a finite error ..., in no row above.\n"; empty where
+// there are none.
+std::string NotFiniteSentence(const PixelErrorStatistics& errors);
 
 }  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/report/tolerance_report.h"
+#include "krot/report/reports.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,10 +6,8 @@
 #include <sstream>
 #include <vector>
 
-#include "krot/report/csv_text.h"
-#include "krot/report/report_json.h"
-#include "krot/report/solve_report.h"
 #include "krot/report/text_table.h"
+#include "krot/report/report_json.h"
 
 namespace krot::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "krot/report/track_report.h"
+#include "krot/report/pair_report.h"
 
 #include "krot/report/report_json.h"
 #include "krot/report/text_table.h"

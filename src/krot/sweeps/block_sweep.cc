@@ -1,4 +1,4 @@
-#include "krot/sweeps/block_sweep.h"
+#include "krot/sweeps/res_int.h"
 
 #include <algorithm>
 #include <functional>

@@ -5,9 +5,8 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/base/timer.h"
+#include "krot/base/context.h"
 #include "krot/problem/cost.h"
-#include "krot/sweeps/block_sweep.h"
 
 namespace krot::internal {
 namespace {

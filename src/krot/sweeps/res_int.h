@@ -1,14 +1,117 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "krot/base/context.h"
 #include "krot/math/norm.h"
 #include "krot/minimax/fast_descent.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {
+
+// The frames that this rank resects, of a problem whose points ranks share:
+// they are consecutive, and every rank has about as many of their observations.
+// The observations are held a second time, in the order of the whole problem,
+// so that a frame's sub-problem has the same rows as in one process.
+//
+// Every rank makes one, and all call its functions together.
+class FrameShare {
+ public:
+  FrameShare(const KnownRotationProblem& problem, Ranks* ranks);
+
+  // All frames and views, the observations of this rank's frames, and the
+  // points of these observations.
+  const KnownRotationProblem& problem() const { return problem_; }
+
+  // An estimate of problem(). Every rank sends 24 bytes for each of its points
+  // and each rank whose frames see it.
+  Estimate Receive(const Estimate& estimate) const;
+
+  // Gives the translations of this rank's frames to all ranks.
+  void Publish(const Estimate& share, Estimate* estimate) const;
+
+ private:
+  Ranks& ranks_;
+  KnownRotationProblem problem_;
+  std::vector<int32_t> frame_begin_;  // first frame per rank, and the end
+  // Per rank, the points of this rank that its frames see.
+  std::vector<std::vector<int32_t>> seen_by_;
+};
+
+// The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
+// other and spread over threads; the result does not depend on how many. Points
+// are solved side by side, in the order of their numbers of observations. Each
+// thread keeps its descents, so that sweeps do not allocate once warm.
+// After a cancellation the remaining blocks are skipped. What the problem fixes
+// does not move.
+//
+// Where ranks share the points, each takes its own points and a share of the
+// frames; all ranks call both functions together.
+//
+// Both return the cost that is reached, pixels: up to rounding that of Cost().
+// It is infinite if a block starts at a depth that is not positive; the
+// estimate is useless then.
+class BlockSweep {
+ public:
+  // Keeps a reference to `problem`.
+  BlockSweep(const KnownRotationProblem& problem,
+             const FastDescentOptions& options, Norm norm,
+             const Context& context);
+
+  // How far blocks go from now on. At first they go to their optima.
+  void SetGoal(const DescentGoal& goal) { goal_ = goal; }
+
+  // Line 3: every point's own optimum, the frames fixed: (Int_k) for all k.
+  double IntersectPoints(Estimate* estimate);
+
+  // Line 4: every frame's own optimum, the points fixed: (Res_j) for all j.
+  double ResectFrames(Estimate* estimate);
+
+ private:
+  // The memory that a thread keeps between sweeps.
+  struct Worker {
+    FastDescent frame_descent;
+    SideBySideDescent point_descent;
+    std::vector<int32_t> points;
+    std::vector<SideBySideDescent::Problem> problems;
+  };
+
+  Worker* WorkerOf(int worker);
+  template <typename Function>
+  double LargestOver(int64_t num_blocks, int64_t blocks_per_chunk,
+                     const Function& minimize);
+  int64_t NumObservations(int32_t point) const {
+    return problem_.point_begin[point + 1] - problem_.point_begin[point];
+  }
+  double IntersectPoints(int64_t begin, int64_t end, int worker,
+                         Estimate* estimate);
+  double ChoosePoints(int64_t begin, int64_t end, const Estimate& estimate,
+                      std::vector<int32_t>* points) const;
+  double ResectShare(Estimate* estimate);
+  void AddPointRows(int32_t point, SideBySideDescent::RowWriter* writer) const;
+  double ResectFrame(int64_t f, FastDescent* descent, Estimate* estimate);
+
+  const KnownRotationProblem& problem_;
+  const FastDescentOptions options_;
+  Norm norm_;
+  const Context context_;
+  DescentGoal goal_;
+  // One per thread, made at its first use: of the threads that were asked for,
+  // the system may provide only a few.
+  std::vector<std::unique_ptr<Worker>> workers_;
+  std::vector<AffineMap> cameras_;  // per view, while points move
+  std::vector<char> is_reference_;  // per view
+  // The warm starts of all blocks.
+  std::vector<ActiveResiduals> point_active_;
+  std::vector<ActiveResiduals> frame_active_;
+  // Where ranks share the points; made when frames move for the first time.
+  std::unique_ptr<FrameShare> frame_share_;
+  std::unique_ptr<BlockSweep> frame_blocks_;
+};
 
 // Resection-Intersection [Zhang18, Alg. 1]: sweeps that minimise every
 // point's own maximum residual with the frames fixed, then every frame's with

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "krot/database.h"
 #include "krot/model.h"
 
 namespace krot::internal {
@@ -84,5 +85,20 @@ void Check(const SceneOptions& options);
 // points in common (sensors turned too far apart). O(observations); about a
 // microsecond each.
 SyntheticScene SynthesizeScene(const SceneOptions& options);
+
+// The database that a model was made from, if all of its tracks are matches:
+// the 2D points are its keypoints, of scale 1, and two images have a match for
+// each two 2D points that see the same point. Requires a valid model. O(sum of
+// squared track lengths).
+Database DatabaseOf(const Model& model);
+
+// A camera of the given COLMAP model with its principal point in the middle
+// of the image and a moderate distortion: fy = 1.01 fx where the model has
+// both, and the projection is one to one over the whole image for
+// focal_length >= half the larger side. A panorama (EQUIRECTANGULAR) fills its
+// image, whatever the focal length. Throws std::invalid_argument for an unknown
+// id. Lengths in pixels.
+Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
+                     double focal_length);
 
 }  // namespace krot::internal

@@ -1,12 +1,65 @@
-#include "krot/synthetic/trajectory.h"
+#include "krot/synthetic/scene_steps.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "krot/base/numbers.h"
-#include "krot/synthetic/rigid_motion.h"
 
 namespace krot::internal {
+
+double Random::Uniform() {
+  return static_cast<double>(engine_() >> 11) * 0x1p-53;
+}
+
+double Random::Uniform(double low, double high) {
+  return low + (high - low) * Uniform();
+}
+
+int64_t Random::UniformInt(int64_t count) {
+  return static_cast<int64_t>(Uniform() * static_cast<double>(count));
+}
+
+double Random::Gaussian() {
+  while (true) {
+    const double x = Uniform(-1, 1);
+    const double y = Uniform(-1, 1);
+    const double s = x * x + y * y;
+    if (s > 0 && s < 1) return x * std::sqrt(-2 * std::log(s) / s);
+  }
+}
+
+Eigen::Vector3d Random::GaussianVector() {
+  const double x = Gaussian();
+  const double y = Gaussian();
+  const double z = Gaussian();
+  return {x, y, z};
+}
+
+bool Random::Chance(double probability) { return Uniform() < probability; }
+
+std::vector<Pose> CamFromWorld(const SceneGeometry& geometry) {
+  std::vector<Pose> cam_from_world;
+  cam_from_world.reserve(geometry.rig_from_world.size() *
+                         geometry.sensor_from_rig.size());
+  for (const Pose& rig_from_world : geometry.rig_from_world) {
+    for (const Pose& sensor_from_rig : geometry.sensor_from_rig) {
+      cam_from_world.push_back(
+          UnitPose(sensor_from_rig.Transform() * rig_from_world.Transform()));
+    }
+  }
+  return cam_from_world;
+}
+
+Pose UnitPose(const RigidTransform& transform) {
+  return {ToWxyz(Eigen::Quaterniond(transform.rotation).normalized()),
+          transform.translation};
+}
+
+Pose PoseFromCenter(const Eigen::Matrix3d& rotation,
+                    const Eigen::Vector3d& center) {
+  return UnitPose({rotation, -(rotation * center)});
+}
+
 namespace {
 
 // The rotation of a camera that looks along `forward`; world y points down.

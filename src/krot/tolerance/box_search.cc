@@ -1,4 +1,4 @@
-#include "krot/tolerance/box_search.h"
+#include "krot/tolerance/tolerance_analysis.h"
 
 #include <algorithm>
 #include <utility>

@@ -9,9 +9,9 @@
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/base/timer.h"
-#include "krot/model/local_frame.h"
-#include "krot/problem/components.h"
+#include "krot/base/context.h"
+#include "krot/model/derived_models.h"
+#include "krot/problem/subset.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

@@ -1,9 +1,13 @@
 #include "krot/verify/certificate_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <sstream>
+#include <vector>
 
-#include "krot/verify/certificate_input.h"
+#include <Eigen/LU>
+
 #include "krot/verify/force_checker.h"
 
 // Of exact multipliers beside the certificate's (force_checker.h),
@@ -11,6 +15,81 @@
 // feasible and proves delta / rho.
 
 namespace krot::internal {
+namespace {
+
+using Real = long double;
+using Matrix3 = Eigen::Matrix<Real, 3, 3>;
+
+constexpr double kMaxExcess = 1e-12;  // of |y|_dual over lambda
+
+}  // namespace
+
+std::string Sentence(const std::string& start, double value,
+                     const std::string& end) {
+  std::ostringstream text;
+  text.precision(17);
+  text << start << value << end;
+  return text.str();
+}
+
+std::optional<std::string> RefuseNumbers(const KnownRotationProblem& problem,
+                                         Norm norm,
+                                         const Certificate& certificate) {
+  if (norm.p != 2 && !norm.IsPolyhedral()) {
+    return Sentence("there are no certificates for p = ", norm.p, "");
+  }
+  const double bound = certificate.lower_bound;
+  if (!(bound > 0) || !std::isfinite(bound)) {
+    return Sentence("the lower bound is ", bound, ", must be positive");
+  }
+  const double defect = certificate.defect;
+  if (!(defect >= 0 && defect <= kMaxDefect)) {
+    return Sentence("the defect is ", defect, ", must be in [0, 1e-6]");
+  }
+  if (certificate.observations.empty()) return "it holds no observation";
+  const int64_t count = static_cast<int64_t>(problem.observations.size());
+  int64_t previous = -1;
+  for (const CertifiedObservation& o : certificate.observations) {
+    if (o.observation <= previous || o.observation >= count) {
+      return "its observations do not ascend or are not the problem's";
+    }
+    previous = o.observation;
+    const std::string which =
+        "the multipliers of observation " + std::to_string(o.observation);
+    if (!std::isfinite(o.lambda) || !o.y.allFinite() || !(o.lambda > 0)) {
+      return which + " are not finite, or lambda is not positive";
+    }
+    if (!(DualNorm<Real>(o.y.cast<Real>(), norm) <=
+          o.lambda * (1 + kMaxExcess))) {
+      return which + " are infeasible: y is longer than lambda";
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> RefuseRotations(
+    const KnownRotationProblem& problem) {
+  std::vector<const View*> first_view(problem.num_frames);
+  for (const View& view : problem.views) {
+    const Matrix3 R_sr = view.cam_from_rig_rotation.cast<Real>();
+    const Matrix3 R_cw = view.cam_from_world_rotation.cast<Real>();
+    for (const Matrix3& R : {R_sr, R_cw}) {
+      const Real error =
+          (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff();
+      if (!(error <= 1e-12)) return "a rotation of its views is none";
+    }
+    const View*& first = first_view[view.frame];
+    if (!first) first = &view;
+    const Matrix3 R_rw =
+        Matrix3(first->cam_from_rig_rotation.cast<Real>()).inverse() *
+        first->cam_from_world_rotation.cast<Real>();
+    if (!((R_cw - R_sr * R_rw).cwiseAbs().maxCoeff() <= kRotationError)) {
+      return "the rotations of a frame's views contradict each other";
+    }
+  }
+  return std::nullopt;
+}
+
 namespace {
 
 // rho, or why there is none.

@@ -4,10 +4,9 @@
 #include <limits>
 #include <optional>
 
-#include "krot/problem/components.h"
-#include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
-#include "krot/verify/certificate_input.h"
+#include "krot/problem/known_rotation_problem.h"
+#include "krot/verify/certificate_check.h"
 
 namespace krot::internal {
 namespace {

@@ -16,13 +16,13 @@
 #include <utility>
 #include <vector>
 
-#include <krot/bridge/conflict_file.h>
+#include <krot/convert/certificate_file.h>
 #include <krot/check.h>
 #include <krot/outliers/outlier_filter.h>
-#include <krot/outliers/tolerant_solve.h>
-#include <krot/report/check_report.h>
-#include <krot/report/outlier_report.h>
-#include <krot/report/solve_report.h>
+#include <krot/outliers/filter_steps.h>
+#include <krot/report/reports.h>
+#include <krot/report/reports.h>
+#include <krot/report/reports.h>
 
 namespace colmap {
 namespace {

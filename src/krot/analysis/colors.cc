@@ -1,0 +1,218 @@
+#include "krot/analysis/colors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "krot/base/check.h"
+#include "krot/context.h"
+#include "krot/model.h"
+#include "krot/model/model_checks.h"
+#include "krot/model/rigs.h"
+
+namespace krot::internal {
+namespace {
+
+constexpr std::array<std::array<uint8_t, 3>, 6> kStops = {{{58, 110, 165},
+                                                           {53, 151, 143},
+                                                           {127, 188, 65},
+                                                           {244, 180, 26},
+                                                           {230, 85, 13},
+                                                           {190, 0, 60}}};
+constexpr std::array<uint8_t, 3> kUnknown = {128, 128, 128};
+
+// NaN if none is finite.
+double LargestError(const std::vector<double>& errors_px,
+                    const Point3D& point) {
+  double largest_px = std::numeric_limits<double>::quiet_NaN();
+  for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+    if (!std::isfinite(errors_px[e])) continue;
+    largest_px = std::fmax(largest_px, errors_px[e]);
+  }
+  return largest_px;
+}
+
+}  // namespace
+
+std::array<uint8_t, 3> ErrorColor(double error_px, double top_px) {
+  if (!std::isfinite(error_px)) return kUnknown;
+  const double share = std::clamp(error_px / top_px, 0.0, 1.0);
+  const double place = share * static_cast<double>(kStops.size() - 1);
+  const size_t stop = std::min(kStops.size() - 2, static_cast<size_t>(place));
+  const double weight = place - static_cast<double>(stop);
+  std::array<uint8_t, 3> color;
+  for (size_t i = 0; i < color.size(); ++i) {
+    const double low = kStops[stop][i];
+    const double high = kStops[stop + 1][i];
+    color[i] = static_cast<uint8_t>(std::lround(low + weight * (high - low)));
+  }
+  return color;
+}
+
+void ColorPointsByError(const std::vector<double>& errors_px, double top_px,
+                        Model* model) {
+  CheckArgument(errors_px.size() == model->track_elements.size(),
+                "errors_px.size()", errors_px.size(),
+                "the number of track elements");
+  CheckArgument(top_px > 0 && std::isfinite(top_px), "top_px", top_px,
+                "a positive number");
+  for (Point3D& point : model->points3D) {
+    point.color = ErrorColor(LargestError(errors_px, point), top_px);
+  }
+}
+
+namespace {
+
+// What is added to the ids of a model.
+struct IdOffsets {
+  CameraId camera = 0;
+  ImageId image = 0;
+  RigId rig = 0;
+  FrameId frame = 0;
+  Point3DId point3D = 0;
+};
+
+template <typename Record>
+uint64_t MaxId(const std::vector<Record>& records) {
+  uint64_t max_id = 0;
+  for (const Record& record : records) {
+    max_id = std::max<uint64_t>(max_id, record.id);
+  }
+  return max_id;
+}
+
+// Sensors other than cameras have ids of their own.
+uint64_t MaxSensorId(const Model& model) {
+  uint64_t max_id = MaxId(model.cameras);
+  for (const Rig& rig : model.rigs) {
+    if (rig.ref_sensor_id) {
+      max_id = std::max<uint64_t>(max_id, rig.ref_sensor_id->id);
+    }
+    for (const RigSensor& sensor : rig.sensors) {
+      max_id = std::max<uint64_t>(max_id, sensor.sensor_id.id);
+    }
+  }
+  return max_id;
+}
+
+// The least power of ten above `max_id1`, for ids up to `max_id2`. The largest
+// value of the type is no id.
+template <typename Id>
+Id Offset(uint64_t max_id1, uint64_t max_id2, const std::string& kind) {
+  constexpr uint64_t kLimit = std::numeric_limits<Id>::max();
+  uint64_t offset = 10;
+  while (offset <= max_id1 && offset <= kLimit / 10) offset *= 10;
+  if (offset <= max_id1 || max_id2 >= kLimit - offset) {
+    throw ModelError("the " + kind + " ids of the two models reach " +
+                     std::to_string(max_id1) + " and " +
+                     std::to_string(max_id2) +
+                     ", too large for one model that holds both");
+  }
+  return static_cast<Id>(offset);
+}
+
+IdOffsets Offsets(const Model& model1, const Model& model2) {
+  return {
+      Offset<CameraId>(MaxSensorId(model1), MaxSensorId(model2), "camera"),
+      Offset<ImageId>(MaxId(model1.images), MaxId(model2.images), "image"),
+      Offset<RigId>(MaxId(model1.rigs), MaxId(model2.rigs), "rig"),
+      Offset<FrameId>(MaxId(model1.frames), MaxId(model2.frames), "frame"),
+      Offset<Point3DId>(MaxId(model1.points3D), MaxId(model2.points3D),
+                        "point"),
+  };
+}
+
+void RenumberRigs(const IdOffsets& offsets, Model* model) {
+  for (Rig& rig : model->rigs) {
+    rig.id += offsets.rig;
+    if (rig.ref_sensor_id) rig.ref_sensor_id->id += offsets.camera;
+    for (RigSensor& sensor : rig.sensors) {
+      sensor.sensor_id.id += offsets.camera;
+    }
+  }
+  for (Frame& frame : model->frames) {
+    frame.id += offsets.frame;
+    frame.rig_id += offsets.rig;
+    for (FrameData& data : frame.data) {
+      data.sensor_id.id += offsets.camera;
+      data.data_id += offsets.image;
+    }
+  }
+}
+
+void Renumber(const IdOffsets& offsets, Model* model) {
+  for (Camera& camera : model->cameras) camera.id += offsets.camera;
+  RenumberRigs(offsets, model);
+  for (Image& image : model->images) {
+    image.id += offsets.image;
+    image.camera_id += offsets.camera;
+    for (Point2D& point2D : image.points2D) {
+      if (point2D.point3D_id == kInvalidPoint3DId) continue;
+      point2D.point3D_id += offsets.point3D;
+    }
+  }
+  for (Point3D& point : model->points3D) point.id += offsets.point3D;
+  for (TrackElement& element : model->track_elements) {
+    element.image_id += offsets.image;
+  }
+}
+
+// Gives every image the pose that its frame and rig say.
+void FollowFrames(Model* model) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(*model);
+  for (size_t n = 0; n < model->images.size(); ++n) {
+    if (!geometries[n].rig_from_world.rotation.allFinite()) continue;
+    model->images[n].cam_from_world = ToPose(geometries[n].cam_from_world);
+  }
+}
+
+void Mark(const std::string& prefix, const std::array<uint8_t, 3>& color,
+          Model* model) {
+  for (Image& image : model->images) image.name = prefix + image.name;
+  for (Point3D& point : model->points3D) point.color = color;
+}
+
+template <typename Record>
+void MoveRecords(std::vector<Record>* from, std::vector<Record>* to) {
+  to->insert(to->end(), std::make_move_iterator(from->begin()),
+             std::make_move_iterator(from->end()));
+}
+
+Model Join(Model model1, Model model2) {
+  Model joined = std::move(model1);
+  joined.stores_rigs = joined.stores_rigs || model2.stores_rigs;
+  const uint64_t num_elements = joined.track_elements.size();
+  for (Point3D& point : model2.points3D) {
+    point.track_begin += num_elements;
+    point.track_end += num_elements;
+  }
+  MoveRecords(&model2.cameras, &joined.cameras);
+  MoveRecords(&model2.rigs, &joined.rigs);
+  MoveRecords(&model2.frames, &joined.frames);
+  MoveRecords(&model2.images, &joined.images);
+  MoveRecords(&model2.points3D, &joined.points3D);
+  MoveRecords(&model2.track_elements, &joined.track_elements);
+  return joined;
+}
+
+}  // namespace
+
+Model OverlayModels(const Model& model1, const Model& model2, int num_threads) {
+  Model first = model1;
+  Model second = model2;
+  DropUnknownPoints3D(&first);  // ids that the other model may bear
+  DropUnknownPoints3D(&second);
+  Renumber(Offsets(first, second), &second);
+  Mark("1/", kOverlayColor1, &first);
+  Mark("2/", kOverlayColor2, &second);
+  Model overlay = Join(std::move(first), std::move(second));
+  if (overlay.stores_rigs) FollowFrames(&overlay);
+  UpdatePointErrors(PixelErrors(overlay, num_threads), &overlay);
+  return overlay;
+}
+
+}  // namespace krot::internal

@@ -1,0 +1,339 @@
+#include "krot/analysis/epipolar.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <tuple>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/analysis/noise.h"
+#include "krot/base/check.h"
+
+namespace krot::internal {
+
+MatchNoise EstimateMatchNoise(
+    const std::vector<std::vector<double>>& errors_px) {
+  constexpr double kAlpha = 0.05;
+  constexpr double kMedianOverSigma = 0.6745;  // of |x|, Gaussian
+  const auto median_of = [](const std::vector<double>& errors) {
+    return errors[errors.size() / 2];
+  };
+  std::vector<double> medians;
+  size_t num_matches = 0;
+  for (const std::vector<double>& errors : errors_px) {
+    if (errors.empty()) continue;
+    medians.push_back(median_of(errors));
+    num_matches += errors.size();
+  }
+  if (medians.empty()) return {};
+  std::sort(medians.begin(), medians.end());
+  const double largest_median = 2 * medians[medians.size() / 4];
+  std::vector<double> better;
+  for (const std::vector<double>& errors : errors_px) {
+    if (errors.empty() || median_of(errors) > largest_median) continue;
+    better.insert(better.end(), errors.begin(), errors.end());
+  }
+  std::nth_element(better.begin(), better.begin() + better.size() / 2,
+                   better.end());
+  MatchNoise noise;
+  noise.sigma_px =
+      std::max(median_of(better) / kMedianOverSigma, kLeastNoisePx);
+  noise.tolerance_px =
+      noise.sigma_px *
+      std::sqrt(2 * std::log(static_cast<double>(num_matches) / kAlpha));
+  return noise;
+}
+
+namespace {
+
+double SignedMatchError(const WitnessMatch& match,
+                        const Eigen::Matrix3d& rotation,
+                        const Eigen::Vector3d& center) {
+  const Eigen::Matrix3d world_from_cam = rotation.transpose();
+  return EpipolarMatch(world_from_cam * match.ray, match.other_ray)
+      .SignedErrorPx(match.other_center - center);
+}
+
+// Rotation and centre after a step: a rotation vector in camera axes, or a
+// shift of the centre.
+void ApplyStep(PoseChange change, const Eigen::Vector3d& step,
+               Eigen::Matrix3d* rotation, Eigen::Vector3d* center) {
+  if (change == PoseChange::kMove) {
+    *center += step;
+  } else if (step.norm() > 0) {
+    *rotation = Eigen::AngleAxisd(step.norm(), step.normalized()) * *rotation;
+  }
+}
+
+// Of a match's signed error by the three parameters of the change: forward
+// differences of steps that are small beside what a pixel stands for.
+Eigen::Vector3d ErrorGradient(const WitnessMatch& match, PoseChange change,
+                              double step, const Eigen::Matrix3d& rotation,
+                              const Eigen::Vector3d& center, double error) {
+  Eigen::Vector3d gradient;
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Matrix3d next_rotation = rotation;
+    Eigen::Vector3d next_center = center;
+    ApplyStep(change, step * Eigen::Vector3d::Unit(i), &next_rotation,
+              &next_center);
+    gradient[i] =
+        (SignedMatchError(match, next_rotation, next_center) - error) / step;
+  }
+  return gradient;
+}
+
+double SumOfErrors(const std::vector<WitnessMatch>& matches,
+                   const Eigen::Matrix3d& rotation,
+                   const Eigen::Vector3d& center) {
+  double sum = 0;
+  for (const WitnessMatch& match : matches) {
+    sum += std::abs(SignedMatchError(match, rotation, center));
+  }
+  return sum;
+}
+
+}  // namespace
+
+RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
+                               const RigidTransform& cam_from_world,
+                               PoseChange change, double noise_px) {
+  constexpr int kMaxIterations = 50;
+  constexpr double kDifferenceStep = 1e-7;  // radians, or of the baselines
+  constexpr double kLeastGain = 1e-4;       // of the sum, for another iteration
+  Eigen::Matrix3d rotation = cam_from_world.rotation;
+  Eigen::Vector3d center = Center(cam_from_world);
+  double shortest = std::numeric_limits<double>::infinity();
+  for (const WitnessMatch& match : matches) {
+    shortest = std::min(shortest, (match.other_center - center).norm());
+  }
+  if (!(shortest > 0) || matches.empty()) return cam_from_world;
+  const double difference_step =
+      kDifferenceStep * (change == PoseChange::kMove ? shortest : 1);
+  double sum = SumOfErrors(matches, rotation, center);
+  for (int i = 0; i < kMaxIterations; ++i) {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
+    for (const WitnessMatch& match : matches) {
+      const double error = SignedMatchError(match, rotation, center);
+      const Eigen::Vector3d gradient = ErrorGradient(
+          match, change, difference_step, rotation, center, error);
+      const double weight = 1 / std::max(std::abs(error), noise_px);
+      normal += weight * gradient * gradient.transpose();
+      right_side -= weight * error * gradient;
+    }
+    Eigen::Vector3d step = normal.ldlt().solve(right_side);
+    if (!step.allFinite()) break;
+    // Halved until the sum falls.
+    double next_sum = sum;
+    Eigen::Matrix3d next_rotation;
+    Eigen::Vector3d next_center;
+    for (int halvings = 0; halvings < 20 && next_sum >= sum; ++halvings) {
+      next_rotation = rotation;
+      next_center = center;
+      ApplyStep(change, step, &next_rotation, &next_center);
+      next_sum = SumOfErrors(matches, next_rotation, next_center);
+      step /= 2;
+    }
+    if (!(next_sum < sum)) break;
+    rotation = next_rotation;
+    center = next_center;
+    const bool is_last = next_sum > (1 - kLeastGain) * sum;
+    sum = next_sum;
+    if (is_last) break;
+  }
+  return {rotation, -rotation * center};
+}
+
+int64_t NumAgreeing(const std::vector<WitnessMatch>& matches,
+                    const RigidTransform& cam_from_world, double tolerance_px) {
+  const Eigen::Vector3d center = Center(cam_from_world);
+  return std::count_if(
+      matches.begin(), matches.end(), [&](const WitnessMatch& match) {
+        return std::abs(SignedMatchError(match, cam_from_world.rotation,
+                                         center)) <= tolerance_px;
+      });
+}
+
+void NearestPoint::Add(const Eigen::Vector3d& point,
+                       const Eigen::Vector3d& direction, double weight) {
+  const Eigen::Matrix3d across = weight * (Eigen::Matrix3d::Identity() -
+                                           direction * direction.transpose());
+  normal_ += across;
+  right_side_ += across * point;
+}
+
+std::optional<Eigen::Vector3d> NearestPoint::Solve() const {
+  const Eigen::FullPivLU<Eigen::Matrix3d> decomposition(normal_);
+  if (!decomposition.isInvertible()) return std::nullopt;
+  return decomposition.solve(right_side_);
+}
+
+namespace {
+
+// A square of directions on the face of the cube where coordinate `face` is 1.
+struct Cell {
+  int face = 0;
+  double s = 0, t = 0;  // its centre, in the two other coordinates
+  double half_width = 1;
+  int64_t num_sure = 0;       // matches that all its directions explain
+  int64_t order = 0;          // when it was made
+  std::vector<int32_t> open;  // matches that some of its directions may explain
+
+  int64_t upper_bound() const {
+    return num_sure + static_cast<int64_t>(open.size());
+  }
+};
+
+// The most promising first; of equals the smallest, which is the nearest to an
+// answer.
+struct IsLessPromising {
+  bool operator()(const Cell& a, const Cell& b) const {
+    return std::make_tuple(a.upper_bound(), -a.half_width, -a.order) <
+           std::make_tuple(b.upper_bound(), -b.half_width, -b.order);
+  }
+};
+
+// So that interval arithmetic, which rounds outwards, gives up no less.
+constexpr double kMoreThanRounding = 1 + 1e-10;
+
+class CellSearch {
+ public:
+  CellSearch(const std::vector<EpipolarMatch>& matches, double tolerance_px,
+             int64_t max_cells)
+      : tolerance_px_(tolerance_px), max_cells_(max_cells) {
+    for (int face = 0; face < 3; ++face) {
+      conditions_[face].reserve(matches.size());
+      for (const EpipolarMatch& match : matches) {
+        conditions_[face].push_back(ConditionOn(face, match));
+      }
+    }
+    all_.resize(matches.size());
+    for (size_t k = 0; k < matches.size(); ++k) {
+      all_[k] = static_cast<int32_t>(k);
+    }
+  }
+
+  BaselineSearch Run() {
+    for (int face = 0; face < 3; ++face) {
+      Cell cell;
+      cell.face = face;
+      Look(std::move(cell), 0, all_);
+    }
+    while (!cells_.empty() && best_.num_cells < max_cells_ &&
+           cells_.top().upper_bound() > best_.num_explained) {
+      const Cell cell = cells_.top();
+      cells_.pop();
+      first_part_[cell.order] = best_.num_cells;
+      const double half = cell.half_width / 2;
+      for (const double ds : {-half, half}) {
+        for (const double dt : {-half, half}) {
+          Cell part;
+          part.face = cell.face;
+          part.s = cell.s + ds;
+          part.t = cell.t + dt;
+          part.half_width = half;
+          Look(std::move(part), cell.num_sure, cell.open);
+        }
+      }
+    }
+    best_.upper_bound = std::max(best_.num_explained, unresolved_);
+    if (!cells_.empty()) {
+      best_.upper_bound =
+          std::max(best_.upper_bound, cells_.top().upper_bound());
+    }
+    for (int64_t face = 0; face < 3; ++face) DescribeCell(face);
+    return best_;
+  }
+
+ private:
+  // As BaselineCertificate has them. No deeper than kSmallest is small.
+  void DescribeCell(int64_t order) {
+    const int64_t first = first_part_[order];
+    best_.cells += first < 0 ? '0' : '1';
+    if (first < 0) return;
+    for (int64_t part = first; part < first + 4; ++part) DescribeCell(part);
+  }
+
+  // A match in the coordinates (1, s, t) of a face.
+  struct Condition {
+    Eigen::Vector3d normal;
+    Eigen::Matrix<double, 4, 3> gradient;
+    double normal_change;    // of normal . b at most, per half width
+    double gradient_change;  // of |gradient b| at most, per half width
+  };
+
+  static Condition ConditionOn(int face, const EpipolarMatch& match) {
+    Condition condition;
+    for (int i = 0; i < 3; ++i) {
+      condition.normal[i] = match.normal[(face + i) % 3];
+      condition.gradient.col(i) = match.gradient.col((face + i) % 3);
+    }
+    condition.normal_change =
+        std::abs(condition.normal[1]) + std::abs(condition.normal[2]);
+    condition.gradient_change =
+        condition.gradient.col(1).norm() + condition.gradient.col(2).norm();
+    return condition;
+  }
+
+  // Sorts the matches that the surrounding cell left open, counts what the
+  // centre explains, and keeps the cell if it may hold a better direction.
+  void Look(Cell cell, int64_t num_sure, const std::vector<int32_t>& open) {
+    cell.num_sure = num_sure;
+    cell.order = best_.num_cells++;
+    first_part_.push_back(-1);
+    cell.open.reserve(open.size());
+    int64_t num_at_centre = num_sure;
+    const Eigen::Vector3d b(1, cell.s, cell.t);
+    for (const int32_t k : open) {
+      const Condition& condition = conditions_[cell.face][k];
+      const double distance = std::abs(condition.normal.dot(b));
+      const double allowed = tolerance_px_ * (condition.gradient * b).norm();
+      const double change =
+          cell.half_width *
+          (condition.normal_change + tolerance_px_ * condition.gradient_change);
+      if (distance <= allowed) ++num_at_centre;
+      if (distance + change <= allowed) {
+        ++cell.num_sure;
+      } else if (distance - change <= kMoreThanRounding * allowed) {
+        cell.open.push_back(k);
+      }
+    }
+    if (num_at_centre > best_.num_explained) {
+      best_.num_explained = num_at_centre;
+      for (int i = 0; i < 3; ++i) best_.baseline[(cell.face + i) % 3] = b[i];
+      best_.baseline.normalize();
+    }
+    if (cell.upper_bound() <= best_.num_explained) return;
+    constexpr double kSmallest = 1e-12;
+    if (cell.half_width < kSmallest) {
+      unresolved_ = std::max(unresolved_, cell.upper_bound());
+      return;
+    }
+    cells_.push(std::move(cell));
+  }
+
+  const double tolerance_px_;
+  const int64_t max_cells_;
+  std::array<std::vector<Condition>, 3> conditions_;
+  std::vector<int32_t> all_;
+  std::priority_queue<Cell, std::vector<Cell>, IsLessPromising> cells_;
+  BaselineSearch best_;
+  int64_t unresolved_ = 0;
+  std::vector<int64_t> first_part_;  // of each cell, -1: it is not divided
+};
+
+}  // namespace
+
+BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
+                              double tolerance_px, int64_t max_cells) {
+  CheckArgument(tolerance_px > 0, "tolerance_px", tolerance_px, "positive");
+  CheckArgument(max_cells > 0, "max_cells", max_cells, "positive");
+  return CellSearch(matches, tolerance_px, max_cells).Run();
+}
+
+}  // namespace krot::internal

@@ -1,0 +1,185 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/camera/camera_model.h"
+#include "krot/database.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
+
+namespace krot::internal {
+
+// A pixel's ray, and its derivatives by the pixel's two coordinates.
+struct PixelRay {
+  Eigen::Vector3d ray;
+  Eigen::Matrix<double, 3, 2> by_pixel;
+};
+
+inline PixelRay operator*(const Eigen::Matrix3d& rotation,
+                          const PixelRay& pixel) {
+  return {rotation * pixel.ray, rotation * pixel.by_pixel};
+}
+
+// In camera axes; none if no ray less than 90 degrees off the axis projects to
+// the pixel, and for cameras without an image plane.
+inline std::optional<PixelRay> RayOf(const Camera& camera,
+                                     const Eigen::Vector2d& pixel) {
+  const CameraModelInfo* info = FindCameraModel(camera.model_id);
+  UndistortedObservation undistorted;
+  if (info == nullptr || !info->has_image_plane ||
+      UndistortPixel(camera.model_id, camera.params.data(), pixel, std::nullopt,
+                     &undistorted) != UndistortStatus::kOk) {
+    return std::nullopt;
+  }
+  PixelRay ray;
+  ray.ray = undistorted.u.homogeneous();
+  ray.by_pixel << undistorted.J.inverse(), 0, 0;
+  return ray;
+}
+
+// A match of two images whose rotations are known, as a condition on the
+// baseline b, the direction from one centre to the other: b, and the rays d1
+// and d2 of the two pixels, all in world axes, lie in one plane if
+// b . (d1 x d2) = 0.
+struct EpipolarMatch {
+  Eigen::Vector3d normal;  // d1 x d2
+  // Its derivatives by the four coordinates of the two pixels, as rows.
+  Eigen::Matrix<double, 4, 3> gradient;
+
+  EpipolarMatch(const PixelRay& ray1, const PixelRay& ray2)
+      : normal(ray1.ray.cross(ray2.ray)) {
+    for (int i = 0; i < 2; ++i) {
+      gradient.row(i) = ray1.by_pixel.col(i).cross(ray2.ray);
+      gradient.row(2 + i) = ray1.ray.cross(ray2.by_pixel.col(i));
+    }
+  }
+
+  // How far the two pixels must move together, in pixels and to first order,
+  // until both lie on their epipolar lines (Sampson's distance), with the side
+  // on which they are. The baseline's length does not matter; 0 where it gives
+  // no lines.
+  double SignedErrorPx(const Eigen::Vector3d& baseline) const {
+    const double change = (gradient * baseline).norm();
+    return change > 0 ? normal.dot(baseline) / change : 0;
+  }
+  double ErrorPx(const Eigen::Vector3d& baseline) const {
+    return std::abs(SignedErrorPx(baseline));
+  }
+};
+
+struct MatchNoise {
+  double sigma_px = 0;      // per axis and keypoint
+  double tolerance_px = 0;  // no Gaussian error of all exceeds it, 95 %
+};
+
+// From the errors of each pair of images (Sampson's distances, pixels), each
+// list ascending; empty lists do not count. A match of a sound model lies
+// within the tolerance, however many there are: of N Gaussian errors the
+// largest exceeds sigma sqrt(2 ln(N / alpha)) with a probability below
+// alpha = 0.05. Sigma is that of the pairs whose median error is at most twice
+// that of the best quarter: so a few wrong poses do not hide among the noise,
+// as long as half of the images are right. Zeros without errors.
+MatchNoise EstimateMatchNoise(
+    const std::vector<std::vector<double>>& errors_px);
+
+// A match of one image, whose pose is in question, with another, whose pose is
+// known.
+struct WitnessMatch {
+  PixelRay ray;        // of the image in question, in its camera's axes
+  PixelRay other_ray;  // of the other image, in world axes
+  Eigen::Vector3d other_center;
+};
+
+enum class PoseChange {
+  kMove,  // another centre, the same rotation
+  kTurn   // another rotation, the same centre
+};
+
+// The pose, changed in one of the two ways, for which the matches have the
+// least sum of absolute errors: Sampson's distances, by iteratively reweighted
+// least squares from the pose as it is. `noise_px`, positive, is the error
+// below which matches weigh the same. A local minimum; the pose itself if there
+// are no matches. O(iterations * matches), at most 50 iterations.
+RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
+                               const RigidTransform& cam_from_world,
+                               PoseChange change, double noise_px);
+
+// How many of the matches are within the tolerance under a pose of their image.
+int64_t NumAgreeing(const std::vector<WitnessMatch>& matches,
+                    const RigidTransform& cam_from_world, double tolerance_px);
+
+// The point with the least weighted sum of squared distances to lines.
+class NearestPoint {
+ public:
+  // A line through a point along a unit vector.
+  void Add(const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
+           double weight);
+
+  // None where the lines do not determine it.
+  std::optional<Eigen::Vector3d> Solve() const;
+
+ private:
+  Eigen::Matrix3d normal_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right_side_ = Eigen::Vector3d::Zero();
+};
+
+// The most matches that one baseline explains.
+struct BaselineSearch {
+  int64_t num_explained = 0;  // by `baseline`: ErrorPx <= tolerance_px
+  // No baseline explains more. Equal to num_explained unless the search ended
+  // early.
+  int64_t upper_bound = 0;
+  Eigen::Vector3d baseline = Eigen::Vector3d::UnitZ();  // of length 1
+  int64_t num_cells = 0;                                // that were looked at
+  // The proof of upper_bound, for BaselineCertificate: which cells were
+  // divided.
+  std::string cells;
+};
+
+// Branch and bound over the half sphere of all directions, exact up to
+// rounding: each cell of a cube's three faces is given up once no direction in
+// it can explain more matches than the best one found, and is divided
+// otherwise. Ends early after `max_cells` cells, and at cells that are no
+// longer than 1e-12. Same result on every machine. O(cells * matches); a
+// thousand matches, half of them wrong, take milliseconds.
+//
+// Throws std::invalid_argument unless tolerance_px > 0 and max_cells > 0.
+BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
+                              double tolerance_px, int64_t max_cells = 1000000);
+
+// A pair that contradicts the poses, by the matches that are lost if these are
+// called wrong.
+struct ContradictoryPair {
+  int32_t image1 = 0;
+  int32_t image2 = 0;  // another image
+  int64_t num_matches = 0;
+};
+
+struct Explanations {
+  Explanation cheapest;
+  // The cheapest of those that call one of its images right, or an image wrong
+  // that is in a contradiction between two right ones, and that give up at most
+  // a tenth more than it, where the two differ; none if there is none.
+  std::optional<Explanation> runner_up;
+  bool is_proved = true;
+};
+
+// The set of images that, called wrong, costs least: an image costs
+// `image_costs[i]` matches, a contradiction between two images that are not
+// called wrong its own. Image by image it is settled whether calling it
+// wrong pays whatever the others are; what is left is branched on, `max_nodes`
+// times at most for each explanation.
+Explanations ExplainContradictions(
+    const std::vector<int64_t>& image_costs,
+    const std::vector<ContradictoryPair>& contradictions,
+    int64_t max_nodes = 100000);
+
+}  // namespace krot::internal

@@ -1,0 +1,245 @@
+#include "krot/analysis/model_input.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <limits>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "krot/base/check.h"
+#include "krot/base/numbers.h"
+#include "krot/context.h"
+#include "krot/model.h"
+#include "krot/model/rigs.h"
+
+namespace krot::internal {
+namespace {
+
+// Of the image's larger side. 2D points that have nothing to do with their 3D
+// points are about half of it off.
+constexpr double kUnrelated = 0.1;
+// How many times the median error of two sides that are both right may differ,
+// and by how many pixels in any case.
+constexpr double kClearly = 2;
+constexpr double kPixel = 1;
+// What rounding may add to the largest error, relative.
+constexpr double kRounding = 1e-9;
+
+struct SideFit {
+  Contradictions::Fit px;
+  double relative_median = 0;  // to the image's larger side
+  int64_t count = 0;
+  bool is_any_finite = false;
+};
+
+// Of the tracks of a valid model and so many elements that do not exist. None
+// without an observation that has a pose.
+std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
+  const std::vector<double> errors_px = PixelErrors(model);
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const auto image_indices = ImageIndices(model);
+  std::vector<double> px(num_unknown, kInfinity);
+  std::vector<double> relative = px;
+  SideFit fit;
+  for (size_t e = 0; e < errors_px.size(); ++e) {
+    const ImageGeometry& image =
+        geometries[image_indices.at(model.track_elements[e].image_id)];
+    if (!image.has_pose) continue;
+    const Camera& camera = model.cameras[image.camera];
+    const auto side = static_cast<double>(
+        std::max({camera.width, camera.height, uint64_t{1}}));
+    const bool is_finite = std::isfinite(errors_px[e]);
+    fit.is_any_finite |= is_finite;
+    px.push_back(is_finite ? errors_px[e] : kInfinity);
+    relative.push_back(px.back() / side);
+  }
+  if (px.empty()) return std::nullopt;
+  fit.count = static_cast<int64_t>(px.size());
+  fit.px.max = *std::max_element(px.begin(), px.end());
+  fit.px.median = Median(px);
+  fit.relative_median = Median(relative);
+  return fit;
+}
+
+Model Followed(Reading reading, const Model& model) {
+  Model copy = model;
+  Follow(reading, &copy);
+  return copy;
+}
+
+// Of a side whose observations `reading` holds, beside those of kBoth: whether
+// it is most of them, without the worst.
+bool IsBetterAlone(const Model& model, Reading reading, const SideFit& both) {
+  const std::optional<SideFit> alone = Measure(Followed(reading, model), 0);
+  return alone && 2 * alone->count >= both.count && alone->px.max < both.px.max;
+}
+
+bool IsRelated(const SideFit& side) {
+  return side.relative_median <= kUnrelated;
+}
+
+// None: neither fits.
+std::optional<Reading> Choose(const Model& model,
+                              const std::optional<SideFit>& tracks,
+                              const std::optional<SideFit>& images) {
+  if (!tracks || !images) return Reading::kBoth;
+  if (!IsRelated(*tracks) && !IsRelated(*images)) return std::nullopt;
+  const auto is_clearly_worse = [](const SideFit& side, const SideFit& other) {
+    return !IsRelated(side) ||
+           side.px.median > kClearly * other.px.median + kPixel;
+  };
+  if (is_clearly_worse(*tracks, *images)) return Reading::kImages;
+  if (is_clearly_worse(*images, *tracks)) return Reading::kTracks;
+  const std::optional<SideFit> both =
+      Measure(Followed(Reading::kBoth, model), 0);
+  if (IsBetterAlone(model, Reading::kImages, *both)) return Reading::kImages;
+  if (IsBetterAlone(model, Reading::kTracks, *both)) return Reading::kTracks;
+  return Reading::kBoth;
+}
+
+const char* Name(Reading reading) {
+  switch (reading) {
+    case Reading::kTracks:
+      return "tracks";
+    case Reading::kImages:
+      return "images";
+    case Reading::kBoth:
+      break;
+  }
+  return "both";
+}
+
+}  // namespace
+
+Contradictions SettleContradictions(const std::string& on_contradiction,
+                                    Model* model) {
+  const bool is_auto = on_contradiction == "auto";
+  const bool follows_images = on_contradiction == "follow_images";
+  CheckArgument(is_auto || follows_images ||
+                    on_contradiction == "follow_tracks" ||
+                    on_contradiction == "refuse",
+                "on_contradiction", on_contradiction,
+                "one of {auto, follow_tracks, follow_images, refuse}");
+  Contradictions found = FindContradictions(*model);
+  if (!found.Any() || on_contradiction == "refuse") return found;
+
+  const Model by_images = Followed(Reading::kImages, *model);
+  ValidateModel(by_images);
+  Model by_tracks = *model;
+  const int64_t num_unknown = DropUnknownPoints2D(&by_tracks);
+  std::optional<SideFit> tracks = Measure(by_tracks, num_unknown);
+  std::optional<SideFit> images = Measure(by_images, 0);
+  const bool has_positions =
+      (tracks && tracks->is_any_finite) || (images && images->is_any_finite);
+  if (!has_positions || !(HasTrack(by_tracks) || HasTrack(by_images))) {
+    tracks = images = std::nullopt;
+  }
+  if (tracks) found.of_tracks = tracks->px;
+  if (images) found.of_images = images->px;
+  if (on_contradiction == "follow_tracks") {
+    found.followed = "tracks";
+    return found;
+  }
+  const std::optional<Reading> reading =
+      is_auto ? Choose(*model, tracks, images) : Reading::kImages;
+  found.followed = reading ? Name(*reading) : "neither";
+  if (reading) Follow(*reading, model);
+  return found;
+}
+
+std::optional<std::pair<double, double>> WorseImagesSide(const Model& before,
+                                                         const Model& after,
+                                                         Norm norm) {
+  if (!FindContradictions(before).Any()) return std::nullopt;
+  const Model old = Followed(Reading::kImages, before);
+  const std::optional<SideFit> fit = Measure(old, 0);
+  if (!fit || !IsRelated(*fit)) return std::nullopt;
+  const PixelErrorStatistics errors = Summarize(PixelErrors(old, -1, norm));
+  const PixelErrorStatistics errors_after =
+      Summarize(PixelErrors(Followed(Reading::kImages, after), -1, norm));
+  const double max_after = errors_after.not_finite > errors.not_finite
+                               ? kInfinity
+                               : errors_after.max;
+  if (!(max_after > errors.max * (1 + kRounding))) return std::nullopt;
+  return std::pair(errors.max, max_after);
+}
+
+namespace {
+
+// A model speaks against rotations if half of its observations fit with its
+// own, to this share of the image's larger side.
+constexpr double kFits = 0.01;
+// A wrong convention multiplies errors by far more than this.
+constexpr double kFarSmaller = 5;
+
+std::optional<double> FiniteMedian(std::vector<double> errors) {
+  if (errors.empty()) return std::nullopt;
+  for (double& error : errors) {
+    if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
+  }
+  const double median = Median(std::move(errors));
+  return std::isfinite(median) ? std::optional<double>(median) : std::nullopt;
+}
+
+// Leaves those that differ, if any do: those of the images that were turned.
+void KeepChanged(std::vector<double>* before, std::vector<double>* after) {
+  size_t num_kept = 0;
+  for (size_t n = 0; n < before->size(); ++n) {
+    const double was = (*before)[n];
+    const double is = (*after)[n];
+    if (was == is || (std::isnan(was) && std::isnan(is))) continue;
+    (*before)[num_kept] = was;
+    (*after)[num_kept++] = is;
+  }
+  if (num_kept == 0) return;
+  before->resize(num_kept);
+  after->resize(num_kept);
+}
+
+double LargestSide(const Model& model) {
+  uint64_t side = 0;
+  for (const Camera& camera : model.cameras) {
+    side = std::max({side, camera.width, camera.height});
+  }
+  return static_cast<double>(side);
+}
+
+std::string Pixels(const std::optional<double>& error) {
+  std::ostringstream text;
+  if (error) text << std::fixed << std::setprecision(2) << *error << " px";
+  return error ? text.str() : "infinite, behind the cameras";
+}
+
+}  // namespace
+
+RotationInput TakeRotations(const FileBytes& file, Model* model,
+                            int num_threads, const FileNote& note) {
+  RotationInput input;
+  std::vector<double> before = PixelErrors(*model, num_threads);
+  input.replaced = ReplaceRotations(file, model, note);
+  std::vector<double> after = PixelErrors(*model, num_threads);
+  KeepChanged(&before, &after);
+  input.median_error_before = FiniteMedian(std::move(before));
+  input.median_error_after = FiniteMedian(std::move(after));
+  const bool model_fits =
+      input.median_error_before &&
+      *input.median_error_before <= kFits * LargestSide(*model);
+  if (input.replaced.mistake.empty() || !model_fits) return input;
+  const bool is_far_worse =
+      !input.median_error_after ||
+      kFarSmaller * *input.median_error_before < *input.median_error_after;
+  if (is_far_worse) {
+    throw ModelError(file.path + ": " + input.replaced.mistake +
+                     "; the median error is " +
+                     Pixels(input.median_error_before) +
+                     " with the model's own, with these " +
+                     Pixels(input.median_error_after));
+  }
+  return input;
+}
+
+}  // namespace krot::internal

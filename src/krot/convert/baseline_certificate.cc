@@ -1,0 +1,319 @@
+#include "krot/convert/baseline_certificate.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/convert/certificate_json.h"
+#include "krot/camera/camera_model.h"
+#include "krot/camera/interval.h"
+#include "krot/context.h"
+#include "krot/model/rigs.h"
+
+namespace krot::internal {
+namespace {
+
+using Json = CertificateFileJson;
+using Eigen::Vector3d;
+
+// Halves of halves: squares are exact numbers up to here.
+constexpr int kDeepestCell = 50;
+
+// An enclosure of a vector.
+using Box = std::array<Interval, 3>;
+
+Box Cross(const Vector3d& a, const Vector3d& b) {
+  const auto difference = [&](int i, int j) {
+    return Interval{a[i], a[i]} * Interval{b[j], b[j]} -
+           Interval{a[j], a[j]} * Interval{b[i], b[i]};
+  };
+  return {difference(1, 2), difference(2, 0), difference(0, 1)};
+}
+
+Interval Dot(const Box& a, const Box& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+Interval Square(const Interval& a) {
+  const double most = std::max(-a.lo, a.hi);
+  const double least = std::max({0.0, a.lo, -a.hi});
+  return Interval{least, most} * Interval{least, most};
+}
+
+// A match: a baseline b explains it if, with the rays d1 and d2 of its pixels
+// and their derivatives, |b . (d1 x d2)| <= tolerance |gradient b|.
+struct Condition {
+  Box normal;
+  std::array<Box, 4> gradient;
+
+  // Both sides, squared.
+  std::pair<Interval, Interval> Sides(const Box& b, double tolerance) const {
+    Interval sum{0, 0};
+    for (const Box& row : gradient) sum = sum + Square(Dot(row, b));
+    return {Square(Dot(normal, b)),
+            Square(Interval{tolerance, tolerance}) * sum};
+  }
+};
+
+struct WorldRay {
+  Vector3d ray;
+  std::array<Vector3d, 2> by_pixel;
+};
+
+std::optional<WorldRay> RayOfPixel(const Camera& camera,
+                                   const Eigen::Matrix3d& world_from_cam,
+                                   const Eigen::Vector2d& pixel) {
+  const CameraModelInfo* info = FindCameraModel(camera.model_id);
+  UndistortedObservation undistorted;
+  if (info == nullptr || !info->has_image_plane ||
+      UndistortPixel(camera.model_id, camera.params.data(), pixel, std::nullopt,
+                     &undistorted) != UndistortStatus::kOk) {
+    return std::nullopt;
+  }
+  const Eigen::Matrix2d inverse = undistorted.J.inverse();
+  WorldRay ray;
+  ray.ray = world_from_cam * undistorted.u.homogeneous();
+  for (int i = 0; i < 2; ++i) {
+    ray.by_pixel[i] =
+        world_from_cam * Vector3d(inverse(0, i), inverse(1, i), 0);
+  }
+  return ray;
+}
+
+std::vector<Condition> ConditionsOf(
+    const Model& model, const std::vector<ImageGeometry>& geometries,
+    const Database& database, const VerifiedPair& pair) {
+  std::vector<Condition> conditions;
+  const auto ray = [&](int32_t image, uint32_t keypoint) {
+    return RayOfPixel(model.cameras[geometries[image].camera],
+                      geometries[image].cam_from_world.rotation.transpose(),
+                      database.keypoints[image][keypoint]);
+  };
+  for (const auto& [keypoint1, keypoint2] : pair.matches) {
+    const auto ray1 = ray(pair.image1, keypoint1);
+    const auto ray2 = ray(pair.image2, keypoint2);
+    if (!ray1 || !ray2) continue;
+    Condition& condition = conditions.emplace_back();
+    condition.normal = Cross(ray1->ray, ray2->ray);
+    for (int i = 0; i < 2; ++i) {
+      condition.gradient[i] = Cross(ray1->by_pixel[i], ray2->ray);
+      condition.gradient[2 + i] = Cross(ray1->ray, ray2->by_pixel[i]);
+    }
+  }
+  return conditions;
+}
+
+// Walks through the cells of one pair.
+class CellChecker {
+ public:
+  CellChecker(const std::vector<Condition>& conditions, double tolerance,
+              const BaselineCertificate::Pair& pair)
+      : conditions_(conditions), tolerance_(tolerance), pair_(pair) {}
+
+  // Why the cells prove nothing; empty if they do.
+  std::string Run() {
+    std::vector<int32_t> all(conditions_.size());
+    for (size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int32_t>(k);
+    for (int face = 0; face < 3 && refusal_.empty(); ++face) {
+      Check(face, 0, 0, 1, 0, all);
+    }
+    if (refusal_.empty() && next_ != pair_.cells.size()) {
+      refusal_ = "its cells go on after the last";
+    }
+    return refusal_;
+  }
+
+ private:
+  void Check(int face, double s, double t, double half_width, int depth,
+             const std::vector<int32_t>& above) {
+    if (!refusal_.empty()) return;
+    if (next_ == pair_.cells.size() || depth > kDeepestCell) {
+      refusal_ = "its cells do not cover all directions";
+      return;
+    }
+    Box b;
+    b[face] = {1, 1};
+    b[(face + 1) % 3] = {s - half_width, s + half_width};
+    b[(face + 2) % 3] = {t - half_width, t + half_width};
+    std::vector<int32_t> open;
+    for (const int32_t k : above) {
+      const auto [distance, allowed] = conditions_[k].Sides(b, tolerance_);
+      if (!(distance.lo > allowed.hi)) open.push_back(k);
+    }
+    const char kind = pair_.cells[next_++];
+    if (kind == '1') {
+      const double half = half_width / 2;
+      for (const double ds : {-half, half}) {
+        for (const double dt : {-half, half}) {
+          Check(face, s + ds, t + dt, half, depth + 1, open);
+        }
+      }
+    } else if (kind != '0') {
+      refusal_ = "its cells hold something else than 0 and 1";
+    } else if (static_cast<int64_t>(open.size()) > pair_.most_explained) {
+      refusal_ = "in one of its cells " + std::to_string(open.size()) +
+                 " matches may be explained, and not " +
+                 std::to_string(pair_.most_explained) + " at most";
+    }
+  }
+
+  const std::vector<Condition>& conditions_;
+  const double tolerance_;
+  const BaselineCertificate::Pair& pair_;
+  size_t next_ = 0;
+  std::string refusal_;
+};
+
+std::string RefusePair(const std::vector<Condition>& conditions,
+                       double tolerance,
+                       const BaselineCertificate::Pair& pair) {
+  if (static_cast<int64_t>(conditions.size()) != pair.num_matches) {
+    return "the database has " + std::to_string(conditions.size()) +
+           " matches of it, and not " + std::to_string(pair.num_matches);
+  }
+  Box b;
+  for (int i = 0; i < 3; ++i) b[i] = {pair.baseline[i], pair.baseline[i]};
+  int64_t num_explained = 0;
+  for (const Condition& condition : conditions) {
+    const auto [distance, allowed] = condition.Sides(b, tolerance);
+    num_explained += distance.hi <= allowed.lo;
+  }
+  if (pair.baseline.isZero(0) || num_explained < pair.num_explained) {
+    return "its baseline explains " + std::to_string(num_explained) +
+           " matches, and not " + std::to_string(pair.num_explained);
+  }
+  return CellChecker(conditions, tolerance, pair).Run();
+}
+
+}  // namespace
+
+BaselineCertificate DescribeBaselines(const Model& model,
+                                      const PairCheck& check) {
+  BaselineCertificate certificate;
+  certificate.tolerance_px = check.tolerance_px;
+  for (const CheckedPair& pair : check.pairs) {
+    if (pair.state != PairState::kContradictory) continue;
+    certificate.pairs.push_back({model.images[pair.image1].id,
+                                 model.images[pair.image2].id, pair.num_matches,
+                                 pair.num_explained, pair.most_explained,
+                                 pair.best_baseline, pair.cells});
+  }
+  return certificate;
+}
+
+std::string BaselineJson(const BaselineCertificate& certificate) {
+  Json pairs = Json::array();
+  for (const BaselineCertificate::Pair& pair : certificate.pairs) {
+    pairs.push_back(
+        {{"image_id1", pair.image_id1},
+         {"image_id2", pair.image_id2},
+         {"num_matches", pair.num_matches},
+         {"num_explained", pair.num_explained},
+         {"most_explained", pair.most_explained},
+         {"baseline",
+          {pair.baseline.x(), pair.baseline.y(), pair.baseline.z()}},
+         {"cells", pair.cells}});
+  }
+  Json json = {{"version", certificate.version},
+               {"tolerance_px", certificate.tolerance_px}};
+  json["baselines"] = std::move(pairs);
+  return json.dump(1) + "\n";
+}
+
+bool HoldsBaselines(const std::string& json) {
+  const Json parsed = Json::parse(json, nullptr, /*allow_exceptions=*/false);
+  return parsed.is_object() && parsed.contains("baselines");
+}
+
+BaselineCertificate ParseBaselines(const std::string& json,
+                                   const std::string& file_name) {
+  const JsonReader reader(file_name);
+  Json parsed;
+  try {
+    parsed = Json::parse(json);
+  } catch (const Json::exception& error) {
+    throw ModelError(file_name + ": no JSON: " + error.what());
+  }
+  const auto member = [&](const char* key) -> const Json& {
+    return reader.Member(parsed, "the file", key);
+  };
+  const Json& version = member("version");
+  if (version != kBaselineCertificateVersion) {
+    reader.Fail("version", version,
+                std::to_string(kBaselineCertificateVersion));
+  }
+  BaselineCertificate certificate;
+  certificate.tolerance_px =
+      reader.Number(member("tolerance_px"), "tolerance_px");
+  const Json& pairs = reader.Array(member("baselines"), "baselines");
+  for (size_t n = 0; n < pairs.size(); ++n) {
+    const std::string place = "baselines[" + std::to_string(n) + "]";
+    const auto of = [&](const char* key) -> const Json& {
+      return reader.Member(pairs[n], place, key);
+    };
+    const auto count = [&](const char* key) {
+      constexpr uint64_t kMost = 1ULL << 32;
+      return static_cast<int64_t>(reader.Id(of(key), place + "." + key, kMost));
+    };
+    BaselineCertificate::Pair& pair = certificate.pairs.emplace_back();
+    pair.image_id1 =
+        static_cast<ImageId>(reader.Id(of("image_id1"), place + ".image_id1",
+                                       std::numeric_limits<ImageId>::max()));
+    pair.image_id2 =
+        static_cast<ImageId>(reader.Id(of("image_id2"), place + ".image_id2",
+                                       std::numeric_limits<ImageId>::max()));
+    pair.num_matches = count("num_matches");
+    pair.num_explained = count("num_explained");
+    pair.most_explained = count("most_explained");
+    pair.baseline = reader.Triple(of("baseline"), place + ".baseline");
+    pair.cells = reader.String(of("cells"), place + ".cells");
+  }
+  return certificate;
+}
+
+BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
+                                const BaselineCertificate& certificate) {
+  BaselineVerdict verdict;
+  if (!(certificate.tolerance_px > 0)) {
+    verdict.refusal = "its tolerance_px is no positive number";
+    return verdict;
+  }
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  std::map<std::pair<ImageId, ImageId>, const VerifiedPair*> pairs;
+  for (const VerifiedPair& pair : database.pairs) {
+    if (!geometries[pair.image1].has_pose ||
+        !geometries[pair.image2].has_pose) {
+      continue;
+    }
+    pairs[{model.images[pair.image1].id, model.images[pair.image2].id}] = &pair;
+  }
+  for (const BaselineCertificate::Pair& pair : certificate.pairs) {
+    const std::string name = "the pair of images " +
+                             std::to_string(pair.image_id1) + " and " +
+                             std::to_string(pair.image_id2);
+    const auto found = pairs.find({pair.image_id1, pair.image_id2});
+    if (found == pairs.end()) {
+      verdict.refusal =
+          "model and database have not " + name + ", or it is there twice";
+      return verdict;
+    }
+    const std::string refusal =
+        RefusePair(ConditionsOf(model, geometries, database, *found->second),
+                   certificate.tolerance_px, pair);
+    if (!refusal.empty()) {
+      verdict.refusal = name + ": " + refusal;
+      return verdict;
+    }
+    pairs.erase(found);
+  }
+  verdict.is_accepted = true;
+  return verdict;
+}
+
+}  // namespace krot::internal

@@ -1,0 +1,369 @@
+#include "krot/convert/certificate_file.h"
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <utility>
+
+#include "krot/convert/build_steps.h"
+#include "krot/convert/certificate_json.h"
+#include "krot/convert/model_digest.h"
+#include "krot/convert/reprojection.h"
+#include "krot/context.h"
+#include "krot/problem/cost.h"
+#include "krot/problem/subset.h"
+
+namespace krot::internal {
+namespace {
+
+// What is not in a problem of an observation.
+struct Sighting {
+  Eigen::Vector2d pixel;
+  int32_t point2D;
+};
+
+// Cameras and poses.
+Model WithoutPoints(const Model& model) {
+  Model result;
+  result.stores_rigs = model.stores_rigs;
+  result.cameras = model.cameras;
+  result.rigs = model.rigs;
+  result.frames = model.frames;
+  for (const Image& image : model.images) {
+    result.images.push_back(
+        {image.id, image.cam_from_world, image.camera_id, image.name, {}});
+  }
+  return result;
+}
+
+}  // namespace
+
+int64_t GatheredSupport::Find(int64_t number) const {
+  return std::lower_bound(in_whole.begin(), in_whole.end(), number) -
+         in_whole.begin();
+}
+
+Certificate GatheredSupport::FromWhole(Certificate certificate) const {
+  for (CertifiedObservation& o : certificate.observations) {
+    o.observation = Find(o.observation);
+  }
+  return certificate;
+}
+
+Certificate GatheredSupport::ToWhole(Certificate certificate) const {
+  for (CertifiedObservation& o : certificate.observations) {
+    o.observation = in_whole[o.observation];
+  }
+  return certificate;
+}
+
+GatheredSupport GatherSupport(const Model& model, const BuiltProblem& built,
+                              const Estimate& estimate,
+                              const std::vector<int64_t>& observations,
+                              Ranks* ranks) {
+  std::vector<int32_t> points;
+  for (const int64_t i : observations) {
+    const int32_t k = built.problem.observations[i].point;
+    if (points.empty() || points.back() != k) points.push_back(k);
+  }
+  std::vector<Point3DId> ids;
+  std::vector<Sighting> sightings;
+  std::vector<int64_t> of_points;
+  for (const int32_t k : points) {
+    ids.push_back(model.points3D[built.point_of[k]].id);
+    for (int64_t i = built.problem.point_begin[k];
+         i < built.problem.point_begin[k + 1]; ++i) {
+      sightings.push_back({built.pixels[i], built.point2D_of[i]});
+      of_points.push_back(i);
+    }
+  }
+  const GatheredPart part(built.problem, of_points, ranks);
+  GatheredSupport support;
+  support.model = WithoutPoints(model);
+  support.built.problem = part.problem();
+  support.built.frame_of = built.frame_of;
+  support.built.image_of = built.image_of;
+  support.estimate = part.Collect(estimate);
+  support.in_whole = part.in_whole();
+  for (const Point3DId id : ranks->GatherOnFirst(ids)) {
+    support.built.point_of.push_back(
+        static_cast<int32_t>(support.model.points3D.size()));
+    support.model.points3D.emplace_back().id = id;
+  }
+  for (const Sighting& sighting : ranks->GatherOnFirst(sightings)) {
+    support.built.pixels.push_back(sighting.pixel);
+    support.built.point2D_of.push_back(sighting.point2D);
+  }
+  const int64_t first =
+      ranks->SumBefore(static_cast<int64_t>(built.problem.observations.size()));
+  std::vector<int64_t> numbers;
+  for (const int64_t i : observations) numbers.push_back(first + i);
+  for (const int64_t number : ranks->GatherOnFirst(numbers)) {
+    support.observations.push_back(support.Find(number));
+  }
+  return support;
+}
+
+std::vector<int64_t> OwnSupport(const Certificate& certificate,
+                                int64_t num_observations, Ranks* ranks) {
+  std::vector<int64_t> numbers;
+  for (const CertifiedObservation& o : certificate.observations) {
+    numbers.push_back(o.observation);
+  }
+  ranks->Broadcast(&numbers);
+  const int64_t first = ranks->SumBefore(num_observations);
+  std::vector<int64_t> own;
+  for (const int64_t number : numbers) {
+    if (number >= first && number < first + num_observations) {
+      own.push_back(number - first);
+    }
+  }
+  return own;
+}
+
+namespace {
+
+bool HasImageTwice(const KnownRotationProblem& problem, int32_t point) {
+  const int64_t begin = problem.point_begin[point];
+  return HasImageTwice(
+      &problem.observations[begin],
+      static_cast<int>(problem.point_begin[point + 1] - begin));
+}
+
+// All but its share.
+SupportPosition Describe(const Model& model, const BuiltProblem& built,
+                         const Estimate& estimate,
+                         const BuiltPosition& position) {
+  SupportPosition described;
+  if (position.of == KnownPosition::Of::kImage) {
+    const Image& image = model.images[built.image_of[position.index]];
+    described.image_id = image.id;
+    described.image_name = image.name;
+  } else {
+    described.point3D_id = model.points3D[built.point_of[position.index]].id;
+  }
+  const Eigen::Vector3d offset = OffsetOf(built, estimate, position);
+  const double ratio = (position.unit_from_world * offset).norm();
+  described.distance = offset.norm();
+  described.radius = ratio > 0 ? described.distance / ratio
+                               : position.region.semi_axes.minCoeff();
+  return described;
+}
+
+}  // namespace
+
+std::vector<SupportPosition> ListSupportPositions(
+    const Model& model, const BuiltProblem& built, const Estimate& estimate,
+    const PixelCertificate& certificate) {
+  // By index, the force of all its rows on the camera.
+  std::map<int64_t, Eigen::Vector3d> pulls;
+  const Certificate& rows = certificate.rows;
+  KnownRotationProblem problem = built.problem;
+  for (size_t n = 0; n < rows.observations.size(); ++n) {
+    const CertifiedObservation& o = rows.observations[n];
+    if (built.HasPixel(o.observation) ||
+        !PutPositionRow(built, o.observation, certificate.bearings[n],
+                        rows.lower_bound, &problem)) {
+      continue;
+    }
+    const Observation& own = problem.observations[o.observation];
+    pulls.emplace(PositionOf(built, o.observation), Eigen::Vector3d::Zero())
+        .first->second +=
+        own.E.transpose() *
+        Eigen::Vector3d(rows.lower_bound * o.lambda, o.y[0], o.y[1]);
+  }
+  double sum = 0;
+  for (const auto& [position, pull] : pulls) sum += pull.norm();
+  std::vector<SupportPosition> support;
+  for (const auto& [n, pull] : pulls) {
+    SupportPosition position =
+        Describe(model, built, estimate, built.positions[n]);
+    position.share = pull.norm() / sum;
+    support.push_back(std::move(position));
+  }
+  std::stable_sort(
+      support.begin(), support.end(),
+      [](const auto& a, const auto& b) { return a.share > b.share; });
+  return support;
+}
+
+std::vector<SupportObservation> ListSupport(const Model& model,
+                                            const BuiltProblem& built,
+                                            const Estimate& estimate, Norm norm,
+                                            const Certificate& certificate) {
+  double sum = 0;
+  for (const CertifiedObservation& o : certificate.observations) {
+    sum += o.lambda;
+  }
+  std::vector<SupportObservation> support;
+  for (const CertifiedObservation& o : certificate.observations) {
+    if (!built.HasPixel(o.observation)) continue;
+    const Observation& observation = built.problem.observations[o.observation];
+    const Image& image = model.images[built.image_of[observation.view]];
+    support.push_back(
+        {image.id, image.name,
+         static_cast<uint32_t>(built.point2D_of[o.observation]),
+         model.points3D[built.point_of[observation.point]].id, o.lambda / sum,
+         ResidualOf(ViewPoint(built.problem, observation, estimate), norm),
+         HasImageTwice(built.problem, observation.point)});
+  }
+  std::stable_sort(
+      support.begin(), support.end(),
+      [](const auto& a, const auto& b) { return a.error_px > b.error_px; });
+  return support;
+}
+
+namespace {
+
+using Json = CertificateFileJson;
+
+CertificateFile ReadCertificate(const JsonReader& reader, const Json& json) {
+  const auto member = [&](const char* key) -> const Json& {
+    return reader.Member(json, "the file", key);
+  };
+  const Json& version = member("version");
+  if (version != kCertificateVersion) {
+    reader.Fail("version", version, std::to_string(kCertificateVersion));
+  }
+  CertificateFile file;
+  file.norm = reader.ReadNorm(member("norm"));
+  file.lower_bound = reader.Number(member("lower_bound"), "lower_bound");
+  file.rows_bound = reader.Number(member("rows_bound"), "rows_bound");
+  file.defect = reader.Number(member("defect"), "defect");
+  file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
+  file.observations =
+      reader.ReadSupport(member("observations"), "observations");
+  const auto fixed = json.find("fixed");
+  if (fixed != json.end()) reader.ReadFixed(*fixed, &file);
+  const auto positions = json.find("positions");
+  if (positions != json.end()) reader.ReadPositions(*positions, &file);
+  return file;
+}
+
+}  // namespace
+
+std::vector<CertificateFile::SupportObservation> DescribeSupport(
+    const Model& model, const BuiltProblem& built,
+    const PixelCertificate& certificate) {
+  std::vector<CertificateFile::SupportObservation> support;
+  for (size_t n = 0; n < certificate.bearings.size(); ++n) {
+    const CertifiedObservation& certified = certificate.rows.observations[n];
+    if (!built.HasPixel(certified.observation)) continue;
+    const Observation& observation =
+        built.problem.observations[certified.observation];
+    CertificateFile::SupportObservation o;
+    o.image_id = model.images[built.image_of[observation.view]].id;
+    o.point2D_idx =
+        static_cast<uint32_t>(built.point2D_of[certified.observation]);
+    o.point3D_id = model.points3D[built.point_of[observation.point]].id;
+    o.bearing = certificate.bearings[n];
+    o.lambda = certified.lambda;
+    o.y = certified.y;
+    support.push_back(o);
+  }
+  return support;
+}
+
+namespace {
+
+// What of the support does not move.
+void DescribeFixed(const Model& model, const BuiltProblem& built,
+                   const PixelCertificate& certificate, CertificateFile* file) {
+  const KnownRotationProblem& problem = built.problem;
+  std::set<int32_t> frames;
+  std::set<int32_t> points;
+  for (const CertifiedObservation& certified : certificate.rows.observations) {
+    if (!built.HasPixel(certified.observation)) continue;
+    const Observation& observation =
+        problem.observations[certified.observation];
+    const int32_t frame = problem.views[observation.view].frame;
+    if (problem.IsFixedFrame(frame) && frames.insert(frame).second) {
+      file->fixed_images.push_back(
+          {model.images[built.image_of[observation.view]].id,
+           *problem.fixed_translations[frame]});
+    }
+    if (problem.IsFixedPoint(observation.point) &&
+        points.insert(observation.point).second) {
+      file->fixed_points.push_back(
+          {model.points3D[built.point_of[observation.point]].id,
+           *problem.fixed_points[observation.point]});
+    }
+  }
+}
+
+// The positions in the support; rows ascend, so that a position's stand
+// together.
+void DescribePositions(const Model& model, const BuiltProblem& built,
+                       const PixelCertificate& certificate,
+                       CertificateFile* file) {
+  int64_t last = -1;
+  for (size_t n = 0; n < certificate.bearings.size(); ++n) {
+    const CertifiedObservation& certified = certificate.rows.observations[n];
+    if (built.HasPixel(certified.observation)) continue;
+    const int64_t index = PositionOf(built, certified.observation);
+    if (index != std::exchange(last, index)) {
+      const BuiltPosition& position = built.positions[index];
+      file->positions.push_back(
+          {position.of, IdOf(model, built, position), position.region, {}});
+    }
+    file->positions.back().rows.push_back(
+        {certificate.bearings[n], certified.lambda, certified.y});
+  }
+}
+
+}  // namespace
+
+CertificateFile DescribeCertificate(const Model& model,
+                                    const BuiltProblem& built, Norm norm,
+                                    const PixelCertificate& certificate) {
+  CertificateFile file;
+  file.norm = norm;
+  file.lower_bound = certificate.lower_bound;
+  file.rows_bound = certificate.rows.lower_bound;
+  file.defect = certificate.rows.defect;
+  file.model_sha256 = ModelSha256(model);
+  file.observations = DescribeSupport(model, built, certificate);
+  DescribeFixed(model, built, certificate, &file);
+  DescribePositions(model, built, certificate, &file);
+  return file;
+}
+
+std::string CertificateJson(const CertificateFile& file) {
+  Json json = {
+      {"version", kCertificateVersion},  {"norm", NormJson(file.norm)},
+      {"lower_bound", file.lower_bound}, {"rows_bound", file.rows_bound},
+      {"defect", file.defect},           {"model_sha256", file.model_sha256}};
+  if (!file.fixed_images.empty() || !file.fixed_points.empty()) {
+    json["fixed"] = FixedJson(file);
+  }
+  if (!file.positions.empty()) json["positions"] = PositionsJson(file);
+  json["observations"] = SupportJson(file.observations);
+  return json.dump(1) + "\n";
+}
+
+CertificateFile ParseCertificate(const std::string& json,
+                                 const std::string& file_name) {
+  try {
+    return ReadCertificate(JsonReader(file_name), Json::parse(json));
+  } catch (const Json::exception& error) {
+    throw ModelError(file_name + ": no JSON: " + error.what());
+  }
+}
+
+std::string ReadCertificateText(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  // Fails on an empty file, too, and on a folder.
+  if (!stream.is_open() || !(text << stream.rdbuf())) {
+    throw ModelError(path.string() + ": cannot be read, or is empty");
+  }
+  return text.str();
+}
+
+CertificateFile ReadCertificateFile(const std::filesystem::path& path) {
+  return ParseCertificate(ReadCertificateText(path), path.string());
+}
+
+}  // namespace krot::internal

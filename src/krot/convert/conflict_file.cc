@@ -1,0 +1,275 @@
+#include "krot/convert/certificate_file.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "krot/convert/build_problem.h"
+#include "krot/convert/certificate_json.h"
+#include "krot/convert/model_digest.h"
+#include "krot/convert/pixel_certificate.h"
+#include "krot/context.h"
+#include "krot/problem/subset.h"
+
+namespace krot::internal {
+namespace {
+
+using Json = CertificateFileJson;
+
+ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
+  const auto member = [&](const char* key) -> const Json& {
+    return reader.Member(json, "the file", key);
+  };
+  const Json& version = member("version");
+  if (version != 1 && version != kConflictFileVersion) {
+    reader.Fail("version", version, "1 or 2");
+  }
+  ConflictFile file;
+  file.version = version;
+  file.norm = reader.ReadNorm(member("norm"));
+  file.max_error = reader.Number(member("max_error"), "max_error");
+  file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
+  const Json& conflicts = reader.Array(member("conflicts"), "conflicts");
+  for (size_t n = 0; n < conflicts.size(); ++n) {
+    const std::string place = "conflicts[" + std::to_string(n) + "]";
+    const auto number = [&](const char* key) {
+      return reader.Number(reader.Member(conflicts[n], place, key),
+                           place + "." + key);
+    };
+    ConflictFile::Conflict conflict;
+    conflict.lower_bound = number("lower_bound");
+    conflict.rows_bound = number("rows_bound");
+    conflict.defect = number("defect");
+    conflict.observations =
+        reader.ReadSupport(reader.Member(conflicts[n], place, "observations"),
+                           place + ".observations");
+    if (file.version == kConflictFileVersion) {
+      const std::string bounds = place + ".max_errors";
+      const Json& values = reader.Array(
+          reader.Member(conflicts[n], place, "max_errors"), bounds);
+      for (size_t i = 0; i < values.size(); ++i) {
+        conflict.max_errors.push_back(
+            reader.Number(values[i], bounds + "[" + std::to_string(i) + "]"));
+      }
+    }
+    file.conflicts.push_back(std::move(conflict));
+  }
+  return file;
+}
+
+}  // namespace
+
+ConflictFile DescribeConflicts(
+    const Model& model, const BuiltProblem& built, Norm norm, double max_error,
+    const std::vector<PixelCertificate>& certificates) {
+  ConflictFile file;
+  file.norm = norm;
+  file.max_error = max_error;
+  file.model_sha256 = ModelSha256(model);
+  if (!built.scales.empty()) file.version = kConflictFileVersion;
+  for (const PixelCertificate& certificate : certificates) {
+    ConflictFile::Conflict conflict{certificate.lower_bound,
+                                    certificate.rows.lower_bound,
+                                    certificate.rows.defect,
+                                    DescribeSupport(model, built, certificate),
+                                    {}};
+    if (!built.scales.empty()) {
+      for (const CertifiedObservation& o : certificate.rows.observations) {
+        conflict.max_errors.push_back(built.scales[o.observation] * max_error);
+      }
+    }
+    file.conflicts.push_back(std::move(conflict));
+  }
+  return file;
+}
+
+std::string ConflictJson(const ConflictFile& file) {
+  Json conflicts = Json::array();
+  for (const ConflictFile::Conflict& conflict : file.conflicts) {
+    conflicts.push_back({{"lower_bound", conflict.lower_bound},
+                         {"rows_bound", conflict.rows_bound},
+                         {"defect", conflict.defect},
+                         {"observations", SupportJson(conflict.observations)}});
+    if (file.version == kConflictFileVersion) {
+      conflicts.back()["max_errors"] = conflict.max_errors;
+    }
+  }
+  Json json = {{"version", file.version},
+               {"norm", NormJson(file.norm)},
+               {"max_error", file.max_error},
+               {"model_sha256", file.model_sha256}};
+  json["conflicts"] = std::move(conflicts);
+  return json.dump(1) + "\n";
+}
+
+bool HoldsConflicts(const std::string& json) {
+  const Json parsed = Json::parse(json, nullptr, /*allow_exceptions=*/false);
+  return parsed.is_object() && parsed.contains("conflicts");
+}
+
+ConflictFile ParseConflicts(const std::string& json,
+                            const std::string& file_name) {
+  try {
+    return ReadConflicts(JsonReader(file_name), Json::parse(json));
+  } catch (const Json::exception& error) {
+    throw ModelError(file_name + ": no JSON: " + error.what());
+  }
+}
+
+namespace {
+
+using Support = CertificateFile::SupportObservation;
+
+// An entry of the file and the conflict that it is of.
+struct Entry {
+  size_t conflict = 0;
+  size_t place = 0;  // in the conflict
+  const Support* observation = nullptr;
+  int64_t index = -1;  // in the problem; -1: not found
+};
+
+// Every observation of the problem serves one entry.
+std::vector<Entry> FindEntries(const Model& model, const BuiltProblem& built,
+                               const ConflictFile& file) {
+  using Key = std::tuple<ImageId, uint32_t, Point3DId>;
+  std::vector<Entry> entries;
+  std::multimap<Key, size_t> by_key;
+  for (size_t n = 0; n < file.conflicts.size(); ++n) {
+    const std::vector<Support>& observations = file.conflicts[n].observations;
+    for (size_t place = 0; place < observations.size(); ++place) {
+      const Support& o = observations[place];
+      by_key.emplace(Key(o.image_id, o.point2D_idx, o.point3D_id),
+                     entries.size());
+      entries.push_back({n, place, &o});
+    }
+  }
+  for (size_t i = 0; i < built.problem.observations.size(); ++i) {
+    const Observation& own = built.problem.observations[i];
+    const auto found =
+        by_key.find({model.images[built.image_of[own.view]].id,
+                     static_cast<uint32_t>(built.point2D_of[i]),
+                     model.points3D[built.point_of[own.point]].id});
+    if (found == by_key.end()) continue;
+    entries[found->second].index = static_cast<int64_t>(i);
+    by_key.erase(found);
+  }
+  return entries;
+}
+
+const Entry* FirstMissing(const std::vector<Entry>& entries) {
+  for (const Entry& entry : entries) {
+    if (entry.index < 0) return &entry;
+  }
+  return nullptr;
+}
+
+std::string NameOfConflict(size_t n) {
+  return "conflict " + std::to_string(n + 1);
+}
+
+bool AreBounds(const ConflictFile::Conflict& conflict, double largest) {
+  return conflict.max_errors.size() == conflict.observations.size() &&
+         std::all_of(conflict.max_errors.begin(), conflict.max_errors.end(),
+                     [&](double bound) {
+                       return bound > 0 && bound <= (1 + 1e-12) * largest;
+                     });
+}
+
+// Why one conflict is refused, or nothing.
+std::optional<std::string> RefuseConflict(const Model& model,
+                                          const BuiltProblem& built,
+                                          const ConflictFile& file, size_t n,
+                                          std::vector<Entry> entries) {
+  const ConflictFile::Conflict& conflict = file.conflicts[n];
+  if (!(conflict.lower_bound > file.max_error)) {
+    return NameOfConflict(n) + " has a bound that is not above max_error";
+  }
+  std::sort(entries.begin(), entries.end(),
+            [](const Entry& a, const Entry& b) { return a.index < b.index; });
+  const bool has_own = file.version == kConflictFileVersion;
+  if (has_own && !AreBounds(conflict, file.max_error)) {
+    return NameOfConflict(n) +
+           " has not one bound per observation, above 0 and at most max_error";
+  }
+  std::vector<int64_t> observations;
+  std::vector<double> scales;
+  PixelCertificate certificate;
+  certificate.lower_bound = conflict.lower_bound;
+  certificate.rows.lower_bound = conflict.rows_bound;
+  certificate.rows.defect = conflict.defect;
+  for (const Entry& entry : entries) {
+    certificate.rows.observations.push_back(
+        {static_cast<int64_t>(observations.size()), entry.observation->lambda,
+         entry.observation->y});
+    certificate.bearings.push_back(entry.observation->bearing);
+    observations.push_back(entry.index);
+    if (has_own) {
+      scales.push_back(conflict.max_errors[entry.place] / file.max_error);
+    }
+  }
+  if (observations.empty()) return NameOfConflict(n) + " is empty";
+  const ProblemSubset subset(built.problem, std::move(observations));
+  BuiltProblem part = BuiltPart(built, subset, built.start);
+  ScaleObservations(std::move(scales), &part);
+  const PixelCertificateCheck check =
+      CheckPixelCertificate(model, part, file.norm, certificate, {});
+  if (check.is_accepted) return std::nullopt;
+  return NameOfConflict(n) + ": " + check.refusal;
+}
+
+}  // namespace
+
+ConflictVerdict VerifyConflictFile(const Model& model,
+                                   const ConflictFile& file) {
+  ConflictVerdict verdict;
+  if (file.model_sha256 != ModelSha256(model)) {
+    verdict.refusal =
+        "it belongs to another model: cameras, rotations or observations "
+        "differ";
+    return verdict;
+  }
+  if (!(file.max_error > 0) || !std::isfinite(file.max_error)) {
+    verdict.refusal = "its max_error is no positive number";
+    return verdict;
+  }
+  BuiltProblem built = BuildProblem(model, {});
+  std::vector<Entry> entries = FindEntries(model, built, file);
+  if (FirstMissing(entries) != nullptr) {
+    BuildProblemOptions rays_alone;
+    rays_alone.ignore_translations = true;
+    built = BuildProblem(model, rays_alone);
+    entries = FindEntries(model, built, file);
+  }
+  if (const Entry* missing = FirstMissing(entries)) {
+    verdict.refusal =
+        "observation " + std::to_string(missing->observation->point2D_idx) +
+        " of image " + std::to_string(missing->observation->image_id) + " in " +
+        NameOfConflict(missing->conflict) +
+        " is not among those that can be used, or is there twice";
+    return verdict;
+  }
+  std::vector<std::vector<Entry>> of_conflict(file.conflicts.size());
+  for (const Entry& entry : entries) {
+    of_conflict[entry.conflict].push_back(entry);
+  }
+  for (size_t n = 0; n < of_conflict.size(); ++n) {
+    const std::optional<std::string> refusal =
+        RefuseConflict(model, built, file, n, std::move(of_conflict[n]));
+    if (refusal) {
+      verdict.refusal = *refusal;
+      return verdict;
+    }
+  }
+  verdict.is_accepted = true;
+  verdict.num_conflicts = static_cast<int64_t>(file.conflicts.size());
+  verdict.num_observations = static_cast<int64_t>(entries.size());
+  verdict.max_error = file.max_error;
+  verdict.has_own_bounds = file.version == kConflictFileVersion;
+  return verdict;
+}
+
+}  // namespace krot::internal

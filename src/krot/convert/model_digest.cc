@@ -1,0 +1,249 @@
+#include "krot/convert/model_digest.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "krot/convert/build_steps.h"
+#include "krot/model/rigs.h"
+
+namespace krot::internal {
+namespace {
+
+__extension__ using Wide = unsigned __int128;
+
+constexpr bool IsPrime(int n) {
+  for (int divisor = 2; divisor * divisor <= n; ++divisor) {
+    if (n % divisor == 0) return false;
+  }
+  return true;
+}
+
+// The first 32 bits behind the point of the root of that degree.
+constexpr uint32_t RootBits(int n, int degree) {
+  const Wide target = Wide(n) << (32 * degree);
+  Wide root = 0;
+  for (int bit = 36; bit >= 0; --bit) {
+    const Wide trial = root | (Wide(1) << bit);
+    const Wide power = degree == 2 ? trial * trial : trial * trial * trial;
+    if (power <= target) root = trial;
+  }
+  return static_cast<uint32_t>(root);
+}
+
+// Of the first primes.
+template <size_t size>
+constexpr std::array<uint32_t, size> PrimeRoots(int degree) {
+  std::array<uint32_t, size> roots = {};
+  size_t found = 0;
+  for (int n = 2; found < size; ++n) {
+    if (IsPrime(n)) roots[found++] = RootBits(n, degree);
+  }
+  return roots;
+}
+
+constexpr std::array<uint32_t, 8> kStart = PrimeRoots<8>(2);
+constexpr std::array<uint32_t, 64> kRounds = PrimeRoots<64>(3);
+
+uint32_t Turn(uint32_t word, int bits) {
+  return (word >> bits) | (word << (32 - bits));
+}
+
+}  // namespace
+
+Sha256Stream::Sha256Stream() : state_(kStart) {}
+
+void Sha256Stream::Append(const unsigned char* bytes, size_t size) {
+  num_bytes_ += size;
+  for (size_t n = 0; n < size; ++n) {
+    block_[block_size_++] = bytes[n];
+    if (block_size_ == block_.size()) DigestBlock();
+  }
+}
+
+// Named as in the standard: the schedule w, the working variables a to h.
+void Sha256Stream::DigestBlock() {
+  std::array<uint32_t, 64> w;
+  for (size_t t = 0; t < 16; ++t) {
+    w[t] = uint32_t{block_[4 * t]} << 24 | uint32_t{block_[4 * t + 1]} << 16 |
+           uint32_t{block_[4 * t + 2]} << 8 | uint32_t{block_[4 * t + 3]};
+  }
+  for (size_t t = 16; t < 64; ++t) {
+    const uint32_t x = w[t - 15], y = w[t - 2];
+    w[t] = w[t - 16] + (Turn(x, 7) ^ Turn(x, 18) ^ (x >> 3)) + w[t - 7] +
+           (Turn(y, 17) ^ Turn(y, 19) ^ (y >> 10));
+  }
+  auto [a, b, c, d, e, f, g, h] = state_;
+  for (size_t t = 0; t < 64; ++t) {
+    const uint32_t t1 = h + (Turn(e, 6) ^ Turn(e, 11) ^ Turn(e, 25)) +
+                        ((e & f) ^ (~e & g)) + kRounds[t] + w[t];
+    const uint32_t t2 = (Turn(a, 2) ^ Turn(a, 13) ^ Turn(a, 22)) +
+                        ((a & b) ^ (a & c) ^ (b & c));
+    h = g, g = f, f = e, e = d + t1, d = c, c = b, b = a, a = t1 + t2;
+  }
+  const std::array<uint32_t, 8> worked = {a, b, c, d, e, f, g, h};
+  for (size_t n = 0; n < 8; ++n) state_[n] += worked[n];
+  block_size_ = 0;
+}
+
+std::array<unsigned char, 32> Sha256Stream::Finish() {
+  const uint64_t num_bits = 8 * num_bytes_;
+  const unsigned char one = 0x80, zero = 0;
+  Append(&one, 1);
+  while (block_size_ != 56) Append(&zero, 1);
+  for (int shift = 56; shift >= 0; shift -= 8) {
+    const auto byte = static_cast<unsigned char>(num_bits >> shift);
+    Append(&byte, 1);
+  }
+  std::array<unsigned char, 32> digest;
+  for (size_t n = 0; n < digest.size(); ++n) {
+    digest[n] = static_cast<unsigned char>(state_[n / 4] >> (24 - 8 * (n % 4)));
+  }
+  return digest;
+}
+
+namespace {
+
+// Collects little-endian bytes and digests them in pieces.
+class Digest {
+ public:
+  void Integer(uint64_t value) {
+    std::array<unsigned char, 8> bytes;
+    for (unsigned char& byte : bytes) {
+      byte = static_cast<unsigned char>(value & 0xff);
+      value >>= 8;
+    }
+    Append(bytes);
+  }
+
+  void Number(double value) {
+    uint64_t bits;
+    std::memcpy(&bits, &value, sizeof(bits));
+    Integer(bits);
+  }
+
+  void Bytes(std::string_view bytes) {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  }
+
+  std::string Hex() {
+    Flush();
+    std::string hex;
+    for (const unsigned char byte : sha256_.Finish()) {
+      hex += "0123456789abcdef"[byte >> 4];
+      hex += "0123456789abcdef"[byte & 15];
+    }
+    return hex;
+  }
+
+ private:
+  static constexpr size_t kPiece = 1 << 16;
+
+  void Append(const std::array<unsigned char, 8>& bytes) {
+    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+    if (buffer_.size() >= kPiece) Flush();
+  }
+
+  void Flush() {
+    sha256_.Append(buffer_.data(), buffer_.size());
+    buffer_.clear();
+  }
+
+  Sha256Stream sha256_;
+  std::vector<unsigned char> buffer_;
+};
+
+void AddQuaternion(const Pose& pose, Digest* digest) {
+  for (const double q : pose.quaternion_wxyz) digest->Number(q);
+}
+
+void AddCamera(const Camera& camera, Digest* digest) {
+  digest->Integer(camera.id);
+  digest->Integer(static_cast<uint64_t>(camera.model_id));
+  digest->Integer(camera.params.size());
+  for (const double param : camera.params) digest->Number(param);
+}
+
+// By image id: which 2D points, and of which 3D points, the tracks name.
+using Observations =
+    std::unordered_map<ImageId, std::vector<std::pair<uint32_t, Point3DId>>>;
+
+Observations SortedObservations(const Model& model) {
+  Observations observations;
+  for (const Point3D& point : model.points3D) {
+    for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
+      const TrackElement& element = model.track_elements[e];
+      observations[element.image_id].emplace_back(element.point2D_idx,
+                                                  point.id);
+    }
+  }
+  for (auto& [image_id, of_image] : observations) {
+    std::sort(of_image.begin(), of_image.end());
+  }
+  return observations;
+}
+
+// How the image's camera sits: in which frame, how that is turned, where in it.
+void AddPlace(const Model& model, const ImageGeometry& image, Digest* digest) {
+  digest->Integer(image.frame >= 0);
+  if (image.frame < 0) return;
+  const Frame& frame = model.frames[image.frame];
+  digest->Integer(frame.id);
+  AddQuaternion(frame.rig_from_world, digest);
+  const Pose cam_from_rig =
+      image.sensor < 0
+          ? Pose()
+          : *model.rigs[image.rig].sensors[image.sensor].sensor_from_rig;
+  AddQuaternion(cam_from_rig, digest);
+  for (const double t : cam_from_rig.translation) digest->Number(t);
+}
+
+void AddObservations(const Image& image, const Observations& observations,
+                     Digest* digest) {
+  const auto found = observations.find(image.id);
+  if (found == observations.end()) {
+    digest->Integer(0);
+    return;
+  }
+  digest->Integer(found->second.size());
+  for (const auto& [point2D_idx, point3D_id] : found->second) {
+    const Point2D& point2D = image.points2D[point2D_idx];
+    digest->Integer(point2D_idx);
+    digest->Number(point2D.x);
+    digest->Number(point2D.y);
+    digest->Integer(point3D_id);
+  }
+}
+
+}  // namespace
+
+std::string ModelSha256(const Model& model) {
+  Digest digest;
+  digest.Integer(model.cameras.size());
+  for (const int32_t n : OrderOfIds(model.cameras)) {
+    AddCamera(model.cameras[n], &digest);
+  }
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  const Observations observations = SortedObservations(model);
+  digest.Integer(model.images.size());
+  for (const int32_t n : OrderOfIds(model.images)) {
+    const Image& image = model.images[n];
+    digest.Integer(image.id);
+    digest.Integer(image.camera_id);
+    AddPlace(model, geometries[n], &digest);
+    AddObservations(image, observations, &digest);
+  }
+  return digest.Hex();
+}
+
+std::string Sha256(std::string_view bytes) {
+  Digest digest;
+  digest.Bytes(bytes);
+  return digest.Hex();
+}
+
+}  // namespace krot::internal

@@ -1,0 +1,267 @@
+#include "krot/convert/reprojection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "krot/geometry.h"
+#include "krot/problem/cost.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Of = KnownPosition::Of;
+
+// |U p|: far enough for a cone that is almost a tube about the region, and
+// beyond a camera that is far off; near enough to keep the digits.
+constexpr double kApexDistance = 10;
+constexpr double kApexPerOffset = 4;
+constexpr double kNearestApex = 1.5;
+constexpr double kFarthestApex = 1e6;
+// Offsets below this, |U x|, have no direction.
+constexpr double kNoOffset = 1e-9;
+
+const BuiltPosition& PositionOfRow(const BuiltProblem& built,
+                                   int64_t observation) {
+  return built.positions[PositionOf(built, observation)];
+}
+
+// U p of a row whose region has its camera at U (C - g) = offset: two cones
+// that touch the unit ball in the offset's direction n, a'n = 1 / |U p|, across
+// each other, and one from the far side.
+Vector3d ApexAround(const Vector3d& offset, int64_t row) {
+  const double length = offset.norm();
+  const Vector3d n =
+      length > kNoOffset ? Vector3d(offset / length) : Vector3d::UnitX();
+  const double distance = std::min(
+      std::max(kApexDistance, kApexPerOffset * length), kFarthestApex / 2);
+  if (row == 2) return -distance * n;
+  const Vector3d b = n.unitOrthogonal();
+  const double sine = 1 / distance;
+  return distance * (sine * n + std::sqrt(1 - sine * sine) *
+                                    (row == 0 ? b : Vector3d(n.cross(b))));
+}
+
+Vector3d ApexOf(const BuiltProblem& built, int64_t observation,
+                const Vector3d& offset) {
+  const Matrix3d& unit_from_world =
+      PositionOfRow(built, observation).unit_from_world;
+  return unit_from_world.inverse() *
+         ApexAround(unit_from_world * offset,
+                    RowIndex(built, observation) % kRowsPerPosition);
+}
+
+// Calls visit(i) for every row of a position, in their order.
+template <typename Visit>
+void ForPositionRows(const BuiltProblem& built, const Visit& visit) {
+  if (built.positions.empty()) return;
+  const auto count = static_cast<int64_t>(built.problem.observations.size());
+  for (int64_t i = 0; i < count; ++i) {
+    if (!built.HasPixel(i)) visit(i);
+  }
+}
+
+// Builds the views and observations of positions; rows are put into them
+// afterwards.
+class PositionAdder {
+ public:
+  explicit PositionAdder(BuiltProblem* built)
+      : built_(*built), problem_(built->problem) {}
+
+  // Of a view: it sees a fixed point.
+  void AddCamera(int32_t view, const Ellipsoid& region) {
+    Add({Of::kImage, view, region, region.UnitFromWorld()},
+        View(problem_.views[view]), problem_.num_points);
+    problem_.fixed_points.resize(problem_.num_points);
+    problem_.fixed_points.emplace_back(region.centre);
+    built_.start.points.push_back(region.centre);
+    ++problem_.num_points;
+  }
+
+  // Of a point: the fixed frame sees it, which stands at the world's origin.
+  void AddPoint(int32_t point, const Ellipsoid& region) {
+    if (frame_ < 0) {
+      frame_ = problem_.num_frames++;
+      problem_.fixed_translations.resize(frame_);
+      problem_.fixed_translations.emplace_back(Vector3d::Zero());
+      built_.start.translations.emplace_back(Vector3d::Zero());
+    }
+    Add({Of::kPoint3D, point, region, region.UnitFromWorld()},
+        {Matrix3d::Identity(), Matrix3d::Identity(), Vector3d::Zero(), frame_},
+        point);
+  }
+
+  // Sorts observations by point again.
+  void Sort() {
+    if (frame_ < 0) return;
+    std::vector<size_t> order(problem_.observations.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+      return problem_.observations[a].point < problem_.observations[b].point;
+    });
+    const auto sort = [&](auto* values) {
+      auto sorted = *values;
+      for (size_t n = 0; n < order.size(); ++n) sorted[n] = (*values)[order[n]];
+      *values = std::move(sorted);
+    };
+    sort(&problem_.observations);
+    sort(&built_.pixels);
+    sort(&built_.point2D_of);
+  }
+
+ private:
+  void Add(const BuiltPosition& position, const View& view, int32_t point) {
+    built_.positions.push_back(position);
+    for (int row = 0; row < kRowsPerPosition; ++row) {
+      const auto shifted = static_cast<int32_t>(problem_.views.size());
+      problem_.views.push_back(view);
+      problem_.observations.push_back({Matrix3d::Identity(), shifted, point});
+      built_.pixels.emplace_back(Eigen::Vector2d::Zero());
+      built_.point2D_of.push_back(-1);
+    }
+  }
+
+  BuiltProblem& built_;
+  KnownRotationProblem& problem_;
+  int32_t frame_ = -1;
+};
+
+}  // namespace
+
+std::optional<Matrix3d> MakePositionRow(const Matrix3d& cam_from_world,
+                                        const Matrix3d& unit_from_world,
+                                        const Vector3d& apex, double level) {
+  const Vector3d p = unit_from_world * apex;
+  const double distance = p.norm();
+  if (!(distance >= kNearestApex && distance <= kFarthestApex)) {
+    return std::nullopt;
+  }
+  const double cotangent = std::sqrt((distance - 1) * (distance + 1));
+  const Vector3d a = p / distance;
+  const Vector3d m = a.unitOrthogonal();
+  Matrix3d basis;
+  basis << a.transpose(), m.transpose(), a.cross(m).transpose();
+  basis.bottomRows<2>() *= level * cotangent / (1 + kPositionSlack);
+  const Matrix3d E = basis * unit_from_world * cam_from_world.transpose();
+  return E / E.row(0).norm();
+}
+
+void AddPositions(const std::vector<KnownPosition>& positions,
+                  BuiltProblem* built) {
+  if (positions.empty()) return;
+  const KnownRotationProblem& problem = built->problem;
+  std::unordered_map<int32_t, const Ellipsoid*> of_image;
+  std::unordered_map<int32_t, const Ellipsoid*> of_point;
+  for (const KnownPosition& p : positions) {
+    (p.of == Of::kImage ? of_image : of_point).emplace(p.index, &p.region);
+  }
+  PositionAdder adder(built);
+  for (size_t v = 0; v < built->image_of.size(); ++v) {
+    const auto known = of_image.find(built->image_of[v]);
+    if (known == of_image.end() ||
+        problem.IsFixedFrame(problem.views[v].frame)) {
+      continue;
+    }
+    adder.AddCamera(static_cast<int32_t>(v), *known->second);
+  }
+  for (size_t k = 0; k < built->point_of.size(); ++k) {
+    const auto known = of_point.find(built->point_of[k]);
+    const auto point = static_cast<int32_t>(k);
+    if (known == of_point.end() || problem.IsFixedPoint(point)) continue;
+    adder.AddPoint(point, *known->second);
+  }
+  adder.Sort();
+  TakePositionRowsOfStart(built->position_level, built);
+}
+
+uint64_t IdOf(const Model& model, const BuiltProblem& built,
+              const BuiltPosition& position) {
+  return position.of == Of::kImage
+             ? model.images[built.image_of[position.index]].id
+             : model.points3D[built.point_of[position.index]].id;
+}
+
+Vector3d OffsetOf(const BuiltProblem& built, const Estimate& estimate,
+                  const BuiltPosition& position) {
+  if (position.of == Of::kPoint3D) {
+    return position.region.centre - estimate.points[position.index];
+  }
+  const View& view = built.problem.views[position.index];
+  return Center(
+             {view.cam_from_world_rotation,
+              CamFromWorld(view, estimate.translations[view.frame]).col(3)}) -
+         position.region.centre;
+}
+
+Vector3d ApexAt(const BuiltProblem& built, const Estimate& estimate,
+                int64_t observation) {
+  return ApexOf(built, observation,
+                OffsetOf(built, estimate, PositionOfRow(built, observation)));
+}
+
+Vector3d ApexOfStart(const BuiltProblem& built, int64_t observation) {
+  return ApexOf(built, observation, Vector3d::Zero());
+}
+
+bool PutPositionRow(const BuiltProblem& built, int64_t observation,
+                    const Vector3d& apex, double level,
+                    KnownRotationProblem* problem) {
+  const BuiltPosition& position = PositionOfRow(built, observation);
+  Observation& own = problem->observations[observation];
+  View& view = problem->views[own.view];
+  const auto row = MakePositionRow(view.cam_from_world_rotation,
+                                   position.unit_from_world, apex, level);
+  if (!row) return false;
+  own.E = *row;
+  view.cam_from_rig_translation =
+      position.of == Of::kPoint3D
+          ? Vector3d(apex - position.region.centre)
+          : Vector3d(
+                built.problem.views[position.index].cam_from_rig_translation +
+                view.cam_from_world_rotation * apex);
+  return true;
+}
+
+void TakePositionRowsOfStart(double level, BuiltProblem* built) {
+  built->position_level = level;
+  ForPositionRows(*built, [&](int64_t i) {
+    PutPositionRow(*built, i, ApexOfStart(*built, i), level, &built->problem);
+  });
+}
+
+void TakePositionRows(const BuiltProblem& built, const Estimate& estimate,
+                      KnownRotationProblem* problem) {
+  ForPositionRows(built, [&](int64_t i) {
+    PutPositionRow(built, i, ApexAt(built, estimate, i), built.position_level,
+                   problem);
+  });
+}
+
+double LargestPositionRatio(const BuiltProblem& built,
+                            const Estimate& estimate) {
+  double largest = 0;
+  for (const BuiltPosition& position : built.positions) {
+    largest = std::max(largest, (position.unit_from_world *
+                                 OffsetOf(built, estimate, position))
+                                    .norm());
+  }
+  return largest;
+}
+
+bool LevelPositions(const BuiltProblem& built, Certificate* certificate) {
+  const double shorter = built.position_level / certificate->lower_bound;
+  for (CertifiedObservation& o : certificate->observations) {
+    if (built.HasPixel(o.observation)) continue;
+    if (shorter > 1) return false;
+    o.y *= shorter;
+  }
+  return true;
+}
+
+}  // namespace krot::internal

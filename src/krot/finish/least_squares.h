@@ -1,0 +1,142 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "krot/base/context.h"
+#include "krot/conic/interior_point.h"
+#include "krot/math/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot::internal {
+
+// Of all estimates with every error below a cap, the least squares:
+//
+//   min 1/2 sum rho(|e_i|^2)   subject to   ||e_i||_p <= cap,  e_i = v_i / w_i,
+//
+// over all frames and points at once, by a primal-dual interior point method
+// (docs/method/joint_solver.md, "The finish"). Not convex, but for the
+// constraints: what is found is a local minimum.
+
+// rho of a squared error, squared pixels: rho(s) = s for small s, and less for
+// what is beyond the scale. As in Ceres.
+struct ErrorLoss {
+  enum class Kind { kTrivial, kHuber, kCauchy };
+  Kind kind = Kind::kTrivial;
+  double scale = 1;  // pixels; > 0
+
+  double Value(double s) const {
+    const double b = scale * scale;
+    switch (kind) {
+      case Kind::kTrivial:
+        break;
+      case Kind::kHuber:
+        return s <= b ? s : 2 * scale * std::sqrt(s) - b;
+      case Kind::kCauchy:
+        return b * std::log1p(s / b);
+    }
+    return s;
+  }
+
+  // rho'(s), in (0, 1].
+  double Weight(double s) const {
+    const double b = scale * scale;
+    switch (kind) {
+      case Kind::kTrivial:
+        break;
+      case Kind::kHuber:
+        return s <= b ? 1 : scale / std::sqrt(s);
+      case Kind::kCauchy:
+        return 1 / (1 + s / b);
+    }
+    return 1;
+  }
+};
+
+// As --Solver.finish_loss takes it: "trivial", "huber", "cauchy".
+inline const char* LossName(ErrorLoss::Kind kind) {
+  switch (kind) {
+    case ErrorLoss::Kind::kHuber:
+      return "huber";
+    case ErrorLoss::Kind::kCauchy:
+      return "cauchy";
+    case ErrorLoss::Kind::kTrivial:
+      break;
+  }
+  return "trivial";
+}
+
+// An iterate; every one of them is below the cap.
+struct BoundedIterate {
+  int iteration = 0;
+  double cost = 0;  // 1/2 sum rho, squared pixels
+  double gap = 0;   // sum of multiplier times slack, relative to the cost
+  double step = 0;  // length of the step that led here, in (0, 1]
+};
+
+struct BoundedOptions {
+  Norm norm;       // of the cap: p = 1, 2 or infinity
+  double cap = 0;  // pixels; > 0
+  // Only the observations of so many first views have errors that are squared;
+  // the others are bounds alone. None: all have.
+  std::optional<int32_t> num_views;
+  ErrorLoss loss;
+  double gap_tolerance = 1e-3;           // > 0, relative to the cost
+  double stationarity_tolerance = 1e-6;  // > 0
+  int max_iterations = 200;              // >= 1
+  // Takes all rows of the problem itself anew where their points project at an
+  // estimate: false if one does not project. Empty where rows do not depend on
+  // where they are taken.
+  std::function<bool(const Estimate&)> take_rows;
+  std::function<void(const BoundedIterate&)> callback;  // may be empty
+};
+
+struct BoundedSummary {
+  InteriorPointTermination termination = InteriorPointTermination::kNotRun;
+  int iterations = 0;
+  double cost_initial = 0;  // 1/2 sum rho, squared pixels
+  double cost_final = 0;    // <= cost_initial
+  // Sum of multiplier times slack relative to the cost: were the problem
+  // convex, no estimate would be lower by more.
+  std::optional<double> duality_gap;
+  // What Newton's step would still gain on the central path, relative to the
+  // cost.
+  std::optional<double> stationarity;
+  int64_t num_active = 0;  // multipliers above 1e-3 of an error's own weight
+};
+
+// Requires an estimate with every residual below the cap (throws
+// std::invalid_argument). Every iterate stays there. Rows of `problem` must be
+// those at `*estimate`; with take_rows they are so afterwards. Of every
+// connected component the frame with the most observations stays, and the scale
+// is free where no baseline sets it. An iteration takes about as long as one of
+// MinimizeJointly; the same bits at any number of threads.
+BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
+                               const BoundedOptions& options,
+                               const Context& context, Estimate* estimate);
+
+// Moves points and frames to a local minimum of
+//
+//   sum_i c^2 r_i^2 / (c^2 + r_i^2),   c twice the median of the r_i,
+//
+// with r_i the residuals in pixels (p = 2) [Geman, McClure 1987], by Gauss and
+// Newton's method with weights (c^2 / (c^2 + r_i^2))^2. c is taken anew after
+// every step, at first as sixteen times the median, and half as many each time
+// [Blake, Zisserman 1987]. An observation that does not see its point counts
+// c^2; a point that none sees stays. Steps are damped by the relative changes
+// of the depths, so that neither the scale nor what the observations hardly
+// hold runs away:
+//
+//   sum_i weight_i (|r_i + dr_i|^2 + (damping c dw_i / w_i)^2).
+//
+// The problem may have several components and must have nothing fixed. Ends
+// where a step lowers the sum by less than 0.03 %, at the latest after 30. If
+// most observations do not see their points, nothing moves. The same bits at
+// any number of threads. O(observations) and a factorisation of the frames'
+// system a step.
+void MinimizeRobustly(const KnownRotationProblem& problem,
+                      const Context& context, Estimate* estimate);
+
+}  // namespace krot::internal

@@ -1,0 +1,133 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/base/context.h"
+
+namespace krot::internal {
+
+// Least squares of bundle adjustment, in blocks of three columns: those of
+// points, and those of frames or of whatever else points share.
+
+// Which observation sees what. Observations stand in the order of their points.
+struct BlockStructure {
+  std::vector<int64_t> point_begin;  // num_points + 1
+  std::vector<int32_t> frame_of;     // per observation
+  std::vector<char> frame_is_fixed;  // per frame; a fixed one has no columns
+  std::vector<char> point_is_fixed;  // per point, likewise; empty: none is
+
+  bool IsFixedPoint(int64_t k) const {
+    return !point_is_fixed.empty() && point_is_fixed[k] != 0;
+  }
+  int64_t num_points() const {
+    return static_cast<int64_t>(point_begin.size()) - 1;
+  }
+  int64_t num_observations() const { return point_begin.back(); }
+  int64_t num_frames() const {
+    return static_cast<int64_t>(frame_is_fixed.size());
+  }
+};
+
+// Each point's observations by frame, equal frames by observation: where those
+// of point k stand from point_begin[k] on, relative to that.
+std::vector<int32_t> OrderByFrame(const BlockStructure& structure);
+
+// A number for every column.
+struct BlockVector {
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Eigen::Vector3d> frames;
+
+  void SetZero(int64_t num_points, int64_t num_frames) {
+    points.assign(num_points, Eigen::Vector3d::Zero());
+    frames.assign(num_frames, Eigen::Vector3d::Zero());
+  }
+  double Dot(const BlockVector& other) const;
+  void Add(double factor, const BlockVector& other);  // += factor * other
+};
+
+// The 3x3 blocks that a symmetric matrix has, by its lower triangle: for each
+// block column its block rows, ascending, beginning with the diagonal's.
+struct BlockPattern {
+  std::vector<int64_t> begin = {0};  // num_columns + 1
+  std::vector<int32_t> row;          // per block
+
+  int32_t num_columns() const { return static_cast<int32_t>(begin.size()) - 1; }
+  int64_t num_blocks() const { return static_cast<int64_t>(row.size()); }
+  bool operator==(const BlockPattern& other) const {
+    return begin == other.begin && row == other.row;
+  }
+};
+
+BlockPattern FullPattern(int32_t num_columns);
+
+// The pairs of free frames that share a point, of any rank where ranks share
+// the points. A block column stands for a free frame. O(sum of the squared
+// lengths of tracks).
+BlockPattern PairsThatSharePoints(const BlockStructure& structure,
+                                  Ranks* ranks = nullptr);
+
+// The sparse Cholesky factor of a matrix of this pattern, in Eigen's
+// fill-reducing order, by a symbolic factorisation of one number per block:
+// that takes next to nothing beside the factor itself.
+struct SparseFactorSize {
+  int64_t numbers;
+  double operations;  // additions and multiplications that make it
+};
+SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern);
+
+// R of A = Q R, 3x3 and upper triangular. An infinite number on the diagonal
+// stands for a direction that no row of A tells: its unknown is 0.
+struct UpperTriangle {
+  double r00 = 0, r01 = 0, r02 = 0, r11 = 0, r12 = 0, r22 = 0;
+
+  Eigen::Vector3d Solve(const Eigen::Vector3d& b) const {  // R^-1 b
+    Eigen::Vector3d x;
+    x[2] = b[2] / r22;
+    x[1] = (b[1] - r12 * x[2]) / r11;
+    x[0] = (b[0] - r01 * x[1] - r02 * x[2]) / r00;
+    return x;
+  }
+  Eigen::Vector3d SolveTransposed(const Eigen::Vector3d& b) const {  // R^-T b
+    Eigen::Vector3d x;
+    x[0] = b[0] / r00;
+    x[1] = (b[1] - r01 * x[0]) / r11;
+    x[2] = (b[2] - r02 * x[0] - r12 * x[1]) / r22;
+    return x;
+  }
+};
+
+// A = Q R by Gram-Schmidt with reorthogonalisation, in place: `rows` holds A,
+// n x 3 and row-major, and Q afterwards. A column that is a combination of the
+// ones before it, up to rounding, becomes 0 in Q. O(n).
+UpperTriangle Orthogonalize(int64_t n, double* rows);
+
+// L^-1 of A = L L', lower triangular, of a positive definite 3x3 matrix. Pivots
+// that are not above `least_pivot` > 0 are replaced by it; then it returns
+// false.
+template <typename Scalar>
+bool InvertCholesky(const Eigen::Matrix<Scalar, 3, 3>& A, Scalar least_pivot,
+                    Eigen::Matrix<Scalar, 3, 3>* inverse) {
+  bool is_exact = true;
+  const auto inverse_root = [&](Scalar pivot) {
+    is_exact = is_exact && pivot > least_pivot;
+    return 1 / std::sqrt(pivot > least_pivot ? pivot : least_pivot);
+  };
+  const Scalar i00 = inverse_root(A(0, 0));
+  const Scalar l10 = A(1, 0) * i00;
+  const Scalar l20 = A(2, 0) * i00;
+  const Scalar i11 = inverse_root(A(1, 1) - l10 * l10);
+  const Scalar l21 = (A(2, 1) - l20 * l10) * i11;
+  const Scalar i22 = inverse_root(A(2, 2) - l20 * l20 - l21 * l21);
+  const Scalar i10 = -l10 * i00 * i11;
+  *inverse << i00, 0, 0,  //
+      i10, i11, 0,        //
+      -(l20 * i00 + l21 * i10) * i22, -l21 * i11 * i22, i22;
+  return is_exact;
+}
+
+}  // namespace krot::internal

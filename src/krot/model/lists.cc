@@ -1,0 +1,191 @@
+#include "krot/model/model_io.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "krot/base/numbers.h"
+#include "krot/context.h"
+#include "krot/model/name_list.h"
+#include "krot/model/rigs.h"
+
+namespace krot::internal {
+
+std::vector<char> FixedFrames(const FileBytes& file, const Model& model,
+                              const FileNote& note) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  ListReader list(file, model, ListReader::Of::kImagesOrIds);
+  std::vector<char> is_fixed(model.frames.size(), 0);
+  while (list.Next()) {
+    const std::optional<int32_t> image = list.TakeName();
+    if (!image) continue;
+    if (!geometries[*image].has_pose) {
+      list.reader().Fail("\"" + model.images[*image].name +
+                             "\", which stands nowhere in the model",
+                         "an image with a pose");
+    }
+    is_fixed[geometries[*image].frame] = 1;
+  }
+  list.Finish(note);
+  return is_fixed;
+}
+
+std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model,
+                                const FileNote& note) {
+  ListReader list(file, model, ListReader::Of::kPoints3D);
+  std::vector<char> is_fixed(model.points3D.size(), 0);
+  while (list.Next()) {
+    if (const auto point = list.TakeName()) is_fixed[*point] = 1;
+  }
+  list.Finish(note);
+  return is_fixed;
+}
+
+namespace {
+
+using Eigen::Vector3d;
+
+// Numbers of a line: an ellipsoid's that is turned, one's along the axes, a
+// ball's, and a ball's without its radius.
+const std::vector<size_t> kCounts = {10, 6, 4, 3};
+constexpr char kExpected[] =
+    "X Y Z RADIUS, or X Y Z and three semi-axes, or these and QW QX QY QZ";
+// Of two semi-axes.
+constexpr double kLargestRatio = 1e4;
+
+Ellipsoid RegionOf(const std::vector<double>& v,
+                   const std::optional<double>& radius,
+                   const TextReader& reader) {
+  if (v.size() == 3 && !radius) {
+    reader.Fail("no RADIUS behind X Y Z",
+                std::string(kExpected) +
+                    "; --Problem.position_radius gives one to all such lines");
+  }
+  Ellipsoid region =
+      BallAround({v[0], v[1], v[2]}, v.size() == 3 ? *radius : v[3]);
+  if (v.size() >= 6) region.semi_axes = {v[3], v[4], v[5]};
+  if (v.size() == 10) region.world_from_axes = {v[6], v[7], v[8], v[9]};
+  if (!(region.semi_axes.minCoeff() > 0)) {
+    std::string found = "\"";
+    AppendNumber(region.semi_axes.minCoeff(), &found);
+    reader.Fail(found + "\"", "a radius above zero");
+  }
+  if (!IsFit(region)) {
+    reader.Fail("semi-axes or a quaternion out of range",
+                "axes of which none is 10,000 times another, and a quaternion "
+                "that is not zero");
+  }
+  return region;
+}
+
+// Between the quartiles of a coordinate, which few strays do not move.
+double Spread(std::vector<Vector3d> positions, int axis) {
+  if (positions.empty()) return 0;
+  std::sort(positions.begin(), positions.end(),
+            [axis](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+  const size_t count = positions.size();
+  return positions[3 * count / 4][axis] - positions[count / 4][axis];
+}
+
+// Whether x and y are degrees on the earth: in their range, nowhere near zero
+// for how near they are to each other, and that next to nothing beside the
+// spread that the model gives the same things or, if it gives none, beside
+// their heights'. A degree is 111 km: metres would be 10^5 times as far apart.
+bool AreDegrees(const std::vector<Vector3d>& positions,
+                const std::vector<Vector3d>& in_model) {
+  constexpr double kNextToNothing = 0.01;
+  Vector3d farthest = Vector3d::Zero();
+  for (const Vector3d& x : positions)
+    farthest = farthest.cwiseMax(x.cwiseAbs());
+  const double larger = std::max(farthest.x(), farthest.y());
+  if (larger > 180 || std::min(farthest.x(), farthest.y()) > 90) return false;
+  const double spread = std::max(Spread(positions, 0), Spread(positions, 1));
+  double other = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    other = std::max(other, Spread(in_model, axis));
+  }
+  if (other == 0) other = Spread(positions, 2);
+  return spread > 0 && spread < kNextToNothing * std::min(larger, other);
+}
+
+bool NamesDegrees(std::string header) {
+  for (char& c : header) {
+    c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  return header.find("lat") != std::string::npos &&
+         (header.find("lon") != std::string::npos ||
+          header.find("lng") != std::string::npos);
+}
+
+// Reads the list; `in_model` are the positions that the model has itself, NaN
+// for none.
+std::vector<KnownPosition> ReadList(const FileBytes& file, const Model& model,
+                                    KnownPosition::Of of,
+                                    const std::vector<Vector3d>& in_model,
+                                    const PositionsOptions& options) {
+  ListReader list(file, model,
+                  of == KnownPosition::Of::kImage ? ListReader::Of::kImages
+                                                  : ListReader::Of::kPoints3D);
+  std::vector<std::pair<ListReader::Line, TextReader>> lines;
+  std::vector<Vector3d> listed;
+  std::vector<Vector3d> own;
+  while (list.Next()) {
+    const auto line = list.Take(kCounts, kExpected);
+    if (!line) continue;
+    lines.emplace_back(*line, list.reader());
+    listed.emplace_back(line->numbers.data());
+    if (in_model[line->index].allFinite()) own.push_back(in_model[line->index]);
+  }
+  if (NamesDegrees(list.header()) || AreDegrees(listed, own)) {
+    throw ModelError(
+        file.path +
+        ": found latitudes and longitudes, expected X Y Z in the model's frame "
+        "and unit; tools/scripts/geodetic_to_positions.sh makes these of them, "
+        "for a model that colmap model_aligner has brought into that frame");
+  }
+  list.Finish(options.on_note);
+  std::vector<KnownPosition> positions;
+  for (const auto& [line, reader] : lines) {
+    positions.push_back(
+        {of, line.index, RegionOf(line.numbers, options.radius, reader)});
+  }
+  return positions;
+}
+
+}  // namespace
+
+bool IsFit(const Ellipsoid& region) {
+  const double norm = region.world_from_axes.norm();
+  return region.centre.allFinite() && region.semi_axes.allFinite() &&
+         region.semi_axes.minCoeff() > 0 &&
+         region.semi_axes.maxCoeff() <=
+             kLargestRatio * region.semi_axes.minCoeff() &&
+         std::isfinite(norm) && norm > 0;
+}
+
+std::vector<KnownPosition> ReadPositions(const FileBytes& file,
+                                         const Model& model,
+                                         const PositionsOptions& options) {
+  std::vector<Vector3d> centres;
+  for (const ImageGeometry& image : ImageGeometries(model)) {
+    centres.push_back(
+        image.has_pose
+            ? Center(image.cam_from_world)
+            : Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  }
+  return ReadList(file, model, KnownPosition::Of::kImage, centres, options);
+}
+
+std::vector<KnownPosition> ReadPointPositions(const FileBytes& file,
+                                              const Model& model,
+                                              const PositionsOptions& options) {
+  std::vector<Vector3d> points;
+  for (const Point3D& point : model.points3D) points.push_back(point.xyz);
+  return ReadList(file, model, KnownPosition::Of::kPoint3D, points, options);
+}
+
+}  // namespace krot::internal
