@@ -8,8 +8,8 @@
 
 #include "krot/adjust.h"
 #include "krot/base/write_file.h"
-#include "krot/convert/certificate_file.h"
 #include "krot/certificate.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/outliers.h"
 #include "krot/outliers/outlier_filter.h"
 #include "krot/pipeline/adjust_model.h"

@@ -11,13 +11,13 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
-#include "krot/analysis/noise.h"
 #include "krot/analysis/model_input.h"
+#include "krot/analysis/noise.h"
 #include "krot/context.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
-#include "krot/model/rigs.h"
 #include "krot/model/model_io.h"
+#include "krot/model/rigs.h"
 #include "krot/options/option_table.h"
 #include "krot/report/sentences.h"
 #include "python/bindings.h"

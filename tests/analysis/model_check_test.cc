@@ -17,9 +17,9 @@
 #include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model.h"
-#include "krot/model/rigs.h"
-#include "krot/model/model_checks.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/model_checks.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {

@@ -13,8 +13,8 @@
 
 #include "krot/analysis/epipolar.h"
 #include "krot/base/numbers.h"
-#include "krot/model/rigs.h"
 #include "krot/model/model_io.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/model_matchers.h"
 

@@ -5,10 +5,10 @@
 namespace krot::internal {
 namespace {
 
-TEST(Median, IsTheMiddleOrTheMeanOfTheTwoThere) {
-  EXPECT_EQ(Median({3}), 3);
-  EXPECT_EQ(Median({9, 1, 2}), 2);
-  EXPECT_EQ(Median({4, 1, 2, 9}), 3);
+TEST(MedianOf, IsTheMiddleOrTheMeanOfTheTwoThere) {
+  EXPECT_EQ(MedianOf({3}), 3);
+  EXPECT_EQ(MedianOf({9, 1, 2}), 2);
+  EXPECT_EQ(MedianOf({4, 1, 2, 9}), 3);
 }
 
 TEST(TimeInterleaved, RunsInTurnAndAsOftenAsAsked) {

@@ -9,8 +9,8 @@
 
 #include "krot/geometry.h"
 #include "krot/model.h"
-#include "krot/model/rigs.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/known_fixture.h"
 #include "tests/cli/scenes.h"
 #include "tests/testing/model_matchers.h"

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "krot/convert/certificate_file.h"
 #include "krot/context.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/pipeline/solve_model.h"
 #include "tests/fuzz/fuzz.h"
 

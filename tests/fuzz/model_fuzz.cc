@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 
+#include "krot/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/model_digest.h"
-#include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/binary_io.h"
 #include "krot/model/model_checks.h"

@@ -9,8 +9,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/convert/certificate_file.h"
 #include "krot/check.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model.h"
 #include "tests/outliers/outlier_scenes.h"
 

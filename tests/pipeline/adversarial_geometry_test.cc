@@ -9,8 +9,8 @@
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"
-#include "krot/synthetic/scene_steps.h"
 #include "krot/synthetic/scene.h"
+#include "krot/synthetic/scene_steps.h"
 
 // Scenes in which something that solvers like to take for granted is missing:
 // parallax, a baseline, noise, more than one point in common. The truth itself

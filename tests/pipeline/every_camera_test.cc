@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
+#include "krot/camera/camera_model.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
-#include "krot/camera/camera_model.h"
 #include "krot/joint/joint.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"

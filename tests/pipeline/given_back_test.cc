@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/convert/reprojection.h"
 #include "krot/camera/camera_model.h"
+#include "krot/convert/reprojection.h"
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "krot/convert/reprojection.h"
 #include "krot/conic/interior_point.h"
+#include "krot/convert/reprojection.h"
 #include "krot/proof/certificate.h"
 #include "krot/synthetic/scene.h"
 

@@ -12,13 +12,13 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/camera/camera_model.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/convert/reprojection.h"
-#include "krot/camera/camera_model.h"
-#include "krot/model/validate.h"
-#include "krot/model/rigs.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
+#include "krot/model/validate.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"

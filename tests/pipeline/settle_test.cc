@@ -12,8 +12,8 @@
 #include <gtest/gtest.h>
 
 #include "krot/camera/camera_model.h"
-#include "krot/model/rigs.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 #include "tests/pipeline/solve_by_ranks.h"
 

@@ -10,8 +10,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "krot/convert/certificate_file.h"
 #include "krot/camera/camera_model.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/problem/cost.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "krot/base/parallel_for.h"
 #include "krot/base/context.h"
+#include "krot/base/parallel_for.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_model.h"
 #include "tools/benchmark/benchmark_report.h"
@@ -158,12 +158,12 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
     const BenchmarkModel model = ReadBenchmarkModel(path);
     const Race race = RunRace(options, path);
     const Proof& proof = race.proof;
-    const double ours = Median(race.krot_seconds);
+    const double ours = MedianOf(race.krot_seconds);
     Cell theirs = MissingCell();
     Cell ratio = MissingCell();
     if (!race.colmap_seconds.empty()) {
-      theirs = SizedCell(Median(race.colmap_seconds));
-      ratios.push_back(ours / Median(race.colmap_seconds));
+      theirs = SizedCell(MedianOf(race.colmap_seconds));
+      ratios.push_back(ours / MedianOf(race.colmap_seconds));
       ratio = SizedCell(ratios.back());
     }
     table.rows.push_back({TextCell(model.name),
@@ -181,7 +181,7 @@ int RunJointBenchmark(const std::vector<std::string>& arguments) {
   table.notes.push_back("No round of a model begins more than " +
                         SizedCell(kEnoughSeconds).text + " s after its first.");
   if (!ratios.empty()) {
-    table.notes.push_back("Median ratio " + SizedCell(Median(ratios)).text +
+    table.notes.push_back("Median ratio " + SizedCell(MedianOf(ratios)).text +
                           ".");
   }
   BenchmarkReport report;

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/parallel_for.h"
 #include "krot/base/context.h"
+#include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
 #include "tools/benchmark/benchmark_command.h"
 #include "tools/benchmark/benchmark_report.h"
@@ -180,7 +180,7 @@ class Contest {
 
   Cell TimeCell(const Outcome& outcome, double lowest) const {
     if (!outcome.has_finished) return MissingCell(LimitText());
-    Cell cell = SizedCell(Median(outcome.seconds));
+    Cell cell = SizedCell(MedianOf(outcome.seconds));
     if (outcome.cost > (1 + kSameCost) * lowest) cell.text += " *";
     return cell;
   }

@@ -47,7 +47,7 @@ std::string Spread(std::vector<double> values) {
   if (values.empty()) return "not measured";
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
   const std::string range = " (" + Text(*low) + " to " + Text(*high) + ")";
-  return Text(Median(std::move(values))) + range;
+  return Text(MedianOf(std::move(values))) + range;
 }
 
 // "tower 0.22, UWO 0.2": a column, row by row.

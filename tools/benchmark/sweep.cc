@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "krot/base/parallel_for.h"
 #include "krot/base/context.h"
+#include "krot/base/parallel_for.h"
 #include "krot/problem/cost.h"
 #include "krot/sweeps/res_int.h"
 #include "tools/benchmark/benchmark_command.h"
@@ -88,7 +88,7 @@ SweepTimes Measure(const SweepOptions& options, const BenchmarkModel& model) {
 }
 
 std::vector<Cell> Row(const BenchmarkModel& model, const SweepTimes& times) {
-  const double fast = Median(times.fast);
+  const double fast = MedianOf(times.fast);
   std::vector<Cell> row = {
       TextCell(model.name),
       CountCell(static_cast<int64_t>(model.built.problem.observations.size())),
@@ -96,12 +96,12 @@ std::vector<Cell> Row(const BenchmarkModel& model, const SweepTimes& times) {
   if (times.paper.empty()) {
     row.insert(row.end(), 2, MissingCell());
   } else {
-    row.push_back(SizedCell(Median(times.paper)));
-    row.push_back(SizedCell(Median(times.paper) / fast));
+    row.push_back(SizedCell(MedianOf(times.paper)));
+    row.push_back(SizedCell(MedianOf(times.paper) / fast));
   }
-  row.push_back(SizedCell(Median(times.floor)));
-  row.push_back(SizedCell(fast / Median(times.floor)));
-  row.push_back(SizedCell(fast / Median(times.threads)));
+  row.push_back(SizedCell(MedianOf(times.floor)));
+  row.push_back(SizedCell(fast / MedianOf(times.floor)));
+  row.push_back(SizedCell(fast / MedianOf(times.threads)));
   row.push_back(RealCell(times.fast_cost, 4));
   row.push_back(times.paper.empty() ? MissingCell()
                                     : RealCell(times.paper_cost, 4));

@@ -31,7 +31,7 @@ int64_t CallsFor(const std::function<void()>& run, double min_seconds) {
 
 }  // namespace
 
-double Median(std::vector<double> values) {
+double MedianOf(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const size_t middle = values.size() / 2;
   return values.size() % 2 == 1 ? values[middle]
@@ -51,7 +51,7 @@ std::vector<double> TimeInterleaved(
   }
   std::vector<double> medians;
   for (const std::vector<double>& list : seconds) {
-    medians.push_back(Median(list));
+    medians.push_back(MedianOf(list));
   }
   return medians;
 }

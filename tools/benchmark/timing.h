@@ -7,7 +7,7 @@ namespace krot::internal {
 
 // The median; the mean of the two in the middle for an even count. Requires at
 // least one value.
-double Median(std::vector<double> values);
+double MedianOf(std::vector<double> values);
 
 // Median seconds of this thread's processor time of one call of each of `runs`,
 // out of `repeats` rounds in which every one is called in turn, so that what

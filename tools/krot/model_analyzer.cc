@@ -3,8 +3,8 @@
 
 #include "krot/analysis/colors.h"
 #include "krot/base/write_file.h"
-#include "krot/convert/certificate_file.h"
 #include "krot/context.h"
+#include "krot/convert/certificate_file.h"
 #include "krot/model.h"
 #include "krot/report/reports.h"
 #include "krot/report/sentences.h"

@@ -5,8 +5,8 @@
 
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
-#include "krot/convert/baseline_certificate.h"
 #include "krot/check.h"
+#include "krot/convert/baseline_certificate.h"
 #include "krot/database.h"
 #include "krot/outliers/filter_steps.h"
 #include "krot/report/reports.h"

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/colors.h"
+#include "krot/analysis/model_comparison.h"
 #include "krot/base/write_file.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/report/reports.h"

@@ -11,8 +11,8 @@
 #include <system_error>
 #include <vector>
 
-#include "krot/base/write_file.h"
 #include "krot/base/context.h"
+#include "krot/base/write_file.h"
 #include "krot/convert/model_digest.h"
 #include "krot/model/model_io.h"
 #include "krot/report/text_table.h"

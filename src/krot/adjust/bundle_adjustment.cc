@@ -14,8 +14,8 @@
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/ceres_problem.h"
 #include "krot/base/check.h"
-#include "krot/base/parallel_for.h"
 #include "krot/base/context.h"
+#include "krot/base/parallel_for.h"
 
 namespace krot::internal {
 namespace {

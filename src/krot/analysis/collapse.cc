@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 
 #include "krot/base/numbers.h"
-#include "krot/model/validate.h"
 #include "krot/model/rigs.h"
+#include "krot/model/validate.h"
 
 namespace krot::internal {
 namespace {

@@ -1,8 +1,8 @@
 #include <vector>
 
 #include "krot/check.h"
-#include "krot/model/rigs.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/rigs.h"
 
 namespace krot {
 

@@ -29,8 +29,8 @@ constexpr double kNotAdjusted = 0.1;
 constexpr double kFewKept = 1.0 / 3;
 // Median deviations: three standard deviations of Gaussian values.
 constexpr double kStandsOut = 4.5;
-// Half of what COLMAP asks of an image that it registers.
-constexpr int64_t kFewestAgree = 15;
+// Three observations determine a pose, and as many check it.
+constexpr int64_t kFewestAgree = 6;
 // Of the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 

@@ -7,8 +7,8 @@
 #include "krot/analysis/model_statistics.h"
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
-#include "krot/model/validate.h"
 #include "krot/model/rigs.h"
+#include "krot/model/validate.h"
 
 namespace krot::internal {
 namespace {

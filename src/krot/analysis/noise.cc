@@ -8,12 +8,11 @@
 #include <utility>
 
 #include "krot/base/check.h"
-#include "krot/base/parallel_for.h"
 #include "krot/base/numbers.h"
+#include "krot/base/parallel_for.h"
 
 namespace krot::internal {
 namespace {
-
 
 // The medians of chi^2 with one and two degrees of freedom.
 constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};

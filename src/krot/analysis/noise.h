@@ -108,7 +108,7 @@ class TrackNoise {
 // the step that its errors ask for.
 struct ImageSums {
   Eigen::Matrix<double, 6, 6> M =
-      Eigen::Matrix<double, 6, 6>::Zero();  // F' R_ii F, R_ii as in noise.h
+      Eigen::Matrix<double, 6, 6>::Zero();  // F' R_ii F, R_ii as above
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();  // F' e
   double square = 0;           // e' R_ii^+ e
   int64_t num_directions = 0;  // of these

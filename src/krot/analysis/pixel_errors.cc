@@ -21,7 +21,6 @@ using namespace internal;
 
 namespace {
 
-
 // x_cam = q x q^-1 + t.
 struct CameraPose {
   Eigen::Quaterniond rotation;

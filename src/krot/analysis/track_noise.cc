@@ -8,9 +8,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
-#include "krot/base/numbers.h"
 
 namespace krot::internal {
 namespace {

@@ -13,7 +13,6 @@
 #include <string_view>
 #include <utility>
 
-
 namespace krot::internal {
 namespace {
 

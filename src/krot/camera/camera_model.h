@@ -143,7 +143,7 @@ std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
 
 // The unit vector whose projection is the pixel and that lies before the first
 // fold of the model: det J > 0 from the axis to it. UndistortPixel
-// (camera_model.h) beyond 90 degrees and for panoramas: the same search from
+// beyond 90 degrees and for panoramas: the same search from
 // the same starts, `x_start` first.
 std::optional<Eigen::Vector3d> PixelBearing(
     int model_id, const double* params, const Eigen::Vector2d& pixel,

@@ -125,7 +125,7 @@ inline Interval atan2(const Interval& y, const Interval& x) {
 // A value with its derivatives by two variables, for forward differentiation
 // of the camera models: f(Dual{u, 1, 0}, Dual{v, 0, 1}) carries df/du, df/dv.
 //
-// Scalar is double, or Interval (interval.h) to bound derivatives on a set.
+// Scalar is double, or Interval to bound derivatives on a set.
 // Only what the camera models use is defined. No allocation, no branches.
 template <typename Scalar>
 struct Dual {

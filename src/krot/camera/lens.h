@@ -241,8 +241,7 @@ struct FovLens {
   }
 };
 
-// The lenses whose image radius follows from a square root; lens.h says what a
-// lens is.
+// The lenses whose image radius follows from a square root.
 
 // Division model of Fitzgibbon (2001): the ray of the lens point is
 // (a, b, 1 + k (a^2 + b^2)), so that

@@ -91,7 +91,7 @@ std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
                                        const ErrorMap::Geometry& geometry);
 
 // Branch and bound over the box |q|_inf <= reach of an ErrorMap, in the norm
-// p = 1, 2 or infinity: what remainder_bound.h is proved with.
+// p = 1, 2 or infinity: what RemainderBound is proved with.
 
 // Whether |f| > 1 is proved on all of the box's boundary.
 bool BoundaryIsOutside(const ErrorMap& map, double p, double reach);

@@ -10,10 +10,10 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "krot/convert/certificate_json.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/interval.h"
 #include "krot/context.h"
+#include "krot/convert/certificate_json.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {

@@ -7,11 +7,11 @@
 #include <sstream>
 #include <utility>
 
+#include "krot/context.h"
 #include "krot/convert/build_steps.h"
 #include "krot/convert/certificate_json.h"
 #include "krot/convert/model_digest.h"
 #include "krot/convert/reprojection.h"
-#include "krot/context.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 

@@ -9,9 +9,9 @@
 #include <Eigen/Core>
 
 #include "krot/base/context.h"
+#include "krot/certificate.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/pixel_certificate.h"
-#include "krot/certificate.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"

@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "krot/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/certificate_json.h"
 #include "krot/convert/model_digest.h"
 #include "krot/convert/pixel_certificate.h"
-#include "krot/context.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {

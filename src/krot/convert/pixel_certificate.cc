@@ -8,9 +8,9 @@
 
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/convert/reprojection.h"
 #include "krot/camera/camera_model.h"
 #include "krot/camera/remainder_bound.h"
+#include "krot/convert/reprojection.h"
 
 namespace krot::internal {
 namespace {

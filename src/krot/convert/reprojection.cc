@@ -8,8 +8,8 @@
 
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/camera/models.h"
 #include "krot/camera/camera_model.h"
+#include "krot/camera/models.h"
 #include "krot/camera/remainder_bound.h"
 #include "krot/minimax/residual_set.h"
 #include "krot/model/rigs.h"

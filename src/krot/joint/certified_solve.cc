@@ -223,15 +223,20 @@ bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
 
 // Whether there is a new estimate. One just below the cost is sought first, or
 // the proof that there is none: cost and what is known to be infeasible are
-// only brought together where neither is found.
+// only brought together where neither is found, or where the last such estimate
+// led hardly lower.
 bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
-  if (TryBelow((1 - kShareOfGapBelow * options_.relative_gap) * cost_,
+  const bool has_led_lower = cost_ < (1 - width_) * fresh_cost_;
+  if (has_led_lower &&
+      TryBelow((1 - kShareOfGapBelow * options_.relative_gap) * cost_,
                report)) {
+    fresh_cost_ = cost_;
     return true;
   }
   if (IsGapReached()) return false;
   const bool is_fresh = Bisect(width_, report);
   width_ *= kShareOfWidth;
+  fresh_cost_ = std::numeric_limits<double>::infinity();
   return is_fresh;
 }
 
@@ -240,6 +245,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
                                      const IterationReport& report) {
   max_iterations_ = max_iterations;
   width_ = kFirstWidth;
+  fresh_cost_ = std::numeric_limits<double>::infinity();
   if (IsLowEnough()) return JointTermination::kGapReached;
   double start_margin = are_multipliers_known_ ? WarmMargin() : kStartMargin;
   Estimate start = estimate_;

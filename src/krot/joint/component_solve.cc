@@ -5,9 +5,9 @@
 
 #include "krot/joint/joint.h"
 #include "krot/joint/working_set.h"
-#include "krot/problem/subset.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"
 
 namespace krot::internal {

@@ -94,8 +94,9 @@ class CertifiedSolve {
   bool are_multipliers_known_;  // to the next run
   int iterations_ = 0;
   int max_iterations_ = 0;
-  double width_ = 0;  // of the next bisection, relative
-  double gap_ = 0;    // of the interior point, where its last run ended
+  double width_ = 0;       // of the next bisection, relative
+  double fresh_cost_ = 0;  // of the last estimate that was found near the cost
+  double gap_ = 0;         // of the interior point, where its last run ended
   const double known_optimum_;
   bool is_given_up_ = false;
 };

@@ -6,10 +6,10 @@
 
 #include "krot/base/check.h"
 #include "krot/base/context.h"
-#include "krot/problem/subset.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 namespace {

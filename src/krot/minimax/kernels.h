@@ -6,7 +6,7 @@
 namespace krot::internal {
 
 // What the descent of one problem (newton_descent.h) and those of problems
-// side by side (kernels.h) have in common.
+// side by side have in common.
 
 // Residuals this small are zero, in pixels.
 inline constexpr double kZeroPixels = 1e-10;
@@ -118,7 +118,7 @@ inline constexpr int kLanes = 8;
 using LaneDoubles = double[kLanes];
 
 // A row of a residual of every lane's problem: a_1, b_1, a_2, b_2, c, d as in
-// kernels.h. A problem that has fewer residuals than the others has
+// ResidualBlock. A problem that has fewer residuals than the others has
 // 0 / 1 here.
 inline constexpr int kLaneRow = 12;
 struct alignas(64) LaneRow {

@@ -9,8 +9,8 @@
 namespace krot::internal {
 
 // What the residuals of all lanes do around x, for p = 2: passes over their
-// rows. The model is that of newton_descent.h with all residuals as members. For
-// kernels alone.
+// rows. The model is that of newton_descent.h with all residuals as members.
+// For kernels alone.
 
 // One residual of every lane: v = A x + b, w = c'x + d.
 struct LaneResidual {

@@ -153,7 +153,7 @@ struct DescentGoal {
 };
 
 // Minimises max_i r_i(x) by sequential quadratic programming: every step
-// minimises a local model (newton_descent.h) of the residuals near the maximum.
+// minimises a local model of the residuals near the maximum.
 // A step that keeps too little of what the model promised teaches the model:
 // residuals that it overlooked, multipliers, tangents; where that does not
 // help, kappa shortens the step, so that one which lowers the maximum exists

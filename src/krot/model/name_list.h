@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "krot/model.h"
-#include "krot/model/validate.h"
 #include "krot/model/text_io.h"
+#include "krot/model/validate.h"
 
 namespace krot::internal {
 

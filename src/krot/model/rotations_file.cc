@@ -11,9 +11,9 @@
 
 #include "krot/base/numbers.h"
 #include "krot/context.h"
-#include "krot/model/rigs.h"
-#include "krot/model/name_list.h"
 #include "krot/model/model_checks.h"
+#include "krot/model/name_list.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -8,8 +8,8 @@
 #include "krot/analysis/noise.h"
 #include "krot/base/check.h"
 #include "krot/finish/least_squares.h"
-#include "krot/outliers/removal.h"
 #include "krot/outliers/packing.h"
+#include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
 
 namespace krot::internal {
@@ -94,7 +94,7 @@ NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   const auto count = static_cast<double>(noise.num_tested);
   limit.max_error =
       std::max(kLeastNoisePx, factor * limit.sigma *
-                                std::sqrt(2 * std::log(count / kFalseAlarm)));
+                                  std::sqrt(2 * std::log(count / kFalseAlarm)));
   return limit;
 }
 

@@ -9,10 +9,10 @@
 #include "krot/model/derived_models.h"
 #include "krot/outliers/conflict.h"
 #include "krot/outliers/filter_steps.h"
-#include "krot/outliers/removal.h"
 #include "krot/outliers/packing.h"
-#include "krot/outliers/robust_start.h"
 #include "krot/outliers/parts.h"
+#include "krot/outliers/removal.h"
+#include "krot/outliers/robust_start.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 

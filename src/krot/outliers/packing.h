@@ -121,9 +121,9 @@ inline constexpr int64_t kMostWork = 1500;
 // they have the least choice, it looks
 //
 //   in its image alone and one other of its track, with the companions that
-//     others need least (packing.h),
+//     others need least,
 //   in two others, then in all, among the observations there whose rays miss
-//     each other by most (packing.h),
+//     each other by most,
 //   and at last among the removal's tight observations,
 //
 // first among those that are neither removed nor taken already, so that no

@@ -8,9 +8,9 @@
 
 #include "krot/base/context.h"
 #include "krot/base/parallel_for.h"
+#include "krot/conic/interior_point.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
-#include "krot/conic/interior_point.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/pipeline/stages.h"
 #include "krot/problem/subset.h"

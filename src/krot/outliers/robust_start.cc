@@ -12,8 +12,8 @@
 
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/convert/build_steps.h"
 #include "krot/conic/interior_point.h"
+#include "krot/convert/build_steps.h"
 #include "krot/finish/least_squares.h"
 #include "krot/outliers/parts.h"
 #include "krot/problem/cost.h"

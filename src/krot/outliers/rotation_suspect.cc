@@ -9,8 +9,8 @@
 #include <Eigen/Geometry>
 
 #include "krot/base/numbers.h"
-#include "krot/convert/reprojection.h"
 #include "krot/camera/camera_model.h"
+#include "krot/convert/reprojection.h"
 #include "krot/minimax/residual_set.h"
 #include "krot/outliers/removal.h"
 

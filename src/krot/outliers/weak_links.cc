@@ -8,12 +8,12 @@
 
 #include <Eigen/Geometry>
 
+#include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
 #include "krot/outliers/robust_start.h"
-#include "krot/problem/subset.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
-#include "krot/analysis/noise.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 namespace {

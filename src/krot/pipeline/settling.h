@@ -10,8 +10,8 @@
 #include "krot/base/parallel_for.h"
 #include "krot/convert/reprojection.h"
 #include "krot/pipeline/solve_model.h"
-#include "krot/problem/subset.h"
 #include "krot/problem/gauge.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 

@@ -15,9 +15,9 @@
 #include "krot/convert/reprojection.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
-#include "krot/problem/subset.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 namespace {

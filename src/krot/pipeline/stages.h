@@ -5,10 +5,10 @@
 #include <optional>
 
 #include "krot/base/context.h"
+#include "krot/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/pixel_certificate.h"
 #include "krot/convert/reprojection.h"
-#include "krot/context.h"
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
 

@@ -7,8 +7,8 @@
 
 #include "krot/base/numbers.h"
 #include "krot/math/norm.h"
-#include "krot/minimax/residual_set.h"
 #include "krot/minimax/kernels.h"
+#include "krot/minimax/residual_set.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

@@ -219,7 +219,7 @@ struct RepairOptions {
 // |y_i|_dual / lambda_i, and what is proved is delta by as much smaller.
 //
 // Requires one connected problem and one multiplier per observation, all
-// lambda > 0. See dual_repair.h for the cost.
+// lambda > 0. See LeastNormSolver for the cost.
 struct RepairedMultipliers {
   // Its observations are those of the problem; its defect is 0, nothing is
   // verified. None if the equations cannot be solved, or if there are misfits.

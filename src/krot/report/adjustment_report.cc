@@ -5,9 +5,9 @@
 #include <sstream>
 #include <vector>
 
-#include "krot/report/text_table.h"
-#include "krot/report/sentences.h"
 #include "krot/report/report_json.h"
+#include "krot/report/sentences.h"
+#include "krot/report/text_table.h"
 
 namespace krot::internal {
 namespace {

@@ -1,6 +1,6 @@
-#include "krot/report/reports.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/report_json.h"
+#include "krot/report/reports.h"
 
 namespace krot::internal {
 namespace {

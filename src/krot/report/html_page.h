@@ -85,7 +85,7 @@ Eigen::Vector3d SceneOrigin(const Model& model);
 //
 // `report_json` is what --report_path writes; the page shows its numbers, and
 // holds it as it is in the element #krot-report. Keys that it lacks are not
-// shown. The models go into #krot-models (html_page.h): all images, at
+// shown. The models go into #krot-models: all images, at
 // most kMaxShownPoints points each, and the distribution of all true pixel
 // errors. Byte sequences that are not UTF-8 are replaced.
 //

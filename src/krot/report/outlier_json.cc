@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "krot/outliers/robust_start.h"
-#include "krot/report/text_table.h"
 #include "krot/report/report_json.h"
+#include "krot/report/text_table.h"
 
 namespace krot::internal {
 namespace {

@@ -6,8 +6,8 @@
 #include <sstream>
 #include <vector>
 
-#include "krot/report/text_table.h"
 #include "krot/report/report_json.h"
+#include "krot/report/text_table.h"
 
 namespace krot::internal {
 namespace {

@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "krot/base/check.h"
+#include "krot/base/context.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/base/context.h"
 #include "krot/model/derived_models.h"
-#include "krot/problem/subset.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 
 namespace krot::internal {
 namespace {

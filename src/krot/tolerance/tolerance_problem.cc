@@ -7,8 +7,8 @@
 
 #include <Eigen/LU>
 
-#include "krot/convert/reprojection.h"
 #include "krot/conic/interior_point.h"
+#include "krot/convert/reprojection.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "krot/sweeps/res_int.h"

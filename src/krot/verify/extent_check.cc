@@ -4,8 +4,8 @@
 #include <limits>
 #include <optional>
 
-#include "krot/problem/subset.h"
 #include "krot/problem/known_rotation_problem.h"
+#include "krot/problem/subset.h"
 #include "krot/verify/certificate_check.h"
 
 namespace krot::internal {

@@ -118,7 +118,7 @@ class FixedConstants {
 };
 
 // What pulls from outside at the centre of a view or at a point, world
-// coordinates. Forces (force_checker.h) balance with it that add up to the pull
+// coordinates. Forces balance with it that add up to the pull
 // at the view's frame, and to its negative at the point.
 struct Pull {
   enum class Kind { kView, kPoint };
@@ -143,7 +143,7 @@ std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull);
 // beside them whose forces balance exactly, with pulls if there are any, how
 // far away those are at most, and what the constants of the rows add up to.
 //
-// Forces (force_checker.h) balance but for g; changing those of a spanning
+// Forces balance but for g; changing those of a spanning
 // forest balances them exactly. The change F_i of a force is one of
 // (delta lambda_i; y_i) by E_i^-T F_i.
 //
