@@ -104,9 +104,9 @@ enum class ImageVerdict {
   kWrong,
 };
 
-// Why an image is wrong. What is judged by observations is asked such that
-// noise three times as large as the model's, as blur makes it in one photo, is
-// none of them.
+// Why an image is wrong. Noise three times the model's, as of a blurred photo,
+// is none of them, unless too few observations are left to tell it from
+// kChance.
 enum class ImageFault {
   kNone,
   kMatches,  // the matches of its pairs contradict its pose (CheckPairs)

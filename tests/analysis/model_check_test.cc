@@ -175,8 +175,6 @@ TEST(CheckModel, AsksForAnAdjustmentWhereMostImagesAreMisplaced) {
   }
 }
 
-// What COLMAP keeps of an image with a wrong pose. Of noise of 0.3 pixels most
-// of it is above the critical value, and is removed.
 // A camera and a rig for each image, all alike.
 void GiveEachImageItsOwnCamera(Model* model) {
   for (size_t n = 1; n < model->images.size(); ++n) {
@@ -299,6 +297,7 @@ TEST(ErrorsInDisc, HasTheLikeliestDensityAndItsDivergence) {
   }
 }
 
+// What COLMAP keeps of an image with a wrong pose.
 TEST(CheckModel, FindsAnImageThatFitsByChanceWithinFourPixels) {
   for (int seed = 1; seed <= 10; ++seed) {
     Model model = Scene(seed, 12, 5, seed % 2 == 0 ? 1 : 0.6);

@@ -17,7 +17,6 @@ using namespace internal;
 
 namespace {
 
-constexpr double kNothingHolds = std::numeric_limits<double>::infinity();
 // An image may be so many times as noisy as most and still be sound.
 constexpr double kNoisyImage = 3;
 // Of the squared errors: another pose takes so much of them away.
@@ -355,7 +354,7 @@ class Checker {
       if (image.verdict == ImageVerdict::kWrong) continue;
       image.relative_center_sigma = std::isfinite(image.center_sigma)
                                         ? image.center_sigma / median
-                                        : kNothingHolds;
+                                        : kInfinity;
       if (!(image.relative_center_sigma <= kWeaklyHeld)) {
         image.verdict = ImageVerdict::kWeaklyHeld;
       }
