@@ -63,6 +63,7 @@ std::vector<Groups::Count> Groups::Counts(bool compares_scales) const {
     int32_t num_frames = 0;
     for (const auto& [group, count] : groups) num_frames += count;
     for (const auto& [group, count] : groups) {
+      counts[group].num_located += num_frames - count >= 2;
       if (count < std::min(2, sizes[group])) continue;
       ++counts[group].num_tracks;
       counts[group].num_shared +=
@@ -96,8 +97,10 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
     const std::vector<Groups::Count> counts =
         groups.Counts(options.compares_scales);
     const auto is_open = [&](int32_t group) {
-      const auto [num_tracks, num_shared] = counts[group];
-      return sizes[group] == 1 ||
+      const auto [num_tracks, num_shared, num_located] = counts[group];
+      const bool is_loose =
+          num_tracks < options.min_tracks && num_tracks < num_located;
+      return sizes[group] == 1 || is_loose ||
              (num_shared >= options.min_tracks &&
               static_cast<double>(num_shared) >=
                   options.min_share * static_cast<double>(num_tracks));

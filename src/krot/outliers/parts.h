@@ -40,6 +40,8 @@ class Groups {
   struct Count {
     int64_t num_tracks = 0;
     int64_t num_shared = 0;
+    // That two others see, whether two of its frames see them or one.
+    int64_t num_located = 0;
   };
   std::vector<Count> Counts(bool compares_scales) const;
   std::vector<int32_t> Sizes() const {
@@ -74,7 +76,8 @@ struct PartOptions {
 // The part of every frame, numbered from 0 in the order of their first frames;
 // the problem must be connected. A group that is tied to others becomes one
 // with that which it shares most of its tracks with, until none is left; first
-// the two that share most. A single frame, which has no scale, is always tied.
+// the two that share most. A single frame, which has no scale, is always tied,
+// and so is a group of so few tracks of its own that others say more.
 // O(sum over tracks of their squared lengths), a dozen times.
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                const PartOptions& options);

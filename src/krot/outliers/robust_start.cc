@@ -8,133 +8,18 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #include "krot/base/numbers.h"
-#include "krot/base/parallel_for.h"
 #include "krot/conic/interior_point.h"
-#include "krot/convert/build_steps.h"
 #include "krot/finish/least_squares.h"
+#include "krot/linear/reduced_camera_system.h"
 #include "krot/outliers/parts.h"
+#include "krot/outliers/placement.h"
+#include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
-namespace {
-
-using Eigen::Vector3d;
-
-constexpr int64_t kPointsPerTask = 64;
-// So many of a long track's pairs are tried, about.
-constexpr int64_t kTriedPairs = 60;
-
-class RobustPoint {
- public:
-  RobustPoint(const KnownRotationProblem& problem,
-              const std::vector<AffineMap>& cameras, Norm norm, double cap,
-              double depth)
-      : problem_(problem),
-        cameras_(cameras),
-        norm_(norm),
-        cap_(cap),
-        depth_(depth) {}
-
-  Vector3d Place(int32_t point) {
-    begin_ = problem_.point_begin[point];
-    end_ = problem_.point_begin[point + 1];
-    rays_.clear();
-    for (int64_t i = begin_; i < end_; ++i) rays_.push_back(RayOf(i));
-    best_ = rays_.front().centre + depth_ * rays_.front().direction;
-    lowest_ = Score(best_);
-    const int64_t count = end_ - begin_;
-    const int64_t num_pairs = count * (count - 1) / 2;
-    const int64_t stride = std::max<int64_t>(1, num_pairs / kTriedPairs);
-    int64_t pair = 0;
-    for (int64_t gap = count - 1; gap > 0; --gap) {
-      for (int64_t a = 0; a + gap < count; ++a, ++pair) {
-        if (pair % stride == 0) Try({rays_[a], rays_[a + gap]});
-      }
-    }
-    std::vector<Ray> agreeing;
-    for (int64_t i = begin_; i < end_; ++i) {
-      if (Error(i, best_) < cap_) agreeing.push_back(rays_[i - begin_]);
-    }
-    Try(agreeing);
-    return best_;
-  }
-
- private:
-  // Where v = 0 and w > 0.
-  Ray RayOf(int64_t i) const {
-    const Observation& o = problem_.observations[i];
-    const AffineMap& camera = cameras_[o.view];
-    Vector3d ray = o.E.row(1).cross(o.E.row(2)).transpose();
-    if (o.E.row(0).dot(ray) < 0) ray = -ray;
-    const auto world_from_cam = camera.leftCols<3>().transpose();
-    return {-world_from_cam * camera.col(3),
-            (world_from_cam * ray).normalized()};
-  }
-  double Error(int64_t i, const Vector3d& xyz) const {
-    const Observation& o = problem_.observations[i];
-    return std::min(cap_,
-                    ResidualOf(ViewPoint(cameras_[o.view], o, xyz), norm_));
-  }
-  double Score(const Vector3d& xyz) const {
-    double sum = 0;
-    for (int64_t i = begin_; i < end_; ++i) sum += Error(i, xyz);
-    return sum;
-  }
-  void Try(const std::vector<Ray>& rays) {
-    const std::optional<Vector3d> midpoint = RetriangulateMidpoint(rays);
-    if (!midpoint) return;
-    const double score = Score(*midpoint);
-    if (!(score < lowest_)) return;
-    lowest_ = score;
-    best_ = *midpoint;
-  }
-
-  const KnownRotationProblem& problem_;
-  const std::vector<AffineMap>& cameras_;
-  const Norm norm_;
-  const double cap_;
-  const double depth_;
-  int64_t begin_ = 0, end_ = 0;  // observations of the point
-  std::vector<Ray> rays_;        // theirs
-  Vector3d best_ = Vector3d::Zero();
-  double lowest_ = 0;
-};
-
-// Of the observations of all points but the given ones; 1 if there are none.
-double MedianDepthOfOthers(const KnownRotationProblem& problem,
-                           const std::vector<int32_t>& points,
-                           const Estimate& estimate) {
-  std::vector<double> depths;
-  for (const Observation& o : problem.observations) {
-    if (std::binary_search(points.begin(), points.end(), o.point)) continue;
-    depths.push_back(ViewPoint(problem, o, estimate).depth);
-  }
-  return depths.empty() ? 1 : Median(std::move(depths));
-}
-
-}  // namespace
-
-void PlacePointsRobustly(const KnownRotationProblem& problem,
-                         const std::vector<int32_t>& points, Norm norm,
-                         double cap, const Context& context,
-                         Estimate* estimate) {
-  const std::vector<AffineMap> cameras =
-      CamerasFromWorld(problem, estimate->translations);
-  const double depth = MedianDepthOfOthers(problem, points, *estimate);
-  ParallelFor(static_cast<int64_t>(points.size()), kPointsPerTask,
-              context.num_threads, [&](int64_t begin, int64_t end, int) {
-                RobustPoint place(problem, cameras, norm, cap, depth);
-                for (int64_t n = begin; n < end; ++n) {
-                  estimate->points[points[n]] = place.Place(points[n]);
-                }
-              });
-}
-
 namespace {
 
 // So much redundancy that tracks check each frame by, doubled until they hang
@@ -148,6 +33,8 @@ constexpr int kStartReweightings = 1;
 constexpr double kStartMu = 1e-3;
 // In levels.
 constexpr double kDearExcess = 0.1;
+// Whose dense factor costs next to nothing.
+constexpr int32_t kCoreFrames = 500;
 
 // The longest tracks first, each that sees a frame which has too few so far.
 // Ascending.
@@ -191,13 +78,18 @@ std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
   }
 }
 
-// Of what hangs together well.
-Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
-                     double level, const Context& context) {
+Estimate AllAtZero(const KnownRotationProblem& problem) {
   Estimate estimate;
   estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
   estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
-  const std::vector<int64_t> tracks = ConnectedTracks(problem);
+  return estimate;
+}
+
+// By the slack programme of some tracks, then all other points.
+Estimate StartByProgramme(const KnownRotationProblem& problem,
+                          const std::vector<int64_t>& tracks, Norm norm,
+                          double level, const Context& context) {
+  Estimate estimate = AllAtZero(problem);
   const ProblemSubset part(problem, tracks);
   Estimate own = part.Restrict(estimate);
   SlackOptions options;
@@ -219,6 +111,160 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   }
   PlacePointsRobustly(problem, others, norm, kCapOfPoints * level, context,
                       &estimate);
+  return estimate;
+}
+
+// Places a core of frames by a programme, and then those that see most of what
+// is placed, ring by ring, as incremental mapping does: where the programme of
+// all frames would have too full a matrix.
+class GrownStart {
+ public:
+  GrownStart(const KnownRotationProblem& problem, Norm norm, double level,
+             const Context& context)
+      : problem_(problem),
+        norm_(norm),
+        level_(level),
+        context_(context),
+        estimate_(AllAtZero(problem)),
+        is_frame_(problem.num_frames, 0),
+        is_point_(problem.num_points, 0) {}
+
+  Estimate Find() {
+    ChooseCore();
+    const ProblemSubset core(problem_, SeenTwice());
+    Estimate own =
+        StartByProgramme(core.problem(), ConnectedTracks(core.problem()), norm_,
+                         level_, context_);
+    MinimizeRobustly(core.problem(), context_, &own);
+    if (!HasBaseline(problem_)) NormalizeScale(core.problem(), &own);
+    core.Replace(own, &estimate_);
+    MarkPoints(core);
+    int32_t num_improved = kCoreFrames;
+    while (!context_.IsCancelled() && AddFrames()) {
+      const ProblemSubset placed(problem_, SeenTwice());
+      Estimate grown = placed.Restrict(estimate_);
+      // In the end those of the core and its rings, too: more see them now.
+      std::vector<int32_t> points;
+      for (int32_t k = 0; k < problem_.num_points; ++k) {
+        const std::optional<int32_t> own_k = placed.FindPoint(k);
+        if (own_k && (num_left_ == 0 || !is_point_[k])) {
+          points.push_back(*own_k);
+        }
+      }
+      PlacePointsRobustly(placed.problem(), points, norm_,
+                          kCapOfPoints * level_, context_, &grown);
+      const int32_t num_placed = problem_.num_frames - num_left_;
+      if (num_left_ > 0 && num_placed >= 2 * num_improved) {
+        MinimizeRobustly(placed.problem(), context_, &grown);
+        num_improved = num_placed;
+      }
+      placed.Replace(grown, &estimate_);
+      MarkPoints(placed);
+    }
+    return std::move(estimate_);
+  }
+
+ private:
+  // Frame by frame, the one that sees most points of those before it.
+  void ChooseCore() {
+    std::vector<int64_t> num_shared(problem_.num_frames, 0);
+    std::vector<char> is_seen(problem_.num_points, 0);
+    const auto most = [](const std::vector<int64_t>& counts) {
+      return std::max_element(counts.begin(), counts.end()) - counts.begin();
+    };
+    std::vector<int64_t> num_seen(problem_.num_frames);
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      num_seen[f] = problem_.frame_begin[f + 1] - problem_.frame_begin[f];
+    }
+    for (int n = 0; n < kCoreFrames; ++n) {
+      const int64_t f = most(n == 0 ? num_seen : num_shared);
+      is_frame_[f] = 1;
+      num_shared[f] = -1;
+      for (int64_t m = problem_.frame_begin[f]; m < problem_.frame_begin[f + 1];
+           ++m) {
+        const int32_t k =
+            problem_.observations[problem_.frame_observations[m]].point;
+        if (std::exchange(is_seen[k], 1)) continue;
+        for (int64_t i = problem_.point_begin[k];
+             i < problem_.point_begin[k + 1]; ++i) {
+          const int32_t other = FrameOf(problem_, i);
+          if (!is_frame_[other]) ++num_shared[other];
+        }
+      }
+    }
+    num_left_ = problem_.num_frames - kCoreFrames;
+  }
+
+  // The observations by placed frames of points that two or more of them see.
+  std::vector<int64_t> SeenTwice() const {
+    std::vector<int64_t> seen;
+    for (int32_t k = 0; k < problem_.num_points; ++k) {
+      const size_t before = seen.size();
+      for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+           ++i) {
+        if (is_frame_[FrameOf(problem_, i)]) seen.push_back(i);
+      }
+      if (seen.size() < before + 2) seen.resize(before);
+    }
+    return seen;
+  }
+
+  void MarkPoints(const ProblemSubset& placed) {
+    for (int32_t k = 0; k < problem_.num_points; ++k) {
+      if (placed.FindPoint(k)) is_point_[k] = 1;
+    }
+  }
+
+  // Those that see half as many placed points as the one that sees most. False
+  // if all are placed.
+  bool AddFrames() {
+    if (num_left_ == 0) return false;
+    std::vector<int64_t> num_seen(problem_.num_frames, -1);
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      if (is_frame_[f]) continue;
+      num_seen[f] = 0;
+      for (int64_t m = problem_.frame_begin[f]; m < problem_.frame_begin[f + 1];
+           ++m) {
+        num_seen[f] +=
+            is_point_[problem_.observations[problem_.frame_observations[m]]
+                          .point];
+      }
+    }
+    const int64_t most = *std::max_element(num_seen.begin(), num_seen.end());
+    std::vector<int32_t> added;
+    for (int32_t f = 0; f < problem_.num_frames; ++f) {
+      if (!is_frame_[f] && 2 * num_seen[f] >= most) added.push_back(f);
+    }
+    context_.Stage("positions from rotations and tracks, images",
+                   problem_.num_frames - num_left_, problem_.num_frames);
+    PlaceFramesRobustly(problem_, added, is_point_, norm_,
+                        kCapOfPoints * level_, context_, &estimate_);
+    for (const int32_t f : added) is_frame_[f] = 1;
+    num_left_ -= static_cast<int32_t>(added.size());
+    return true;
+  }
+
+  const KnownRotationProblem& problem_;
+  const Norm norm_;
+  const double level_;
+  const Context& context_;
+  Estimate estimate_;
+  std::vector<char> is_frame_, is_point_;  // placed
+  int32_t num_left_ = 0;                   // frames
+};
+
+// Of what hangs together well.
+Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
+                     double level, const Context& context) {
+  const std::vector<int64_t> tracks = ConnectedTracks(problem);
+  const ProblemSubset part(problem, tracks);
+  const bool is_full =
+      problem.num_frames > kCoreFrames &&
+      ReducedCameraSystem(AnchoredStructure(part.problem())).kind() !=
+          ReducedCameraSystem::Kind::kSparse;
+  Estimate estimate =
+      is_full ? GrownStart(problem, norm, level, context).Find()
+              : StartByProgramme(problem, tracks, norm, level, context);
   if (!HasBaseline(problem)) NormalizeScale(problem, &estimate);
   return estimate;
 }
@@ -249,9 +295,7 @@ Estimate StartOfParts(const KnownRotationProblem& problem,
                       double level, const Context& context) {
   const std::vector<std::vector<int64_t>> split =
       SplitIntoParts(problem, part_of);
-  Estimate estimate;
-  estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
-  estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
+  Estimate estimate = AllAtZero(problem);
   std::vector<int32_t> point_part(problem.num_points, -1);
   for (size_t n = 0; n < split.size(); ++n) {
     if (split[n].empty()) continue;
@@ -301,9 +345,7 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
 
 Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
                          double level, const Context& context) {
-  Estimate estimate;
-  estimate.translations.resize(problem.num_frames, Eigen::Vector3d::Zero());
-  estimate.points.resize(problem.num_points, Eigen::Vector3d::Zero());
+  Estimate estimate = AllAtZero(problem);
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     const ProblemSubset part(problem, std::move(component));
     part.Replace(StartOfComponent(part.problem(), norm, level, context),

@@ -22,17 +22,6 @@ inline std::vector<double> WeightsAgainst(const std::vector<double>& excess,
   return weights;
 }
 
-// Places points where most of their tracks agree, the frames fixed: of the
-// midpoints of pairs of rays, and of the rays that agree with the best of
-// them, the one with the least sum of errors, none counted for more than
-// `cap`, pixels. A point that no pair puts in front of both cameras goes to the
-// median depth along its first ray. `points` ascend; the others stay, and the
-// median is theirs. O(observations), with a large constant.
-void PlacePointsRobustly(const KnownRotationProblem& problem,
-                         const std::vector<int32_t>& points, Norm norm,
-                         double cap, const Context& context,
-                         Estimate* estimate);
-
 // From nothing, pixels: what is an error is known only afterwards.
 inline constexpr double kLevelOfStart = 2;
 // In levels: what is farther from a point disagrees with it.
@@ -47,7 +36,8 @@ inline constexpr double kCapOfPoints = 4;
 //   2. the longest tracks, so many that they check every frame many times over
 //      and all hang together;
 //   3. their slack programme from nothing (conic/interior_point.h), and again
-//      with weights that let large errors count less;
+//      with weights that let large errors count less; of a core of frames only
+//      where its matrix would fill, and then the other frames, ring by ring;
 //   4. the other points where most of their rays agree;
 //   5. then the parts, each where a robust sum of squares is least
 //      (finish/least_squares.h), are joined.

@@ -19,6 +19,7 @@
 #include "krot/model/rigs.h"
 #include "krot/outliers/filter_steps.h"
 #include "krot/outliers/match_tracks.h"
+#include "krot/outliers/placement.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/gauge.h"
 

@@ -1,0 +1,168 @@
+#include "krot/outliers/placement.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "krot/base/numbers.h"
+#include "krot/base/parallel_for.h"
+#include "krot/convert/build_steps.h"
+#include "krot/problem/centre_unknowns.h"
+#include "krot/problem/cost.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int64_t kPlacesPerTask = 64;
+// So many of the pairs of rays are tried, about.
+constexpr int64_t kTriedPairs = 60;
+
+// Where v = 0 and w > 0, in the world; of unit length.
+Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i) {
+  const Observation& o = problem.observations[i];
+  Vector3d ray = o.E.row(1).cross(o.E.row(2)).transpose();
+  if (o.E.row(0).dot(ray) < 0) ray = -ray;
+  return (problem.views[o.view].cam_from_world_rotation.transpose() * ray)
+      .normalized();
+}
+
+// A place near most of its rays, in numbers of error(n, place) of the n-th,
+// none counted for more than the cap.
+template <typename Error>
+class RobustPlace {
+ public:
+  RobustPlace(const std::vector<Ray>& rays, double cap, const Error& error)
+      : rays_(rays), cap_(cap), error_(error) {}
+
+  // From `depth` along the first ray. There must be one.
+  Vector3d Find(double depth) {
+    best_ = rays_.front().centre + depth * rays_.front().direction;
+    lowest_ = Score(best_);
+    const int64_t count = static_cast<int64_t>(rays_.size());
+    const int64_t num_pairs = count * (count - 1) / 2;
+    const int64_t stride = std::max<int64_t>(1, num_pairs / kTriedPairs);
+    int64_t pair = 0;
+    for (int64_t gap = count - 1; gap > 0; --gap) {
+      for (int64_t a = 0; a + gap < count; ++a, ++pair) {
+        if (pair % stride == 0) Try({rays_[a], rays_[a + gap]});
+      }
+    }
+    std::vector<Ray> agreeing;
+    for (int64_t n = 0; n < count; ++n) {
+      if (error_(n, best_) < cap_) agreeing.push_back(rays_[n]);
+    }
+    Try(agreeing);
+    return best_;
+  }
+
+ private:
+  double Score(const Vector3d& place) const {
+    double sum = 0;
+    for (size_t n = 0; n < rays_.size(); ++n) {
+      sum += std::min(cap_, error_(static_cast<int64_t>(n), place));
+    }
+    return sum;
+  }
+  void Try(const std::vector<Ray>& rays) {
+    const std::optional<Vector3d> midpoint = RetriangulateMidpoint(rays);
+    if (!midpoint) return;
+    const double score = Score(*midpoint);
+    if (!(score < lowest_)) return;
+    lowest_ = score;
+    best_ = *midpoint;
+  }
+
+  const std::vector<Ray>& rays_;
+  const double cap_;
+  const Error& error_;
+  Vector3d best_ = Vector3d::Zero();
+  double lowest_ = 0;
+};
+
+// Of the observations of all points but the given ones; 1 if there are none.
+double MedianDepthOfOthers(const KnownRotationProblem& problem,
+                           const std::vector<int32_t>& points,
+                           const Estimate& estimate) {
+  std::vector<double> depths;
+  for (const Observation& o : problem.observations) {
+    if (std::binary_search(points.begin(), points.end(), o.point)) continue;
+    depths.push_back(ViewPoint(problem, o, estimate).depth);
+  }
+  return depths.empty() ? 1 : Median(std::move(depths));
+}
+
+}  // namespace
+
+void PlacePointsRobustly(const KnownRotationProblem& problem,
+                         const std::vector<int32_t>& points, Norm norm,
+                         double cap, const Context& context,
+                         Estimate* estimate) {
+  const std::vector<AffineMap> cameras =
+      CamerasFromWorld(problem, estimate->translations);
+  const double depth = MedianDepthOfOthers(problem, points, *estimate);
+  const auto place = [&](int32_t k) {
+    const int64_t first = problem.point_begin[k];
+    std::vector<Ray> rays;
+    for (int64_t i = first; i < problem.point_begin[k + 1]; ++i) {
+      const AffineMap& camera = cameras[problem.observations[i].view];
+      rays.push_back({-camera.leftCols<3>().transpose() * camera.col(3),
+                      DirectionOf(problem, i)});
+    }
+    const auto error = [&](int64_t n, const Vector3d& xyz) {
+      const Observation& o = problem.observations[first + n];
+      return ResidualOf(ViewPoint(cameras[o.view], o, xyz), norm);
+    };
+    estimate->points[k] = RobustPlace(rays, cap, error).Find(depth);
+  };
+  ParallelFor(static_cast<int64_t>(points.size()), kPlacesPerTask,
+              context.num_threads, [&](int64_t begin, int64_t end, int) {
+                for (int64_t n = begin; n < end; ++n) place(points[n]);
+              });
+}
+
+void PlaceFramesRobustly(const KnownRotationProblem& problem,
+                         const std::vector<int32_t>& frames,
+                         const std::vector<char>& is_placed, Norm norm,
+                         double cap, const Context& context,
+                         Estimate* estimate) {
+  const std::vector<Eigen::Matrix3d> rig_from_world =
+      RigFromWorldRotations(problem);
+  const auto place = [&](int32_t f) {
+    std::vector<Ray> rays;
+    std::vector<int64_t> seen;
+    for (int64_t m = problem.frame_begin[f]; m < problem.frame_begin[f + 1];
+         ++m) {
+      const int64_t i = problem.frame_observations[m];
+      const Observation& o = problem.observations[i];
+      if (!is_placed[o.point]) continue;
+      const View& view = problem.views[o.view];
+      // From the camera's centre to the frame's origin.
+      const Vector3d to_origin = view.cam_from_world_rotation.transpose() *
+                                 view.cam_from_rig_translation;
+      rays.push_back(
+          {estimate->points[o.point] + to_origin, -DirectionOf(problem, i)});
+      seen.push_back(i);
+    }
+    if (rays.empty()) return;
+    const auto error = [&](int64_t n, const Vector3d& origin) {
+      const Observation& o = problem.observations[seen[n]];
+      const AffineMap camera =
+          CamFromWorld(problem.views[o.view], -rig_from_world[f] * origin);
+      return ResidualOf(ViewPoint(camera, o, estimate->points[o.point]), norm);
+    };
+    estimate->translations[f] =
+        -rig_from_world[f] * RobustPlace(rays, cap, error).Find(1);
+  };
+  ParallelFor(static_cast<int64_t>(frames.size()), kPlacesPerTask,
+              context.num_threads, [&](int64_t begin, int64_t end, int) {
+                for (int64_t n = begin; n < end; ++n) place(frames[n]);
+              });
+}
+
+}  // namespace krot::internal

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "krot/base/context.h"
+#include "krot/math/norm.h"
+#include "krot/problem/known_rotation_problem.h"
+
+namespace krot::internal {
+
+// Places points where most of their tracks agree, the frames fixed: of the
+// midpoints of pairs of rays, and of the rays that agree with the best of
+// them, the one with the least sum of errors, none counted for more than
+// `cap`, pixels. A point that no pair puts in front of both cameras goes to the
+// median depth along its first ray. `points` ascend; the others stay, and the
+// median is theirs. O(observations), with a large constant.
+void PlacePointsRobustly(const KnownRotationProblem& problem,
+                         const std::vector<int32_t>& points, Norm norm,
+                         double cap, const Context& context,
+                         Estimate* estimate);
+
+// The same for frames by those of their points that `is_placed` marks: a
+// frame's origin lies on a line through each of them, its rotation known. A
+// frame that sees no such point stays.
+void PlaceFramesRobustly(const KnownRotationProblem& problem,
+                         const std::vector<int32_t>& frames,
+                         const std::vector<char>& is_placed, Norm norm,
+                         double cap, const Context& context,
+                         Estimate* estimate);
+
+}  // namespace krot::internal
