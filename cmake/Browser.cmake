@@ -13,9 +13,10 @@ target_include_directories(nlohmann_json::nlohmann_json INTERFACE ${headers})
 # krot_browser_link(<target>)
 #
 # A function createKrot() that makes an instance with a file system of its own;
-# its callMain runs one command.
+# its callMain runs one command. -O1 is for this step alone, in which a minute of
+# optimisation makes the page smaller by 3 % and no command faster.
 function(krot_browser_link target)
-  target_link_options(${target} PRIVATE
+  target_link_options(${target} PRIVATE -O1
     -sMODULARIZE=1 -sEXPORT_NAME=createKrot -sINVOKE_RUN=0
     -sFORCE_FILESYSTEM=1 -sEXPORTED_RUNTIME_METHODS=FS,callMain
     -sALLOW_MEMORY_GROWTH=1 -sMAXIMUM_MEMORY=4GB -sENVIRONMENT=worker,node)

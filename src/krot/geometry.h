@@ -25,23 +25,15 @@ struct RigidTransform {
 };
 
 // a_from_c = a_from_b * b_from_c.
-inline RigidTransform operator*(const RigidTransform& a_from_b,
-                                const RigidTransform& b_from_c) {
-  return {a_from_b.rotation * b_from_c.rotation,
-          a_from_b * b_from_c.translation};
-}
+RigidTransform operator*(const RigidTransform& a_from_b,
+                         const RigidTransform& b_from_c);
 
 // a_from_b of b_from_a: x -> R' x - R' t.
-inline RigidTransform Inverse(const RigidTransform& b_from_a) {
-  const Eigen::Matrix3d rotation = b_from_a.rotation.transpose();
-  return {rotation, -rotation * b_from_a.translation};
-}
+RigidTransform Inverse(const RigidTransform& b_from_a);
 
 // Where a camera of this cam_from_world stands in the world: the point that is
 // mapped to the origin, -R' t.
-inline Eigen::Vector3d Center(const RigidTransform& cam_from_world) {
-  return -cam_from_world.rotation.transpose() * cam_from_world.translation;
-}
+Eigen::Vector3d Center(const RigidTransform& cam_from_world);
 
 // x -> scale * rotation * x + translation; the default is the identity.
 struct Similarity {
@@ -49,9 +41,7 @@ struct Similarity {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const {
-    return scale * (rotation * x) + translation;
-  }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const;
 };
 
 // A quaternion's coefficients in COLMAP's order.
@@ -81,10 +71,7 @@ struct Ellipsoid {
   Eigen::Vector3d semi_axes;  // > 0
   Eigen::Quaterniond world_from_axes = Eigen::Quaterniond::Identity();
 
-  Eigen::Matrix3d UnitFromWorld() const {
-    return semi_axes.cwiseInverse().asDiagonal() *
-           world_from_axes.normalized().toRotationMatrix().transpose();
-  }
+  Eigen::Matrix3d UnitFromWorld() const;
   bool IsBall() const {
     return semi_axes[0] == semi_axes[1] && semi_axes[1] == semi_axes[2];
   }

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <Eigen/Dense>
 
 #include "tests/adjust/small_blocks.h"
+#include "tests/oracle/dense_algebra.h"
 
 // The oracles are a dense least-squares problem whose rows are written down one
 // by one, and central differences of the barrier cost.
@@ -128,7 +128,7 @@ TEST(BarrierSystem, FindsTheDirectionOfTheDenseSystem) {
       if (diagonal > 0) gains += dense.g[c] * dense.g[c] / diagonal / 2;
       diagonal = diagonal > 0 ? diagonal * (1 + 1 / kRadius) : 1;
     }
-    const VectorXd expected = -dense.H.ldlt().solve(dense.g);
+    const VectorXd expected = -SolveByLu(dense.H, dense.g);
     EXPECT_LT((Stack(system->direction().unknowns) - expected).norm(),
               1e-6 * expected.norm());
     EXPECT_NEAR(system->SingleGains(), gains, 1e-9 * gains);

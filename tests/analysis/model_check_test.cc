@@ -10,9 +10,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 
 #include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
@@ -21,6 +19,7 @@
 #include "krot/model/model_checks.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {
 namespace {
@@ -423,11 +422,11 @@ TEST(CheckModel, KnowsHowFirmlyAnImageIsHeld) {
     }
   }
   const Eigen::MatrixXd covariance =
-      *check.sigma_px * *check.sigma_px * N.inverse();
+      *check.sigma_px * *check.sigma_px *
+      SolveByLu(N, Eigen::MatrixXd::Identity(N.rows(), N.cols()));
   const auto largest = [&](Eigen::Index begin) {
-    return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(
-                         covariance.block<3, 3>(begin, begin))
-                         .eigenvalues()[2]);
+    return std::sqrt(
+        EigenOfSymmetric(covariance.block<3, 3>(begin, begin)).values[2]);
   };
   const ImageCheck& one = check.images[image];
   EXPECT_NEAR(one.center_sigma, largest(3), 1e-4 * largest(3));

@@ -7,12 +7,11 @@
 #include <set>
 
 #include <gtest/gtest.h>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
+#include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {
 namespace {
@@ -82,15 +81,14 @@ struct DenseTrack {
             (error(xyz + step) - error(xyz - step)) / (2 * kStep);
       }
     }
-    const Eigen::MatrixXd Q =
-        Eigen::HouseholderQR<Eigen::MatrixXd>(A).householderQ() *
-        Eigen::MatrixXd::Identity(rows, 3);
-    slope = Q.transpose() * errors;
-    R = Eigen::MatrixXd::Identity(rows, rows) - Q * Q.transpose();
+    const LongMatrix A_long = A.cast<long double>();
+    const LongMatrix I = LongMatrix::Identity(rows, rows);
+    R = (I - A_long * LeastNormSolution(A_long, I)).cast<double>();
+    slope = errors - R * errors;
   }
 
   Eigen::VectorXd errors;  // over their relative sigmas
-  Eigen::Vector3d slope;   // what a step of the point would still take away
+  Eigen::VectorXd slope;   // what a step of the point would still take away
   Eigen::MatrixXd R;
 };
 
@@ -121,16 +119,16 @@ void ExpectNoiseByDefinition(const Model& model,
       EXPECT_NEAR(
           (one.error_px / (sigmas.empty() ? 1 : sigmas[e]) - error).norm(), 0,
           1e-6);
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> R_ii(
-          track.R.block<2, 2>(row, row));
+      const SymmetricEigen R_ii =
+          EigenOfSymmetric(track.R.block<2, 2>(row, row));
       double chi2 = 0;
       int num_controlled = 0;
       for (int j = 0; j < 2; ++j) {
-        const double r = R_ii.eigenvalues()[j];
+        const double r = R_ii.values[j];
         EXPECT_NEAR(one.redundancy[j], r, 1e-5);
         if (r < kControlled) continue;
         ++num_controlled;
-        chi2 += std::pow(R_ii.eigenvectors().col(j).dot(error), 2) /
+        chi2 += std::pow(R_ii.vectors.col(j).dot(error), 2) /
                 (r * *noise.sigma_px * *noise.sigma_px);
       }
       ASSERT_EQ(one.num_controlled, num_controlled);
@@ -146,7 +144,7 @@ void ExpectNoiseByDefinition(const Model& model,
       ++num_tested;
       num_below_median += chi2 < (num_controlled == 2 ? 2 * std::log(2.0)
                                                       : MedianOfChi2WithOne());
-      redundancy += R_ii.eigenvalues().sum();
+      redundancy += R_ii.values.sum();
     }
   }
   EXPECT_EQ(noise.num_tested, num_tested);

@@ -46,7 +46,7 @@ class Computing(KrotPage):
     def test_reads_a_zip_and_writes_text_for_text(self):
         self.give(zipped(self.root / "scene", self.root / "scene.zip"),
                   "#choose-files")
-        self.assertIn("12 images", self.browser.text("#model"))
+        self.assertIn("8 images", self.browser.text("#model"))
         self.submit("#solve")
         model = self.unpack(self.download("result.zip"))
         self.assertTrue((model / "images.txt").exists())

@@ -40,7 +40,7 @@ class KrotPage(unittest.TestCase):
         cls.downloads.mkdir()
         cls.open_browser()
         krot("model_synthesizer", "--output_path", cls.root / "scene",
-             "--Scene.num_frames", 12, "--Scene.num_points", 300,
+             "--Scene.num_frames", 8, "--Scene.num_points", 60,
              "--Scene.pixel_noise", 1, "--Scene.outlier_ratio", 0.01,
              "--output_type", "TXT")
         krot("solver", "--input_path", cls.root / "scene",

@@ -1,10 +1,9 @@
 #include "krot/linear/reduced_camera_system.h"
 
 #include <gtest/gtest.h>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 
 #include "tests/linear/block_matrix.h"
+#include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {
 namespace {
@@ -23,23 +22,19 @@ MatrixXd InverseOf(const IncompleteCholesky& factor, Index n) {
 }
 
 // Its blocks on the diagonal as the identity.
-MatrixXd Whitened(MatrixXd matrix) {
+MatrixXd Whitened(const MatrixXd& matrix) {
+  MatrixXd L = MatrixXd::Zero(matrix.rows(), matrix.cols());
   for (Index k = 0; k < matrix.rows(); k += 3) {
-    const Eigen::LLT<Eigen::Matrix3d> llt(matrix.block<3, 3>(k, k));
-    const Eigen::Matrix3d W = llt.matrixL().solve(Eigen::Matrix3d::Identity());
-    matrix.middleRows<3>(k) = (W * matrix.middleRows<3>(k)).eval();
-    matrix.middleCols<3>(k) = (matrix.middleCols<3>(k) * W.transpose()).eval();
+    L.block<3, 3>(k, k) = CholeskyFactor(matrix.block<3, 3>(k, k));
   }
-  return matrix;
+  return SolveByLu(L, SolveByLu(L, matrix).transpose());
 }
 
 // Of the eigenvalues of `inverse` `matrix`.
 double Condition(const MatrixXd& inverse, const MatrixXd& matrix) {
-  const MatrixXd L = matrix.llt().matrixL();
-  const VectorXd eigenvalues =
-      Eigen::SelfAdjointEigenSolver<MatrixXd>(L.transpose() * inverse * L)
-          .eigenvalues();
-  return eigenvalues.maxCoeff() / eigenvalues.minCoeff();
+  const MatrixXd L = CholeskyFactor(matrix);
+  const VectorXd values = EigenOfSymmetric(L.transpose() * inverse * L).values;
+  return values.maxCoeff() / values.minCoeff();
 }
 
 // A chain has one block below the diagonal, and half of that rounds up.
@@ -83,9 +78,7 @@ TEST(IncompleteCholesky, ShiftsWhatIsNotPositiveDefiniteUpToALimit) {
   IncompleteCholesky factor;
   ASSERT_TRUE(factor.Factorize(system.pattern, system.blocks));
   const MatrixXd inverse = InverseOf(factor, matrix.rows());
-  EXPECT_GT(
-      Eigen::SelfAdjointEigenSolver<MatrixXd>(inverse).eigenvalues().minCoeff(),
-      0);
+  EXPECT_GT(EigenOfSymmetric(inverse).values.minCoeff(), 0);
   system.blocks[0](0, 0) = -100;
   EXPECT_FALSE(factor.Factorize(system.pattern, system.blocks));
 }
@@ -95,7 +88,7 @@ constexpr int kManyFrames = 700;
 
 // |x - A^-1 b| in the energy norm, relative.
 double EnergyError(const MatrixXd& A, const VectorXd& b, const VectorXd& x) {
-  const VectorXd exact = A.ldlt().solve(b);
+  const VectorXd exact = SolveByLu(A, b);
   const VectorXd error = x - exact;
   return std::sqrt(error.dot(A * error) / exact.dot(b));
 }

@@ -1,19 +1,15 @@
 #include "krot/linear/schur_complement.h"
 
-#include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <Eigen/Dense>
+
+#include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {
 namespace {
-
-using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-using LongVector = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
 
 // Frame 0 is fixed; point 0 is seen by frame 1 alone, twice, the others by all,
 // by frame 1 twice and in falling order.
@@ -109,38 +105,6 @@ class CentredLeastSquaresTest : public testing::Test {
     return stacked;
   }
 
-  // x of A'A x = g + A'r by QR. Large rows go first, as graded rows require.
-  // The columns of fixed points are unit rows' here.
-  LongVector SolveDensely(LongMatrix A, const LongVector& g,
-                          const LongVector& r) const {
-    for (int64_t c = 0; c < A.cols(); ++c) {
-      if (!A.col(c).isZero(0)) continue;
-      A.conservativeResize(A.rows() + 1, Eigen::NoChange);
-      A.bottomRows<1>().setZero();
-      A(A.rows() - 1, c) = 1;
-    }
-    std::vector<Eigen::Index> order(A.rows());
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(), [&](Eigen::Index a, Eigen::Index b) {
-      return A.row(a).squaredNorm() > A.row(b).squaredNorm();
-    });
-    LongMatrix sorted(A.rows(), A.cols());
-    LongVector rhs(A.rows());
-    for (Eigen::Index n = 0; n < A.rows(); ++n) {
-      sorted.row(n) = A.row(order[n]);
-      rhs[n] = order[n] < r.size() ? r[order[n]] : 0;
-    }
-    const Eigen::ColPivHouseholderQR<LongMatrix> qr(sorted);
-    const auto R =
-        qr.matrixR().topRows(A.cols()).template triangularView<Eigen::Upper>();
-    const LongMatrix P = qr.colsPermutation();
-    LongVector y = P.transpose() * g;
-    R.transpose().solveInPlace(y);
-    y += (qr.householderQ().transpose() * rhs).head(A.cols());
-    R.solveInPlace(y);
-    return P * y;
-  }
-
   BlockStructure structure_ = MakeStructure(5, 12);
   std::mt19937 generator_{1};
   std::normal_distribution<double> normal_;
@@ -162,8 +126,6 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesTheNormalEquationsAsDenseQrDoes) {
     const LongMatrix A = this->DenseA(&system);
     const Eigen::VectorXd r = this->RandomRows();
     const BlockVector g = this->RandomUnknowns();
-    BlockVector zero;
-    zero.SetZero(12, 5);
     for (const bool has_g : {false, true}) {
       for (const bool has_r : {false, true}) {
         BlockVector x;
@@ -171,10 +133,11 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesTheNormalEquationsAsDenseQrDoes) {
         system.SolveRefined(has_g ? &g : nullptr, has_r ? r.data() : nullptr,
                             &x, image.data());
         EXPECT_TRUE(x.frames[0].isZero(0));  // the fixed one
-        const LongVector expected =
-            this->SolveDensely(A, this->Stack(has_g ? g : zero),
-                               has_r ? LongVector(r.cast<long double>())
-                                     : LongVector::Zero(r.size()));
+        // A'A x = g + A'r.
+        LongVector rhs = LongVector::Zero(r.size());
+        if (has_r) rhs += r.cast<long double>();
+        if (has_g) rhs += LeastNormSolution(A.transpose(), this->Stack(g));
+        const LongVector expected = LeastNormSolution(A, rhs);
         EXPECT_LE((this->Stack(x) - expected).norm(), 1e-11L * expected.norm());
         EXPECT_LE((image.cast<long double>() - A * expected).norm(),
                   1e-11L * (A * expected).norm());
@@ -197,9 +160,8 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesForRowsGradedOverEightDecades) {
     r = Ax.cwiseProduct(Eigen::VectorXd::Ones(r.size()) + 0.1 * r);
     BlockVector x;
     system.SolveRefined(nullptr, r.data(), &x);
-    const LongVector expected = this->SolveDensely(
-        this->DenseA(&system), LongVector::Zero(this->num_columns()),
-        r.cast<long double>());
+    const LongVector expected =
+        LeastNormSolution(this->DenseA(&system), r.cast<long double>());
     EXPECT_LT((this->Stack(x) - expected).norm(), 1e-7L * expected.norm());
   }
 }
@@ -215,9 +177,8 @@ TYPED_TEST(CentredLeastSquaresTest, KeepsWhatOneRowOutweighs) {
   r[TypeParam::value * i] *= 1e-3;
   ASSERT_TRUE(system.Factorize());
   BlockVector x;
-  const LongVector expected = this->SolveDensely(
-      this->DenseA(&system), LongVector::Zero(this->num_columns()),
-      r.cast<long double>());
+  const LongVector expected =
+      LeastNormSolution(this->DenseA(&system), r.cast<long double>());
   system.Solve(nullptr, r.data(), &x, r.data());  // in place
   EXPECT_LT((this->Stack(x) - expected).norm(), 1e-7L * expected.norm());
 }
@@ -251,8 +212,7 @@ TYPED_TEST(CentredLeastSquaresTest, LeavesAPointOnItsOnlyRay) {
   system.SolveRefined(nullptr, r.data(), &x, image.data());
   EXPECT_EQ(x.points[3][2], 0);
   const LongMatrix A = this->DenseA(&system);
-  const LongVector expected =
-      A * A.completeOrthogonalDecomposition().solve(r.cast<long double>());
+  const LongVector expected = A * LeastNormSolution(A, r.cast<long double>());
   EXPECT_LT((image.cast<long double>() - expected).norm(),
             1e-11L * expected.norm());
 }

@@ -23,6 +23,7 @@ from chromium import Chromium
 import plant
 
 KROT = None
+BROWSER = None  # one for all tests: software takes a second to draw a page's view
 SKIPPED = 77
 
 # Were it taken for markup, it would end the script and make an element.
@@ -100,8 +101,8 @@ def rounded_down(value):
     return "%.4f" % (math.floor(value * 1e4) / 1e4)
 
 
-class PageTest(unittest.TestCase):
-    """A scene with rigs, noise and distortion, solved and opened."""
+class SolvedScene(unittest.TestCase):
+    """A scene with rigs, noise and distortion, solved."""
 
     @classmethod
     def setUpClass(cls):
@@ -123,7 +124,7 @@ class PageTest(unittest.TestCase):
         for end, model in (("before", "input"), ("after", "output")):
             cls.analyze(end, root / model)
         cls.page = (root / "page.html").as_uri()
-        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
+        cls.browser = BROWSER
 
     @staticmethod
     def rename_an_image(file):
@@ -148,11 +149,17 @@ class PageTest(unittest.TestCase):
             largest.setdefault(seen["point3D_id"], seen["error_px"])
         cls.point_errors[end] = largest
 
-    def setUp(self):
-        self.browser.open(self.page)
-
     def tearDown(self):
         self.assertEqual(self.browser.console(), [])
+
+
+class ReadTest(SolvedScene):
+    """What the page shows as soon as it is open."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.browser.open(cls.page)
 
     def test_holds_the_report_as_it_was_written(self):
         held = json.loads(self.browser.text("#krot-report"))
@@ -219,6 +226,13 @@ class PageTest(unittest.TestCase):
         first = self.browser.texts("#images tbody tr:first-child td")
         self.assertEqual(first[3],
                          pixels(self.report["pixel_error"]["after"]["max"]))
+
+
+class UseTest(SolvedScene):
+    """What it shows when it is clicked and turned."""
+
+    def setUp(self):
+        self.browser.open(self.page)
 
     def test_click_on_a_camera_shows_its_numbers(self):
         self.switch("#scene input[type=checkbox]")  # no lines of the support
@@ -296,7 +310,7 @@ class OtherCommandsTest(unittest.TestCase):
                  "--ground_truth_path", cls.root / "truth",
                  "--Scene.num_frames", 8, "--Scene.num_points", 60,
                  "--Scene.pixel_noise", 1, "--Scene.start_point_noise", 0.002)
-        cls.browser = cls.enterClassContext(Chromium())
+        cls.browser = BROWSER
 
     def open_page_of(self, *arguments):
         page = self.root / "page.html"
@@ -421,7 +435,7 @@ class FilterTest(unittest.TestCase):
                  "--html_path", root / "page.html")
         cls.report = json.loads((root / "report.json").read_text())
         cls.page = (root / "page.html").as_uri()
-        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
+        cls.browser = BROWSER
 
     def setUp(self):
         self.browser.open(self.page)
@@ -504,13 +518,12 @@ class RenderedSceneTest(unittest.TestCase):
                        for seen in report["removed"]}
             self.assertLessEqual(set(planted), removed)
             self.assertLessEqual(report["num_must_go"], len(planted))
-            with Chromium((1200, 1300)) as browser:
-                browser.open((root / "page.html").as_uri())
-                crops = json.loads(browser.text("#krot-crops"))
-                sizes = browser.run("""
-                    return [...document.querySelectorAll('#suspects img')].map(
-                        (image) => image.naturalWidth);""")
-                self.assertEqual(browser.console(), [])
+            BROWSER.open((root / "page.html").as_uri())
+            crops = json.loads(BROWSER.text("#krot-crops"))
+            sizes = BROWSER.run("""
+                return [...document.querySelectorAll('#suspects img')].map(
+                    (image) => image.naturalWidth);""")
+            self.assertEqual(BROWSER.console(), [])
             shown = {(crop["image_name"], crop["point2D_idx"])
                      for crop in crops}
             self.assertLessEqual(set(planted), shown)
@@ -541,12 +554,11 @@ class NoiseAloneTest(unittest.TestCase):
                          "--output_path", root / "output",
                          "--OutlierFilter.profile_path", root / "profile.json",
                          "--html_path", root / "page.html")
-                with Chromium((1200, 1300)) as browser:
-                    browser.open((root / "page.html").as_uri())
-                    self.assertIn("No observation is called wrong",
-                                  browser.text("#verdict"))
-                    self.assertNotIn("elbow", browser.text("#profile"))
-                    self.assertEqual(browser.console(), [])
+                BROWSER.open((root / "page.html").as_uri())
+                self.assertIn("No observation is called wrong",
+                              BROWSER.text("#verdict"))
+                self.assertNotIn("elbow", BROWSER.text("#profile"))
+                self.assertEqual(BROWSER.console(), [])
 
 
 class RotationSuspectTest(unittest.TestCase):
@@ -575,7 +587,7 @@ class RotationSuspectTest(unittest.TestCase):
                  root / "checked.html")
         cls.checked = json.loads((root / "checked.json").read_text())
         cls.checked_page = (root / "checked.html").as_uri()
-        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
+        cls.browser = BROWSER
 
     @staticmethod
     def turned(text, row, first):
@@ -663,7 +675,7 @@ class PairsTest(unittest.TestCase):
                  "--database_path", root / "database.db", "--image_path",
                  root / "photos", "--html_path", root / "page.html")
         cls.page = (root / "page.html").as_uri()
-        cls.browser = cls.enterClassContext(Chromium((1200, 1300)))
+        cls.browser = BROWSER
 
     def tearDown(self):
         self.assertEqual(self.browser.console(), [])
@@ -745,7 +757,7 @@ class ToleranceTest(unittest.TestCase):
                  "--ToleranceAnalyzer.max_error", 3, "--report_path",
                  root / "report.json", "--html_path", root / "page.html")
         boxes = json.loads((root / "report.json").read_text())["boxes"]
-        browser = self.enterContext(Chromium((1200, 1300)))
+        browser = BROWSER
         browser.open((root / "page.html").as_uri())
         self.assertEqual(browser.texts("#boxes tbody td:first-child"),
                          [box["image_name"] for box in boxes])
@@ -771,13 +783,14 @@ class PathTest(unittest.TestCase):
 
 
 def main():
-    global KROT
+    global BROWSER, KROT
     KROT = sys.argv.pop(1)
     program = Chromium.missing_program()
     if program is not None:
         print(f"skipped: there is no {program}")
         return SKIPPED
-    return 0 if unittest.main(exit=False).result.wasSuccessful() else 1
+    with Chromium((1200, 1300)) as BROWSER:
+        return 0 if unittest.main(exit=False).result.wasSuccessful() else 1
 
 
 if __name__ == "__main__":

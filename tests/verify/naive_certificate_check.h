@@ -5,9 +5,9 @@
 #include <map>
 
 #include <Eigen/Core>
-#include <Eigen/SVD>
 
 #include "krot/verify/certificate_check.h"
+#include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {
 
@@ -22,7 +22,6 @@ struct NaiveCheck {
 
 inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
                                const Certificate& certificate) {
-  using Matrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
   std::map<int, int> point_row, frame_row;
   int rows = 0;
   int omitted = -1;
@@ -34,8 +33,8 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
     if (frame != omitted && frame_row.emplace(frame, rows).second) rows += 3;
   }
   const int count = static_cast<int>(certificate.observations.size());
-  Matrix M = Matrix::Zero(rows, 3 * count);
-  Matrix defect = Matrix::Zero(rows, 1);
+  LongMatrix M = LongMatrix::Zero(rows, 3 * count);
+  LongVector defect = LongVector::Zero(rows);
   NaiveCheck check;
   for (int i = 0; i < count; ++i) {
     const CertifiedObservation& certified = certificate.observations[i];
@@ -54,10 +53,10 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
         for (int r = 0; r < 2; ++r) {
           const long double a = entry(1 + r, k);
           M(row + k, 3 * i + r) = lambda * a;
-          defect(row + k, 0) += a * certified.y[r];
+          defect(row + k) += a * certified.y[r];
         }
         M(row + k, 3 * i + 2) = certificate.lower_bound * lambda * entry(0, k);
-        defect(row + k, 0) += M(row + k, 3 * i + 2);
+        defect(row + k) += M(row + k, 3 * i + 2);
       }
     };
     add(point_row.at(o.point), view.cam_from_world_rotation);
@@ -71,11 +70,10 @@ inline NaiveCheck CheckNaively(const KnownRotationProblem& problem, double p,
                                  : a + b;
     check.longest = std::max(check.longest, dual / certified.lambda);
   }
-  const Eigen::JacobiSVD<Matrix> svd(M);
   check.term =
       rows > 3 * count
           ? INFINITY
-          : static_cast<double>(defect.norm() / svd.singularValues()(rows - 1));
+          : static_cast<double>(defect.norm() / SingularValues(M)(rows - 1));
   return check;
 }
 

@@ -150,6 +150,30 @@ constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
 
+RigidTransform operator*(const RigidTransform& a_from_b,
+                         const RigidTransform& b_from_c) {
+  return {a_from_b.rotation * b_from_c.rotation,
+          a_from_b * b_from_c.translation};
+}
+
+RigidTransform Inverse(const RigidTransform& b_from_a) {
+  const Matrix3d rotation = b_from_a.rotation.transpose();
+  return {rotation, -rotation * b_from_a.translation};
+}
+
+Vector3d Center(const RigidTransform& cam_from_world) {
+  return -cam_from_world.rotation.transpose() * cam_from_world.translation;
+}
+
+Vector3d Similarity::operator*(const Vector3d& x) const {
+  return scale * (rotation * x) + translation;
+}
+
+Matrix3d Ellipsoid::UnitFromWorld() const {
+  return semi_axes.cwiseInverse().asDiagonal() *
+         world_from_axes.normalized().toRotationMatrix().transpose();
+}
+
 Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz) {
   const Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
   return std::abs(q.squaredNorm() - 1) <= kRounding ? q : q.normalized();
