@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/analysis/position_frame.h"
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
 #include "krot/model/model_io.h"
@@ -25,6 +26,8 @@ struct ModelPaths {
   std::string fixed_points_path;  // "": all move
   std::string positions_path;     // "": none is known
   std::string point_positions_path;
+  std::string positions_frame = "model";
+  std::string output_frame = "model";
   std::optional<double> position_radius;  // of lines without one
   std::string report_path;
   std::string html_path;
@@ -94,8 +97,15 @@ void WarnOfDegeneration(const Model& input, const Model& written,
 // What paths.fixed_*_path name of the model. Throws ModelError.
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
                           const LogOptions& log);
-std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
-                                              const Model& model,
-                                              const LogOptions& log);
+
+struct KnownPositions {
+  std::vector<KnownPosition> positions;  // in the model's frame
+  std::optional<PositionFrame> frame;    // that the files have of their own
+};
+
+// What paths.*positions_path know of the model; tells on stderr of a frame that
+// was found, and of wrong positions. Throws ModelError.
+KnownPositions ReadKnownPositions(const ModelPaths& paths, const Model& model,
+                                  const LogOptions& log);
 
 }  // namespace krot::internal

@@ -7,6 +7,7 @@
 
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
+#include "krot/compare.h"
 #include "krot/database.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/problem/cost.h"
@@ -74,8 +75,9 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
   options.solve.problem.fixed = ReadFixedParts(command.paths, model, log);
-  options.solve.problem.positions =
-      ReadKnownPositions(command.paths, model, log);
+  KnownPositions known = ReadKnownPositions(command.paths, model, log);
+  options.solve.problem.positions = std::move(known.positions);
+  report->position_frame = std::move(known.frame);
   options.solve.checkpoint = checkpoint;
   Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
@@ -298,6 +300,19 @@ void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
           names.front() + "' for one; --output_type BIN avoids that");
 }
 
+// The model in the positions' frame, measured anew there; none if that is not
+// asked for.
+std::optional<Model> InOutputFrame(const ModelPaths& paths, const Model& solved,
+                                   SolveReport* report) {
+  if (paths.output_frame != "own" || !report->position_frame) {
+    return std::nullopt;
+  }
+  report->is_in_position_frame = true;
+  Model moved = TransformModel(solved, report->position_frame->own_from_model);
+  report->summary.pixel_error_after = Summarize(PixelErrors(moved));
+  return moved;
+}
+
 }  // namespace
 
 int RunSolveCommand(const SolveCommand& command) {
@@ -344,7 +359,8 @@ int RunSolveCommand(const SolveCommand& command) {
   }
   BeginPhase(log, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModel(solved, paths.output_path, write_options);
+  const std::optional<Model> moved = InOutputFrame(paths, solved, &report);
+  WriteModel(moved ? *moved : solved, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
   RecordEnd(total_timer, command.context.num_threads, &report.run);
   WriteCertificates(command, report.summary);

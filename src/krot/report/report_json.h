@@ -47,6 +47,10 @@ Json RotationsJson(const std::optional<RotationInput>& rotations);
 // The images and points that do not hold their place.
 Json NotHeldJson(const LooseParts& loose);
 
+// The frame that known positions have of their own; null without.
+struct SolveReport;
+Json PositionFrameJson(const SolveReport& report);
+
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.
 std::string ReportText(const Json& json);

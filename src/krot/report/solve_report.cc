@@ -323,6 +323,7 @@ std::string SolveJson(const SolveReport& report) {
       {"positions",
        {{"num_known", summary.num_positions},
         {"largest_ratio", summary.largest_position_ratio},
+        {"frame", PositionFrameJson(report)},
         {"factor", FactorJson(summary.position_factor)}}},
       {"not_held", NotHeldJson(summary.loose)},
       {"cost_initial", summary.cost_initial},

@@ -312,6 +312,9 @@ std::string SolveTable(const SolveReport& report) {
          << " without observations in common; each is solved.\n";
   }
   text << LooseSentences(summary.loose, summary.num_images)
+       << (report.position_frame
+               ? PositionFrameSentence(*report.position_frame) + ".\n"
+               : std::string())
        << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
        << SolveEndSentence(summary) << '\n'
        << VerdictSentence(summary) << '\n';
