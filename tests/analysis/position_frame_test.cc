@@ -145,7 +145,8 @@ INSTANTIATE_TEST_SUITE_P(FromCentimetresToMetres, FindPositionFrameAtRadius,
 TEST(FindPositionFrame, LosesNoDigitsFarFromTheOrigin) {
   Town town(20, 3);
   for (size_t n = 0; n < town.truth.size(); ++n) {
-    const Vector3d place = Center(ImageGeometries(town.model)[n].cam_from_world);
+    const Vector3d place =
+        Center(ImageGeometries(town.model)[n].cam_from_world);
     town.positions.push_back({KnownPosition::Of::kImage,
                               static_cast<int32_t>(n),
                               BallAround(town.own_from_model * place, 1e-3)});
@@ -155,8 +156,8 @@ TEST(FindPositionFrame, LosesNoDigitsFarFromTheOrigin) {
   EXPECT_NEAR(frame.own_from_model.scale, 50, 50 * 1e-9);
   EXPECT_TRUE(frame.wrong.empty());
   for (const KnownPosition& position : frame.positions) {
-    const Vector3d place = Center(
-        ImageGeometries(town.model)[position.index].cam_from_world);
+    const Vector3d place =
+        Center(ImageGeometries(town.model)[position.index].cam_from_world);
     EXPECT_LE((position.region.centre - place).norm(), 1e-9);
     EXPECT_NEAR(position.region.semi_axes[0], 1e-3 / 50, 1e-12);
     EXPECT_LE((frame.own_from_model * place -
@@ -181,11 +182,11 @@ TEST(FindPositionFrame, TurnsEllipsoidsWithTheFrame) {
     const Ellipsoid& in_model = frame.positions[n].region;
     for (int trial = 0; trial < 5; ++trial) {
       const Vector3d place = in_model.centre + 0.01 * town.Normal3();
-      EXPECT_NEAR((in_model.UnitFromWorld() * (place - in_model.centre)).norm(),
-                  (own.UnitFromWorld() *
-                   (frame.own_from_model * place - own.centre))
-                      .norm(),
-                  1e-6);
+      EXPECT_NEAR(
+          (in_model.UnitFromWorld() * (place - in_model.centre)).norm(),
+          (own.UnitFromWorld() * (frame.own_from_model * place - own.centre))
+              .norm(),
+          1e-6);
     }
   }
 }
@@ -300,7 +301,8 @@ TEST(FindPositionFrame, RefusesPositionsOfOtherImages) {
     for (KnownPosition& position : town.positions) {
       position.region = BallAround(30 * town.Normal3(), radius);
     }
-    EXPECT_THAT(RefusalOf(town), HasSubstr("as far as they are from each other"));
+    EXPECT_THAT(RefusalOf(town),
+                HasSubstr("as far as they are from each other"));
   }
 }
 

@@ -132,6 +132,12 @@ void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
                }});
 }
 
+void AddDistancesPath(std::string* path, OptionParser* parser) {
+  parser->AddPath("distances_path", path, false, "a file",
+                  "Known distances: lines of two images or two 3D points, and "
+                  "METRES TOLERANCE");
+}
+
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
   parser->AddBool(
       "write_on_interrupt", &paths->write_on_interrupt,
@@ -267,36 +273,6 @@ FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
                                    model, WarnOn(log));
   }
   return fixed;
-}
-
-KnownPositions ReadKnownPositions(const ModelPaths& paths, const Model& model,
-                                  const LogOptions& log) {
-  PositionsOptions options{paths.position_radius, WarnOn(log)};
-  options.has_own_frame = paths.positions_frame == "own";
-  KnownPositions known;
-  if (!paths.positions_path.empty()) {
-    LogInput(paths.positions_path);
-    known.positions =
-        ReadPositions(ReadFileBytes(paths.positions_path), model, options);
-  }
-  if (!paths.point_positions_path.empty()) {
-    LogInput(paths.point_positions_path);
-    const std::vector<KnownPosition> of_points = ReadPointPositions(
-        ReadFileBytes(paths.point_positions_path), model, options);
-    known.positions.insert(known.positions.end(), of_points.begin(),
-                           of_points.end());
-  }
-  if (!options.has_own_frame) return known;
-  known.frame = FindPositionFrame(model, known.positions,
-                                  paths.positions_path.empty()
-                                      ? paths.point_positions_path
-                                      : paths.positions_path);
-  known.positions = known.frame->positions;
-  LogLine(log, 1, PositionFrameSentence(*known.frame));
-  for (const WrongPosition& wrong : known.frame->wrong) {
-    LogLine(log, 0, "warning: " + WrongPositionSentence(wrong));
-  }
-  return known;
 }
 
 }  // namespace krot::internal

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "krot/analysis/position_frame.h"
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
 #include "krot/model/model_io.h"
@@ -26,6 +25,7 @@ struct ModelPaths {
   std::string fixed_points_path;  // "": all move
   std::string positions_path;     // "": none is known
   std::string point_positions_path;
+  std::string distances_path;  // "": none is known
   std::string positions_frame = "model";
   std::string output_frame = "model";
   std::optional<double> position_radius;  // of lines without one
@@ -44,6 +44,7 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
 // Of a command that keeps cameras within a radius of where they are known to
 // be.
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser);
+void AddDistancesPath(std::string* path, OptionParser* parser);
 // Of a command whose estimate is of use before its end.
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
@@ -97,15 +98,5 @@ void WarnOfDegeneration(const Model& input, const Model& written,
 // What paths.fixed_*_path name of the model. Throws ModelError.
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
                           const LogOptions& log);
-
-struct KnownPositions {
-  std::vector<KnownPosition> positions;  // in the model's frame
-  std::optional<PositionFrame> frame;    // that the files have of their own
-};
-
-// What paths.*positions_path know of the model; tells on stderr of a frame that
-// was found, and of wrong positions. Throws ModelError.
-KnownPositions ReadKnownPositions(const ModelPaths& paths, const Model& model,
-                                  const LogOptions& log);
 
 }  // namespace krot::internal

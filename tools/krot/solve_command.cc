@@ -7,7 +7,6 @@
 
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"
-#include "krot/compare.h"
 #include "krot/database.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/problem/cost.h"
@@ -15,6 +14,7 @@
 #include "krot/report/text_table.h"
 #include "tools/krot/free_memory.h"
 #include "tools/krot/interrupt.h"
+#include "tools/krot/metres.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
@@ -300,19 +300,6 @@ void WarnOfWhiteSpace(const LogOptions& log, const Model& model) {
           names.front() + "' for one; --output_type BIN avoids that");
 }
 
-// The model in the positions' frame, measured anew there; none if that is not
-// asked for.
-std::optional<Model> InOutputFrame(const ModelPaths& paths, const Model& solved,
-                                   SolveReport* report) {
-  if (paths.output_frame != "own" || !report->position_frame) {
-    return std::nullopt;
-  }
-  report->is_in_position_frame = true;
-  Model moved = TransformModel(solved, report->position_frame->own_from_model);
-  report->summary.pixel_error_after = Summarize(PixelErrors(moved));
-  return moved;
-}
-
 }  // namespace
 
 int RunSolveCommand(const SolveCommand& command) {
@@ -334,6 +321,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (has_database) {
     model = PlaceByMatches(command, model, &report, &seconds_placed);
   }
+  report.distances = ReadKnownDistances(paths, model, log);
   const std::unique_ptr<Checkpoint> checkpoint =
       OpenCheckpoint(command.checkpoint, paths, model, command.context, log);
   if (command.take_share) model = command.take_share(model);
@@ -357,6 +345,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, solved);
   }
+  MeasureSolved(solved, log, &report);
   BeginPhase(log, "writing " + paths.output_path);
   const Timer write_timer;
   const std::optional<Model> moved = InOutputFrame(paths, solved, &report);

@@ -70,6 +70,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
   AddRotationsPath(&command.paths, &parser);
   AddFixedPaths(&command.paths, &parser);
   AddPositionsPath(&command.paths, &parser);
+  AddDistancesPath(&command.paths.distances_path, &parser);
   parser.AddPath("database_path", &command.database_path, false, "a file",
                  "With Solver.init feasible: use this database's verified "
                  "matches in place of the model's tracks");

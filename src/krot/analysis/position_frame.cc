@@ -25,6 +25,9 @@ constexpr size_t kMostScored = 300;
 // three dimensions.
 constexpr double kFarByMedian = 2.6;
 constexpr int kMaxRefits = 20;
+// Positions scatter by this at least, relative to their size: those of a
+// synthetic scene may be exact.
+constexpr double kLeastScatter = 1e-6;
 // Places this near to a line, relative to its length, are on it.
 constexpr double kOnLine = 3e-5;
 // The standard deviation of a turn about the line that is too large, radians.
@@ -297,8 +300,12 @@ class FrameFinder {
   // Fits the similarity to what agrees with it until that stays the same.
   std::vector<FramePair> Settle() {
     std::vector<double> misfits = MisfitsOf(pairs_, own_from_model_);
-    tolerance_ = has_radii_ ? std::max(1.0, JudgeBySpread(misfits).tolerance)
-                            : JudgeBySpread(misfits).tolerance;
+    std::vector<double> sizes;
+    for (const FramePair& pair : pairs_) {
+      sizes.push_back(pair.pose.center1.norm());
+    }
+    const double least = has_radii_ ? 1 : kLeastScatter * Median(sizes);
+    tolerance_ = std::max(least, JudgeBySpread(misfits).tolerance);
     std::vector<FramePair> agreeing = Within(pairs_, misfits, tolerance_);
     for (int refit = 0; refit < kMaxRefits; ++refit) {
       const auto refined = AlignCenters(PosesOf(agreeing));
@@ -307,9 +314,9 @@ class FrameFinder {
       misfits = MisfitsOf(pairs_, own_from_model_);
       // Three equations of each position, seven unknowns.
       const double equations = 3 * static_cast<double>(agreeing.size());
-      tolerance_ = kFarByMedian * std::sqrt(equations / (equations - 7)) *
-                   Median(MisfitsOf(agreeing, own_from_model_));
-      if (has_radii_) tolerance_ = std::max(1.0, tolerance_);
+      tolerance_ = std::max(
+          least, kFarByMedian * std::sqrt(equations / (equations - 7)) *
+                     Median(MisfitsOf(agreeing, own_from_model_)));
       std::vector<FramePair> next = Within(pairs_, misfits, tolerance_);
       if (next.size() < 3) break;
       const bool is_same = std::equal(

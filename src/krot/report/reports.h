@@ -16,6 +16,7 @@
 #include "krot/convert/baseline_certificate.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/model_checks.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/outliers/outlier_filter.h"
@@ -112,6 +113,7 @@ struct ComparisonReport {
   ComparisonSummary summary;
   Contradictions contradictions1;  // of the models as their files have them
   Contradictions contradictions2;
+  std::optional<DistanceReport> distances;
   // Accepted ones, where given.
   std::optional<CertificateVerdict> certificate1;
   std::optional<CertificateVerdict> certificate2;
@@ -166,6 +168,7 @@ struct ModelReport {
   int64_t num_tracks_with_repeated_image = 0;
   DepthStatistics depth;
   TriangulationAngleStatistics triangulation_angle;
+  std::optional<DistanceReport> distances;
 };
 
 // Requires a valid model (ValidateModel) and num_worst >= 0.
@@ -231,7 +234,17 @@ struct SolveReport {
   // is written in it.
   std::optional<PositionFrame> position_frame;
   bool is_in_position_frame = false;
+  std::optional<DistanceReport> distances;  // before and after
 };
+
+// A row for each known distance: what is known, its length in each model, in
+// metres by that model's scale, and which contradict the others. `heads` name
+// the models.
+std::string DistanceTable(const DistanceReport& report,
+                          const std::vector<std::string>& heads);
+
+// What contradicts the others in the last model, a sentence each.
+std::vector<std::string> ContradictedDistances(const DistanceReport& report);
 
 // "57 of 60 positions agree with the model, to 0.631 m (median); ..."
 std::string PositionFrameSentence(const PositionFrame& frame);

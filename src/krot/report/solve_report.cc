@@ -325,6 +325,7 @@ std::string SolveJson(const SolveReport& report) {
         {"largest_ratio", summary.largest_position_ratio},
         {"frame", PositionFrameJson(report)},
         {"factor", FactorJson(summary.position_factor)}}},
+      {"distances", DistancesJson(report.distances, {"before", "after"})},
       {"not_held", NotHeldJson(summary.loose)},
       {"cost_initial", summary.cost_initial},
       {"cost_final", summary.cost_final},

@@ -322,7 +322,10 @@ std::string SolveTable(const SolveReport& report) {
     text << SupportTable(summary.support, kListedSupport)
          << PositionsTable(summary.support_positions, kListedSupport);
   }
-  text << (summary.is_certified ? "\n" : "")
+  if (report.distances) {
+    text << DistanceTable(*report.distances, {"before", "after"});
+  }
+  text << (summary.is_certified || report.distances ? "\n" : "")
        << RunSentence(report.run,
                       "built " + FormatNumber(summary.seconds_build, 2) +
                           " s, solved " +
