@@ -5,6 +5,7 @@
 #include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model/model_io.h"
+#include "krot/model/pose_priors.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/run_log.h"
 
@@ -35,8 +36,10 @@ KnownPositions ReadKnownPositions(const ModelPaths& paths, const Model& model,
   KnownPositions known;
   if (!paths.positions_path.empty()) {
     LogInput(paths.positions_path);
-    known.positions =
-        ReadPositions(ReadFileBytes(paths.positions_path), model, options);
+    const FileBytes file = ReadFileBytes(paths.positions_path);
+    known.positions = options.has_own_frame && IsDatabase(file)
+                          ? ReadPosePriors(paths.positions_path, model, options)
+                          : ReadPositions(file, model, options);
   }
   if (!paths.point_positions_path.empty()) {
     LogInput(paths.point_positions_path);

@@ -110,7 +110,8 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
 
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
   parser->AddPath("positions_path", &paths->positions_path, false, "a file",
-                  "Known positions of cameras: lines of NAME X Y Z RADIUS");
+                  "Known positions of cameras: lines of NAME X Y Z RADIUS, or "
+                  "in a frame of their own a database with pose priors");
   parser->AddPath("point_positions_path", &paths->point_positions_path, false,
                   "a file",
                   "Known positions of 3D points: lines of ID X Y Z RADIUS");

@@ -96,16 +96,14 @@ ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
                   std::to_string(num_done) + " of " + std::to_string(num_boxes),
               static_cast<double>(num_done) / static_cast<double>(num_boxes)});
   };
-  LogLine(log, 1,
-          "looking for " +
-              Counted(6 * static_cast<int64_t>(options.images.size() +
-                                               options.points.size()),
-                      "end") +
-              (options.distances.empty()
-                   ? std::string()
-                   : " and " +
-                         Counted(static_cast<int64_t>(options.distances.size()),
-                                 "length")));
+  const auto num_lengths = static_cast<int64_t>(options.distances.size());
+  const std::string ends = Counted(6 * (num_boxes - num_lengths), "end");
+  const std::string lengths = Counted(num_lengths, "length");
+  LogLine(
+      log, 1,
+      "looking for " + (num_lengths == 0           ? ends
+                        : num_lengths == num_boxes ? lengths
+                                                   : ends + " and " + lengths));
   BeginPhase(log, "looking for an estimate within the bound");
   Context context = command.context;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));

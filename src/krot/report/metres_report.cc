@@ -78,7 +78,9 @@ std::string ScaleWords(const MeasuredDistances& measured) {
               ? " (" + FormatLength(scale.lowest) + " to " +
                     FormatLength(scale.highest) + ")"
               : std::string()) +
-         " by " + Counted(scale.num_agreeing, "distance");
+         " by " + Counted(scale.num_agreeing, "distance") +
+         (scale.is_unique ? ""
+                          : ", though others that contradict them are as many");
 }
 
 }  // namespace
