@@ -98,17 +98,17 @@ std::string RefusalOf(const Town& town) {
 }
 
 struct Counts {
-  int64_t wrong = 0;
-  int64_t named = 0;
-  int64_t both = 0;
+  double wrong = 0;
+  double named = 0;
+  double both = 0;
 };
 
 Counts CountNamed(const Town& town, const PositionFrame& frame) {
   Counts counts;
-  counts.wrong = static_cast<int64_t>(town.wrong.size());
+  counts.wrong = static_cast<double>(town.wrong.size());
   for (const WrongPosition& position : frame.wrong) {
     ++counts.named;
-    counts.both += static_cast<int64_t>(town.wrong.count(position.index));
+    counts.both += static_cast<double>(town.wrong.count(position.index));
   }
   return counts;
 }
