@@ -35,7 +35,9 @@ std::string BlobOf(const std::vector<double>& numbers) {
   return text + "'";
 }
 
-std::string BlobOf(const Vector3d& v) { return BlobOf({v[0], v[1], v[2]}); }
+std::string BlobOfPosition(const Vector3d& v) {
+  return BlobOf({v[0], v[1], v[2]});
+}
 
 class PosePriors : public ::testing::Test {
  protected:
@@ -71,7 +73,7 @@ class PosePriors : public ::testing::Test {
 };
 
 TEST_F(PosePriors, AreReadOfEveryColmap) {
-  const std::string position = BlobOf(Vector3d(1, 2, 3));
+  const std::string position = BlobOfPosition(Vector3d(1, 2, 3));
   const std::string covariance = BlobOf({4, 0, 0, 0, 9, 0, 0, 0, 16});
   for (const std::string& sql :
        {"CREATE TABLE pose_priors (image_id INTEGER PRIMARY KEY NOT NULL, "
@@ -107,16 +109,17 @@ TEST_F(PosePriors, AreReadOfEveryColmap) {
 // axis a, and one of latitude nearly that of a (1 - e^2).
 TEST_F(PosePriors, InLatitudesAndLongitudesBecomeEastNorthAndUp) {
   Write(std::string(kImageForm) + "INSERT INTO pose_priors VALUES (1, " +
-        BlobOf(Vector3d(0, 9, 100)) + ", 0, NULL), (2, " +
-        BlobOf(Vector3d(0.001, 9, 100)) + ", 0, NULL), (3, " +
-        BlobOf(Vector3d(0, 9.001, 130)) + ", 0, NULL);");
+        BlobOfPosition(Vector3d(0, 9, 100)) + ", 0, NULL), (2, " +
+        BlobOfPosition(Vector3d(0.001, 9, 100)) + ", 0, NULL), (3, " +
+        BlobOfPosition(Vector3d(0, 9.001, 130)) + ", 0, NULL);");
   std::string note;
   PositionsOptions options;
   options.radius = 2;
   options.on_note = [&](const std::string& sentence) { note = sentence; };
   const auto positions = Read(options);
   ASSERT_EQ(positions.size(), 3u);
-  EXPECT_THAT(note, HasSubstr("east, north and up, metres, at 0 9 100, where "
+  EXPECT_THAT(note, HasSubstr("east, north and up, metres, at "
+                              "0.00000000 9.00000000 100.000, where "
                               "a.jpg is"));
   const double degree = std::acos(-1) / 180;
   const double a = 6378137, e2 = 0.00669437999014;
@@ -136,12 +139,12 @@ TEST_F(PosePriors, AreRefusedWhereTheyCannotBeMeant) {
   const double nan = std::nan("");
   for (const auto& [values, part] :
        std::vector<std::pair<std::string, std::string>>{
-           {"(1, " + BlobOf(Vector3d(nan, 0, 0)) + ", 1, NULL)",
+           {"(1, " + BlobOfPosition(Vector3d(nan, 0, 0)) + ", 1, NULL)",
             "found no pose prior"},
-           {"(1, " + BlobOf(Vector3d(91, 0, 0)) + ", 0, NULL)",
+           {"(1, " + BlobOfPosition(Vector3d(91, 0, 0)) + ", 0, NULL)",
             "found latitude 91"},
-           {"(1, " + BlobOf(Vector3d(1, 0, 0)) + ", 0, NULL), (2, " +
-                BlobOf(Vector3d(1, 0, 0)) + ", 1, NULL)",
+           {"(1, " + BlobOfPosition(Vector3d(1, 0, 0)) + ", 0, NULL), (2, " +
+                BlobOfPosition(Vector3d(1, 0, 0)) + ", 1, NULL)",
             "found 1 of 2 pose priors in WGS84"}}) {
     Write(std::string(kImageForm) + "INSERT INTO pose_priors VALUES " + values +
           ";");

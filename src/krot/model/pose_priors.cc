@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -144,14 +145,13 @@ void TakeIntoLocalFrame(const Model& model, SqliteDatabase* database,
     (*priors)[n].position = rotation * (places[n] - places[nearest]);
   }
   if (!note) return;
-  std::string text = source +
-                     ": latitudes and longitudes (WGS84) are taken "
-                     "into east, north and up, metres, at";
-  for (int axis = 0; axis < 3; ++axis) {
-    text += ' ';
-    AppendNumber(origin[axis], &text);
-  }
-  note(text + ", where " + model.images[(*priors)[nearest].image].name + " is");
+  char at[96];
+  std::snprintf(at, sizeof(at), "%.8f %.8f %.3f", origin[0], origin[1],
+                origin[2]);
+  note(source +
+       ": latitudes and longitudes (WGS84) are taken into east, north and up, "
+       "metres, at " +
+       at + ", where " + model.images[(*priors)[nearest].image].name + " is");
 }
 
 // None unless the covariance has an inverse.
