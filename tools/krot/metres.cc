@@ -68,7 +68,10 @@ std::optional<DistanceReport> ReadKnownDistances(const ModelPaths& paths,
       MeasureFile(paths.distances_path, {&model}, log, false);
   if (!report) return report;
   const std::optional<DistanceScale>& scale = report->models[0].scale;
-  if (!scale || scale->is_unique) return report;
+  const bool is_held =
+      !paths.positions_path.empty() || !paths.point_positions_path.empty() ||
+      !paths.fixed_images_path.empty() || !paths.fixed_points_path.empty();
+  if (is_held || !scale || scale->is_unique) return report;
   throw ModelError(
       paths.distances_path + ": found " +
       Counted(static_cast<int64_t>(report->distances.size()), "distance") +

@@ -23,8 +23,8 @@ std::optional<DistanceReport> MeasureFile(
     const LogOptions& log, bool may_lack_metres = true);
 
 // The distances of a command that solves, in its input; none without a path.
-// Throws ModelError, too, where they contradict each other and no majority
-// agrees.
+// Throws ModelError, too, where they are to set the scale, contradict each
+// other, and several sets of them are the largest.
 std::optional<DistanceReport> ReadKnownDistances(const ModelPaths& paths,
                                                  const Model& model,
                                                  const LogOptions& log);
