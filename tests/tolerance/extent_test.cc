@@ -81,7 +81,7 @@ std::vector<double> Stacked(const BlockVector& blocks) {
 // The same by translations, t = -R_rw C.
 BlockVector ByTranslations(const KnownRotationProblem& problem,
                            const Pull& pull) {
-  BlockVector coefficients = CoefficientsOf(problem, pull);
+  BlockVector coefficients = CoefficientsOf(problem, {pull});
   const auto rig_from_world = RigFromWorldRotations(problem);
   for (size_t f = 0; f < coefficients.frames.size(); ++f) {
     coefficients.frames[f] = -(rig_from_world[f] * coefficients.frames[f]);
@@ -117,7 +117,7 @@ Extent Find(const TolerantScene& tolerant, Norm norm, const Pull& pull) {
   options.norm = norm;
   options.bound = tolerant.bound;
   options.tolerance = kTolerance;
-  return FindExtent(tolerant.scene.problem, pull, tolerant.scale, options, {},
+  return FindExtent(tolerant.scene.problem, {pull}, tolerant.scale, options, {},
                     tolerant.scene.estimate);
 }
 

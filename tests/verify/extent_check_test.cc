@@ -262,14 +262,15 @@ TEST(CheckExtent, RefusesWhatIsTamperedWithOrProvesLess) {
 TEST(BalancingPull, IsWhatIsMissingAtTheFrameInUnitsOfTheDirection) {
   for (const double baseline : {0.0, 0.25}) {
     ByHand hand = FarthestCamera({7, -11, 13}, baseline);
-    EXPECT_NEAR(BalancingPull(hand.problem, hand.certificate, 0, {0, 0, -4}), 0,
+    const Pull keeper{Pull::Kind::kView, 0, {0, 0, -4}};
+    EXPECT_NEAR(BalancingPull(hand.problem, hand.certificate, keeper), 0,
                 10 * kEta);
     hand.certificate.pulls.clear();
-    EXPECT_NEAR(BalancingPull(hand.problem, hand.certificate, 0, {0, 0, -4}),
-                0.25, 10 * kEta);
+    EXPECT_NEAR(BalancingPull(hand.problem, hand.certificate, keeper), 0.25,
+                10 * kEta);
     hand.certificate.pulls = {{Pull::Kind::kView, 1, {0, 0, 1}}};
-    EXPECT_NEAR(BalancingPull(hand.problem, hand.certificate, 0, {0, 0, -4}),
-                0.5, 10 * kEta);
+    EXPECT_NEAR(BalancingPull(hand.problem, hand.certificate, keeper), 0.5,
+                10 * kEta);
   }
 }
 

@@ -55,6 +55,7 @@ std::string RunDigest(const CheckpointOptions& options, const ModelPaths& paths,
         &paths.positions_path, &paths.point_positions_path}) {
     text += FileDigest(*path) + "\n";
   }
+  text += paths.positions_frame + "\n";
   return Sha256(text);
 }
 

@@ -12,6 +12,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
+#include "tools/krot/metres.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/same_path.h"
 
@@ -24,6 +25,7 @@ struct AnalyzerOptions {
   std::string report_path;
   std::string csv_path;
   std::string certificate_path;
+  std::string distances_path;
   std::string error_colors_path;
   double error_colors_top = 4;
   bool overwrite = false;
@@ -47,6 +49,7 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                         "CSV");
   parser->AddPath("certificate_path", &options->certificate_path, false,
                   "a file", "A certificate of this model: show what it proves");
+  AddDistancesPath(&options->distances_path, parser);
   parser->AddPath("error_colors_path", &options->error_colors_path, false,
                   "a folder",
                   "Where a copy for COLMAP's GUI goes, with points coloured by "
@@ -157,6 +160,8 @@ int RunModelAnalyzer(const std::vector<std::string>& arguments) {
   const std::string certificate = CertificateText(options, model);
   ModelReport report = AnalyzeModel(model, options.num_worst);
   report.contradictions = contradictions;
+  report.distances =
+      MeasureFile(options.distances_path, {&model}, options.common.log);
   report.poses = poses;
   DeferInterrupts();
   if (!options.error_colors_path.empty()) {

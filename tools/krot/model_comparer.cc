@@ -14,6 +14,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
+#include "tools/krot/metres.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/same_path.h"
@@ -37,6 +38,7 @@ struct ComparerOptions {
   std::string html_path;
   std::string certificate_path1;
   std::string certificate_path2;
+  std::string distances_path;
   std::string overlay_path;
   std::string output_type = "BIN";
   bool overwrite = false;
@@ -72,6 +74,7 @@ void AddComparerOptions(ComparerOptions* options, OptionParser* parser) {
   parser->AddPath("certificate_path2", &options->certificate_path2, false,
                   "a file",
                   "A certificate of the second model: show what it proves");
+  AddDistancesPath(&options->distances_path, parser);
   parser->AddPath("overlay_path", &options->overlay_path, false, "a folder",
                   "Where one model goes that holds both in two colours");
   parser->AddChoice("output_type", &options->output_type, {"BIN", "TXT"},
@@ -215,6 +218,8 @@ int RunModelComparer(const std::vector<std::string>& arguments) {
   report.certificate1 = Verify(model1, options.certificate_path1);
   report.certificate2 = Verify(model2, options.certificate_path2);
   report.summary = Compare(options, model1, model2);
+  report.distances = MeasureFile(options.distances_path, {&model1, &model2},
+                                 options.common.log);
   const std::string table = ComparisonTable(report, options.num_worst);
 
   const Model aligned =

@@ -110,19 +110,33 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser) {
 
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
   parser->AddPath("positions_path", &paths->positions_path, false, "a file",
-                  "Known positions of cameras: lines of NAME X Y Z RADIUS, in "
-                  "the model's frame and unit");
+                  "Known positions of cameras: lines of NAME X Y Z RADIUS, or "
+                  "in a frame of their own a database with pose priors");
   parser->AddPath("point_positions_path", &paths->point_positions_path, false,
                   "a file",
                   "Known positions of 3D points: lines of ID X Y Z RADIUS");
+  parser->AddChoice("positions_frame", &paths->positions_frame,
+                    {"model", "own"},
+                    "Where known positions are: model: in the model's frame "
+                    "and unit; own: in one of their own, say metres, which is "
+                    "found first");
+  parser->AddChoice("output_frame", &paths->output_frame, {"model", "own"},
+                    "With positions_frame own: the frame and unit of the model "
+                    "that is written, the model's or the positions'");
   parser->Add({"Problem.position_radius",
                "The radius of known positions whose lines have none",
-               "a number > 0, in the model's unit", "every line has its own",
+               "a number > 0, in the positions' unit", "every line has its own",
                false, [paths](const std::string& text) {
                  paths->position_radius.emplace();
                  return ParseReal(text, &*paths->position_radius) &&
                         *paths->position_radius > 0;
                }});
+}
+
+void AddDistancesPath(std::string* path, OptionParser* parser) {
+  parser->AddPath("distances_path", path, false, "a file",
+                  "Known distances: lines of two images or two 3D points, and "
+                  "METRES TOLERANCE");
 }
 
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser) {
@@ -260,25 +274,6 @@ FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
                                    model, WarnOn(log));
   }
   return fixed;
-}
-
-std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
-                                              const Model& model,
-                                              const LogOptions& log) {
-  const PositionsOptions options{paths.position_radius, WarnOn(log)};
-  std::vector<KnownPosition> positions;
-  if (!paths.positions_path.empty()) {
-    LogInput(paths.positions_path);
-    positions =
-        ReadPositions(ReadFileBytes(paths.positions_path), model, options);
-  }
-  if (!paths.point_positions_path.empty()) {
-    LogInput(paths.point_positions_path);
-    const std::vector<KnownPosition> of_points = ReadPointPositions(
-        ReadFileBytes(paths.point_positions_path), model, options);
-    positions.insert(positions.end(), of_points.begin(), of_points.end());
-  }
-  return positions;
 }
 
 }  // namespace krot::internal

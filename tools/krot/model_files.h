@@ -25,6 +25,9 @@ struct ModelPaths {
   std::string fixed_points_path;  // "": all move
   std::string positions_path;     // "": none is known
   std::string point_positions_path;
+  std::string distances_path;  // "": none is known
+  std::string positions_frame = "model";
+  std::string output_frame = "model";
   std::optional<double> position_radius;  // of lines without one
   std::string report_path;
   std::string html_path;
@@ -41,6 +44,7 @@ void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
 // Of a command that keeps cameras within a radius of where they are known to
 // be.
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser);
+void AddDistancesPath(std::string* path, OptionParser* parser);
 // Of a command whose estimate is of use before its end.
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
@@ -94,8 +98,5 @@ void WarnOfDegeneration(const Model& input, const Model& written,
 // What paths.fixed_*_path name of the model. Throws ModelError.
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
                           const LogOptions& log);
-std::vector<KnownPosition> ReadKnownPositions(const ModelPaths& paths,
-                                              const Model& model,
-                                              const LogOptions& log);
 
 }  // namespace krot::internal

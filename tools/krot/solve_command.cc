@@ -14,6 +14,7 @@
 #include "krot/report/text_table.h"
 #include "tools/krot/free_memory.h"
 #include "tools/krot/interrupt.h"
+#include "tools/krot/metres.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/solve_progress.h"
 
@@ -74,8 +75,9 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
   const LogOptions& log = command.common.log;
   TolerantSolveOptions options = command.options;
   options.solve.problem.fixed = ReadFixedParts(command.paths, model, log);
-  options.solve.problem.positions =
-      ReadKnownPositions(command.paths, model, log);
+  KnownPositions known = ReadKnownPositions(command.paths, model, log);
+  options.solve.problem.positions = std::move(known.positions);
+  report->position_frame = std::move(known.frame);
   options.solve.checkpoint = checkpoint;
   Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));
@@ -319,6 +321,7 @@ int RunSolveCommand(const SolveCommand& command) {
   if (has_database) {
     model = PlaceByMatches(command, model, &report, &seconds_placed);
   }
+  report.distances = ReadKnownDistances(paths, model, log);
   const std::unique_ptr<Checkpoint> checkpoint =
       OpenCheckpoint(command.checkpoint, paths, model, command.context, log);
   if (command.take_share) model = command.take_share(model);
@@ -342,9 +345,11 @@ int RunSolveCommand(const SolveCommand& command) {
   if (write_options.format == ModelFormat::kText) {
     WarnOfWhiteSpace(log, solved);
   }
+  MeasureSolved(solved, log, &report);
   BeginPhase(log, "writing " + paths.output_path);
   const Timer write_timer;
-  WriteModel(solved, paths.output_path, write_options);
+  const std::optional<Model> moved = InOutputFrame(paths, solved, &report);
+  WriteModel(moved ? *moved : solved, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
   RecordEnd(total_timer, command.context.num_threads, &report.run);
   WriteCertificates(command, report.summary);

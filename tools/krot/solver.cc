@@ -70,6 +70,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
   AddRotationsPath(&command.paths, &parser);
   AddFixedPaths(&command.paths, &parser);
   AddPositionsPath(&command.paths, &parser);
+  AddDistancesPath(&command.paths.distances_path, &parser);
   parser.AddPath("database_path", &command.database_path, false, "a file",
                  "With Solver.init feasible: use this database's verified "
                  "matches in place of the model's tracks");
@@ -91,6 +92,9 @@ int RunSolver(const std::vector<std::string>& arguments) {
   }
   ResolveSolverOptions(parser, &command.options.solve);
   ResolveDatabase(parser, &command);
+  if (command.paths.positions_frame != "own") {
+    parser.Refuse("output_frame", "without --positions_frame own");
+  }
   ResolveCheckpoint(parser, &command.checkpoint);
   ExplainMethod(command);
   return RunSolveCommand(command);

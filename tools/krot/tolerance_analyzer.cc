@@ -13,6 +13,7 @@
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
+#include "tools/krot/run_log.h"
 #include "tools/krot/solve_progress.h"
 
 namespace krot::internal {
@@ -21,6 +22,7 @@ namespace {
 struct ToleranceCommand {
   ModelPaths paths;  // without an output
   std::string csv_path;
+  std::string distances_path;
   int num_worst = 10;
   Context context;
   ToleranceArguments arguments;
@@ -32,6 +34,11 @@ void AddCommandOptions(ToleranceCommand* command, OptionParser* parser) {
   parser->AddPath("input_path", &paths->input_path, true, "a folder",
                   "The COLMAP model to read, binary or text");
   AddToleranceOptions(&command->arguments, &command->context, parser);
+  parser->AddPath("ToleranceAnalyzer.distances", &command->distances_path,
+                  false, "a file",
+                  "Whose least and greatest lengths are asked for: lines of "
+                  "two images or two 3D points, and METRES TOLERANCE where "
+                  "known; the first known one is the scale bar");
   AddRotationsPath(paths, parser);
   AddFixedPaths(paths, parser);
   parser->AddOutputFile("report_path", &paths->report_path,
@@ -72,16 +79,31 @@ ToleranceResult Analyze(const ToleranceCommand& command, const Model& model) {
   const LogOptions& log = command.common.log;
   ToleranceOptions options = ResolveToleranceOptions(command.arguments, model);
   options.solve.problem.fixed = ReadFixedParts(command.paths, model, log);
-  const auto num_boxes =
-      static_cast<int64_t>(options.images.size() + options.points.size());
+  if (!command.distances_path.empty()) {
+    LogInput(command.distances_path);
+    options.distances = ReadDistances(ReadFileBytes(command.distances_path),
+                                      model, true, WarnOn(log));
+    if (command.arguments.images.empty() && command.arguments.points.empty()) {
+      options.images.clear();
+    }
+  }
+  const auto num_boxes = static_cast<int64_t>(
+      options.images.size() + options.points.size() + options.distances.size());
   options.on_box = [&](int64_t num_done) {
     ShowProgress(
-        log,
-        {"boxes",
-         "box " + std::to_string(num_done) + " of " + std::to_string(num_boxes),
-         static_cast<double>(num_done) / static_cast<double>(num_boxes)});
+        log, {"boxes",
+              (options.distances.empty() ? "box " : "box or length ") +
+                  std::to_string(num_done) + " of " + std::to_string(num_boxes),
+              static_cast<double>(num_done) / static_cast<double>(num_boxes)});
   };
-  LogLine(log, 1, "looking for " + Counted(6 * num_boxes, "end"));
+  const auto num_lengths = static_cast<int64_t>(options.distances.size());
+  const std::string ends = Counted(6 * (num_boxes - num_lengths), "end");
+  const std::string lengths = Counted(num_lengths, "length");
+  LogLine(
+      log, 1,
+      "looking for " + (num_lengths == 0           ? ends
+                        : num_lengths == num_boxes ? lengths
+                                                   : ends + " and " + lengths));
   BeginPhase(log, "looking for an estimate within the bound");
   Context context = command.context;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));

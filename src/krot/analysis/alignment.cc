@@ -115,19 +115,20 @@ std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses) {
 
 std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses) {
   if (poses.size() < 3) return std::nullopt;
-  const double count = static_cast<double>(poses.size());
+  double weights = 0;
+  for (const PosePair& pose : poses) weights += pose.weight;
   Vector3d mean1 = Vector3d::Zero();
   Vector3d mean2 = Vector3d::Zero();
   for (const PosePair& pose : poses) {
-    mean1 += pose.center1 / count;
-    mean2 += pose.center2 / count;
+    mean1 += pose.weight * pose.center1 / weights;
+    mean2 += pose.weight * pose.center2 / weights;
   }
   Matrix3d covariance = Matrix3d::Zero();
   double variance2 = 0;
   for (const PosePair& pose : poses) {
     const Vector3d offset2 = pose.center2 - mean2;
-    covariance += (pose.center1 - mean1) * offset2.transpose();
-    variance2 += offset2.squaredNorm();
+    covariance += pose.weight * (pose.center1 - mean1) * offset2.transpose();
+    variance2 += pose.weight * offset2.squaredNorm();
   }
   const std::optional<Matrix3d> rotation = NearestRotation(covariance);
   if (!rotation) return std::nullopt;

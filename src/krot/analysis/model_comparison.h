@@ -23,6 +23,7 @@ struct PosePair {
   // From the points that it sees, the median; 0 if it sees none.
   double distance1 = 0;
   double distance2 = 0;
+  double weight = 1;  // of the squared distance in AlignCenters; > 0
 };
 
 // Those that keep their place among the others from one model to the other
@@ -43,8 +44,8 @@ double SceneRadius(const std::vector<PosePair>& poses);
 // and have no mean. O(images).
 std::optional<Similarity> AlignFrames(const std::vector<PosePair>& poses);
 
-// The similarity that minimises the sum of squares of the distances between
-// the camera centres [Umeyama, PAMI 13(4), 1991]. None if there are fewer than
+// The similarity that minimises the weighted sum of squares of the distances
+// between the camera centres [Umeyama, PAMI 13(4), 1991]. None if there are fewer than
 // three, or if those of one model lie on a line, to 3e-5 of its length: the
 // rotation about it could not be told. O(images).
 std::optional<Similarity> AlignCenters(const std::vector<PosePair>& poses);

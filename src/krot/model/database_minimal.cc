@@ -3,6 +3,7 @@
 #include "krot/base/write_file.h"
 #include "krot/database.h"
 #include "krot/model.h"
+#include "krot/model/pose_priors.h"
 
 namespace krot {
 
@@ -19,5 +20,16 @@ void WriteDatabase(const std::filesystem::path& path, const Model&,
   throw WriteError(path.string() +
                    ": cannot be written by this build, which has no SQLite");
 }
+
+namespace internal {
+
+std::vector<KnownPosition> ReadPosePriors(const std::filesystem::path& path,
+                                          const Model&,
+                                          const PositionsOptions&) {
+  throw ModelError(path.string() +
+                   ": cannot be read by this build, which has no SQLite");
+}
+
+}  // namespace internal
 
 }  // namespace krot

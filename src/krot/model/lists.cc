@@ -57,14 +57,16 @@ constexpr char kExpected[] =
 // Of two semi-axes.
 constexpr double kLargestRatio = 1e4;
 
+[[noreturn]] void FailWithoutRadius(const TextReader& reader) {
+  reader.Fail("no RADIUS behind X Y Z",
+              std::string(kExpected) +
+                  "; --Problem.position_radius gives one to all such lines");
+}
+
 Ellipsoid RegionOf(const std::vector<double>& v,
                    const std::optional<double>& radius,
                    const TextReader& reader) {
-  if (v.size() == 3 && !radius) {
-    reader.Fail("no RADIUS behind X Y Z",
-                std::string(kExpected) +
-                    "; --Problem.position_radius gives one to all such lines");
-  }
+  if (v.size() == 3 && !radius) FailWithoutRadius(reader);
   Ellipsoid region =
       BallAround({v[0], v[1], v[2]}, v.size() == 3 ? *radius : v[3]);
   if (v.size() >= 6) region.semi_axes = {v[3], v[4], v[5]};
@@ -138,20 +140,32 @@ std::vector<KnownPosition> ReadList(const FileBytes& file, const Model& model,
     if (!line) continue;
     lines.emplace_back(*line, list.reader());
     listed.emplace_back(line->numbers.data());
-    if (in_model[line->index].allFinite()) own.push_back(in_model[line->index]);
+    const Vector3d& place = in_model[line->index];
+    if (!options.has_own_frame && place.allFinite()) own.push_back(place);
   }
   if (NamesDegrees(list.header()) || AreDegrees(listed, own)) {
     throw ModelError(
-        file.path +
-        ": found latitudes and longitudes, expected X Y Z in the model's frame "
-        "and unit; tools/scripts/geodetic_to_positions.sh makes these of them, "
-        "for a model that colmap model_aligner has brought into that frame");
+        file.path + ": found latitudes and longitudes, expected X Y Z " +
+        (options.has_own_frame
+             ? "in metres; tools/scripts/geodetic_to_positions.sh makes these "
+               "of them"
+             : "in the model's frame and unit; "
+               "tools/scripts/geodetic_to_positions.sh makes metres of them, "
+               "for --positions_frame own"));
   }
   list.Finish(options.on_note);
+  const auto has_radius = [&](const auto& line) {
+    return line.first.numbers.size() > 3 || options.radius.has_value();
+  };
+  const bool may_lack_radii =
+      options.has_own_frame &&
+      std::none_of(lines.begin(), lines.end(), has_radius);
   std::vector<KnownPosition> positions;
   for (const auto& [line, reader] : lines) {
-    positions.push_back(
-        {of, line.index, RegionOf(line.numbers, options.radius, reader)});
+    positions.push_back({of, line.index,
+                         may_lack_radii
+                             ? BallAround(Vector3d(line.numbers.data()), 0)
+                             : RegionOf(line.numbers, options.radius, reader)});
   }
   return positions;
 }

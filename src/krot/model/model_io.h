@@ -52,6 +52,9 @@ struct PositionsOptions {
   // Of lines without one; > 0, scene units. None: such lines are refused.
   std::optional<double> radius;
   FileNote on_note = {};  // what was skipped
+  // The file has a frame and a unit of its own. Then all lines may be without a
+  // radius, which is 0 in what is returned.
+  bool has_own_frame = false;
 };
 
 // The positions of images that a text file lists (GPS, surveys:

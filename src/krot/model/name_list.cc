@@ -10,7 +10,7 @@ namespace krot::internal {
 namespace {
 
 constexpr int32_t kAmbiguous = -1;  // several images bear the name
-constexpr std::string_view kBlanksAndQuotes = " \t\r;\""; 
+constexpr std::string_view kBlanksAndQuotes = " \t\r;\"";
 constexpr std::string_view kSeparators = " \t\r;\",";
 
 std::string Quoted(std::string_view text) {
@@ -76,11 +76,13 @@ ListReader::ListReader(const FileBytes& file, const Model& model, Of of)
   }
 }
 
+std::optional<int32_t> ListReader::FindPoint(std::string_view name) const {
+  const auto id = TextReader::ParseNumber<Point3DId>(name);
+  return id ? point_ids_.Find(*id) : std::nullopt;
+}
+
 std::optional<int32_t> ListReader::Find(std::string_view name) const {
-  if (of_ == Of::kPoints3D) {
-    const auto id = TextReader::ParseNumber<Point3DId>(name);
-    return id ? point_ids_.Find(*id) : std::nullopt;
-  }
+  if (of_ == Of::kPoints3D) return FindPoint(name);
   auto image = image_of_name_.find(name);
   std::string path(name);
   std::replace(path.begin(), path.end(), '\\', '/');
@@ -161,6 +163,76 @@ std::optional<ListReader::Line> ListReader::Take(
   return std::nullopt;
 }
 
+// The names may hold blanks: wherever both halves are known.
+std::optional<std::array<KnownDistance::End, 2>> ListReader::FindPair(
+    std::string_view names) const {
+  const auto find =
+      [&](std::string_view name) -> std::optional<KnownDistance::End> {
+    if (name.empty()) return std::nullopt;
+    if (const auto image = Find(name)) return KnownDistance::End{true, *image};
+    if (const auto point = FindPoint(name)) {
+      return KnownDistance::End{false, *point};
+    }
+    return std::nullopt;
+  };
+  for (size_t gap = names.find_first_of(kSeparators);
+       gap != std::string_view::npos;
+       gap = names.find_first_of(kSeparators, gap + 1)) {
+    const auto first = find(Trimmed(names.substr(0, gap)));
+    const auto second = find(Trimmed(names.substr(gap)));
+    if (!first || !second) continue;
+    if (first->is_image == second->is_image && first->index == second->index) {
+      reader_.Fail(Quoted(names) + ", the same twice", "two that differ");
+    }
+    return std::array{*first, *second};
+  }
+  return std::nullopt;
+}
+
+std::optional<ListReader::PairLine> ListReader::TakePair(
+    size_t count, bool may_lack_numbers, const std::string& expected) {
+  const std::string_view line = reader_.Rest();
+  if (HasDecimalComma(line)) reader_.FailAtNumber<double>(line, expected);
+  PairLine pair;
+  std::string_view front = line;
+  while (pair.numbers.size() < count) {
+    const auto number =
+        TextReader::ParseNumber<double>(TakeLast(kSeparators, &front));
+    if (!number) break;
+    pair.numbers.insert(pair.numbers.begin(), *number);
+  }
+  const bool has_numbers = pair.numbers.size() == count;
+  std::optional<std::array<KnownDistance::End, 2>> ends;
+  if (has_numbers) ends = FindPair(Trimmed(front));
+  if (!ends && may_lack_numbers) {
+    ends = FindPair(Trimmed(line));
+    if (ends) pair.numbers.clear();
+  }
+  if (!ends && num_lines_ == 0 && header_.empty() && !HasNumber(line)) {
+    header_ = line;
+    return std::nullopt;
+  }
+  ++num_lines_;
+  const bool is_in_front =
+      has_numbers && !(may_lack_numbers && Trimmed(front).empty());
+  const std::string_view names = Trimmed(is_in_front ? front : line);
+  if (!ends && ((!has_numbers && (!may_lack_numbers || HasNumber(line))) ||
+                names.find_first_of(kSeparators) == std::string_view::npos)) {
+    reader_.Fail(Quoted(Trimmed(line)), expected);
+  }
+  if (!ends) {
+    skipped_.Add(std::string(names));
+    return std::nullopt;
+  }
+  for (const double number : pair.numbers) {
+    if (!std::isfinite(number)) {
+      reader_.Fail(Quoted(Trimmed(line)), "finite numbers: " + expected);
+    }
+  }
+  pair.ends = *ends;
+  return pair;
+}
+
 ListReader::Line ListReader::TakeNumbers(std::string_view name,
                                          std::vector<double> numbers,
                                          const std::string& expected) {
@@ -190,6 +262,7 @@ void ListReader::NotePath(std::string_view name, int32_t index) {
 }
 
 std::string ListReader::Described(std::string_view name) const {
+  if (of_ == Of::kPairs) return Quoted(name);
   return of_ == Of::kPoints3D ? "3D point " + std::string(name)
                               : "image " + Quoted(name);
 }
@@ -200,7 +273,9 @@ std::string ListReader::NameOf(int32_t index) const {
 }
 
 void ListReader::Finish(const FileNote& note) const {
-  const std::string kind = of_ == Of::kPoints3D ? "3D point" : "image";
+  const std::string kind = of_ == Of::kPoints3D ? "3D point"
+                           : of_ == Of::kPairs  ? "pair"
+                                                : "image";
   if (num_lines_ == 0) {
     throw ModelError(file_.path + ": found no line, expected one for each " +
                      kind);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/text_io.h"
 #include "krot/model/validate.h"
 
@@ -26,7 +28,8 @@ class ListReader {
   enum class Of {
     kImages,
     kImagesOrIds,  // or by its id, where no image has such a name
-    kPoints3D
+    kPoints3D,
+    kPairs  // of images, or points, or one of each
   };
 
   // Keeps references to the file and the model.
@@ -50,6 +53,15 @@ class ListReader {
   std::optional<Line> Take(const std::vector<size_t>& counts,
                            const std::string& expected);
 
+  struct PairLine {
+    std::array<KnownDistance::End, 2> ends;
+    std::vector<double> numbers;  // finite
+  };
+  // This line, two names, of images or, where no image has such a name, of 3D
+  // points, and `count` numbers, or maybe none. Otherwise as Take.
+  std::optional<PairLine> TakePair(size_t count, bool may_lack_numbers,
+                                   const std::string& expected);
+
   // Throws ModelError if there was no line, or none whose name the model has;
   // tells `note` of those that were skipped.
   void Finish(const FileNote& note) const;
@@ -70,6 +82,9 @@ class ListReader {
   // Of what bears the name; none if the model does not have it. Fails if
   // several images bear it.
   std::optional<int32_t> Find(std::string_view name) const;
+  std::optional<int32_t> FindPoint(std::string_view name) const;
+  std::optional<std::array<KnownDistance::End, 2>> FindPair(
+      std::string_view names) const;
   Line TakeNumbers(std::string_view name, std::vector<double> numbers,
                    const std::string& expected);
   // Counts a path that is taken for an image's name.

@@ -185,6 +185,9 @@ std::string ComparisonTable(const ComparisonReport& report, int max_rows) {
          ImageTable("The images whose largest error changed most", summary,
                     num_rows, &MaxErrorChange) +
          WorstPointTable(summary, num_rows) +
+         (report.distances
+              ? DistanceTable(*report.distances, {"model 1", "model 2"})
+              : "") +
          CertificateText("Model 1", report.certificate1, max_rows) +
          CertificateText("Model 2", report.certificate2, max_rows);
 }
@@ -284,6 +287,7 @@ std::string ComparisonJson(const ComparisonReport& report) {
         {"shared2", CountedErrorJson(summary.shared_errors2)}}},
       {"images", SharedImagesJson(summary.images)},
       {"worst_points", WorstPointsJson(summary.worst_points)},
+      {"distances", DistancesJson(report.distances, {"model1", "model2"})},
       {"certificate",
        {{"model1", VerdictJson(report.certificate1)},
         {"model2", VerdictJson(report.certificate2)}}},

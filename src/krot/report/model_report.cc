@@ -248,7 +248,8 @@ std::string ModelTable(const ModelReport& report, int max_rows) {
   return ColmapFigures(report.colmap) + OverallErrors(report) +
          CameraErrorTable(report.cameras, num_rows) +
          ImageErrorTable(report.images, num_rows) + WorstTable(report.worst) +
-         NoiseTable(report.noise) + TrackTable(report) + GeometryTable(report);
+         NoiseTable(report.noise) + TrackTable(report) + GeometryTable(report) +
+         (report.distances ? DistanceTable(*report.distances, {"model"}) : "");
 }
 
 std::string ModelCsv(const ModelReport& report) {
@@ -371,6 +372,7 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
       {"noise", NoiseJson(report.noise)},
       {"track_lengths", TrackLengthsJson(report.track_lengths)},
       {"num_tracks_with_repeated_image", report.num_tracks_with_repeated_image},
+      {"distances", DistancesJson(report.distances, {"model"})},
       {"depth",
        {{"count", depth.count},
         {"not_positive", depth.not_positive},

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "krot/analysis/model_input.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/model_checks.h"
 #include "krot/report/sentences.h"
 
@@ -46,6 +48,14 @@ Json RotationsJson(const std::optional<RotationInput>& rotations);
 
 // The images and points that do not hold their place.
 Json NotHeldJson(const LooseParts& loose);
+
+// The frame that known positions have of their own; null without.
+struct SolveReport;
+Json PositionFrameJson(const SolveReport& report);
+
+// Null without; `names` are the keys of the models' lengths, scene units.
+Json DistancesJson(const std::optional<DistanceReport>& report,
+                   const std::vector<std::string>& names);
 
 // The text of a report. Image names are bytes, not always UTF-8: what is not
 // is replaced.

@@ -11,10 +11,12 @@
 #include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_statistics.h"
 #include "krot/analysis/noise.h"
+#include "krot/analysis/position_frame.h"
 #include "krot/check.h"
 #include "krot/convert/baseline_certificate.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/model/model_checks.h"
 #include "krot/outliers/match_tracks.h"
 #include "krot/outliers/outlier_filter.h"
@@ -111,6 +113,7 @@ struct ComparisonReport {
   ComparisonSummary summary;
   Contradictions contradictions1;  // of the models as their files have them
   Contradictions contradictions2;
+  std::optional<DistanceReport> distances;
   // Accepted ones, where given.
   std::optional<CertificateVerdict> certificate1;
   std::optional<CertificateVerdict> certificate2;
@@ -165,6 +168,7 @@ struct ModelReport {
   int64_t num_tracks_with_repeated_image = 0;
   DepthStatistics depth;
   TriangulationAngleStatistics triangulation_angle;
+  std::optional<DistanceReport> distances;
 };
 
 // Requires a valid model (ValidateModel) and num_worst >= 0.
@@ -226,7 +230,27 @@ struct SolveReport {
   std::optional<OutlierFilterSummary> outliers;
   // Where positions and points come from a database's.
   std::optional<MatchTracksSummary> matches;
+  // Of known positions, where they have one of their own; and whether the model
+  // is written in it.
+  std::optional<PositionFrame> position_frame;
+  bool is_in_position_frame = false;
+  std::optional<DistanceReport> distances;  // before and after
 };
+
+// A row for each known distance: what is known, its length in each model, in
+// metres by that model's scale, and which contradict the others. `heads` name
+// the models.
+std::string DistanceTable(const DistanceReport& report,
+                          const std::vector<std::string>& heads);
+
+// What contradicts the others in the last model, a sentence each.
+std::vector<std::string> ContradictedDistances(const DistanceReport& report);
+
+// "57 of 60 positions agree with the model, to 0.631 m (median); ..."
+std::string PositionFrameSentence(const PositionFrame& frame);
+
+// "the position of a.jpg is 123.4 m off, its radius is 2 m: left out".
+std::string WrongPositionSentence(const WrongPosition& wrong);
 
 // For the terminal: errors before and after, what was left out, why it ended,
 // how long it took.

@@ -312,6 +312,9 @@ std::string SolveTable(const SolveReport& report) {
          << " without observations in common; each is solved.\n";
   }
   text << LooseSentences(summary.loose, summary.num_images)
+       << (report.position_frame
+               ? PositionFrameSentence(*report.position_frame) + ".\n"
+               : std::string())
        << PositionFactorSentence(summary) << PositionsKeptSentence(summary)
        << SolveEndSentence(summary) << '\n'
        << VerdictSentence(summary) << '\n';
@@ -319,7 +322,10 @@ std::string SolveTable(const SolveReport& report) {
     text << SupportTable(summary.support, kListedSupport)
          << PositionsTable(summary.support_positions, kListedSupport);
   }
-  text << (summary.is_certified ? "\n" : "")
+  if (report.distances) {
+    text << DistanceTable(*report.distances, {"before", "after"});
+  }
+  text << (summary.is_certified || report.distances ? "\n" : "")
        << RunSentence(report.run,
                       "built " + FormatNumber(summary.seconds_build, 2) +
                           " s, solved " +

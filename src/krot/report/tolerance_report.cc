@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <limits>
 #include <sstream>
 #include <vector>
@@ -113,10 +114,81 @@ Json BoxesJson(const std::vector<ToleranceBox>& boxes) {
   return json;
 }
 
+Json EndJson(const BoxEnd& end) {
+  return {{"proved", NumberOrNull(end.proved)}, {"reached", end.reached}};
+}
+
+Json LengthsJson(const std::vector<ToleranceLength>& lengths) {
+  Json json = Json::array();
+  for (const ToleranceLength& length : lengths) {
+    json.push_back(
+        {{"name", length.name},
+         {"metres", NumberOrNull(length.metres)},
+         {"tolerance", length.metres ? Json(length.tolerance) : Json()},
+         {"is_bar", length.is_bar},
+         {"length", FiniteOrNull(length.length)},
+         {"is_free", length.is_free},
+         {"low", EndJson(length.low)},
+         {"high", EndJson(length.high)},
+         {"is_contradicted", length.IsContradicted()}});
+  }
+  return json;
+}
+
+// Six significant digits.
+std::string LengthText(const std::optional<double>& length) {
+  if (!length) return "-";
+  std::ostringstream text;
+  text << std::setprecision(6) << *length;
+  return text.str();
+}
+
+// The least and the greatest lengths; "" if none was asked for.
+std::string LengthTable(const ToleranceSummary& summary) {
+  const std::vector<ToleranceLength>& lengths = summary.lengths;
+  if (lengths.empty()) return "";
+  const auto bar =
+      std::find_if(lengths.begin(), lengths.end(),
+                   [](const ToleranceLength& length) { return length.is_bar; });
+  const bool is_metric = bar != lengths.end();
+  std::string text =
+      "\nWhat all estimates within " + FormatNumber(summary.max_error, 4) +
+      " px, with these rotations, allow distances to be, " +
+      (is_metric ? "metres by " + bar->name : std::string("scene units")) +
+      "\n";
+  TextTable table;
+  table.AddRow({"", "at least", "at most", "in the model", "known", "within"});
+  std::string contradictions;
+  bool has_free = false;
+  for (const ToleranceLength& length : lengths) {
+    table.AddRow({length.name, LengthText(length.low.proved),
+                  LengthText(length.high.proved), FormatLength(length.length),
+                  LengthText(length.metres),
+                  length.metres ? FormatLength(length.tolerance) : "-"});
+    has_free = has_free || !length.low.proved;
+    if (!length.IsContradicted() || !is_metric) continue;
+    contradictions += "It is proved that " + length.name + " is not " +
+                      FormatLength(*length.metres) + " m to within " +
+                      FormatLength(length.tolerance) + " m, if " + bar->name +
+                      " is what is known of it.\n";
+  }
+  return text + table.ToString() + contradictions +
+         (has_free ? "Where there is no end, -, none was proved: most likely "
+                     "nothing holds the distance"
+                   : "") +
+         (has_free ? (is_metric ? ", or the scale bar.\n" : ".\n") : "");
+}
+
 }  // namespace
 
 std::string ToleranceTable(const ToleranceReport& report, int max_rows) {
   const ToleranceSummary& summary = report.summary;
+  const std::string end =
+      "\n" +
+      RunSentence(report.run,
+                  "analyzed " + FormatNumber(summary.seconds, 2) + " s (" +
+                      Counted(summary.num_programmes, "cone programme") + ")");
+  if (summary.boxes.empty()) return LengthTable(summary) + end;
   const std::vector<ToleranceBox> listed =
       Listed(summary.boxes, static_cast<size_t>(max_rows));
   const int decimals = DecimalsFor(listed);
@@ -151,11 +223,7 @@ std::string ToleranceTable(const ToleranceReport& report, int max_rows) {
         "Where there is no end, -, none was found, or nothing holds what is "
         "asked for.\n";
   }
-  return text + "\n" +
-         RunSentence(report.run,
-                     "analyzed " + FormatNumber(summary.seconds, 2) + " s (" +
-                         Counted(summary.num_programmes, "cone programme") +
-                         ")");
+  return text + LengthTable(summary) + end;
 }
 
 std::string ToleranceJson(const ToleranceReport& report) {
@@ -186,6 +254,7 @@ std::string ToleranceJson(const ToleranceReport& report) {
        {{"before", ErrorJson(report.pixel_error_before)},
         {"after", ErrorJson(report.pixel_error_after)}}},
       {"boxes", BoxesJson(summary.boxes)},
+      {"lengths", LengthsJson(summary.lengths)},
       {"agreement",
        {{"num_ends", summary.agreement.num_ends},
         {"num_proved", summary.agreement.num_proved},

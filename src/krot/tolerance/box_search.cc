@@ -1,6 +1,8 @@
 #include "krot/tolerance/tolerance_analysis.h"
 
 #include <algorithm>
+#include <functional>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -19,13 +21,27 @@ constexpr int kMaxRounds = 12;
 // Bisection along the segment from the centre ends with this share of it.
 constexpr double kSegmentStep = 1.0 / 1024;
 
-class BoxSearch {
+// The relative rounding error of the few operations behind a proof.
+constexpr double kRoundingOfSums = 8 * std::numeric_limits<double>::epsilon();
+
+// The same pulls in a part of the problem; none unless it holds all.
+std::optional<Pulls> AllInPart(const ProblemSubset& part, const Pulls& pulls) {
+  Pulls in_part;
+  for (const Pull& pull : pulls) {
+    const std::optional<Pull> placed = InPart(part, pull);
+    if (!placed) return std::nullopt;
+    in_part.push_back(*placed);
+  }
+  return in_part;
+}
+
+// Finds ends of sums over the same targets, whatever their directions.
+class EndSearch {
  public:
-  BoxSearch(const ToleranceProblem& shared, const ProblemSubset& usable,
-            const Pull& target, double tolerance, const Context& context)
+  EndSearch(const ToleranceProblem& shared, const ProblemSubset& usable,
+            const Pulls& targets, double tolerance, const Context& context)
       : shared_(shared),
         usable_(usable),
-        target_(target),
         tolerance_(tolerance),
         context_(context),
         reprojection_(shared.model(), shared.built()),
@@ -34,17 +50,40 @@ class BoxSearch {
     for (int32_t k = 0; k < shared.problem().num_points; ++k) {
       if (usable.FindPoint(k)) usables_.AddPoint(k);
     }
-    if (target.kind == Pull::Kind::kPoint) {
-      set_.AddPoint(*usable.FindPoint(target.index));
+    for (const Pull& target : targets) {
+      if (!IsFixedPosition(shared.problem(), target)) moving_.push_back(target);
+    }
+    Pulls members = moving_;
+    if (shared.scale()) members.push_back(*shared.scale());
+    if (shared.gauge().first) members.push_back(*shared.gauge().first);
+    for (const Pull& member : members) {
+      if (member.kind != Pull::Kind::kPoint) continue;
+      if (const auto point = usable.FindPoint(member.index)) {
+        set_.AddPoint(*point);
+      }
     }
     set_.AddTies(num_ties_);
   }
 
-  // Along the target's axis, `sign` being 1 or -1.
-  BoxEnd FindEnd(int axis, double sign) {
-    Pull pull = target_;
-    pull.direction = sign * Eigen::Vector3d::Unit(axis);
-    const double at_centre = Along(shared_.problem(), shared_.centre(), pull);
+  // The largest sum over pulls at the targets. `on_reached` is told of every
+  // estimate within the bound that was met.
+  BoxEnd FindEnd(const Pulls& pulls,
+                 const std::function<void(const Estimate&)>& on_reached = {}) {
+    // What is fixed adds a constant.
+    Pulls moving;
+    double constant = 0;
+    double size = 0;
+    for (const Pull& pull : pulls) {
+      const Eigen::Vector3d x =
+          PositionOf(shared_.problem(), shared_.centre(), pull);
+      size += pull.direction.cwiseAbs().dot(x.cwiseAbs());
+      if (IsFixedPosition(shared_.problem(), pull)) {
+        constant += pull.direction.dot(x);
+      } else {
+        moving.push_back(pull);
+      }
+    }
+    const double at_centre = Along(shared_.problem(), shared_.centre(), moving);
     BoxEnd end;
     end.reached = at_centre;
     ExtentOptions options;
@@ -58,8 +97,8 @@ class BoxSearch {
         scale = InPart(part, *InPart(usable_, *shared_.scale()));
       }
       const Extent extent = FindExtent(
-          part.problem(), *InPart(part, *InPart(usable_, pull)), scale, options,
-          context_, part.Restrict(usable_.Restrict(shared_.centre())));
+          part.problem(), *AllInPart(part, *AllInPart(usable_, moving)), scale,
+          options, context_, part.Restrict(usable_.Restrict(shared_.centre())));
       ++num_programmes_;
       if (extent.proved) {
         end.proved =
@@ -67,7 +106,10 @@ class BoxSearch {
       }
       Estimate of_usable;
       const Estimate far_end = Complete(part, extent.estimate, &of_usable);
-      end.reached = std::max(end.reached, ReachAllowed(pull, far_end));
+      const Estimate allowed = ReachAllowed(far_end);
+      if (on_reached) on_reached(allowed);
+      end.reached =
+          std::max(end.reached, Along(shared_.problem(), allowed, moving));
       if (end.proved &&
           *end.proved - end.reached <= tolerance_ * (*end.proved - at_centre)) {
         break;
@@ -81,8 +123,10 @@ class BoxSearch {
         break;
       }
     }
-    end.reached *= sign;
-    if (end.proved) *end.proved *= sign;
+    end.reached += constant;
+    if (end.proved && moving.size() < pulls.size()) {
+      *end.proved += constant + kRoundingOfSums * size;
+    }
     return end;
   }
 
@@ -99,8 +143,8 @@ class BoxSearch {
       const auto holds = [&](const Pull& pull) {
         return InPart(part, *InPart(usable_, pull)).has_value();
       };
-      if (set_.IsAll() ||
-          (holds(target_) && (!shared_.scale() || holds(*shared_.scale())))) {
+      if (set_.IsAll() || (std::all_of(moving_.begin(), moving_.end(), holds) &&
+                           (!shared_.scale() || holds(*shared_.scale())))) {
         return part;
       }
       num_ties_ *= 2;
@@ -133,29 +177,26 @@ class BoxSearch {
     return whole;
   }
 
-  // p'x of the farthest estimate on the segment from the centre whose true
-  // errors are all within the bound.
-  double ReachAllowed(const Pull& pull, const Estimate& far_end) const {
+  // The farthest estimate on the segment from the centre whose true errors are
+  // all within the bound.
+  Estimate ReachAllowed(const Estimate& far_end) const {
     const auto is_allowed = [&](const Estimate& estimate) {
       return reprojection_.TrueCost(estimate, shared_.norm(),
                                     context_.num_threads) <= shared_.bound();
     };
-    const auto reach = [&](const Estimate& estimate) {
-      return Along(shared_.problem(), estimate, pull);
-    };
-    if (is_allowed(far_end)) return reach(far_end);
+    if (is_allowed(far_end)) return far_end;
     double allowed = 0;
     for (double step = 0.5; step >= kSegmentStep; step /= 2) {
       if (is_allowed(Between(shared_.centre(), far_end, allowed + step))) {
         allowed += step;
       }
     }
-    return reach(Between(shared_.centre(), far_end, allowed));
+    return Between(shared_.centre(), far_end, allowed);
   }
 
   const ToleranceProblem& shared_;
   const ProblemSubset& usable_;
-  const Pull target_;
+  Pulls moving_;  // targets
   const double tolerance_;
   const Context context_;
   const Reprojection reprojection_;
@@ -164,6 +205,12 @@ class BoxSearch {
   int num_ties_ = kFirstTies;
   int64_t num_programmes_ = 0;
 };
+
+BoxEnd Negative(BoxEnd end) {
+  end.reached = -end.reached;
+  if (end.proved) *end.proved = -*end.proved;
+  return end;
+}
 
 }  // namespace
 
@@ -179,15 +226,118 @@ PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
     box.low[axis].proved = box.high[axis].proved = position[axis];
   }
   if (is_fixed) return box;
-  const std::optional<ProblemSubset> usable = problem.UsablePart(target);
+  const std::optional<ProblemSubset> usable = problem.UsablePart({target});
   if (!usable) return box;
-  BoxSearch search(problem, *usable, target, tolerance, context);
+  EndSearch search(problem, *usable, {target}, tolerance, context);
   for (int axis = 0; axis < 3; ++axis) {
-    box.low[axis] = search.FindEnd(axis, -1);
-    box.high[axis] = search.FindEnd(axis, 1);
+    const Eigen::Vector3d along = Eigen::Vector3d::Unit(axis);
+    box.low[axis] =
+        Negative(search.FindEnd({{target.kind, target.index, -along}}));
+    box.high[axis] = search.FindEnd({{target.kind, target.index, along}});
   }
   box.num_programmes = search.num_programmes();
   return box;
+}
+
+namespace {
+
+using Pair = std::array<Pull, 2>;
+
+Eigen::Vector3d DifferenceOf(const KnownRotationProblem& problem,
+                             const Estimate& estimate, const Pair& pair) {
+  return PositionOf(problem, estimate, pair[1]) -
+         PositionOf(problem, estimate, pair[0]);
+}
+
+bool IsSame(const KnownRotationProblem& problem, const Pull& a, const Pull& b) {
+  if (a.kind != b.kind) return false;
+  return a.kind == Pull::Kind::kPoint
+             ? a.index == b.index
+             : problem.views[a.index].frame == problem.views[b.index].frame;
+}
+
+// Whether the difference is the same in all estimates.
+bool IsConstant(const KnownRotationProblem& problem, const Pair& pair) {
+  return IsSame(problem, pair[0], pair[1]) ||
+         (IsFixedPosition(problem, pair[0]) &&
+          IsFixedPosition(problem, pair[1]));
+}
+
+// Whether the gauge keeps the difference's length along its direction.
+bool IsScale(const ToleranceProblem& problem, const Pair& pair) {
+  const ToleranceGauge& gauge = problem.gauge();
+  if (!problem.scale()) return false;
+  const auto is = [&](const Pull& a, const Pull& b) {
+    return a.kind == b.kind && a.index == b.index;
+  };
+  return (is(pair[0], *gauge.first) && is(pair[1], *gauge.second)) ||
+         (is(pair[1], *gauge.first) && is(pair[0], *gauge.second));
+}
+
+}  // namespace
+
+LengthRange FindLength(const ToleranceProblem& problem, const Pair& targets,
+                       const std::optional<Pair>& unit, double tolerance,
+                       const Context& context) {
+  const KnownRotationProblem& whole = problem.problem();
+  const auto length_of = [&](const Estimate& estimate, const Pair& pair) {
+    return DifferenceOf(whole, estimate, pair).norm();
+  };
+  const double at_centre = length_of(problem.centre(), targets);
+  LengthRange range;
+  range.low.reached = range.high.reached = at_centre;
+  if (IsConstant(whole, targets)) {
+    const double size = PositionOf(whole, problem.centre(), targets[0]).norm();
+    range.low.proved =
+        std::max(at_centre - kRoundingOfSums * (size + at_centre), 0.);
+    range.high.proved = at_centre + kRoundingOfSums * (size + at_centre);
+    return range;
+  }
+  const std::optional<ProblemSubset> usable =
+      problem.UsablePart({targets[0], targets[1]});
+  if (!usable) return range;
+  const double unit_length = unit ? length_of(problem.centre(), *unit) : 1;
+  const auto measure = [&](const Estimate& estimate) {
+    const double length = length_of(estimate, targets) *
+                          (unit ? unit_length / length_of(estimate, *unit) : 1);
+    range.low.reached = std::min(range.low.reached, length);
+    range.high.reached = std::max(range.high.reached, length);
+  };
+  EndSearch search(problem, *usable, {targets[0], targets[1]}, tolerance,
+                   context);
+  const auto find_end = [&](const Eigen::Vector3d& along) {
+    return search
+        .FindEnd({{targets[1].kind, targets[1].index, along},
+                  {targets[0].kind, targets[0].index, -along}},
+                 measure)
+        .proved;
+  };
+  const Eigen::Vector3d difference =
+      DifferenceOf(whole, problem.centre(), targets);
+  const Eigen::Vector3d u =
+      at_centre > 0 ? difference.normalized() : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d v = u.unitOrthogonal();
+  // Of the differences along u, v and w the one that is farthest from zero.
+  Eigen::Vector3d farthest = Eigen::Vector3d::Constant(at_centre);
+  std::optional<double> least = at_centre;
+  bool is_proved = true;
+  const bool is_scale = IsScale(problem, targets);
+  for (int axis = is_scale ? 1 : 0; axis < 3; ++axis) {
+    const Eigen::Vector3d along = axis == 0   ? u
+                                  : axis == 1 ? v
+                                              : Eigen::Vector3d(u.cross(v));
+    const std::optional<double> high = find_end(along);
+    const std::optional<double> low = find_end(-along);
+    is_proved = is_proved && high && low;
+    if (!is_proved) break;
+    farthest[axis] = std::max(*high, *low);
+    if (axis == 0) least = -*low;
+  }
+  range.num_programmes = search.num_programmes();
+  if (!is_proved) return range;
+  range.low.proved = std::max(*least * (1 - kRoundingOfSums), 0.);
+  range.high.proved = farthest.norm() * (1 + kRoundingOfSums);
+  return range;
 }
 
 }  // namespace krot::internal

@@ -15,21 +15,20 @@
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
-namespace {
 
-// A model whose largest error is at most this share of the bound is not solved
-// first.
-constexpr double kFitShare = 0.95;
-
-// The inverse of a list of indices in the model: for each element of the model
-// its index in the problem, or -1.
-std::vector<int32_t> Inverse(const std::vector<int32_t>& of, size_t count) {
+std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count) {
   std::vector<int32_t> inverse(count, -1);
   for (size_t n = 0; n < of.size(); ++n) {
     inverse[of[n]] = static_cast<int32_t>(n);
   }
   return inverse;
 }
+
+namespace {
+
+// A model whose largest error is at most this share of the bound is not solved
+// first.
+constexpr double kFitShare = 0.95;
 
 double TrueCostOf(const Model& model, const BuiltProblem& built, Norm norm,
                   const Context& context) {
@@ -74,7 +73,7 @@ ToleranceGauge GaugeFor(const ToleranceOptions& options,
     const int32_t view = view_of[image];
     CheckArgument(view >= 0, "gauge_images", image,
                   "images of the optimisation");
-    (gauge.first ? gauge.second : gauge.first) = view;
+    (gauge.first ? gauge.second : gauge.first) = {Pull::Kind::kView, view};
     frames.push_back(built.problem.views[view].frame);
     of_component.push_back(components.of_frame[frames.back()]);
   }
@@ -108,11 +107,11 @@ void FillBoxes(const ToleranceOptions& options, const ToleranceProblem& problem,
                const std::vector<int32_t>& view_of, const Context& context,
                ToleranceSummary* summary) {
   const std::vector<int32_t> point_of =
-      Inverse(problem.built().point_of, problem.model().points3D.size());
+      InverseOf(problem.built().point_of, problem.model().points3D.size());
   const auto num_boxes = static_cast<int64_t>(summary->boxes.size());
   Context inner = context;
   if (num_boxes > 1) inner.num_threads = 1;
-  std::atomic<int64_t> num_done = 0;
+  std::atomic<int64_t> num_done = static_cast<int64_t>(summary->lengths.size());
   ParallelFor(num_boxes, 1, context.num_threads, [&](int64_t n, int64_t, int) {
     if (context.IsCancelled()) return;
     ToleranceBox& box = summary->boxes[n];
@@ -126,7 +125,7 @@ void FillBoxes(const ToleranceOptions& options, const ToleranceProblem& problem,
                         index};
       box.position = PositionOf(problem.problem(), problem.centre(), target);
       box.is_free = !IsFixedPosition(problem.problem(), target) &&
-                    !problem.UsablePart(target);
+                    !problem.UsablePart({target});
       box.box = FindBox(problem, target, options.tolerance, inner);
     }
     if (options.on_box) options.on_box(++num_done);
@@ -186,15 +185,18 @@ ToleranceResult AnalyzeInFrame(const Model& model,
     summary.num_fixed_points += problem.IsFixedPoint(k);
   }
   const std::vector<int32_t> view_of =
-      Inverse(built.image_of, result.model.images.size());
+      InverseOf(built.image_of, result.model.images.size());
   const ToleranceGauge gauge = GaugeFor(options, built, view_of);
-  for (const std::optional<int32_t>& view : {gauge.first, gauge.second}) {
+  for (const std::optional<Pull>& view : {gauge.first, gauge.second}) {
     if (!view) continue;
     summary.gauge_images.push_back(
-        result.model.images[built.image_of[*view]].name);
+        result.model.images[built.image_of[view->index]].name);
   }
   if (options.on_box) options.on_box(0);
   const Estimate centre = built.start;
+  if (!options.distances.empty()) {
+    FillLengths(options, result.model, gauge, built, context, &summary);
+  }
   const ToleranceProblem shared(result.model, &built, centre, gauge,
                                 options.solve.norm, options.max_error, context);
   summary.num_rowless = shared.num_rowless();

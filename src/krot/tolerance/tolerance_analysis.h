@@ -14,6 +14,7 @@
 #include "krot/linear/blocks.h"
 #include "krot/math/norm.h"
 #include "krot/model.h"
+#include "krot/model/known_distances.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
@@ -23,8 +24,15 @@
 
 namespace krot::internal {
 
-// A row that keeps the scale where nothing else does: direction'x of the view's
-// centre stays what it is at the start.
+// A linear function of positions, the sum of p'x over pulls: of one, a
+// coordinate; of two that are opposite, that of a difference.
+using Pulls = std::vector<Pull>;
+
+double Along(const KnownRotationProblem& problem, const Estimate& estimate,
+             const Pulls& pulls);
+
+// A row that keeps the scale where nothing else does: direction'x of a view's
+// centre or a point stays what it is at the start.
 using ScaleRow = Pull;
 
 struct ExtentOptions {
@@ -37,21 +45,23 @@ struct ExtentOptions {
 // How far estimates reach whose residuals are all below the bound.
 struct Extent {
   Estimate estimate;             // that reaches the farthest
-  std::optional<double> proved;  // p'x is no more: CheckExtent; scene units
+  std::optional<double> proved;  // the sum is no more: CheckExtent; scene units
   int iterations = 0;
 };
 
-// Maximises p'x of `pull` from `start`, which must be below the bound. Nothing
-// is proved where there is no end, or where double precision does not suffice.
-// The problem must be connected and something in it fixed.
-Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
+// Maximises the sum of p'x over `pulls` from `start`, which must be below the
+// bound. Nothing is proved where there is no end, or where double precision
+// does not suffice. The problem must be connected and something in it fixed,
+// though none of what pulls.
+Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
                   const std::optional<ScaleRow>& scale,
                   const ExtentOptions& options, const Context& context,
                   const Estimate& start);
 
-// The gradient of p'x by points and frames' centres; 0 where they are fixed.
+// The gradient of the sum by points and frames' centres; 0 where they are
+// fixed.
 BlockVector CoefficientsOf(const KnownRotationProblem& problem,
-                           const Pull& pull);
+                           const Pulls& pulls);
 
 // Marks the points whose residuals are all below `bound`, pixels, if the point
 // is infinitely far away in some direction. Wherever the frames are, such a
@@ -62,11 +72,11 @@ std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
 
 // What holds place and scale of the estimates.
 struct ToleranceGauge {
-  // Views: the frame of the first is fixed and, if that leaves the scale free,
-  // the second keeps its distance from it along the line between the two.
-  // Without a first, what the problem fixes does both.
-  std::optional<int32_t> first;
-  std::optional<int32_t> second;
+  // Of a view or a point each: the first is fixed (of a view the frame) and, if
+  // that leaves the scale free, the second keeps its distance from it along the
+  // line between the two. Without a first, what the problem fixes does both.
+  std::optional<Pull> first;
+  std::optional<Pull> second;
 };
 
 // A gauge for a problem that fixes nothing: the view with the most observations
@@ -91,13 +101,14 @@ class ToleranceProblem {
   const KnownRotationProblem& problem() const { return built_.problem; }
   const Estimate& centre() const { return centre_; }
   const std::optional<ScaleRow>& scale() const { return scale_; }
+  const ToleranceGauge& gauge() const { return gauge_; }
   Norm norm() const { return norm_; }
   double bound() const { return bound_; }
 
   // The part of the problem that bounds anything and is connected to something
   // fixed: without observations that have no outer row, and without far points
-  // other than `target`. None if it does not contain the target.
-  std::optional<ProblemSubset> UsablePart(const Pull& target) const;
+  // other than targets. None if it does not contain all targets that may move.
+  std::optional<ProblemSubset> UsablePart(const Pulls& targets) const;
 
   int64_t num_rowless() const { return num_rowless_; }
   int64_t num_far_points() const { return num_far_points_; }
@@ -106,6 +117,7 @@ class ToleranceProblem {
   const Model& model_;
   const BuiltProblem& built_;
   const Estimate& centre_;
+  const ToleranceGauge gauge_;
   const Norm norm_;
   const double bound_;
   std::optional<ScaleRow> scale_;
@@ -128,6 +140,25 @@ std::vector<int64_t> HeldObservations(const KnownRotationProblem& problem,
 PositionBox FindBox(const ToleranceProblem& problem, const Pull& target,
                     double tolerance, const Context& context);
 
+// The least and the greatest length of a difference of two positions.
+struct LengthRange {
+  BoxEnd low;
+  BoxEnd high;
+  int64_t num_programmes = 0;
+};
+
+// The same for |x_2 - x_1|, in the gauge's unit. With u the difference's
+// direction at the centre and v, w across, proved are the ends of the
+// differences along u and the largest ones along v and w; so |x_2 - x_1| is at
+// least the least along u, and at most the diagonal of the box
+// (docs/method/outliers.md, "Lengths"). Both ends are proved together, or
+// neither. What is reached is measured in units of the length of `unit`, if
+// given, whose length at the centre counts.
+LengthRange FindLength(const ToleranceProblem& problem,
+                       const std::array<Pull, 2>& targets,
+                       const std::optional<std::array<Pull, 2>>& unit,
+                       double tolerance, const Context& context);
+
 // What the data allow: all positions that a camera or a point may have in an
 // estimate whose errors are within a bound, with rotations and intrinsics as
 // given. This is what `krot tolerance_analyzer` does between reading and
@@ -139,6 +170,10 @@ struct ToleranceOptions {
   // Indices in Model::images and Model::points3D whose boxes are wanted.
   std::vector<int32_t> images;
   std::vector<int32_t> points;
+  // Distances whose least and greatest length are wanted. The first with metres
+  // is the scale bar: all lengths are in metres then, and otherwise in scene
+  // units.
+  std::vector<KnownDistance> distances;
   // The indices of two images that hold place and scale. Empty: what
   // solve.problem.fixed marks does or, if that is nothing, two images are
   // chosen.
@@ -147,8 +182,8 @@ struct ToleranceOptions {
   // bound if the model is none.
   SolveModelOptions solve;
   // Called once there is an estimate within the bound, then after every box,
-  // with the number of boxes so far. May be empty; must be safe to call from
-  // several threads.
+  // and length, with the number of them so far. May be empty; must be safe to
+  // call from several threads.
   std::function<void(int64_t num_boxes)> on_box;
 };
 
@@ -159,6 +194,27 @@ struct EndAgreement {
   // How far beyond what was reached the worst proved end is, relative to the
   // way there from the position.
   double worst = 0;
+};
+
+// What the data allow a distance to be; in metres where there is a scale bar.
+struct ToleranceLength {
+  std::string name;              // "a.jpg to b.jpg"
+  std::optional<double> metres;  // as it is known
+  double tolerance = 0;          // of that
+  bool is_bar = false;
+  double length = 0;  // in the resulting model
+  // It has no ends: an end of it takes no part, or is not connected to what
+  // holds the scale.
+  bool is_free = false;
+  BoxEnd low;
+  BoxEnd high;
+
+  // Whether it is proved that it is not as long as known.
+  bool IsContradicted() const {
+    return metres && low.proved && high.proved &&
+           (*metres + tolerance < *low.proved ||
+            *metres - tolerance > *high.proved);
+  }
 };
 
 struct ToleranceSummary {
@@ -180,11 +236,23 @@ struct ToleranceSummary {
   int64_t num_fixed_points = 0;
   std::vector<std::string> gauge_images;  // empty if the options fix something
   std::vector<ToleranceBox> boxes;        // images, then points, as asked for
+  std::vector<ToleranceLength> lengths;   // as ToleranceOptions::distances
   // In the frame in which they are found: far from the origin the last digits
   // of coordinates are as large as a narrow box.
   EndAgreement agreement;
   double seconds = 0;
 };
+
+// The inverse of a list of indices in the model: for each of its `count`
+// elements the index in the list, or -1.
+std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count);
+
+// Fills in summary->lengths, around the estimate that `built` starts from: by a
+// problem of their own, whose gauge is the scale bar where there is one and the
+// scale is free, and else `gauge`.
+void FillLengths(const ToleranceOptions& options, const Model& model,
+                 const ToleranceGauge& gauge, const BuiltProblem& built,
+                 const Context& context, ToleranceSummary* summary);
 
 struct ToleranceResult {
   Model model;  // the input, or the solved one; the boxes are around it

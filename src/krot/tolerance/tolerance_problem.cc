@@ -25,15 +25,15 @@ constexpr double kFirstProof = 20;
 // The relative rounding error of the few operations after the check.
 constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
 
-// The upper bound of p'x that the multipliers prove, if any.
+// The upper bound of the sum that the multipliers prove, if any.
 std::optional<double> Prove(const KnownRotationProblem& problem,
-                            const Pull& pull,
+                            const Pulls& pulls,
                             const std::optional<ScaleRow>& scale,
                             const ExtentOptions& options, const Estimate& start,
                             const std::vector<Multiplier>& multipliers) {
   ExtentCertificate certificate;
   certificate.bound = options.bound;
-  certificate.pulls = {pull};
+  certificate.pulls = pulls;
   for (size_t i = 0; i < multipliers.size(); ++i) {
     certificate.observations.push_back(
         {static_cast<int64_t>(i), multipliers[i].lambda, multipliers[i].y});
@@ -41,8 +41,7 @@ std::optional<double> Prove(const KnownRotationProblem& problem,
   double kept = 0;
   if (scale) {
     Pull keeper = *scale;
-    keeper.direction *=
-        BalancingPull(problem, certificate, scale->index, scale->direction);
+    keeper.direction *= BalancingPull(problem, certificate, *scale);
     certificate.pulls.push_back(keeper);
     kept = Along(problem, start, keeper);
   }
@@ -52,7 +51,7 @@ std::optional<double> Prove(const KnownRotationProblem& problem,
          kRounding * (std::abs(check.extent) + std::abs(kept));
 }
 
-// The largest distance of a frame or a point from the pull's position.
+// The largest distance of a frame or a point from a pull's position.
 double SizeOf(const KnownRotationProblem& problem, const Estimate& estimate,
               const Pull& pull) {
   const Eigen::Vector3d x = PositionOf(problem, estimate, pull);
@@ -69,7 +68,14 @@ double SizeOf(const KnownRotationProblem& problem, const Estimate& estimate,
 
 }  // namespace
 
-Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
+double Along(const KnownRotationProblem& problem, const Estimate& estimate,
+             const Pulls& pulls) {
+  double sum = 0;
+  for (const Pull& pull : pulls) sum += Along(problem, estimate, pull);
+  return sum;
+}
+
+Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
                   const std::optional<ScaleRow>& scale,
                   const ExtentOptions& options, const Context& context,
                   const Estimate& start) {
@@ -77,20 +83,20 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
   extent.estimate = start;
   LinearObjective objective;
   objective.h.SetZero(problem.num_points, problem.num_frames);
-  objective.h.Add(-1, CoefficientsOf(problem, pull));
-  if (scale) objective.e = CoefficientsOf(problem, *scale);
-  const double at_start = Along(problem, start, pull);
-  const double far_away = kFarAway * SizeOf(problem, start, pull);
+  objective.h.Add(-1, CoefficientsOf(problem, pulls));
+  if (scale) objective.e = CoefficientsOf(problem, {*scale});
+  const double at_start = Along(problem, start, pulls);
+  const double far_away = kFarAway * SizeOf(problem, start, pulls.front());
 
   InteriorPointOptions interior_point;
   interior_point.norm = options.norm;
   interior_point.max_iterations = options.max_iterations;
   interior_point.stop = [&](const ConicIterate& iterate) {
-    const double reached = Along(problem, *iterate.estimate, pull);
+    const double reached = Along(problem, *iterate.estimate, pulls);
     if (reached - at_start > far_away) return true;
     if (iterate.gap > kFirstProof * options.tolerance) return false;
     const std::optional<double> proved =
-        Prove(problem, pull, scale, options, start, *iterate.multipliers);
+        Prove(problem, pulls, scale, options, start, *iterate.multipliers);
     if (!proved) return false;
     extent.proved = std::min(*proved, extent.proved.value_or(*proved));
     return *extent.proved - reached <=
@@ -106,17 +112,17 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pull& pull,
 
 // A view's centre moves as its frame's does.
 BlockVector CoefficientsOf(const KnownRotationProblem& problem,
-                           const Pull& pull) {
+                           const Pulls& pulls) {
   BlockVector coefficients;
   coefficients.SetZero(problem.num_points, problem.num_frames);
-  if (pull.kind == Pull::Kind::kPoint) {
-    if (problem.IsFixedPoint(pull.index)) return coefficients;
-    coefficients.points[pull.index] = pull.direction;
-    return coefficients;
+  for (const Pull& pull : pulls) {
+    if (IsFixedPosition(problem, pull)) continue;
+    if (pull.kind == Pull::Kind::kPoint) {
+      coefficients.points[pull.index] += pull.direction;
+    } else {
+      coefficients.frames[problem.views[pull.index].frame] += pull.direction;
+    }
   }
-  const View& view = problem.views[pull.index];
-  if (problem.IsFixedFrame(view.frame)) return coefficients;
-  coefficients.frames[view.frame] = pull.direction;
   return coefficients;
 }
 
@@ -149,6 +155,18 @@ Estimate MeanDirections(const KnownRotationProblem& problem) {
 Vector3d CentreAt(const KnownRotationProblem& problem, const Estimate& estimate,
                   int32_t view) {
   return PositionOf(problem, estimate, {Pull::Kind::kView, view});
+}
+
+// Holds a view's frame, or a point, where the estimate has it.
+void Fix(const Pull& what, const Estimate& at, KnownRotationProblem* problem) {
+  if (what.kind == Pull::Kind::kPoint) {
+    problem->fixed_points.resize(problem->num_points);
+    problem->fixed_points[what.index] = at.points[what.index];
+    return;
+  }
+  const int32_t frame = problem->views[what.index].frame;
+  problem->fixed_translations.resize(problem->num_frames);
+  problem->fixed_translations[frame] = at.translations[frame];
 }
 
 }  // namespace
@@ -186,21 +204,22 @@ ToleranceGauge ChooseGauge(const KnownRotationProblem& problem,
   std::vector<int64_t> counts(problem.views.size(), 0);
   for (const Observation& o : problem.observations) ++counts[o.view];
   ToleranceGauge gauge;
-  gauge.first = static_cast<int32_t>(
+  const auto first = static_cast<int32_t>(
       std::max_element(counts.begin(), counts.end()) - counts.begin());
+  gauge.first = {Pull::Kind::kView, first};
   if (HasBaseline(problem)) return gauge;
   const Components components = FindComponents(problem);
   const auto component = [&](int32_t v) {
     return components.of_frame[problem.views[v].frame];
   };
-  const Vector3d at_first = CentreAt(problem, estimate, *gauge.first);
+  const Vector3d at_first = CentreAt(problem, estimate, first);
   double farthest = 0;
   for (int32_t v = 0; v < static_cast<int32_t>(counts.size()); ++v) {
-    if (counts[v] == 0 || component(v) != component(*gauge.first)) continue;
+    if (counts[v] == 0 || component(v) != component(first)) continue;
     const double distance = (CentreAt(problem, estimate, v) - at_first).norm();
     if (distance <= farthest) continue;
     farthest = distance;
-    gauge.second = v;
+    gauge.second = {Pull::Kind::kView, v};
   }
   return gauge;
 }
@@ -224,18 +243,15 @@ ToleranceProblem::ToleranceProblem(const Model& model, BuiltProblem* built,
     : model_(model),
       built_(*built),
       centre_(centre),
+      gauge_(gauge),
       norm_(norm),
       bound_(bound) {
   KnownRotationProblem& problem = built->problem;
-  if (gauge.first) {
-    const int32_t frame = problem.views[*gauge.first].frame;
-    problem.fixed_translations.resize(problem.num_frames);
-    problem.fixed_translations[frame] = centre.translations[frame];
-  }
+  if (gauge.first) Fix(*gauge.first, centre, &problem);
   if (gauge.first && gauge.second && IsScaleFree(problem)) {
-    scale_ = ScaleRow{Pull::Kind::kView, *gauge.second};
-    scale_->direction = (CentreAt(problem, centre, *gauge.second) -
-                         CentreAt(problem, centre, *gauge.first))
+    scale_ = *gauge.second;
+    scale_->direction = (PositionOf(problem, centre, *gauge.second) -
+                         PositionOf(problem, centre, *gauge.first))
                             .normalized();
   }
   has_row_ =
@@ -246,20 +262,26 @@ ToleranceProblem::ToleranceProblem(const Model& model, BuiltProblem* built,
 }
 
 std::optional<ProblemSubset> ToleranceProblem::UsablePart(
-    const Pull& target) const {
+    const Pulls& targets) const {
   const KnownRotationProblem& whole = problem();
+  std::vector<char> is_far = is_far_;
+  for (const Pulls& wanted : {targets, scale_ ? Pulls{*scale_} : Pulls{}}) {
+    for (const Pull& pull : wanted) {
+      if (pull.kind == Pull::Kind::kPoint) is_far[pull.index] = 0;
+    }
+  }
   std::vector<int64_t> usable;
   for (size_t i = 0; i < whole.observations.size(); ++i) {
-    const int32_t point = whole.observations[i].point;
-    const bool is_target =
-        target.kind == Pull::Kind::kPoint && target.index == point;
-    if (!has_row_[i] || (is_far_[point] && !is_target)) continue;
+    if (!has_row_[i] || is_far[whole.observations[i].point]) continue;
     usable.push_back(static_cast<int64_t>(i));
   }
   ProblemSubset part(whole, HeldObservations(whole, std::move(usable)));
-  if (!InPart(part, target) || (scale_ && !InPart(part, *scale_))) {
-    return std::nullopt;
+  for (const Pull& target : targets) {
+    if (!InPart(part, target) && !IsFixedPosition(whole, target)) {
+      return std::nullopt;
+    }
   }
+  if (scale_ && !InPart(part, *scale_)) return std::nullopt;
   return std::optional<ProblemSubset>(std::move(part));
 }
 

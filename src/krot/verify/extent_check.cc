@@ -76,27 +76,33 @@ ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
 }
 
 double BalancingPull(const KnownRotationProblem& problem,
-                     const ExtentCertificate& certificate, int32_t view,
-                     const Eigen::Vector3d& direction) {
-  const int32_t frame = problem.views[view].frame;
+                     const ExtentCertificate& certificate, const Pull& keeper) {
+  const bool is_view = keeper.kind == Pull::Kind::kView;
+  // What moves with the keeper.
+  const auto node = [&](int32_t view, int32_t point) {
+    return is_view ? problem.views[view].frame : point;
+  };
+  const int32_t own = node(is_view ? keeper.index : 0, keeper.index);
   Vector3 sum = Vector3::Zero();
   for (const CertifiedObservation& o : certificate.observations) {
     const Observation& observation = problem.observations[o.observation];
-    const View& own = problem.views[observation.view];
-    if (own.frame != frame) continue;
-    sum += own.cam_from_world_rotation.transpose().cast<Real>() *
+    if (node(observation.view, observation.point) != own) continue;
+    sum += problem.views[observation.view]
+               .cam_from_world_rotation.transpose()
+               .cast<Real>() *
            MakeForce(observation, o.y.cast<Real>(),
                      Real{certificate.bound} * o.lambda)
                .sum;
   }
+  if (!is_view) sum = -sum;
   for (const Pull& pull : certificate.pulls) {
-    if (pull.kind != Pull::Kind::kView ||
-        problem.views[pull.index].frame != frame) {
+    if (pull.kind != keeper.kind ||
+        node(is_view ? pull.index : 0, pull.index) != own) {
       continue;
     }
     sum -= pull.direction.cast<Real>();
   }
-  const Vector3 n = direction.cast<Real>();
+  const Vector3 n = keeper.direction.cast<Real>();
   return static_cast<double>(n.dot(sum) / n.squaredNorm());
 }
 

@@ -46,11 +46,10 @@ struct ExtentCheck {
 ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
                         const ExtentCertificate& certificate);
 
-// The pull along `direction` at the centre of `view` with which the certificate
-// balances at its frame in this direction: the multiplier of what keeps the
-// scale.
+// By how much the pull `keeper`, at a view or a point, has to be multiplied so
+// that the certificate balances there in its direction: the multiplier of what
+// keeps the scale.
 double BalancingPull(const KnownRotationProblem& problem,
-                     const ExtentCertificate& certificate, int32_t view,
-                     const Eigen::Vector3d& direction);
+                     const ExtentCertificate& certificate, const Pull& keeper);
 
 }  // namespace krot::internal

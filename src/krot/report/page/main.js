@@ -89,8 +89,8 @@ function showProfile({ profile }) {
 }
 
 function showBoxes(report, show) {
-  byId('boxes-section').hidden = !report.boxes;
-  if (!report.boxes) return;
+  byId('boxes-section').hidden = !report.boxes?.length;
+  if (!report.boxes?.length) return;
   byId('boxes-note').textContent = boxesNote(report);
   byId('boxes').append(boxesTable(report.boxes, show));
 }
