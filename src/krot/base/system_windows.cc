@@ -9,11 +9,49 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <codecvt>
 #include <cstdlib>
 #include <limits>
 #include <memory>
 
 #include "krot/base/system.h"
+
+// libstdc++ makes a path of a narrow text by this facet, whose own functions
+// take every byte for a letter in the locale "C", and msvcrt.dll has no locale
+// of UTF-8. These take the place of all of them.
+namespace std {
+
+using ByUtf8 = codecvt_utf8_utf16<wchar_t>;
+using OfLocale = codecvt<wchar_t, char, mbstate_t>;
+
+codecvt_base::result OfLocale::do_out(state_type& state, const wchar_t* from,
+                                      const wchar_t* from_end,
+                                      const wchar_t*& from_next, char* to,
+                                      char* to_end, char*& to_next) const {
+  return ByUtf8().out(state, from, from_end, from_next, to, to_end, to_next);
+}
+// What is not UTF-8 becomes U+FFFD, and so the name of no file.
+codecvt_base::result OfLocale::do_in(state_type& state, const char* from,
+                                     const char* from_end,
+                                     const char*& from_next, wchar_t* to,
+                                     wchar_t* to_end, wchar_t*& to_next) const {
+  for (;;) {
+    const result done =
+        ByUtf8().in(state, from, from_end, from_next, to, to_end, to_next);
+    if (done != error || to_next == to_end) return done;
+    *to_next++ = L'\xFFFD';
+    from = ++from_next;
+    to = to_next;
+  }
+}
+int OfLocale::do_length(state_type& state, const char* from, const char* end,
+                        size_t max) const {
+  return ByUtf8().length(state, from, end, max);
+}
+int OfLocale::do_encoding() const noexcept { return ByUtf8().encoding(); }
+int OfLocale::do_max_length() const noexcept { return ByUtf8().max_length(); }
+
+}  // namespace std
 
 namespace krot::internal {
 namespace {
