@@ -1,15 +1,6 @@
 # The command as WebAssembly (emscripten; preset `wasm`): build-wasm/krot.js and
 # krot.wasm, which src/browser makes a page of. See docs/browser.md.
 
-# The one header library that stands among all headers of the host.
-find_path(KROT_JSON_FOLDER nlohmann/json.hpp PATHS /usr/include REQUIRED
-  NO_CMAKE_FIND_ROOT_PATH)
-set(headers ${PROJECT_BINARY_DIR}/headers)
-file(MAKE_DIRECTORY ${headers})
-file(CREATE_LINK ${KROT_JSON_FOLDER}/nlohmann ${headers}/nlohmann SYMBOLIC)
-add_library(nlohmann_json::nlohmann_json INTERFACE IMPORTED)
-target_include_directories(nlohmann_json::nlohmann_json INTERFACE ${headers})
-
 # krot_browser_link(<target>)
 #
 # A function createKrot() that makes an instance with a file system of its own;

@@ -34,6 +34,10 @@ function(krot_warnings target)
     target_compile_options(${target}
       PRIVATE -Wno-shorten-64-to-32 -Wno-overlength-strings)
   endif()
+  if(MINGW)  # A unit has more sections than the older format can number.
+    target_compile_options(${target}
+      PRIVATE -Wa,-mbig-obj -Wno-maybe-uninitialized)
+  endif()
   if(KROT_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
@@ -82,22 +86,48 @@ function(krot_precompiled_headers target kind)
     ${frameworks})
 endfunction()
 
-# krot_native_kernel(<file>)
+# krot_native_kernel(<target> <file>...)
 #
-# Compiles one source file of this folder's library for the machine at hand.
-# It must have no Eigen type in its interface: vector flags would change their
-# alignment and so the ABI.
-function(krot_native_kernel file)
-  set(kernel_flags -O3 -fno-math-errno -fno-trapping-math)
+# Adds source files that are compiled for other vector units than the rest: for
+# the machine's at hand with KROT_NATIVE, else on x86 once for each of
+# krot/base/vector_units.h, which chooses. They must have no Eigen type in their
+# interface: vector flags would change their alignment and so the ABI. Nor may
+# functions of one name be left in several of them: all of theirs are in a
+# namespace KROT_UNITS, and Eigen is called KrotEigen_<units>.
+function(krot_native_kernel target)
+  set(units own)
+  set(own_flags)
   if(KROT_NATIVE)
     include(CheckCXXCompilerFlag)
     check_cxx_compiler_flag(-march=native KROT_HAS_MARCH_NATIVE)
     if(KROT_HAS_MARCH_NATIVE)
-      list(APPEND kernel_flags -march=native)
+      set(own_flags -march=native)
     endif()
+  elseif(KROT_CHOOSES_UNITS)
+    list(APPEND units avx2 avx512)
+    set(avx2_flags -mavx2 -mfma)
+    set(avx512_flags -mavx512f -mavx512dq -mavx512vl -mavx2 -mfma)
   endif()
-  set_source_files_properties(${file} PROPERTIES
-    COMPILE_OPTIONS "${kernel_flags}" SKIP_PRECOMPILE_HEADERS ON)
+  foreach(unit IN LISTS units)
+    set(kernels ${target}_${unit})
+    add_library(${kernels} OBJECT ${ARGN})
+    krot_warnings(${kernels})
+    target_include_directories(${kernels} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+    target_compile_definitions(${kernels}
+      PRIVATE KROT_UNITS=${unit} Eigen=KrotEigen_${unit})
+    # GCC 12 warns of what its own AVX-512 headers leave open on purpose.
+    target_compile_options(${kernels} PRIVATE
+      -O3 -fno-math-errno -fno-trapping-math ${${unit}_flags}
+      $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
+    if(MINGW)  # GCC aligns no stack of Windows to more than 16 bytes.
+      target_compile_options(${kernels}
+        PRIVATE -Wa,-muse-unaligned-vector-move)
+    endif()
+    target_link_libraries(${kernels} PRIVATE Eigen3::Eigen)
+    set_target_properties(${kernels} PROPERTIES UNITY_BUILD OFF)
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${kernels}>)
+    set_property(GLOBAL APPEND PROPERTY KROT_LIBRARIES ${kernels})
+  endforeach()
 endfunction()
 
 # krot_test(<name> [SLOW filter] SOURCES file... DEPENDS target...)

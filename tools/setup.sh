@@ -53,7 +53,7 @@ install_missing() {
 }
 
 # build_krot FOLDER CMAKE_OPTION... builds into FOLDER, in the generator of an
-# earlier build if there is one.
+# earlier build if there is one: all, or $target.
 build_krot() {
   local folder=$1 generator=(-G Ninja)
   shift
@@ -61,5 +61,5 @@ build_krot() {
   say "Building into $folder"
   cmake -S "$root" -B "$folder" "${generator[@]}" \
     -DCMAKE_BUILD_TYPE=Release "$@"
-  cmake --build "$folder" --parallel "$(nproc)"
+  cmake --build "$folder" --parallel "$(nproc)" --target "${target:-all}"
 }

@@ -26,7 +26,8 @@ TEST(ResidualKernel, GradientsAreThoseOfThePieces) {
     Fill(problem, &set);
     const Vector3d x = generator.Start(problem, 0.5);
     std::vector<GradientBlock> blocks(set.num_blocks());
-    EvaluateGradients(set.blocks(), set.num_blocks(), x.data(), blocks.data());
+    best_residual_kernels.evaluate_gradients(set.blocks(), set.num_blocks(),
+                                             x.data(), blocks.data());
     for (int i = 0; i < count; ++i) {
       ResidualPiece piece;
       ResidualPieces(problem.residuals[i], x, Norm::L2(), /*share=*/1, &piece);
@@ -55,7 +56,7 @@ TEST(ResidualKernel, AResidualThatIsZeroHasGradientZero) {
   set.Add(residual);
   const Vector3d x(0, 0, 2);
   GradientBlock block;
-  EvaluateGradients(set.blocks(), 1, x.data(), &block);
+  best_residual_kernels.evaluate_gradients(set.blocks(), 1, x.data(), &block);
   EXPECT_EQ(block.value[0], 0);
   for (const auto& gradient : block.gradient) EXPECT_EQ(gradient[0], 0);
 }
@@ -71,8 +72,8 @@ TEST(ResidualKernel, ADepthShareKeepsAllDepthsAboveTheLowest) {
     const Vector3d x = generator.Start(problem, 0.5);
     for (const double length : {0.1, 1.0, 10.0, 1000.0}) {
       const Vector3d d = length * generator.Normal3();
-      const double share = DepthShare(set.blocks(), set.num_blocks(), x.data(),
-                                      d.data(), lowest);
+      const double share = best_residual_kernels.depth_share(
+          set.blocks(), set.num_blocks(), x.data(), d.data(), lowest);
       double least = 1;  // depth at the end of the share, relative to its start
       for (const Residual& residual : problem.residuals) {
         least =
@@ -103,7 +104,8 @@ TEST(ResidualKernel, MetricIsTheSumOverAllResiduals) {
                   (w * w);
     }
     double metric[6];
-    SumMetric(set.blocks(), set.num_blocks(), x.data(), cost, metric);
+    best_residual_kernels.sum_metric(set.blocks(), set.num_blocks(), x.data(),
+                                     cost, metric);
     int entry = 0;
     for (int i = 0; i < 3; ++i) {
       for (int j = i; j < 3; ++j, ++entry) {

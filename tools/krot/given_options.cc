@@ -84,7 +84,7 @@ std::vector<OptionAssignment> GivenOptions(
 
 std::vector<OptionAssignment> ReadProjectFile(
     const std::string& path, const std::vector<Option>& options) {
-  std::ifstream stream(path);
+  std::ifstream stream{std::filesystem::path(path)};
   std::error_code ignored;
   if (!stream || std::filesystem::is_directory(path, ignored)) {
     throw OptionError("--project_path = " + path +

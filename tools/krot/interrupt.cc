@@ -1,12 +1,13 @@
 #include "tools/krot/interrupt.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <csignal>
+#include <chrono>
+#include <cstdlib>
+#include <thread>
 
+#include "krot/base/system.h"
 #include "tools/krot/command_error.h"
 
 namespace krot::internal {
@@ -21,40 +22,32 @@ static_assert(CancelFlag::is_always_lock_free,
 std::array<char, 128> sentence;
 size_t sentence_length = 0;
 
-void SetInterrupted(int) { interrupted.store(true); }
+void SetInterrupted() { interrupted.store(true); }
 
-void End(int) {
+void End() {
   is_ending.store(true);
-  if (::write(STDERR_FILENO, sentence.data(), sentence_length) < 0) {
-    // Nobody listens.
-  }
-  ::_exit(kExitInterrupted);
-}
-
-void Handle(void (*handler)(int), int flags) {
-  struct sigaction action = {};
-  action.sa_handler = handler;
-  action.sa_flags = flags;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
+  WriteToStderr({sentence.data(), sentence_length});
+  std::_Exit(kExitInterrupted);
 }
 
 }  // namespace
 
 void EndOnInterrupt(const std::string& who) {
   // A bar may stand on a terminal's line.
-  const std::string text = (::isatty(STDERR_FILENO) == 1 ? "\n" : "") + who +
+  const std::string text = (IsStderrTerminal() ? "\n" : "") + who +
                            ": interrupted, nothing was written\n";
   sentence_length = std::min(text.size(), sentence.size());
   std::copy_n(text.begin(), sentence_length, sentence.begin());
-  Handle(&End, 0);
+  OnEndRequest(&End, /*once=*/false);
 }
 
 void Interrupt() { interrupted.store(true); }
 
 const CancelFlag& DeferInterrupts() {
-  Handle(&SetInterrupted, static_cast<int>(SA_RESETHAND) | SA_RESTART);
-  while (is_ending.load()) ::pause();  // another thread is ending the process
+  OnEndRequest(&SetInterrupted, /*once=*/true);
+  while (is_ending.load()) {  // another thread is ending the process
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+  }
   return interrupted;
 }
 

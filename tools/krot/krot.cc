@@ -1,7 +1,5 @@
 // krot COMMAND [options]: the command table, and what becomes of exceptions.
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cstdlib>
@@ -15,6 +13,7 @@
 
 #include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/checkpoint.h"
+#include "krot/base/system.h"
 #include "krot/base/write_file.h"
 #include "krot/context.h"
 #include "krot/options/option_table.h"
@@ -221,11 +220,8 @@ std::atomic<bool> has_memory_ended{false};
     }
     if (has_memory_ended) throw std::bad_alloc();
   } catch (const std::bad_alloc&) {
-    if (::write(STDERR_FILENO, out_of_memory.data(), out_of_memory.size()) <
-        0) {
-      std::abort();
-    }
-    ::_exit(kExitInternal);
+    if (!WriteToStderr(out_of_memory)) std::abort();
+    std::_Exit(kExitInternal);
   } catch (...) {
     std::abort();
   }
@@ -251,7 +247,7 @@ int Main(const std::vector<std::string>& arguments) {
 
 int main(int argc, char** argv) try {
   krot::internal::SilenceCeres();
-  return krot::internal::Main({argv + std::min(argc, 1), argv + argc});
+  return krot::internal::Main(krot::internal::ProgramArguments(argc, argv));
 } catch (const std::bad_alloc&) {
   return krot::internal::Fail("krot", "out of memory",
                               krot::internal::kExitInternal);

@@ -1,19 +1,17 @@
 #include "tools/krot/log.h"
 
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
-#include <cstdlib>
 #include <iostream>
 #include <mutex>
 #include <set>
 #include <system_error>
 #include <thread>
 #include <utility>
+
+#include "krot/base/system.h"
 
 namespace krot::internal {
 namespace {
@@ -29,21 +27,6 @@ void LogToSink(const std::string& text) {
 
 // In one piece: a signal's sentence begins a line of its own.
 void Write(const std::string& text) { std::cerr << text << std::flush; }
-
-// Whether lines on stderr can be rewritten.
-bool IsTerminal() {
-  const char* term = std::getenv("TERM");
-  return isatty(STDERR_FILENO) == 1 && term != nullptr && *term != '\0' &&
-         std::string(term) != "dumb";
-}
-
-int TerminalColumns() {
-  constexpr int kUsual = 80;
-  winsize size = {};
-  const bool is_known =
-      ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return is_known ? size.ws_col : kUsual;
-}
 
 // The longest beginning of the text that takes no more than `columns`, without
 // control characters. Beyond ASCII a character counts as a wide one.
@@ -120,7 +103,7 @@ void ProgressLine::Show(const LogOptions& options, const Progress& progress) {
   updated_ = Clock::now();
   is_printed_ = false;
   if (is_new) {
-    is_terminal_ = IsTerminal();
+    is_terminal_ = CanRewriteLines();
     StartWatching();
   }
   const bool is_first = is_new && told_.count(progress.stage) == 0;
@@ -137,7 +120,7 @@ void ProgressLine::Begin(const LogOptions& options, const std::string& words) {
   is_active_ = true;
   is_phase_ = true;
   is_printed_ = true;  // not before it takes long
-  is_terminal_ = IsTerminal();
+  is_terminal_ = CanRewriteLines();
   updated_ = printed_ = Clock::now();
   StartWatching();
 }
@@ -178,7 +161,9 @@ void ProgressLine::Print(const std::string& addition) {
   whole.words += addition;
   if (is_terminal_) {
     // Back to the margin; what is left of a longer line is erased.
-    Write('\r' + FitProgress(whole, TerminalColumns()) + "\033[K");
+    constexpr int kUsual = 80;
+    const int columns = TerminalColumns().value_or(kUsual);
+    Write('\r' + FitProgress(whole, columns) + "\033[K");
     line_is_open_ = true;
   } else {
     Write(whole.words + '\n');

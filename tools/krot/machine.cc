@@ -1,29 +1,10 @@
 #include "tools/krot/machine.h"
 
-#include <stdlib.h>
-
-#include <fstream>
-
 #include "krot/base/parallel_for.h"
+#include "krot/base/system.h"
 #include "krot/report/text_table.h"
 
 namespace krot::internal {
-namespace {
-
-// "model name : AMD EPYC" of /proc/cpuinfo.
-std::string CpuName() {
-  std::ifstream stream("/proc/cpuinfo");
-  for (std::string line; std::getline(stream, line);) {
-    const size_t colon = line.find(": ");
-    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
-      return line.substr(colon + 2);
-    }
-  }
-  return "unknown";
-}
-
-}  // namespace
-
 Machine ThisMachine() {
   Machine machine;
   machine.cpu = CpuName();
@@ -34,7 +15,7 @@ Machine ThisMachine() {
   machine.compiler = "GCC " __VERSION__;
 #endif
   machine.flags = KROT_BUILD_FLAGS;
-  getloadavg(&machine.load, 1);
+  machine.load = LoadAverage();
   return machine;
 }
 

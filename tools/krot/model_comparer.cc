@@ -123,7 +123,7 @@ void CheckComparerPaths(const ComparerOptions& options,
       for (const auto& [option, path] :
            {std::pair("report_path", options.report_path),
             std::pair("html_path", options.html_path)}) {
-        if (!IsSamePath(folder / name, path)) continue;
+        if (!IsSamePath((folder / name).string(), path)) continue;
         throw OptionError("--" + std::string(option) + " = " + path +
                           ", must not be " + name + " of --output_path");
       }

@@ -5,21 +5,18 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 
 #include <jpeglib.h>
 #include <png.h>
+
+#include "krot/context.h"
+#include "krot/model/model_io.h"
 
 namespace krot::internal {
 namespace {
 
 constexpr uint8_t kOutside = 128;
 constexpr int kJpegQuality = 88;
-
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, CloseFile>;
 
 // libjpeg reports errors by a call that must not return.
 struct JpegErrors {
@@ -35,7 +32,7 @@ void SayNothing(j_common_ptr) {}
 
 // Nothing with a destructor lives between setjmp and longjmp but `photo`, which
 // is the caller's.
-bool ReadJpeg(std::FILE* file, Photo* photo) {
+bool ReadJpeg(const std::string& bytes, Photo* photo) {
   jpeg_decompress_struct info;
   JpegErrors errors;
   info.err = jpeg_std_error(&errors.manager);
@@ -46,7 +43,8 @@ bool ReadJpeg(std::FILE* file, Photo* photo) {
     return false;
   }
   jpeg_create_decompress(&info);
-  jpeg_stdio_src(&info, file);
+  jpeg_mem_src(&info, reinterpret_cast<const unsigned char*>(bytes.data()),
+               static_cast<unsigned long>(bytes.size()));
   jpeg_read_header(&info, TRUE);
   info.out_color_space = JCS_RGB;
   jpeg_start_decompress(&info);
@@ -63,11 +61,14 @@ bool ReadJpeg(std::FILE* file, Photo* photo) {
   return true;
 }
 
-bool ReadPng(std::FILE* file, Photo* photo) {
+bool ReadPng(const std::string& bytes, Photo* photo) {
   png_image image;
   std::memset(&image, 0, sizeof(image));
   image.version = PNG_IMAGE_VERSION;
-  if (png_image_begin_read_from_stdio(&image, file) == 0) return false;
+  if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) ==
+      0) {
+    return false;
+  }
   image.format = PNG_FORMAT_RGB;
   photo->width = static_cast<int>(image.width);
   photo->height = static_cast<int>(image.height);
@@ -82,16 +83,19 @@ bool ReadPng(std::FILE* file, Photo* photo) {
 }  // namespace
 
 std::optional<Photo> ReadPhoto(const std::string& path) {
-  const File file(std::fopen(path.c_str(), "rb"));
-  if (!file) return std::nullopt;
-  unsigned char head[8] = {};
-  const size_t count = std::fread(head, 1, sizeof(head), file.get());
-  std::rewind(file.get());
-  Photo photo;
-  const bool is_png = count == sizeof(head) && png_sig_cmp(head, 0, count) == 0;
-  if (is_png ? ReadPng(file.get(), &photo) : ReadJpeg(file.get(), &photo)) {
-    return photo;
+  std::string bytes;
+  try {
+    bytes = ReadFileBytes(path).bytes;
+  } catch (const ModelError&) {
+    return std::nullopt;
   }
+  constexpr size_t kHead = 8;
+  const bool is_png =
+      bytes.size() >= kHead &&
+      png_sig_cmp(reinterpret_cast<const unsigned char*>(bytes.data()), 0,
+                  kHead) == 0;
+  Photo photo;
+  if (is_png ? ReadPng(bytes, &photo) : ReadJpeg(bytes, &photo)) return photo;
   return std::nullopt;
 }
 

@@ -1,9 +1,5 @@
 #include "tools/krot/run_log.h"
 
-#include <fcntl.h>
-#include <sys/utsname.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
@@ -12,6 +8,7 @@
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/base/system.h"
 #include "krot/base/write_file.h"
 #include "krot/convert/model_digest.h"
 #include "krot/model/model_io.h"
@@ -28,18 +25,15 @@ namespace fs = std::filesystem;
 class RunLog {
  public:
   explicit RunLog(const std::string& file)
-      : descriptor_(::open(file.c_str(),
-                           O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
-                           mode_t{0666})) {
+      : descriptor_(file, FileDescriptor::Use::kReplace) {
     if (descriptor_.is_open()) return;
     throw WriteError(file + ": cannot be created: " +
                      std::generic_category().message(errno));
   }
 
   void Plain(const std::string& line) const {
-    const std::string text = line + '\n';
     // A log that no longer fits on the disk ends no run.
-    if (::write(descriptor_.get(), text.data(), text.size()) < 0) return;
+    static_cast<void>(descriptor_.Write(line + '\n'));
   }
   void Timed(const std::string& line) const {
     Plain(FormatNumber(timer_.Seconds(), 3) + " s  " + line);
@@ -59,12 +53,6 @@ std::string Now() {
   return text;
 }
 
-std::string System() {
-  utsname name;
-  if (::uname(&name) != 0) return "unknown";
-  return std::string(name.sysname) + " " + name.release + " " + name.machine;
-}
-
 }  // namespace
 
 void BeginRunLog(const std::string& file, const OptionParser& parser) {
@@ -72,7 +60,8 @@ void BeginRunLog(const std::string& file, const OptionParser& parser) {
   run_log.emplace(file);
   run_log->Plain(parser.command() + ", version " KROT_VERSION);
   run_log->Plain("begun " + Now());
-  run_log->Plain("machine: " + MachineLine(ThisMachine()) + "; " + System());
+  run_log->Plain("machine: " + MachineLine(ThisMachine()) + "; " +
+                 SystemName());
   run_log->Plain("working directory: " + fs::current_path().string());
   for (const Option& option : parser.options()) {
     run_log->Plain("--" + option.name + "=" + parser.Text(option.name) +

@@ -12,7 +12,6 @@
 #include "krot/problem/cost.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"
-#include "tools/krot/free_memory.h"
 #include "tools/krot/interrupt.h"
 #include "tools/krot/metres.h"
 #include "tools/krot/report_files.h"
@@ -61,7 +60,7 @@ void CheckMemory(const SolveSummary& summary) {
   const int64_t free = FreeMemoryBytes();
   const auto least = static_cast<int64_t>(
       static_cast<double>(summary.needed_bytes) / kMostAnnounced);
-  if (BytesStillNeeded(least) <= free) return;
+  if (least - ResidentBytes() <= free) return;
   throw CommandError(kExitInternal,
                      "out of memory before it began: " + MemoryWords(summary) +
                          ", " + FormatBytes(free) +

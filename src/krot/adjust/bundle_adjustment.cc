@@ -202,6 +202,11 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
   return result;
 }
 
-void SilenceCeres() { FLAGS_minloglevel = google::GLOG_FATAL; }
+void SilenceCeres() {
+// The stand-in for glog that Ceres brings along is silenced when it is built.
+#ifndef CERCES_INTERNAL_MINIGLOG_GLOG_LOGGING_H_
+  FLAGS_minloglevel = google::GLOG_FATAL;
+#endif
+}
 
 }  // namespace krot::internal

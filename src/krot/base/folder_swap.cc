@@ -1,39 +1,12 @@
 #include "krot/base/write_file.h"
 
-#include <dirent.h>
-#include <fcntl.h>
-#include <stdio.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstdio>
-#include <memory>
 #include <new>
-#include <string_view>
 #include <utility>
 
 namespace krot::internal {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::error_code LastError() { return {errno, std::generic_category()}; }
-
-std::error_code ListEntries(const fs::path& folder,
-                            std::vector<fs::path>* names) {
-  const std::unique_ptr<DIR, int (*)(DIR*)> stream(::opendir(folder.c_str()),
-                                                   &::closedir);
-  if (!stream) return LastError();
-  for (;;) {
-    errno = 0;
-    const dirent* entry = ::readdir(stream.get());
-    if (entry == nullptr) break;
-    const std::string_view name = entry->d_name;
-    if (name != "." && name != "..") names->emplace_back(name);
-  }
-  return errno == 0 ? std::error_code() : LastError();
-}
 
 // The path that rename acts on: without symbolic links, dots and a trailing
 // slash.
@@ -43,32 +16,6 @@ fs::path Resolve(const fs::path& target) {
   return resolved.has_filename() ? resolved : resolved.parent_path();
 }
 
-std::string Reason(int error) { return std::generic_category().message(error); }
-
-// False where the system cannot tell.
-bool IsMountPoint([[maybe_unused]] const fs::path& folder) {
-#ifdef STATX_ATTR_MOUNT_ROOT
-  struct statx status;
-  return ::statx(AT_FDCWD, folder.c_str(), 0, 0, &status) == 0 &&
-         (status.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0;
-#else
-  return false;
-#endif
-}
-
-// Exchanges two names in one step. Returns false, with errno, where the system
-// or the file system cannot do that.
-bool ExchangeNames([[maybe_unused]] const fs::path& a,
-                   [[maybe_unused]] const fs::path& b) {
-#ifdef RENAME_EXCHANGE
-  return ::renameat2(AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(),
-                     RENAME_EXCHANGE) == 0;
-#else
-  errno = ENOSYS;
-  return false;
-#endif
-}
-
 // `path`, or its nearest parent that exists.
 fs::path ExistingPart(fs::path path) {
   while (!fs::exists(path)) path = path.parent_path();
@@ -76,19 +23,22 @@ fs::path ExistingPart(fs::path path) {
 }
 
 bool HoldsWorkingDirectory(const fs::path& folder) {
-  const fs::path inside = fs::current_path().lexically_relative(folder);
-  return !inside.empty() && *inside.begin() != "..";
+  std::error_code ignored;
+  fs::path current = fs::current_path();
+  while (!fs::equivalent(current, folder, ignored)) {
+    if (!current.has_relative_path()) return false;
+    current = current.parent_path();
+  }
+  return true;
 }
 
 void CheckFolderIsWritable(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     throw WriteError(folder.string() + ": is a file, expected a folder");
   }
-  if (::access(folder.c_str(), R_OK | W_OK | X_OK) != 0) {
-    throw WriteError(folder.string() +
-                     ": cannot be written to: " + Reason(errno));
-  }
-  if (const std::error_code error = TryToCreateIn(folder)) {
+  std::error_code error = CheckPermissions(folder);
+  if (!error) error = TryToCreateIn(folder);
+  if (error) {
     throw WriteError(folder.string() +
                      ": cannot be written to: " + error.message());
   }
@@ -98,7 +48,7 @@ void CheckFolderIsWritable(const fs::path& folder) {
 fs::path CreateSibling(const fs::path& target) {
   for (int i = 0;; ++i) {
     const std::string name = "." + target.filename().string() + ".krot-" +
-                             std::to_string(::getpid()) + "-" +
+                             std::to_string(ProcessId()) + "-" +
                              std::to_string(i);
     fs::path sibling = target.parent_path() / name;
     if (fs::create_directory(sibling)) return sibling;
@@ -132,14 +82,15 @@ void Carry(const fs::path& from, const fs::path& to) {
 // systems without RENAME_EXCHANGE need two renames; the first gives the old
 // folder a name of its own, which it keeps.
 fs::path Exchange(const fs::path& staging, const fs::path& target) {
-  if (ExchangeNames(staging, target)) return staging;
-  if (errno != EINVAL && errno != ENOSYS) {
+  std::error_code error = ExchangeNames(staging, target);
+  if (!error) return staging;
+  if (error != std::errc::function_not_supported) {
     throw WriteError(target.string() +
-                     ": cannot be replaced: " + Reason(errno));
+                     ": cannot be replaced: " + error.message());
   }
-  const fs::path old = staging.string() + "-old";
+  fs::path old = staging;
+  old += "-old";
   fs::rename(target, old);
-  std::error_code error;
   fs::rename(staging, target, error);
   if (error) {
     fs::rename(old, target);
@@ -171,8 +122,8 @@ std::error_code RemoveTree(const fs::path& path) try {
       if (!failure) failure = error;
     }
   }
-  if (::remove(path.c_str()) != 0 && !failure) failure = LastError();
-  return failure;
+  const std::error_code error = RemoveEntry(path);
+  return failure ? failure : error;
 } catch (const std::bad_alloc&) {
   return std::make_error_code(std::errc::not_enough_memory);
 }
@@ -241,9 +192,7 @@ void FolderSwap::MoveIntoPlace() {
     std::error_code error;
     fs::rename(from, to, error);
     if (!error) break;
-    const bool is_taken = error == std::errc::directory_not_empty ||
-                          error == std::errc::file_exists;
-    if (!is_taken || from == staging_) {
+    if (!fs::is_directory(to) || from == staging_) {
       throw WriteError(to.string() + ": cannot be created: " + error.message());
     }
     from /= *next;

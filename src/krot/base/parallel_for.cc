@@ -1,7 +1,5 @@
 #include "krot/base/parallel_for.h"
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cfenv>
@@ -9,6 +7,7 @@
 #include <thread>
 
 #include "krot/base/check.h"
+#include "krot/base/system.h"
 
 namespace krot::internal {
 // One call of Run. It lives on the caller's stack until no call of its work
@@ -29,7 +28,7 @@ ThreadPool& ThreadPool::Get() {
   const auto make_pool = [] { pool = new ThreadPool; };
   [[maybe_unused]] static const bool made = [&] {
     make_pool();
-    pthread_atfork(nullptr, nullptr, make_pool);
+    OnFork(make_pool);
     return true;
   }();
   return *pool;

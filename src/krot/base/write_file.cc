@@ -1,8 +1,5 @@
 #include "krot/base/write_file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-
 #include <cerrno>
 #include <optional>
 #include <system_error>
@@ -32,44 +29,18 @@ Failure FailureOf(const char* action) {
   return {action, std::generic_category().message(errno)};
 }
 
-// File systems without fsync answer EINVAL.
-bool Sync(const FileDescriptor& descriptor) {
-  return ::fsync(descriptor.get()) == 0 || errno == EINVAL;
-}
-
 std::optional<Failure> TryToWrite(const fs::path& file,
                                   std::string_view contents) {
-  FileDescriptor descriptor(::open(
-      file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, mode_t{0666}));
+  FileDescriptor descriptor(file, FileDescriptor::Use::kReplace);
   if (!descriptor.is_open()) return FailureOf("created");
-  while (!contents.empty()) {
-    const ssize_t result =
-        ::write(descriptor.get(), contents.data(), contents.size());
-    if (result < 0 && errno == EINTR) continue;
-    if (result < 0) return FailureOf("written");
-    contents.remove_prefix(static_cast<size_t>(result));
-  }
+  if (!descriptor.Write(contents)) return FailureOf("written");
   // Some file systems report only now that there is no space left.
-  if (!Sync(descriptor)) return FailureOf("written");
+  if (!descriptor.Sync()) return FailureOf("written");
   if (!descriptor.Close()) return FailureOf("written");
   return std::nullopt;
 }
 
 }  // namespace
-
-std::error_code TryToCreateIn(const fs::path& folder) {
-#ifdef O_TMPFILE
-  // A file without a name, where the file system has such.
-  const FileDescriptor unnamed(
-      ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, mode_t{0600}));
-  if (unnamed.is_open()) return {};
-#endif
-  const fs::path named = folder / (".krot-" + std::to_string(getpid()));
-  const bool is_there =
-      ::mkdir(named.c_str(), mode_t{0700}) == 0 || errno == EEXIST;
-  if (is_there && ::rmdir(named.c_str()) == 0) return {};
-  return {errno, std::generic_category()};
-}
 
 void CheckFileWritable(const fs::path& file, const fs::path& folder_to_come) {
   const fs::path folder = ParentFolder(file);
@@ -102,7 +73,7 @@ void WriteFile(const fs::path& file, std::string_view contents) {
 
 void WriteFileAtomically(const fs::path& file, std::string_view contents) {
   fs::path temporary = file;
-  temporary += ".new-" + std::to_string(getpid());
+  temporary += ".new-" + std::to_string(ProcessId());
   const auto fail = [&](std::string why) {
     std::error_code ignored;
     fs::remove(temporary, ignored);
@@ -122,11 +93,10 @@ void WriteFileAtomically(const fs::path& file, std::string_view contents) {
 }
 
 void SyncFolder(const fs::path& folder) {
-  FileDescriptor descriptor(
-      ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!descriptor.is_open() || Sync(descriptor)) return;
-  throw WriteError(folder.string() + ": cannot be written: " +
-                   std::generic_category().message(errno));
+  if (const std::error_code error = SyncEntries(folder)) {
+    throw WriteError(folder.string() +
+                     ": cannot be written: " + error.message());
+  }
 }
 
 }  // namespace krot::internal

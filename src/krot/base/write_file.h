@@ -1,7 +1,5 @@
 #pragma once
 
-#include <unistd.h>
-
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -9,37 +7,10 @@
 #include <system_error>
 #include <vector>
 
+#include "krot/base/system.h"
 #include "krot/context.h"
 
 namespace krot::internal {
-
-// An open file that is closed when it goes out of scope.
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int value) : value_(value) {}
-  ~FileDescriptor() {
-    if (is_open()) ::close(value_);
-  }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-
-  bool is_open() const { return value_ >= 0; }
-  int get() const { return value_; }
-  // Returns false, with errno, if earlier writes did not reach the file.
-  bool Close() {
-    const int value = value_;
-    value_ = -1;
-    return ::close(value) == 0;
-  }
-
- private:
-  int value_;
-};
-
-// Why nothing can be created in `folder`; no error if something can. It is
-// tried, since permissions tell root nothing of /proc or of a read-only disk;
-// nothing stays.
-std::error_code TryToCreateIn(const std::filesystem::path& folder);
 
 // Throws WriteError if WriteFileAtomically would fail because there is no
 // folder (unless that is `folder_to_come`, which will exist by then), no

@@ -5,8 +5,37 @@
 
 namespace krot::internal {
 
-// What is compiled for the machine at hand. It has no Eigen type in its
-// interface: vector flags change their alignment, and so what callers expect.
+// What is compiled for other vector units than the rest. It has no Eigen type
+// in its interface: vector flags change their alignment, and so what callers
+// expect.
+
+// Part of a matrix: columns of `rows` numbers, `stride` numbers apart.
+struct MatrixTile {
+  const double* numbers;
+  int64_t rows;
+  int64_t columns;
+  int64_t stride;
+};
+
+struct LinearKernels {
+  // As the function of that name.
+  void (*subtract_from_columns)(const double* const g[3], const double s[9],
+                                int64_t n, double* first_column,
+                                int64_t stride);
+  // Replaces the lower triangle by its Cholesky factor L; false unless the tile
+  // is positive definite.
+  bool (*factorize)(const MatrixTile& tile);
+  // tile := tile L'^-1
+  void (*divide_by_transposed)(const MatrixTile& L, const MatrixTile& tile);
+  // tile -= a b'; of the lower triangle alone if a is b.
+  void (*subtract_product)(const MatrixTile& a, const MatrixTile& b,
+                           const MatrixTile& tile);
+  // x := L^-1 x, or L'^-1 x
+  void (*divide)(const MatrixTile& L, bool transposed, double* x);
+  // from -= tile x, or tile' x
+  void (*subtract_times)(const MatrixTile& tile, bool transposed,
+                         const double* x, double* from);
+};
 
 // Three columns of a matrix, `stride` numbers apart, lose G'S:
 //
@@ -39,11 +68,10 @@ class DenseCholesky {
   void Solve(double* x) const;
 
  private:
-  int64_t NumTiles() const;            // along a side
-  int64_t Size(int64_t i) const;       // rows, or columns, of tile i
-  int64_t stride() const;              // of every tile
-  double* Tile(int64_t i, int64_t j);  // j <= i
-  const double* Tile(int64_t i, int64_t j) const;
+  int64_t NumTiles() const;                     // along a side
+  int64_t Size(int64_t i) const;                // rows, or columns, of tile i
+  int64_t stride() const;                       // of every tile
+  MatrixTile Tile(int64_t i, int64_t j) const;  // j <= i
 
   int64_t size_ = 0;
   int num_threads_ = 1;

@@ -182,7 +182,7 @@ double IdleEntry(int k) { return k == kLaneRow - 1 ? 1 : 0; }
 
 SideBySideDescent::SideBySideDescent(const FastDescentOptions& options,
                                      Norm norm)
-    : uses_lanes_(LanesPay() && norm.p == 2 &&
+    : uses_lanes_(best_lane_kernels.lanes_pay && norm.p == 2 &&
                   options.settings == FastDescentSettings::kFast),
       max_iterations_(options.max_iterations),
       alone_(options, norm) {}
@@ -235,7 +235,8 @@ void SideBySideDescent::Step(const DescentGoal& goal) {
   if (pieces_.size() < rows_.size()) pieces_.resize(rows_.size());
   const LaneGoal lane_goal = {goal.tolerance, goal.level, goal.sufficient,
                               max_iterations_};
-  StepLanes(rows_.data(), num_rows, lane_goal, &descents_, pieces_.data());
+  best_lane_kernels.step_lanes(rows_.data(), num_rows, lane_goal, &descents_,
+                               pieces_.data());
   for (int k = 0; k < kLanes; ++k) {
     if (lanes_[k].problem == nullptr || descents_.status[k] == kLaneRuns) {
       continue;

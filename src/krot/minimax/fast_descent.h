@@ -98,7 +98,8 @@ class FastDescent {
 //
 // A problem that gives lanes trouble (an optimum far away, many steps), and one
 // with more than kMaxResiduals, is handed to FastDescent, from its start; with
-// `paper` settings, other norms and short vectors (LanesPay) every one is.
+// `paper` settings, other norms and short vectors (LaneKernels::lanes_pay)
+// every one is.
 class SideBySideDescent {
  public:
   // Longer problems fill the lanes of a vector by themselves, and eight of them

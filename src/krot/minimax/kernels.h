@@ -79,12 +79,6 @@ struct alignas(64) ResidualBlock {
   double row[kResidualRow][kResidualLanes];
 };
 
-// values[i] = r_i(x) for all lanes of `num_blocks` blocks (infinity unless
-// the depth is positive); returns the largest. p >= 1 or infinity. About 1 ns
-// per residual for p = 2.
-double EvaluateResiduals(const ResidualBlock* blocks, int64_t num_blocks,
-                         double p, const double x[3], double* values);
-
 // Eight residuals side by side, differentiated.
 struct alignas(64) GradientBlock {
   double value[kResidualLanes];
@@ -95,21 +89,28 @@ struct alignas(64) GradientBlock {
   double bend[3][kResidualLanes];
 };
 
-// For p = 2, all lanes of `num_blocks` blocks and positive depths: r_i(x) and
-// its derivatives (0 where r_i = 0, which has none).
-void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
-                       const double x[3], GradientBlock* gradients);
-
-// The largest share of the step d, at most 1, on which no depth falls below
-// `lowest` of what it is at x; all must be positive. 0 <= lowest < 1.
-double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
-                  const double x[3], const double d[3], double lowest);
-
-// The upper triangle, row by row, of
-//   sum_i (A_i'A_i + cost^2 c_i c_i') / w_i^2
-// over all lanes of `num_blocks` blocks; all depths must be positive.
-void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
-               const double x[3], double cost, double metric[6]);
+// What residual_kernel.cc is compiled to.
+struct ResidualKernels {
+  // values[i] = r_i(x) for all lanes of `num_blocks` blocks (infinity unless
+  // the depth is positive); returns the largest. p >= 1 or infinity. About 1 ns
+  // per residual for p = 2.
+  double (*evaluate_residuals)(const ResidualBlock* blocks, int64_t num_blocks,
+                               double p, const double x[3], double* values);
+  // For p = 2, all lanes of `num_blocks` blocks and positive depths: r_i(x) and
+  // its derivatives (0 where r_i = 0, which has none).
+  void (*evaluate_gradients)(const ResidualBlock* blocks, int64_t num_blocks,
+                             const double x[3], GradientBlock* gradients);
+  // The largest share of the step d, at most 1, on which no depth falls below
+  // `lowest` of what it is at x; all must be positive. 0 <= lowest < 1.
+  double (*depth_share)(const ResidualBlock* blocks, int64_t num_blocks,
+                        const double x[3], const double d[3], double lowest);
+  // The upper triangle, row by row, of
+  //   sum_i (A_i'A_i + cost^2 c_i c_i') / w_i^2
+  // over all lanes of `num_blocks` blocks; all depths must be positive.
+  void (*sum_metric)(const ResidualBlock* blocks, int64_t num_blocks,
+                     const double x[3], double cost, double metric[6]);
+};
+extern const ResidualKernels& best_residual_kernels;
 
 // Problems (1) side by side, one per lane of a vector. Plain memory, no Eigen:
 // this header is shared with code compiled for other vector units.
@@ -133,6 +134,7 @@ struct alignas(64) LanePiece {
   LaneDoubles multiplier;  // mu of newton_descent.h
 };
 
+inline constexpr double kNoPieceIndex = -2;
 // As many pieces as can bear a step.
 inline constexpr int kCorners = 4;
 
@@ -167,7 +169,8 @@ struct alignas(64) LaneDescents {
   LaneDoubles cost;
   LaneDoubles iterations;  // steps tried
 
-  // The active set: indices of residuals or of lane_hull.h, and weights.
+  // The active set: indices of residuals, of lane_hull.h or kNoPieceIndex, and
+  // weights.
   LaneDoubles index[kCorners];
   LaneDoubles weight[kCorners];
   // What they give to H of the next step: over residuals alone, with sum 1.
@@ -187,19 +190,20 @@ struct alignas(64) LaneDescents {
   void Begin(int lane);
 };
 
-// Whether the vectors that the kernel was compiled for are long enough, four
-// numbers or more: with two, lanes take longer than one problem after the
-// other.
-bool LanesPay();
-
-// One step of NewtonDescent, for p = 2, in every lane that has a problem, or
-// part of one where active sets change often: minimises the model of all
-// residuals and tries the step. Failed trials teach the model multipliers, but
-// no tangents. Ends as NewtonDescent does, or gives up. What a lane does
-// depends on its own problem alone. `pieces`: memory for as many as rows, the
-// same in all steps. About 30 ns per row and step, all lanes together, and 400
-// ns.
-void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
-               LaneDescents* descents, LanePiece* pieces);
+// What lane_descent.cc is compiled to.
+struct LaneKernels {
+  // Whether the vectors are long enough, four numbers or more.
+  bool lanes_pay;
+  // One step of NewtonDescent, for p = 2, in every lane that has a problem, or
+  // part of one where active sets change often: minimises the model of all
+  // residuals and tries the step. Failed trials teach the model multipliers,
+  // but no tangents. Ends as NewtonDescent does, or gives up. What a lane does
+  // depends on its own problem alone. `pieces`: memory for as many as rows, the
+  // same in all steps. About 30 ns per row and step, all lanes together, and
+  // 400 ns.
+  void (*step_lanes)(const LaneRow* rows, int num_rows, const LaneGoal& goal,
+                     LaneDescents* descents, LanePiece* pieces);
+};
+extern const LaneKernels& best_lane_kernels;
 
 }  // namespace krot::internal

@@ -4,7 +4,7 @@
 
 #include "krot/minimax/lane_model.h"
 
-namespace krot::internal {
+namespace krot::internal::KROT_UNITS {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -239,30 +239,15 @@ void Stepping::StoreDescents() {
   }
 }
 
-}  // namespace
-
-void LaneDescents::Begin(int lane) {
-  iterations[lane] = 0;
-  bool is_warm = false;
-  for (int a = 0; a < kCorners; ++a) {
-    weight[a][lane] = multiplier[a][lane];
-    const bool is_corner = multiplier[a][lane] > 0;
-    if (!is_corner) index[a][lane] = kNoPieceIndex;
-    is_warm |= is_corner;
-  }
-  is_cold[lane] = is_warm ? 0 : 1;
-  raises[lane] = 0;
-  kappa[lane] = kFirstKappa;
-  lessons[lane] = 0;
-  cost_failed[lane] = kInfinity;
-  calls[lane] = 0;
-}
-
-bool LanesPay() { return kVectorLanes >= 4; }
-
 void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
                LaneDescents* descents, LanePiece* pieces) {
   Stepping({rows, num_rows}, goal, descents, pieces).Run();
 }
 
-}  // namespace krot::internal
+}  // namespace
+
+// With two numbers to a vector, lanes take longer than one problem after the
+// other.
+extern const LaneKernels kLaneKernels = {kVectorLanes >= 4, &StepLanes};
+
+}  // namespace krot::internal::KROT_UNITS

@@ -4,16 +4,14 @@
 
 #include "krot/minimax/lanes.h"
 
-namespace krot::internal {
+namespace krot::internal::KROT_UNITS {
 
 // The active sets of simplex_qp.cc in all lanes at once: the same moves of the
 // same weights, one at a time and in every lane that is due one. For kernels
 // alone.
 
-// Names of pieces that are no residuals: the zero below which none of them
-// falls, and no piece.
+// The zero below which no residual falls, as a piece.
 inline constexpr double kZeroPieceIndex = -1;
-inline constexpr double kNoPieceIndex = -2;
 
 // An active piece, in the coordinates where the curvature is 1.
 struct LaneCorner {
@@ -236,4 +234,4 @@ inline LaneMask LaneHull::Add(const LaneMask& adding, const LaneCorner& piece) {
   return appends | replaces;
 }
 
-}  // namespace krot::internal
+}  // namespace krot::internal::KROT_UNITS

@@ -6,7 +6,7 @@
 #include "krot/minimax/lane_hull.h"
 #include "krot/minimax/lanes.h"
 
-namespace krot::internal {
+namespace krot::internal::KROT_UNITS {
 
 // What the residuals of all lanes do around x, for p = 2: passes over their
 // rows. The model is that of newton_descent.h with all residuals as members.
@@ -203,4 +203,4 @@ inline LaneStep MinimizeLaneModel(const LanePiece* pieces, int count,
   return result;
 }
 
-}  // namespace krot::internal
+}  // namespace krot::internal::KROT_UNITS

@@ -4,7 +4,7 @@
 
 #include "krot/minimax/kernels.h"
 
-namespace krot::internal {
+namespace krot::internal::KROT_UNITS {
 
 // Arithmetic in all lanes at once, for kernels alone (krot_native_kernel): the
 // vectors are as long as those of the machine that the file is compiled for,
@@ -235,4 +235,4 @@ inline void Store(const LaneMatrix& lanes, LaneDoubles (*memory)[6]) {
   Store(lanes.m22, &(*memory)[5]);
 }
 
-}  // namespace krot::internal
+}  // namespace krot::internal::KROT_UNITS

@@ -62,8 +62,8 @@ void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
 // One piece per member, eight at a time.
 void LocalModel::AddSmoothPieces() {
   gradients_.resize(rows_.num_blocks());
-  EvaluateGradients(rows_.blocks(), rows_.num_blocks(), x_.data(),
-                    gradients_.data());
+  best_residual_kernels.evaluate_gradients(rows_.blocks(), rows_.num_blocks(),
+                                           x_.data(), gradients_.data());
   pieces_.resize(members_.size() + 1);
   member_of_piece_.resize(members_.size() + 1);
   for (size_t m = 0; m < members_.size(); ++m) {
@@ -101,7 +101,8 @@ bool LocalModel::IsMetricGood(double cost) const {
 
 void LocalModel::SetMetric(double cost) {
   double sums[6];
-  SumMetric(rows_.blocks(), rows_.num_blocks(), x_.data(), cost, sums);
+  best_residual_kernels.sum_metric(rows_.blocks(), rows_.num_blocks(),
+                                   x_.data(), cost, sums);
   metric_ << sums[0], sums[1], sums[2],  //
       sums[1], sums[3], sums[4],         //
       sums[2], sums[4], sums[5];
@@ -240,8 +241,9 @@ bool LocalModel::AddTangents(const Vector3d& x_trial,
 // with d / (1 + f) as much as its linearisation does with d.
 double LocalModel::ShareOf(const Vector3d& d) const {
   const Vector3d longer = (kLargestFall / kSmallFall) * d;
-  const double share = DepthShare(rows_.blocks(), rows_.num_blocks(), x_.data(),
-                                  longer.data(), kSmallestDepthShare);
+  const double share = best_residual_kernels.depth_share(
+      rows_.blocks(), rows_.num_blocks(), x_.data(), longer.data(),
+      kSmallestDepthShare);
   if (share == 1) return 1;
   const double fall = kSmallFall / share;
   return std::min(1 / (1 + fall), kLargestFall / fall);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace krot::internal {
+namespace krot::internal::KROT_UNITS {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -69,8 +69,6 @@ double Evaluate(const ResidualBlock* blocks, int64_t num_blocks,
   }
   return result;
 }
-
-}  // namespace
 
 double EvaluateResiduals(const ResidualBlock* blocks, int64_t num_blocks,
                          double p, const double x[3], double* values) {
@@ -160,4 +158,9 @@ void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
   }
 }
 
-}  // namespace krot::internal
+}  // namespace
+
+extern const ResidualKernels kResidualKernels = {
+    &EvaluateResiduals, &EvaluateGradients, &DepthShare, &SumMetric};
+
+}  // namespace krot::internal::KROT_UNITS

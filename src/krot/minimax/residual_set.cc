@@ -121,8 +121,8 @@ void ResidualSet::AddFrom(const ResidualSet& other, int i) {
 }
 
 double ResidualSet::Evaluate(const Eigen::Vector3d& x, Norm norm) {
-  return EvaluateResiduals(blocks_.data(), num_blocks(), norm.p, x.data(),
-                           values_.data());
+  return best_residual_kernels.evaluate_residuals(
+      blocks_.data(), num_blocks(), norm.p, x.data(), values_.data());
 }
 
 }  // namespace krot::internal

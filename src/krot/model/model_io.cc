@@ -1,10 +1,7 @@
 #include "krot/model/model_io.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -36,29 +33,16 @@ bool IsLfsPointer(std::string_view bytes) {
 FileBytes ReadFileBytes(const std::filesystem::path& path) {
   FileBytes file;
   file.path = path.string();
-  const FileDescriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const FileDescriptor descriptor(path, FileDescriptor::Use::kRead);
   if (!descriptor.is_open()) FailWithErrno(file.path, "opened");
 
-  struct stat status;
-  if (::fstat(descriptor.get(), &status) != 0) {
-    FailWithErrno(file.path, "read");
-  }
-  if (!S_ISREG(status.st_mode)) {
+  const std::optional<int64_t> size = descriptor.RegularSize();
+  if (!size) {
     throw ModelError(file.path + ": not a regular file, expected a model file");
   }
-
-  file.bytes.resize(static_cast<size_t>(status.st_size));
-  size_t num_read = 0;
-  while (num_read < file.bytes.size()) {
-    const ssize_t result =
-        ::read(descriptor.get(), file.bytes.data() + num_read,
-               file.bytes.size() - num_read);
-    if (result < 0 && errno == EINTR) continue;
-    if (result < 0) FailWithErrno(file.path, "read");
-    if (result == 0) break;  // it shrank since fstat
-    num_read += static_cast<size_t>(result);
+  if (!descriptor.ReadAt(0, static_cast<size_t>(*size), &file.bytes)) {
+    FailWithErrno(file.path, "read");
   }
-  file.bytes.resize(num_read);
 
   if (IsLfsPointer(file.bytes)) {
     throw ModelError(file.path +

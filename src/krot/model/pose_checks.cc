@@ -180,7 +180,7 @@ void FindStaleImages(const Model& model,
                                      Eigen::Quaterniond(pose.rotation));
     const double move = (stored.translation - pose.translation).norm();
     const bool is_same =
-        turn_deg <= kSamePose * 180 / M_PI && move <= kSamePose * size;
+        turn_deg <= kSamePose * 180 / kPi && move <= kSamePose * size;
     if (is_same) continue;
     turns_deg.push_back(turn_deg);
     if (turn_deg >= checks->largest_turn_deg) {
@@ -195,7 +195,7 @@ void FindStaleImages(const Model& model,
 }  // namespace
 
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-  return a.angularDistance(b) * 180 / M_PI;
+  return a.angularDistance(b) * 180 / kPi;
 }
 
 PoseChecks CheckPoses(const Model& model) {

@@ -1,13 +1,12 @@
 #include "krot/model/sqlite_rows.h"
 
 #include <sqlite3.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <system_error>
 
+#include "krot/base/system.h"
 #include "krot/model.h"
 
 namespace krot::internal {
@@ -15,14 +14,12 @@ namespace {
 
 // The beginning of the file, as far as it tells what the file is.
 std::string HeadOf(const std::filesystem::path& path) {
-  std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(path.c_str(), "rb"),
-                                             &std::fclose);
-  if (!file) {
+  const FileDescriptor file(path, FileDescriptor::Use::kRead);
+  std::string head;
+  if (!file.is_open() || !file.ReadAt(0, 64, &head)) {
     throw ModelError(path.string() + ": cannot be opened: " +
                      std::generic_category().message(errno));
   }
-  std::string head(64, '\0');
-  head.resize(std::fread(head.data(), 1, head.size(), file.get()));
   return head;
 }
 
@@ -75,7 +72,7 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
   RequireSqlite(path);
   // SQLite looks for the log beside the file that a link stands for.
   std::error_code error;
-  path_ = std::filesystem::canonical(path, error).string();
+  path_ = std::filesystem::canonical(path, error).generic_string();
   if (error) Fail("cannot be opened: " + error.message());
   before_ = States();
   // Without a log or a journal nobody is writing: no locks are needed, and
@@ -98,12 +95,11 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
 
 SqliteDatabase::FileState SqliteDatabase::StateOf(const std::string& path) {
   FileState state;
-  struct stat status = {};
-  if (::stat(path.c_str(), &status) != 0) return state;
-  state.exists = true;
-  state.size = status.st_size;
-  state.seconds = status.st_mtim.tv_sec;
-  state.nanoseconds = status.st_mtim.tv_nsec;
+  std::error_code error;
+  state.size = static_cast<int64_t>(std::filesystem::file_size(path, error));
+  state.exists = !error;
+  if (!state.exists) state.size = 0;
+  state.written = std::filesystem::last_write_time(path, error);
   return state;
 }
 

@@ -32,11 +32,10 @@ class SqliteDatabase {
   struct FileState {
     bool exists = false;
     int64_t size = 0;
-    int64_t seconds = 0;
-    int64_t nanoseconds = 0;
+    std::filesystem::file_time_type written = {};
     bool operator==(const FileState& other) const {
       return exists == other.exists && size == other.size &&
-             seconds == other.seconds && nanoseconds == other.nanoseconds;
+             written == other.written;
     }
   };
   static FileState StateOf(const std::string& path);

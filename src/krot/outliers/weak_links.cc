@@ -201,7 +201,7 @@ void Joiner::FindTurn(const PlaceSearch& tracks, WeakLink* link) {
     return;
   }
   link->num_agreeing_turned = count;
-  link->turn_deg = Eigen::AngleAxisd(turned->rotation).angle() * (180 / M_PI);
+  link->turn_deg = Eigen::AngleAxisd(turned->rotation).angle() * (180 / kPi);
 }
 
 WeakLink Joiner::Join(GroupPair pair) {

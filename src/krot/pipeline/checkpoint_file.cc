@@ -1,10 +1,5 @@
 #include "krot/pipeline/checkpoint_file.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -16,11 +11,6 @@ namespace {
 
 constexpr char kMagic[] = "krot checkpoint 1\n";
 constexpr size_t kDigestSize = 64;
-
-int OpenAlone(const std::string& name) {
-  CheckFileWritable(name);
-  return ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, mode_t{0666});
-}
 
 std::string Reason() { return std::generic_category().message(errno); }
 
@@ -37,9 +27,11 @@ std::string Reason() { return std::generic_category().message(errno); }
 
 CheckpointFile::CheckpointFile(const std::filesystem::path& file,
                                const std::string& run)
-    : name_(file.string()), descriptor_(OpenAlone(name_)) {
+    : name_(file.string()),
+      descriptor_((CheckFileWritable(file), file),
+                  FileDescriptor::Use::kUpdate) {
   if (!descriptor_.is_open()) ThrowNotWritten(name_);
-  if (::flock(descriptor_.get(), LOCK_EX | LOCK_NB) != 0) {
+  if (!descriptor_.Lock()) {
     throw CheckpointError(name_ + ": another run writes this checkpoint");
   }
   const std::string head = kMagic + run + "\n";
@@ -63,18 +55,8 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file,
 
 // As many bytes as there are, up to `size`.
 std::string CheckpointFile::ReadAt(int64_t offset, size_t size) const {
-  std::string bytes(size, '\0');
-  size_t done = 0;
-  while (done < size) {
-    const ssize_t result =
-        ::pread(descriptor_.get(), bytes.data() + done, size - done,
-                offset + static_cast<int64_t>(done));
-    if (result < 0 && errno == EINTR) continue;
-    if (result < 0) ThrowNotRead(name_);
-    if (result == 0) break;
-    done += static_cast<size_t>(result);
-  }
-  bytes.resize(done);
+  std::string bytes;
+  if (!descriptor_.ReadAt(offset, size, &bytes)) ThrowNotRead(name_);
   return bytes;
 }
 
@@ -86,9 +68,9 @@ std::optional<std::string> CheckpointFile::ReadRecord() {
   if (head.size() < kHeadSize) return std::nullopt;
   std::memcpy(&size, head.data(), sizeof(size));
   const int64_t begin = offset_ + static_cast<int64_t>(kHeadSize);
-  struct stat status = {};
-  if (::fstat(descriptor_.get(), &status) != 0) ThrowNotRead(name_);
-  if (size > static_cast<uint64_t>(status.st_size - begin)) return std::nullopt;
+  const std::optional<int64_t> file_size = descriptor_.RegularSize();
+  if (!file_size) ThrowNotRead(name_);
+  if (size > static_cast<uint64_t>(*file_size - begin)) return std::nullopt;
   std::string record = ReadAt(begin, size);
   if (Sha256(record) != head.substr(sizeof(size))) return std::nullopt;
   offset_ = begin + static_cast<int64_t>(size);
@@ -114,22 +96,13 @@ void CheckpointFile::Append(const std::string& record) {
 void CheckpointFile::WriteBehind(
     std::initializer_list<std::string_view> parts) {
   is_broken_ = true;
-  if (::ftruncate(descriptor_.get(), offset_) != 0) ThrowNotWritten(name_);
+  bool is_written = descriptor_.Truncate(offset_);
   int64_t offset = offset_;
-  for (std::string_view part : parts) {
-    while (!part.empty()) {
-      const ssize_t result =
-          ::pwrite(descriptor_.get(), part.data(), part.size(), offset);
-      if (result < 0 && errno == EINTR) continue;
-      if (result < 0) ThrowNotWritten(name_);
-      offset += result;
-      part.remove_prefix(static_cast<size_t>(result));
-    }
+  for (const std::string_view part : parts) {
+    is_written = is_written && descriptor_.Write(part);
+    offset += static_cast<int64_t>(part.size());
   }
-  // File systems without fsync answer EINVAL.
-  if (::fsync(descriptor_.get()) != 0 && errno != EINVAL) {
-    ThrowNotWritten(name_);
-  }
+  if (!is_written || !descriptor_.Sync()) ThrowNotWritten(name_);
   offset_ = offset;
   is_broken_ = false;
 }

@@ -1,12 +1,11 @@
 #include "krot/report/sentences.h"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "krot/base/parallel_for.h"
+#include "krot/base/system.h"
 #include "krot/context.h"
 #include "krot/report/text_table.h"
 #include "krot/version.h"
@@ -297,16 +296,6 @@ std::string RunSentence(const RunRecord& run, const std::string& middle) {
          FormatNumber(run.seconds_total, 2) + " s in all on " +
          Counted(run.threads, "thread") + ", " +
          FormatBytes(run.peak_memory_bytes) + " at most.\n";
-}
-
-int64_t PeakMemoryBytes() {
-  rusage usage = {};
-  getrusage(RUSAGE_SELF, &usage);
-#ifdef __APPLE__
-  return usage.ru_maxrss;  // bytes
-#else
-  return static_cast<int64_t>(usage.ru_maxrss) * 1024;  // kB
-#endif
 }
 
 }  // namespace krot::internal

@@ -97,7 +97,4 @@ void RecordEnd(const Timer& timer, int num_threads, RunRecord* run);
 // "Read 0.10 s, MIDDLE, wrote 0.20 s; 1.50 s in all on 2 threads, ...\n".
 std::string RunSentence(const RunRecord& run, const std::string& middle);
 
-// The largest resident set of this process so far, in bytes.
-int64_t PeakMemoryBytes();
-
 }  // namespace krot::internal
