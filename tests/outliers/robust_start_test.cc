@@ -102,6 +102,18 @@ TEST(FindRobustStart, KeepsTheBaselinesOfARig) {
   EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(model)), 0.02);
 }
 
+// So many that they are not placed all at once.
+TEST(FindRobustStart, PlacesManyCamerasThatSeeEachOthersPoints) {
+  SceneOptions options = Scene(0.1, 0);
+  options.layout = SceneLayout::kOrbit;
+  options.num_frames = 620;
+  options.num_points = 9000;
+  options.track_length = 8;
+  const SyntheticScene scene = SynthesizeScene(options);
+  EXPECT_LT(CentreError(scene.ground_truth, AtRobustStart(Wiped(scene.model))),
+            0.01);
+}
+
 // 24 cameras on a circle, or along a path, in parts.
 SceneOptions SceneInParts(SceneLayout layout) {
   SceneOptions options = Scene(0.05, 0);
@@ -150,6 +162,17 @@ TEST(FindParts, LeavesWholeWhatManyTracksHold) {
         FindParts(ProblemOf(SynthesizeScene(SceneInParts(layout)).model), {});
     EXPECT_EQ(parts, std::vector<int32_t>(24, 0));
   }
+}
+
+// No two frames share many tracks, but each many with all others.
+TEST(FindParts, IsNotMisledByGroupsWithoutTracksOfTheirOwn) {
+  SceneOptions options = Scene(0, 0);
+  options.layout = SceneLayout::kOrbit;
+  options.num_frames = 300;
+  options.num_points = 3000;
+  options.track_length = 8;
+  EXPECT_EQ(FindParts(ProblemOf(SynthesizeScene(options).model), {}),
+            std::vector<int32_t>(300, 0));
 }
 
 TEST(FindRobustStart, HoldsTheScaleOfPartsThatTenTracksJoinHalfOfThemWrong) {
@@ -270,6 +293,19 @@ TEST(FilterOutliers, PlacesAModelWithoutPositions) {
   EXPECT_LE(summary.removed.size(), scene.outliers.size());
   EXPECT_LE(summary.num_proved, static_cast<int64_t>(summary.removed.size()));
   EXPECT_GT(summary.num_proved, 0);
+}
+
+TEST(FilterOutliers, SparesWhatFitsTheModelsOwnPositionsAndNothingElse) {
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  options.spares_what_fits = true;
+  options.solve.init = SolveInit::kFeasible;
+  for (const double ratio : {0.0, 0.1}) {
+    const SyntheticScene scene = SynthesizeScene(Scene(ratio, 0));
+    const OutlierFilterResult result =
+        FilterOutliers(scene.ground_truth, options, {});
+    EXPECT_EQ(result.summary.is_spared, ratio == 0) << ratio;
+  }
 }
 
 TEST(FilterOutliers, ChoosesABoundWhereNoneIsGiven) {
