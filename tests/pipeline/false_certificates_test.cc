@@ -60,12 +60,12 @@ Model ProvedScene(uint64_t seed) {
   return SynthesizeScene(options).model;
 }
 
-struct Solved {
+struct SolvedScene {
   double cost = 0;  // the largest error of an estimate
   CertificateFile certificate;
 };
 
-Solved RunSolve(const Model& model) {
+SolvedScene RunSolve(const Model& model) {
   SolveModelOptions options;
   options.joint.relative_gap = kProvedGap;
   options.finish.finish = Finish::kNone;
@@ -165,7 +165,7 @@ TEST(FalseCertificates, AreNeverAcceptedAndTrueOnesAre) {
   for (int n = 0; n < NumModels(); ++n) {
     const auto seed = static_cast<uint64_t>(n);
     const Model model = ProvedScene(seed);
-    const Solved solved = RunSolve(model);
+    const SolvedScene solved = RunSolve(model);
     ASSERT_FALSE(solved.certificate.observations.empty());
     whole.Add(model, solved.certificate, solved.cost);
     for (int k = 0; k < kTamperings; ++k) {
