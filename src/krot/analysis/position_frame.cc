@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <functional>
-#include <random>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
 
+#include "krot/analysis/frame_search.h"
 #include "krot/analysis/model_comparison.h"
 #include "krot/base/numbers.h"
 #include "krot/context.h"
@@ -20,12 +19,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int64_t kMostTriples = 50'000;
-constexpr size_t kMostScored = 300;
-// The distance that one of a thousand exceeds, by the median: of a Gaussian in
-// three dimensions.
-constexpr double kFarByMedian = 2.6;
-constexpr int kMaxRefits = 20;
 // Positions scatter by this at least, relative to their size: those of a
 // synthetic scene may be exact.
 constexpr double kLeastScatter = 1e-6;
@@ -33,158 +26,6 @@ constexpr double kLeastScatter = 1e-6;
 constexpr double kOnLine = 3e-5;
 // The standard deviation of a turn about the line that is too large, radians.
 constexpr double kLooseTurn = 1.0 / 3;
-
-// A position of what the model places. `pose.center1` is the position, from the
-// median of all, and `pose.center2` the model's place, likewise.
-struct FramePair {
-  size_t index = 0;
-  PosePair pose;
-  Matrix3d unit_from_own = Matrix3d::Identity();
-};
-
-std::vector<PosePair> PosesOf(const std::vector<FramePair>& pairs) {
-  std::vector<PosePair> poses;
-  for (const FramePair& pair : pairs) poses.push_back(pair.pose);
-  return poses;
-}
-
-Vector3d OffsetAt(const Similarity& own_from_model, const FramePair& pair) {
-  return own_from_model * pair.pose.center2 - pair.pose.center1;
-}
-
-// Distances by radii, or as they are where radii are unknown.
-std::vector<double> MisfitsOf(const std::vector<FramePair>& pairs,
-                              const Similarity& own_from_model) {
-  std::vector<double> misfits;
-  for (const FramePair& pair : pairs) {
-    misfits.push_back(
-        (pair.unit_from_own * OffsetAt(own_from_model, pair)).norm());
-  }
-  return misfits;
-}
-
-std::vector<FramePair> Within(const std::vector<FramePair>& pairs,
-                              const std::vector<double>& misfits,
-                              double tolerance) {
-  std::vector<FramePair> within;
-  for (size_t n = 0; n < pairs.size(); ++n) {
-    if (misfits[n] <= tolerance) within.push_back(pairs[n]);
-  }
-  return within;
-}
-
-// Both lower is better.
-struct Judgement {
-  double score = kInfinity;
-  double tolerance = 1;  // misfits below it agree
-};
-
-Judgement JudgeByRadii(const std::vector<double>& misfits) {
-  Judgement judgement{0, 1};
-  for (const double misfit : misfits) {
-    judgement.score += std::min(misfit * misfit, 1.0);
-  }
-  return judgement;
-}
-
-// By the misfit that a majority does not exceed, of at least four where there
-// are as many: three places always fit a little.
-Judgement JudgeBySpread(std::vector<double> misfits) {
-  const size_t count =
-      std::max(misfits.size() / 2 + 1, std::min<size_t>(misfits.size(), 4));
-  std::nth_element(misfits.begin(), misfits.begin() + (count - 1),
-                   misfits.end());
-  return {misfits[count - 1], kFarByMedian * misfits[count - 1]};
-}
-
-class FrameSearch {
- public:
-  using Judge = std::function<Judgement(const std::vector<double>&)>;
-
-  FrameSearch(const std::vector<FramePair>& pairs, Judge judge)
-      : pairs_(pairs), judge_(std::move(judge)) {}
-
-  // None if all triples are on a line.
-  std::optional<Similarity> Run() {
-    const size_t n = pairs_.size();
-    if (n * (n - 1) / 2 * (n - 2) / 3 <= kMostTriples) {
-      for (size_t a = 0; a < n; ++a) {
-        for (size_t b = a + 1; b < n; ++b) {
-          for (size_t c = b + 1; c < n; ++c) Try(a, b, c);
-        }
-      }
-    } else {
-      std::mt19937_64 generator(1);
-      for (int64_t triple = 0; triple < kMostTriples; ++triple) {
-        const size_t a = generator() % n;
-        const size_t b = generator() % n;
-        const size_t c = generator() % n;
-        if (a != b && b != c && c != a) Try(a, b, c);
-      }
-    }
-    return best_;
-  }
-
- private:
-  void Try(size_t a, size_t b, size_t c) {
-    const auto found =
-        AlignCenters({pairs_[a].pose, pairs_[b].pose, pairs_[c].pose});
-    if (!found || !(found->scale > 0)) return;
-    if (Take(*found)) Refine();
-  }
-
-  bool Take(const Similarity& own_from_model) {
-    const Judgement judgement = judge_(MisfitsOf(pairs_, own_from_model));
-    if (!(judgement.score < judgement_.score)) return false;
-    judgement_ = judgement;
-    best_ = own_from_model;
-    return true;
-  }
-
-  // On what agrees with the best, and on twice as far: three places say less
-  // than all of them.
-  void Refine() {
-    for (int refit = 0; refit < kMaxRefits; ++refit) {
-      bool is_better = false;
-      for (const double factor : {2.0, 1.0}) {
-        const auto refined = AlignCenters(PosesOf(Within(
-            pairs_, MisfitsOf(pairs_, *best_), factor * judgement_.tolerance)));
-        if (refined && refined->scale > 0) is_better |= Take(*refined);
-      }
-      if (!is_better) return;
-    }
-  }
-
-  const std::vector<FramePair>& pairs_;
-  const Judge judge_;
-  Judgement judgement_;
-  std::optional<Similarity> best_;
-};
-
-// At most kMostScored of them, always the same.
-std::vector<FramePair> Sample(std::vector<FramePair> pairs) {
-  if (pairs.size() <= kMostScored) return pairs;
-  std::mt19937_64 generator(2);
-  for (size_t n = 0; n < kMostScored; ++n) {
-    std::swap(pairs[n], pairs[n + generator() % (pairs.size() - n)]);
-  }
-  pairs.resize(kMostScored);
-  return pairs;
-}
-
-std::optional<Similarity> Search(const std::vector<FramePair>& pairs,
-                                 bool has_radii) {
-  const std::vector<FramePair> sample = Sample(pairs);
-  if (has_radii) {
-    const auto found = FrameSearch(sample, JudgeByRadii).Run();
-    if (!found) return std::nullopt;
-    const auto agreeing = Within(sample, MisfitsOf(sample, *found), 1);
-    if (2 * agreeing.size() > sample.size() && agreeing.size() >= 3) {
-      return found;
-    }
-  }
-  return FrameSearch(sample, JudgeBySpread).Run();
-}
 
 Vector3d MedianOf(const std::vector<FramePair>& pairs,
                   Vector3d PosePair::*center) {
@@ -246,7 +87,7 @@ class FrameFinder {
            " positions of what the model places, expected three at least, "
            "which are not on one line");
     }
-    const auto found = Search(pairs_, has_radii_);
+    const auto found = SearchFrame(pairs_, has_radii_);
     if (!found) FailOnLine(0);
     own_from_model_ = *found;
     const std::vector<FramePair> agreeing = Settle();
@@ -306,7 +147,7 @@ class FrameFinder {
       sizes.push_back(pair.pose.center1.norm());
     }
     const double least = has_radii_ ? 1 : kLeastScatter * Median(sizes);
-    tolerance_ = std::max(least, JudgeBySpread(misfits).tolerance);
+    tolerance_ = std::max(least, SpreadTolerance(misfits));
     std::vector<FramePair> agreeing = Within(pairs_, misfits, tolerance_);
     for (int refit = 0; refit < kMaxRefits; ++refit) {
       const auto refined = AlignCenters(PosesOf(agreeing));
