@@ -3,14 +3,18 @@
 # x86, build-linux/krot, or for Windows by mingw-w64, build-windows/krot.exe.
 # The libraries that Debian has no static form of are built from Debian's
 # sources, Ceres without SuiteSparse, which has GPL parts. About half an hour on
-# two cores.
+# two cores; with -DKROT_MINIMAL=ON, without bundle adjustment, databases, photos
+# and project files, a quarter of an hour.
 #
-# Usage: tools/build_static.sh linux|windows
+# Usage: tools/build_static.sh linux|windows [CMAKE_OPTION...]
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
-[[ $# == 1 && ($1 == linux || $1 == windows) ]] \
-  || die "usage: tools/build_static.sh linux|windows"
+[[ ${1:-} == linux || ${1:-} == windows ]] \
+  || die "usage: tools/build_static.sh linux|windows [CMAKE_OPTION...]"
 system=$1
+shift
+is_minimal=
+[[ " $* " != *" -DKROT_MINIMAL=ON "* ]] || is_minimal=1
 folder=$root/build-$system
 needs=$folder/needs  # what is built of them
 sources=$root/build-sources
@@ -57,7 +61,8 @@ compile_need() {
   say "Building $name for $system"
   mkdir -p "$objects" "$needs/lib"
   for source in "$@"; do
-    "$compiler" -O2 -w -c "-I$needs/include" "$source" \
+    "$compiler" -O2 -w -DBOOST_BIND_GLOBAL_PLACEHOLDERS -c \
+      "-I$needs/include" "$source" \
       -o "$objects/$(basename "$source").o"
   done
   "$archiver" rcs "$needs/lib/lib$name.a" "$objects"/*.o
@@ -65,12 +70,20 @@ compile_need() {
 
 mkdir -p "$needs/include" "$sources"
 toolchain=()
+options=("-DCeres_DIR=$needs/lib/cmake/Ceres")
 if [[ $system == windows ]]; then
   toolchain=("-DCMAKE_TOOLCHAIN_FILE=$root/cmake/Windows.cmake"
-    "-DCMAKE_FIND_ROOT_PATH=$needs;/usr/x86_64-w64-mingw32")
-  archiver=x86_64-w64-mingw32-ar
+    "-DCMAKE_FIND_ROOT_PATH=$needs;/usr/x86_64-w64-mingw32"
+    -DEigen3_DIR=/usr/share/eigen3/cmake)
+  options+=("${toolchain[@]}" -DBoost_NO_BOOST_CMAKE=ON
+    -DZLIB_LIBRARY=/usr/x86_64-w64-mingw32/lib/libz.a)
   install_missing "${build_needs[@]}" tclsh:tcl libz-mingw-w64-dev \
     x86_64-w64-mingw32-g++-posix:g++-mingw-w64-x86-64-posix
+else
+  install_missing "${build_needs[@]}"
+fi
+if [[ $system == windows && -z $is_minimal ]]; then
+  archiver=x86_64-w64-mingw32-ar
   for headers in boost eigen3/Eigen eigen3/unsupported nlohmann; do
     ln -sfn "/usr/include/$headers" "$needs/include/$(basename "$headers")"
   done
@@ -89,21 +102,15 @@ if [[ $system == windows ]]; then
     -DWITH_TURBOJPEG=OFF
   get_source libpng1.6
   build_need libpng1.6 -DPNG_SHARED=OFF -DPNG_TESTS=OFF
-else
-  install_missing "${build_needs[@]}"
 fi
-get_source ceres-solver
-# Without glog it logs by itself: nothing but what ends the process.
-build_need ceres-solver -DMINIGLOG=ON -DGFLAGS=OFF -DSUITESPARSE=OFF \
-  -DCXSPARSE=OFF -DLAPACK=OFF -DEIGENSPARSE=ON -DSCHUR_SPECIALIZATIONS=OFF \
-  -DBUILD_TESTING=OFF -DBUILD_EXAMPLES=OFF -DBUILD_BENCHMARKS=OFF \
-  -DCMAKE_CXX_FLAGS=-DMAX_LOG_LEVEL=-3 -DEigen3_DIR=/usr/share/eigen3/cmake
+if [[ -z $is_minimal ]]; then
+  get_source ceres-solver
+  # Without glog it logs by itself: nothing but what ends the process.
+  build_need ceres-solver -DMINIGLOG=ON -DGFLAGS=OFF -DSUITESPARSE=OFF \
+    -DCXSPARSE=OFF -DLAPACK=OFF -DEIGENSPARSE=ON -DSCHUR_SPECIALIZATIONS=OFF \
+    -DBUILD_TESTING=OFF -DBUILD_EXAMPLES=OFF -DBUILD_BENCHMARKS=OFF \
+    -DCMAKE_CXX_FLAGS=-DMAX_LOG_LEVEL=-3
+fi
 
-options=("-DCeres_DIR=$needs/lib/cmake/Ceres")
-if [[ $system == windows ]]; then
-  options+=("${toolchain[@]}" -DEigen3_DIR=/usr/share/eigen3/cmake
-    -DBoost_NO_BOOST_CMAKE=ON
-    -DZLIB_LIBRARY=/usr/x86_64-w64-mingw32/lib/libz.a)
-fi
-target=krot build_krot "$folder" -DKROT_STATIC=ON -DKROT_NATIVE=OFF -DKROT_BUILD_TESTS=OFF \
-  "${options[@]}"
+target=krot build_krot "$folder" -DKROT_STATIC=ON -DKROT_NATIVE=OFF \
+  -DKROT_BUILD_TESTS=OFF "${options[@]}" "$@"
