@@ -199,8 +199,9 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
   AdjustmentReport report;
   RecordEnd(timer, given.num_threads(), &report.run);
   report.summary = std::move(result.summary);
-  return {std::make_shared<Model>(std::move(result.model)),
-          AdjustmentJson(report), std::nullopt};
+  std::string json = AdjustmentJson(report, result.model);
+  return {std::make_shared<Model>(std::move(result.model)), std::move(json),
+          std::nullopt};
 }
 
 Outcome ToleranceCommand(const ModelPointer& model, const Progress& progress,

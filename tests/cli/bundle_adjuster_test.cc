@@ -1,3 +1,5 @@
+#include <cmath>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -85,6 +87,79 @@ TEST_F(BundleAdjuster, TakesNoMoreIterationsFarFromTheOrigin) {
   for (const double distance : {3e3, 3e4, 3e6}) {
     EXPECT_LE(num_iterations(distance), nearby + 2) << distance;
   }
+}
+
+TEST_F(BundleAdjuster, TellsOfItsPrecision) {
+  const KrotResult result = Adjust({});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, ::testing::HasSubstr("px a posteriori, redundancy "));
+  const Json report = Report();
+  const Json& precision = report["precision"];
+  const int64_t redundancy = precision["redundancy"];
+  EXPECT_EQ(redundancy, 2 * report["num_observations"].get<int64_t>() -
+                            report["num_parameters"].get<int64_t>() + 7);
+  const double cost = report["cost_final"];
+  EXPECT_NEAR(precision["sigma0"],
+              std::sqrt(2 * cost / static_cast<double>(redundancy)),
+              1e-9 * cost);
+  EXPECT_NEAR(precision["largest_residuals"][0]["error"],
+              report["pixel_error"]["after"]["max"], 1e-9);
+  EXPECT_EQ(precision["images"].size(), report["num_images"]);
+  EXPECT_TRUE(precision["images"][0]["covariance"][5][5].is_number());
+  EXPECT_EQ(precision["cameras"][0]["params"][0], "f");
+}
+
+TEST_F(BundleAdjuster, WritesAProtocolWhereTheReportIsText) {
+  const KrotResult result =
+      RunKrot({"bundle_adjuster", "--input_path", folder_ / "input",
+               "--output_path", folder_ / "output", "--report_path",
+               folder_ / "report.txt", "--BundleAdjustment.datum", "POINTS"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const std::string text = ReadBytes(folder_ / "report.txt");
+  for (const char* part :
+       {"sigma0 a posteriori, px", "largest residual: point3D_id ",
+        "inner constraints over all object points", "Interior orientation",
+        "Exterior orientation", "Reliability", "Rays per object point",
+        "Object points; RMS of the standard deviations"}) {
+    EXPECT_THAT(text, ::testing::HasSubstr(part));
+  }
+}
+
+// The survey is the adjusted model turned, moved and 3 times as large; one
+// point of it is off by 0.3.
+TEST_F(BundleAdjuster, ComparesCheckPointsWithTheirSurvey) {
+  ASSERT_EQ(Adjust({}).exit_code, 0);
+  const Model model = Load(folder_ / "output");
+  std::ofstream file(folder_ / "survey.txt");
+  file.precision(17);
+  for (size_t k = 0; k < 40; ++k) {
+    const Eigen::Vector3d& x = model.points3D[k].xyz;
+    file << model.points3D[k].id << ' ' << 100 - 3 * x.y() << ' '
+         << 3 * x.x() - 50 << ' ' << 3 * x.z() + (k == 7 ? 0.3 : 0) << '\n';
+  }
+  file.close();
+  const Words check = {"--check_points_path", folder_ / "survey.txt"};
+  const KrotResult result = Adjust(check);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Json points = Report()["check_points"];
+  EXPECT_NEAR(points["scale"], 3, 0.05);
+  ASSERT_EQ(points["points"].size(), 40);
+  EXPECT_EQ(points["points"][7]["point3D_id"], model.points3D[7].id);
+  EXPECT_NEAR(points["points"][7]["difference"][2], -0.3, 0.06);
+  EXPECT_GT(points["rms"], 0.3 / std::sqrt(40.0) / 2);
+  EXPECT_LT(points["rms"], 0.3 / std::sqrt(40.0));
+}
+
+TEST_F(BundleAdjuster, RefusesCheckPointsThatAreTooFew) {
+  const Model model = Load(folder_ / "input");
+  std::ofstream(folder_ / "survey.txt") << model.points3D[0].id << " 1 2 3\n"
+                                        << model.points3D[1].id << " 2 3 4\n";
+  const KrotResult result =
+      Adjust({"--check_points_path", folder_ / "survey.txt"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, ::testing::HasSubstr(
+                              "found 2 check points of the model, expected "
+                              "three or more that are not on a line"));
 }
 
 TEST_F(BundleAdjuster, AgreesWithColmap) {

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <sstream>
 #include <string>
@@ -134,6 +135,72 @@ TEST_F(Scripts, CheckACertificateWithoutKrot) {
   WriteBytes(certificate, json.dump());
   EXPECT_NE(RunScript("check_certificate.py", {certificate, solved}).exit_code,
             0);
+}
+
+// A scene without noise as a project of DBAT, whose lens corrects what was
+// measured: x + K1 r^2 x is the pinhole's.
+TEST_F(Scripts, ReadAPhotogrammetricProject) {
+  if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0) {
+    GTEST_SKIP() << "numpy is not installed";
+  }
+  SceneOptions options;
+  options.num_frames = 5;
+  options.track_length = 4;
+  options.num_points = 50;
+  options.camera_model_id = 0;
+  options.has_rigs = false;
+  const Model scene = SynthesizeScene(options).ground_truth;
+  constexpr double kPixel = 0.01, kK1 = 1e-4;  // mm
+  const std::vector<double>& params = scene.cameras[0].params;
+  std::ofstream camera(folder_ / "camera.xml");
+  camera << "<image>" << scene.cameras[0].width << ','
+         << scene.cameras[0].height << "</image><sensor>auto,"
+         << kPixel * static_cast<double>(scene.cameras[0].height)
+         << "</sensor><cc>" << kPixel * params[0] << "</cc><pp>"
+         << kPixel * params[1] << ',' << kPixel * params[2] << "</pp><K>" << kK1
+         << ",0,0</K><P>0,0</P>";
+  std::ofstream names(folder_ / "images.txt"), eo(folder_ / "eo.txt"),
+      points(folder_ / "points.txt");
+  eo.precision(17);
+  points.precision(17);
+  for (const Image& image : scene.images) {
+    names << image.id << ", photos/" << image.name << '\n';
+    const Eigen::Matrix3d R = image.cam_from_world.Rotation();
+    const Eigen::Vector3d centre =
+        -R.transpose() * image.cam_from_world.translation;
+    const Eigen::Matrix3d M =
+        (Eigen::Vector3d(1, -1, -1).asDiagonal() * R).transpose();
+    constexpr double kDegrees = 57.295779513082321;
+    eo << image.id << ", " << centre.x() << ", " << centre.y() << ", "
+       << centre.z() << ", " << kDegrees * std::atan2(-M(1, 2), M(2, 2)) << ", "
+       << kDegrees * std::asin(M(0, 2)) << ", "
+       << kDegrees * std::atan2(-M(0, 1), M(0, 0)) << '\n';
+    for (const Point2D& point : image.points2D) {
+      const Eigen::Vector2d ideal =
+          kPixel * Eigen::Vector2d(point.x - params[1], point.y - params[2]);
+      Eigen::Vector2d measured = ideal;
+      for (int i = 0; i < 50; ++i) {
+        measured = ideal / (1 + kK1 * measured.squaredNorm());
+      }
+      points << image.id << ", " << point.point3D_id << ", "
+             << params[1] + measured.x() / kPixel << ", "
+             << params[2] + measured.y() / kPixel << '\n';
+    }
+  }
+  for (std::ofstream* file : {&camera, &names, &eo, &points}) file->close();
+  const ScriptResult result = RunScript(
+      "photogrammetry_to_colmap.py",
+      {"dbat", folder_ / "camera.xml", folder_ / "images.txt",
+       folder_ / "eo.txt", folder_ / "points.txt", folder_ / "converted"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const Model converted = Load(folder_ / "converted");
+  EXPECT_EQ(converted.points3D.size(), scene.points3D.size());
+  const PixelErrorStatistics errors = Summarize(PixelErrors(converted));
+  EXPECT_EQ(errors.count, static_cast<int64_t>(scene.track_elements.size()));
+  EXPECT_LT(errors.max, 1e-4);
+  for (size_t k = 0; k < scene.points3D.size(); ++k) {
+    EXPECT_LT((converted.points3D[k].xyz - scene.points3D[k].xyz).norm(), 1e-6);
+  }
 }
 
 bool HasColmapAndJq() {

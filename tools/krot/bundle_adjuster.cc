@@ -1,8 +1,11 @@
+#include <filesystem>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "krot/base/context.h"
+#include "krot/base/write_file.h"
+#include "krot/model/model_io.h"
 #include "krot/options/command_options.h"
 #include "krot/pipeline/adjust_model.h"
 #include "krot/report/reports.h"
@@ -12,6 +15,7 @@
 #include "tools/krot/interrupt.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
+#include "tools/krot/run_log.h"
 #include "tools/krot/solve_progress.h"
 
 namespace krot::internal {
@@ -66,8 +70,27 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
   }
 }
 
-int Run(const ModelPaths& paths, const CommonOptions& common,
-        AdjustModelOptions options, int num_threads) {
+// Surveyed points of the model; empty without a file. Throws ModelError where
+// they are too few to compare with.
+std::vector<KnownPosition> ReadCheckPoints(const std::string& path,
+                                           const Model& model,
+                                           const LogOptions& log) {
+  if (path.empty()) return {};
+  LogInput(path);
+  // Their radius has no meaning here.
+  std::vector<KnownPosition> points =
+      ReadPointPositions(ReadFileBytes(path), model, {1.0, WarnOn(log)});
+  if (!CompareWithSurvey(model, points)) {
+    throw ModelError(path + ": found " + std::to_string(points.size()) +
+                     " check points of the model, expected three or more that "
+                     "are not on a line");
+  }
+  return points;
+}
+
+int Run(const ModelPaths& paths, const std::string& check_points_path,
+        const CommonOptions& common, AdjustModelOptions options,
+        int num_threads) {
   const Timer total_timer;
   const WriteModelOptions write_options = CheckModelPaths(paths, common.log);
   AdjustmentReport report;
@@ -75,6 +98,10 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
 
   const Model model = ReadInput(paths, common.log, &report.run);
 
+  const std::vector<KnownPosition> check_points =
+      ReadCheckPoints(check_points_path, model, common.log);
+  options.finds_precision =
+      !paths.report_path.empty() || !paths.html_path.empty();
   options.adjustment.fixed = ReadFixedParts(paths, model, common.log);
   Context context{num_threads};
   if (paths.write_on_interrupt) context.cancel = &DeferInterrupts();
@@ -82,14 +109,23 @@ int Run(const ModelPaths& paths, const CommonOptions& common,
       Adjust(model, std::move(options), context, common.log);
   DeferInterrupts();
   report.summary = std::move(result.summary);
+  report.check_points = CompareWithSurvey(result.model, check_points);
 
   BeginPhase(common.log, "writing " + paths.output_path);
   const Timer write_timer;
   WriteModel(result.model, paths.output_path, write_options);
   report.run.seconds_write = write_timer.Seconds();
   RecordEnd(total_timer, num_threads, &report.run);
-  WriteReports(paths.report_path, paths.html_path, AdjustmentJson(report),
-               model, result.model, num_threads, common.log);
+  const bool is_text =
+      std::filesystem::path(paths.report_path).extension() == ".txt";
+  if (is_text) {
+    BeginPhase(common.log, "writing " + paths.report_path);
+    WriteFileAtomically(paths.report_path,
+                        AdjustmentText(report, result.model));
+  }
+  WriteReports(is_text ? "" : paths.report_path, paths.html_path,
+               AdjustmentJson(report, result.model), model, result.model,
+               num_threads, common.log);
   PrintTable(common.log, AdjustmentTable(report));
   WarnOfDegeneration(model, result.model, common.log);
   if (context.IsCancelled()) ThrowInterrupted(paths);
@@ -106,8 +142,14 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                       "lowers the sum of the squared reprojection errors of a "
                       "COLMAP model, below a cap if you want; the coordinate "
                       "frame stays");
-  AddModelPaths(&paths, &parser);
+  AddModelPaths(&paths, &parser, nullptr,
+                "Where the report goes: as text if its name ends in .txt, else "
+                "as JSON");
   AddFixedPaths(&paths, &parser);
+  std::string check_points_path;
+  parser.AddPath("check_points_path", &check_points_path, false, "a file",
+                 "Surveyed 3D points, lines of ID X Y Z, that have no say: the "
+                 "report compares them, in the survey's frame and unit");
   AddWriteOnInterrupt(&paths, &parser);
   options.AddTo(&parser);
   AddCommonOptions("Accepted everywhere; this command draws no random numbers",
@@ -116,7 +158,8 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
     PrintTable(common.log, parser.Help());
     return kExitDone;
   }
-  return Run(paths, common, options.Resolve(parser), options.num_threads());
+  return Run(paths, check_points_path, common, options.Resolve(parser),
+             options.num_threads());
 }
 
 }  // namespace krot::internal

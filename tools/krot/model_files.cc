@@ -77,7 +77,7 @@ void CheckSideName(const std::string& option, const std::string& path) {
 }  // namespace
 
 void AddModelPaths(ModelPaths* paths, OptionParser* parser,
-                   const char* output_meaning) {
+                   const char* output_meaning, const char* report_meaning) {
   parser->AddPath("input_path", &paths->input_path, true, "a folder",
                   "The COLMAP model to read, binary or text");
   const bool is_required = output_meaning == nullptr;
@@ -87,8 +87,7 @@ void AddModelPaths(ModelPaths* paths, OptionParser* parser,
   parser->AddChoice("output_type", &paths->output_type, {"auto", "BIN", "TXT"},
                     "The format to write; auto: the input's");
   AddOverwrite(&paths->overwrite, parser);
-  parser->AddOutputFile("report_path", &paths->report_path,
-                        "Where the report goes, as JSON");
+  parser->AddOutputFile("report_path", &paths->report_path, report_meaning);
   AddHtmlPath(&paths->html_path, parser);
   AddOnContradiction(&paths->on_contradiction, parser);
 }

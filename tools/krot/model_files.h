@@ -35,8 +35,10 @@ struct ModelPaths {
 };
 
 // The output is required unless its meaning is given: "Where ... goes".
-void AddModelPaths(ModelPaths* paths, OptionParser* parser,
-                   const char* output_meaning = nullptr);
+void AddModelPaths(
+    ModelPaths* paths, OptionParser* parser,
+    const char* output_meaning = nullptr,
+    const char* report_meaning = "Where the report goes, as JSON");
 // Of a command that takes other rotations than the model's.
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
 // Of a command that may hold images and points.

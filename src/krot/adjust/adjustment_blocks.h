@@ -119,6 +119,21 @@ struct AdjustmentColumns {
 void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
                const BlockVector& direction, double step, AdjustmentBlocks* to);
 
+// The frames, refined sensors and points that hang together, as indices of
+// AdjustmentBlocks; those alone that take part.
+struct AdjustmentComponent {
+  std::vector<size_t> frames;
+  std::vector<size_t> sensors;
+  std::vector<size_t> points;
+  // Whether a sensor that is not refined has a translation.
+  bool has_fixed_scale = false;
+  bool is_held = false;  // something in it is fixed
+};
+
+// In the order of their first frames. O(observations).
+std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
+                                                bool refine_sensors);
+
 // Moves every connected component of `after` by a similarity that gives it the
 // centroid of its camera centres, their RMS distance to it, and the mean
 // rotation that it has in `before`, all of those cameras that keep their place

@@ -13,6 +13,7 @@
 
 #include "krot/adjust/adjustment_blocks.h"
 #include "krot/adjust/ceres_problem.h"
+#include "krot/adjust/precision_system.h"
 #include "krot/base/check.h"
 #include "krot/base/context.h"
 #include "krot/base/parallel_for.h"
@@ -166,6 +167,13 @@ void MinimizeBelowCap(const BundleAdjustmentOptions& options,
 BundleAdjustmentResult AdjustBundle(const Model& model,
                                     const BundleAdjustmentOptions& options,
                                     const Context& context) {
+  return AdjustBundle(model, options, context, {}, nullptr);
+}
+
+BundleAdjustmentResult AdjustBundle(
+    const Model& model, const BundleAdjustmentOptions& options,
+    const Context& context, AdjustmentDatum datum,
+    std::optional<AdjustmentPrecision>* precision) {
   CheckOptions(options);
   const Timer timer;
   const AdjustmentBlocks before =
@@ -198,6 +206,11 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
     RestoreSimilarity(options, before, &blocks);
   }
   result.model = ApplyBlocks(model, before, blocks);
+  if (precision != nullptr && summary.num_parameters > 0 && cost) {
+    context.Note("computing standard deviations and redundancy numbers");
+    *precision =
+        FindPrecision(result.model, options, columns, blocks, datum, context);
+  }
   summary.seconds = timer.Seconds();
   return result;
 }

@@ -1,6 +1,6 @@
 // Where there is no Ceres: nothing can be adjusted.
 
-#include "krot/adjust/bundle_adjustment.h"
+#include "krot/adjust/precision.h"
 #include "krot/base/check.h"
 
 namespace krot::internal {
@@ -10,6 +10,13 @@ BundleAdjustmentResult AdjustBundle(const Model&,
                                     const Context&) {
   throw std::invalid_argument(
       "bundle adjustment is not in this build, which has no Ceres");
+}
+
+BundleAdjustmentResult AdjustBundle(const Model& model,
+                                    const BundleAdjustmentOptions& options,
+                                    const Context& context, AdjustmentDatum,
+                                    std::optional<AdjustmentPrecision>*) {
+  return AdjustBundle(model, options, context);
 }
 
 void SilenceCeres() {}

@@ -15,63 +15,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The parts of a connected component, as indices of AdjustmentBlocks. Sensors
-// are listed only if they are refined; otherwise `has_fixed_scale` says whether
-// any has a translation.
-struct Component {
-  std::vector<size_t> frames;
-  std::vector<size_t> sensors;
-  std::vector<size_t> points;
-  bool has_fixed_scale = false;
-  bool is_held = false;  // something in it is fixed
-};
-
-std::vector<Component> FindComponents(const AdjustmentBlocks& blocks,
-                                      bool refine_sensors) {
-  const size_t num_frames = blocks.frames.size();
-  const size_t num_sensors = blocks.sensors.size();
-  const size_t num_nodes = num_frames + num_sensors + blocks.points.size();
-  DisjointSets nodes(static_cast<int64_t>(num_nodes));
-  std::vector<bool> is_used(num_nodes, false);
-  std::vector<bool> is_scaled(num_frames, false);
-  for (const AdjustmentObservation& observation : blocks.observations) {
-    const size_t frame = observation.frame;
-    const size_t point = num_frames + num_sensors + observation.point;
-    is_used[frame] = is_used[point] = true;
-    nodes.Unite(point, frame);
-    if (observation.sensor < 0) continue;
-    const size_t sensor = num_frames + observation.sensor;
-    if (refine_sensors) {
-      is_used[sensor] = true;
-      nodes.Unite(sensor, frame);
-    } else if (TranslationOf(blocks.sensors[observation.sensor]).norm() > 0) {
-      is_scaled[frame] = true;
-    }
-  }
-
-  std::map<size_t, Component> components;
-  for (size_t node = 0; node < num_nodes; ++node) {
-    if (!is_used[node]) continue;
-    Component& component = components[nodes.Find(node)];
-    if (node < num_frames) {
-      component.frames.push_back(node);
-      component.is_held = component.is_held || blocks.frame_is_fixed[node];
-      component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
-    } else if (node < num_frames + num_sensors) {
-      component.sensors.push_back(node - num_frames);
-    } else {
-      const size_t point = node - num_frames - num_sensors;
-      component.points.push_back(point);
-      component.is_held = component.is_held || blocks.point_is_fixed[point];
-    }
-  }
-  std::vector<Component> list;
-  for (auto& [root, component] : components) {
-    list.push_back(std::move(component));
-  }
-  return list;
-}
-
 Vector3d CenterOf(const PoseBlock& frame) {
   return Center({RotationOf(frame), TranslationOf(frame)});
 }
@@ -130,7 +73,7 @@ std::vector<size_t> HeldFrames(const AdjustmentBlocks& before,
                                const AdjustmentBlocks& after,
                                const std::vector<double>& distances_before,
                                const std::vector<double>& distances_after,
-                               const Component& component,
+                               const AdjustmentComponent& component,
                                const Matrix3d& rotation) {
   std::vector<CameraMove> cameras;
   for (const size_t f : component.frames) {
@@ -164,6 +107,52 @@ void MoveFrame(const Vector3d& center, const Matrix3d& world_rotation,
 
 }  // namespace
 
+std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
+                                                bool refine_sensors) {
+  const size_t num_frames = blocks.frames.size();
+  const size_t num_sensors = blocks.sensors.size();
+  const size_t num_nodes = num_frames + num_sensors + blocks.points.size();
+  DisjointSets nodes(static_cast<int64_t>(num_nodes));
+  std::vector<bool> is_used(num_nodes, false);
+  std::vector<bool> is_scaled(num_frames, false);
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    const size_t frame = observation.frame;
+    const size_t point = num_frames + num_sensors + observation.point;
+    is_used[frame] = is_used[point] = true;
+    nodes.Unite(point, frame);
+    if (observation.sensor < 0) continue;
+    const size_t sensor = num_frames + observation.sensor;
+    if (refine_sensors) {
+      is_used[sensor] = true;
+      nodes.Unite(sensor, frame);
+    } else if (TranslationOf(blocks.sensors[observation.sensor]).norm() > 0) {
+      is_scaled[frame] = true;
+    }
+  }
+
+  std::map<size_t, AdjustmentComponent> components;
+  for (size_t node = 0; node < num_nodes; ++node) {
+    if (!is_used[node]) continue;
+    AdjustmentComponent& component = components[nodes.Find(node)];
+    if (node < num_frames) {
+      component.frames.push_back(node);
+      component.is_held = component.is_held || blocks.frame_is_fixed[node];
+      component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
+    } else if (node < num_frames + num_sensors) {
+      component.sensors.push_back(node - num_frames);
+    } else {
+      const size_t point = node - num_frames - num_sensors;
+      component.points.push_back(point);
+      component.is_held = component.is_held || blocks.point_is_fixed[point];
+    }
+  }
+  std::vector<AdjustmentComponent> list;
+  for (auto& [root, component] : components) {
+    list.push_back(std::move(component));
+  }
+  return list;
+}
+
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before,
                        AdjustmentBlocks* after) {
@@ -173,7 +162,7 @@ void RestoreSimilarity(const BundleAdjustmentOptions& options,
       TypicalDistances(before, before.observations);
   const std::vector<double> distances_after =
       TypicalDistances(*after, before.observations);
-  for (const Component& component :
+  for (const AdjustmentComponent& component :
        FindComponents(before, options.refine_sensor_from_rig)) {
     if (component.is_held) continue;
     const auto rotation_of =

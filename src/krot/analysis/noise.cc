@@ -17,17 +17,6 @@ namespace {
 // The medians of chi^2 with one and two degrees of freedom.
 constexpr double kMedians[] = {0, 0.4549364231195724, 1.3862943611198906};
 
-// w of a sum over so many directions: that of two with the same probability to
-// be exceeded, exp(-w^2 / 2).
-double StandardizedError(double chi2, int num_directions) {
-  if (num_directions == 2) return std::sqrt(chi2);
-  if (num_directions == 0) return kNaN;
-  const double probability = std::erfc(std::sqrt(chi2 / 2));
-  if (probability > 1e-300) return std::sqrt(-2 * std::log(probability));
-  // erfc(x) ~ exp(-x^2) / (x sqrt(pi))
-  return std::sqrt(chi2 + std::log(chi2 * std::acos(-1.0) / 2));
-}
-
 void CheckOptions(const Model& model, const NoiseOptions& options) {
   CheckArgument(options.false_alarm > 0 && options.false_alarm < 1,
                 "false_alarm", options.false_alarm, "in (0, 1)");
@@ -236,6 +225,16 @@ ModelNoise Snooper::TakeNoise() {
 }
 
 }  // namespace
+
+// Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
+double StandardizedError(double chi2, int num_directions) {
+  if (num_directions == 2) return std::sqrt(chi2);
+  if (num_directions == 0) return kNaN;
+  const double probability = std::erfc(std::sqrt(chi2 / 2));
+  if (probability > 1e-300) return std::sqrt(-2 * std::log(probability));
+  // erfc(x) ~ exp(-x^2) / (x sqrt(pi))
+  return std::sqrt(chi2 + std::log(chi2 * std::acos(-1.0) / 2));
+}
 
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context) {

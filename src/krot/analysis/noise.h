@@ -37,6 +37,11 @@ struct NoiseSnooping {
   bool is_sigma_kept = false;
 };
 
+// The w of a sum of squares in so many directions, in [0, 2], each divided by
+// its variance: of a single direction the w of two that is exceeded with the
+// same probability. NaN of none.
+double StandardizedError(double chi2, int num_directions);
+
 // Of every track the observation with the largest w is removed, if that is
 // above the critical value, and the track is fitted anew; then sigma and the
 // critical value are taken anew, until nothing is above. The largest w is the

@@ -61,6 +61,14 @@ void AdjustmentOptions::AddRefined(OptionTable* table) {
                     &options->min_track_length, AtLeast(1, "observations"),
                     "Leave out points with fewer usable observations; they "
                     "stay in the model");
+  table->AddNamed<AdjustmentDatum>(
+      "BundleAdjustment.datum", &datum_,
+      {{"CAMERAS", AdjustmentDatum::kCameras},
+       {"POINTS", AdjustmentDatum::kPoints},
+       {"FIRST_CAMERA", AdjustmentDatum::kFirstCamera}},
+      "What the report's standard deviations refer to where nothing is fixed: "
+      "the cameras' mean place, turn and extent; inner constraints over the "
+      "points; or the first camera and its longest base");
 }
 
 void AdjustmentOptions::AddCap(OptionTable* table) {
@@ -162,6 +170,7 @@ AdjustModelOptions AdjustmentOptions::Resolve(const OptionTable& table) const {
              "BundleAdjustment.max_error_factor");
 
   AdjustModelOptions options;
+  options.datum = datum_;
   options.adjustment = adjustment_;
   BundleAdjustmentOptions& adjustment = options.adjustment;
   if (!refine_extrinsics_) {

@@ -96,6 +96,7 @@ class AdjustmentOptions {
   bool refine_extrinsics_ = true;
   double max_error_ = 0;
   double max_error_factor_ = 0;
+  AdjustmentDatum datum_ = AdjustmentDatum::kCameras;
 };
 
 }  // namespace krot::internal

@@ -87,7 +87,8 @@ AdjustModelResult AdjustInFrame(const Model& model,
     adjustment.max_error = summary.max_error;  // none if it is to be lowered
   }
   BundleAdjustmentResult adjusted =
-      AdjustBundle(start ? *start : model, adjustment, context);
+      AdjustBundle(start ? *start : model, adjustment, context, options.datum,
+                   options.finds_precision ? &summary.precision : nullptr);
   summary.adjustment = std::move(adjusted.summary);
   summary.max_error = summary.adjustment.max_error;
   result.model = std::move(adjusted.model);

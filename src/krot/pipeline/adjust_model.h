@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "krot/adjust/bundle_adjustment.h"
+#include "krot/adjust/precision.h"
 #include "krot/base/context.h"
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"
@@ -23,6 +24,9 @@ struct AdjustModelOptions {
   std::optional<double> max_error_factor;
   // For the known rotation problem, which goes without its finish.
   SolveModelOptions start;
+  // What the precision refers to, and whether it is computed.
+  AdjustmentDatum datum = AdjustmentDatum::kCameras;
+  bool finds_precision = false;
 };
 
 struct AdjustModelSummary {
@@ -34,6 +38,7 @@ struct AdjustModelSummary {
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_start;  // where the adjustment began
   PixelErrorStatistics pixel_error_after;
+  std::optional<AdjustmentPrecision> precision;  // if it was asked for
 };
 
 struct AdjustModelResult {

@@ -166,6 +166,7 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   }
   text << ".\n";
   if (summary.max_error) text << CapSentence(summary) << '\n';
+  if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
   std::string adjusted;
   if (summary.start) {
     adjusted = "found a start in " +
@@ -176,10 +177,12 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   return text.str();
 }
 
-std::string AdjustmentJson(const AdjustmentReport& report) {
+std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
   const AdjustModelSummary& summary = report.summary;
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
   Json start_bound, start_seconds;  // null unless there was such a solve
+  Json precision;                   // null unless it was asked for
+  if (summary.precision) precision = PrecisionJson(*summary.precision, model);
   if (summary.start) {
     start_bound = NumberOrNull(summary.start->lower_bound);
     start_seconds = StartSeconds(*summary.start);
@@ -209,6 +212,8 @@ std::string AdjustmentJson(const AdjustmentReport& report) {
        {{"before", ErrorJson(summary.pixel_error_before)},
         {"start", ErrorJson(summary.pixel_error_start)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
+      {"precision", precision},
+      {"check_points", CheckPointsJson(report.check_points)},
   };
   return ReportText(json, report.run,
                     {{"start", start_seconds}, {"adjust", adjustment.seconds}});

@@ -27,17 +27,50 @@
 
 namespace krot::internal {
 
+// Surveyed points that had no say, against a model's.
+struct CheckPoints {
+  struct Point {
+    Point3DId point3D_id = 0;
+    Eigen::Vector3d surveyed = Eigen::Vector3d::Zero();
+    // The model's minus the surveyed, after the similarity that fits them best,
+    // in the survey's frame and unit.
+    Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+  };
+
+  double scale = 1;  // the survey's unit for one of the model's
+  std::vector<Point> points;
+};
+
+// Of points' positions. None if there are fewer than three, or if they are on a
+// line.
+std::optional<CheckPoints> CompareWithSurvey(
+    const Model& model, const std::vector<KnownPosition>& surveyed);
+
 // What one run of `krot bundle_adjuster` did.
 struct AdjustmentReport {
   RunRecord run;
   AdjustModelSummary summary;
+  std::optional<CheckPoints> check_points;
 };
 
 // For the terminal: errors before and after, what took part, why it ended.
 std::string AdjustmentTable(const AdjustmentReport& report);
 
 // report.json; the keys are listed in docs/cli.md. What is not known is null.
-std::string AdjustmentJson(const AdjustmentReport& report);
+// `model` is the one that is written.
+std::string AdjustmentJson(const AdjustmentReport& report, const Model& model);
+
+// The same as a protocol to read: with precision, that of every camera, image
+// and point.
+std::string AdjustmentText(const AdjustmentReport& report, const Model& model);
+
+// What both say of the precision: sigma0, redundancy, standard deviations and
+// reliability.
+nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
+                                     const Model& model);
+// Null where there are none.
+nlohmann::ordered_json CheckPointsJson(const std::optional<CheckPoints>& check);
+std::string PrecisionSentence(const AdjustmentPrecision& precision);
 
 // Why there is no model below the cap, with the bound that proves it if one
 // does. Requires the termination kInfeasibleStart.

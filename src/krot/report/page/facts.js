@@ -77,6 +77,8 @@ export function factsTable(report) {
     ['Iterations', counts(report.num_iterations)],
     ['Rounds', counts(report.rounds?.length)],
     ['Linear solver', report.linear_solver],
+    ['Redundancy', counts(report.precision?.redundancy)],
+    ['Sigma0 a posteriori, px', significant(report.precision?.sigma0, 4)],
     ['Cap on every error, px', report.max_error],
     ['Left out', report.left_out &&
       (listed(Object.entries(report.left_out), count) || 'none')],

@@ -1,0 +1,239 @@
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "krot/adjust/precision_system.h"
+#include "krot/geometry.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+// Translation, in units of the component's size, rotation, and scale.
+using Similar = Eigen::Matrix<double, 3, 7>;
+
+// Of the largest eigenvalue of a Gram matrix: below is rounding.
+constexpr double kNothing = 1e-12;
+
+Matrix3d Cross(const Vector3d& x) {
+  Matrix3d matrix;
+  matrix << 0, -x.z(), x.y(), x.z(), 0, -x.x(), -x.y(), x.x(), 0;
+  return matrix;
+}
+
+// x -> x + unit t + omega x (x - O) + s (x - O), for the parts of a component.
+class Motion {
+ public:
+  Motion(const AdjustmentColumns& columns, const AdjustmentBlocks& blocks,
+         const AdjustmentComponent& component)
+      : columns_(columns), blocks_(blocks), component_(component) {
+    for (const size_t f : component.frames) {
+      centers_.push_back(Center(
+          {RotationOf(blocks.frames[f]), TranslationOf(blocks.frames[f])}));
+      origin_ += centers_.back() / static_cast<double>(component.frames.size());
+    }
+    double sum = 0;
+    for (const Vector3d& center : centers_) {
+      sum += (center - origin_).squaredNorm();
+    }
+    for (const size_t k : component.points) {
+      if (sum > 0) break;
+      sum = (blocks.points[k] - origin_).squaredNorm();
+    }
+    unit_ = sum > 0 ? std::sqrt(sum / static_cast<double>(centers_.size())) : 1;
+  }
+
+  Similar OfPlace(const Vector3d& x) const {
+    Similar rows;
+    rows << unit_ * Matrix3d::Identity(), -Cross(x - origin_), x - origin_;
+    return rows;
+  }
+  // R -> R exp(-[omega]), AdjustmentColumns::Pose.
+  static Similar OfRotation() {
+    Similar rows = Similar::Zero();
+    rows.middleCols<3>(3) = -Matrix3d::Identity();
+    return rows;
+  }
+  static Similar OfBaseline(const Vector3d& center_in_rig) {
+    Similar rows = Similar::Zero();
+    rows.col(6) = center_in_rig;
+    return rows;
+  }
+
+  // visit(block or kHeld, rows, whether a length) for all that is not a point.
+  template <typename Visit>
+  void ForEachBlock(const Visit& visit) const {
+    for (size_t n = 0; n < component_.frames.size(); ++n) {
+      const AdjustmentColumns::Pose& pose =
+          columns_.frames[component_.frames[n]];
+      visit(pose.rotation, OfRotation(), false);
+      visit(pose.center, OfPlace(centers_[n]), true);
+    }
+    for (const size_t s : component_.sensors) {
+      const AdjustmentColumns::Pose& pose = columns_.sensors[s];
+      const PoseBlock& sensor = blocks_.sensors[s];
+      visit(pose.center,
+            OfBaseline(Center({RotationOf(sensor), TranslationOf(sensor)})),
+            true);
+    }
+  }
+
+  // Those combinations, as columns, that move nothing that is held.
+  MatrixXd Free() const {
+    Eigen::Matrix<double, 7, 7> gram = Eigen::Matrix<double, 7, 7>::Zero();
+    const auto hold = [&](const Similar& rows, bool is_length) {
+      gram += rows.transpose() * rows / (is_length ? unit_ * unit_ : 1);
+    };
+    ForEachBlock([&](int32_t block, const Similar& rows, bool is_length) {
+      if (block == AdjustmentColumns::kHeld) hold(rows, is_length);
+    });
+    for (const size_t k : component_.points) {
+      if (!columns_.point_moves[k]) hold(OfPlace(blocks_.points[k]), true);
+    }
+    if (component_.has_fixed_scale) gram(6, 6) += 1;
+    if (gram.isZero(0)) return MatrixXd::Identity(7, 7);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 7, 7>> eigen(
+        gram);
+    Index count = 0;
+    while (count < 7 &&
+           eigen.eigenvalues()[count] <= kNothing * eigen.eigenvalues()[6]) {
+      ++count;
+    }
+    return eigen.eigenvectors().leftCols(count);
+  }
+
+  // Adds what the datum holds, 7 columns, lengths in units of the component's
+  // size: of blocks, and of points.
+  void Hold(AdjustmentDatum datum, const std::vector<int32_t>& points,
+            MatrixXd* held_blocks, MatrixXd* held_points) const {
+    if (datum == AdjustmentDatum::kPoints) {
+      for (size_t n = 0; n < points.size(); ++n) {
+        held_points->middleRows<3>(static_cast<Index>(3 * n)) =
+            OfPlace(blocks_.points[points[n]]) / (unit_ * unit_);
+      }
+    } else if (datum == AdjustmentDatum::kFirstCamera) {
+      HoldFirst(held_blocks);
+    } else {
+      for (size_t n = 0; n < component_.frames.size(); ++n) {
+        const AdjustmentColumns::Pose& pose =
+            columns_.frames[component_.frames[n]];
+        if (pose.rotation != AdjustmentColumns::kHeld) {
+          held_blocks->middleRows<3>(3 * pose.rotation) = OfRotation();
+        }
+        if (pose.center == AdjustmentColumns::kHeld) continue;
+        Similar rows = OfPlace(centers_[n]) / (unit_ * unit_);
+        rows.middleCols<3>(3).setZero();
+        held_blocks->middleRows<3>(3 * pose.center) = rows;
+      }
+    }
+  }
+
+ private:
+  void HoldFirst(MatrixXd* held) const {
+    const AdjustmentColumns::Pose& first =
+        columns_.frames[component_.frames[0]];
+    Vector3d longest = Vector3d::Zero();
+    size_t farthest = 0;
+    for (size_t n = 1; n < centers_.size(); ++n) {
+      const Vector3d base = centers_[n] - centers_[0];
+      if (base.squaredNorm() <= longest.squaredNorm()) continue;
+      longest = base;
+      farthest = n;
+    }
+    Index coordinate = 0;
+    longest.cwiseAbs().maxCoeff(&coordinate);
+    const AdjustmentColumns::Pose& other =
+        columns_.frames[component_.frames[farthest]];
+    for (int c = 0; c < 3; ++c) {
+      (*held)(3 * first.center + c, c) = 1 / unit_;
+      (*held)(3 * first.rotation + c, 3 + c) = 1;
+    }
+    if (farthest > 0) (*held)(3 * other.center + coordinate, 6) = 1 / unit_;
+  }
+
+  const AdjustmentColumns& columns_;
+  const AdjustmentBlocks& blocks_;
+  const AdjustmentComponent& component_;
+  std::vector<Vector3d> centers_;
+  Vector3d origin_ = Vector3d::Zero();
+  double unit_ = 1;
+};
+
+ComponentGauge GaugeOf(const AdjustmentColumns& columns,
+                       const AdjustmentBlocks& blocks,
+                       const AdjustmentComponent& component,
+                       AdjustmentDatum datum) {
+  ComponentGauge gauge;
+  const Motion motion(columns, blocks, component);
+  const MatrixXd free = motion.Free();
+  if (free.cols() == 0) return gauge;
+  MatrixXd similar = MatrixXd::Zero(3 * Index{columns.num_blocks}, 7);
+  motion.ForEachBlock([&](int32_t block, const Similar& rows, bool) {
+    if (block != AdjustmentColumns::kHeld)
+      similar.middleRows<3>(3 * block) = rows;
+  });
+  // A motion that moves points alone is theirs to say: they are not determined.
+  MatrixXd moves = similar * free;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(moves.transpose() *
+                                                      moves);
+  Index none = 0;
+  while (none < free.cols() &&
+         eigen.eigenvalues()[none] <=
+             kNothing * eigen.eigenvalues()[free.cols() - 1]) {
+    ++none;
+  }
+  const bool is_whole = none == 0 && free.cols() == 7;
+  const MatrixXd basis =
+      is_whole ? free
+               : free * eigen.eigenvectors().rightCols(free.cols() - none);
+  gauge.blocks = similar * basis;
+  for (const size_t k : component.points) {
+    if (columns.point_moves[k]) gauge.points.push_back(static_cast<int32_t>(k));
+  }
+  gauge.of_points.resize(3 * static_cast<Index>(gauge.points.size()),
+                         basis.cols());
+  for (size_t n = 0; n < gauge.points.size(); ++n) {
+    gauge.of_points.middleRows<3>(static_cast<Index>(3 * n)) =
+        motion.OfPlace(blocks.points[gauge.points[n]]) * basis;
+  }
+
+  if (datum == AdjustmentDatum::kFirstCamera && !is_whole) {
+    datum = AdjustmentDatum::kCameras;
+  }
+  // Where cameras or points alone do not hold all of it, both do.
+  MatrixXd held_blocks = MatrixXd::Zero(similar.rows(), 7);
+  MatrixXd held_points = MatrixXd::Zero(gauge.of_points.rows(), 7);
+  for (const AdjustmentDatum more :
+       {datum, datum == AdjustmentDatum::kPoints ? AdjustmentDatum::kCameras
+                                                 : AdjustmentDatum::kPoints}) {
+    motion.Hold(more, gauge.points, &held_blocks, &held_points);
+    gauge.held_blocks = held_blocks * basis;
+    gauge.held_points = held_points * basis;
+    const MatrixXd held = gauge.held_blocks.transpose() * gauge.blocks +
+                          gauge.held_points.transpose() * gauge.of_points;
+    if (Eigen::FullPivLU<MatrixXd>(held).rcond() > kNothing) break;
+  }
+  return gauge;
+}
+
+}  // namespace
+
+std::vector<ComponentGauge> FindGauges(const BundleAdjustmentOptions& options,
+                                       const AdjustmentColumns& columns,
+                                       const AdjustmentBlocks& blocks,
+                                       AdjustmentDatum datum) {
+  std::vector<ComponentGauge> gauges;
+  for (const AdjustmentComponent& component :
+       FindComponents(blocks, options.refine_sensor_from_rig)) {
+    ComponentGauge gauge = GaugeOf(columns, blocks, component, datum);
+    if (gauge.size() > 0) gauges.push_back(std::move(gauge));
+  }
+  return gauges;
+}
+
+}  // namespace krot::internal

@@ -1,0 +1,268 @@
+#include "krot/adjust/precision_system.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include <Eigen/Eigenvalues>
+
+#include "krot/base/parallel_for.h"
+#include "krot/check.h"
+#include "krot/geometry.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix2d;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+
+constexpr int64_t kItems = 64;  // per chunk of a parallel loop
+
+// Where a point's rays meet, nearest to a right angle; degrees.
+double MeetingAngle(const std::vector<Vector3d>& rays) {
+  double largest = 0;
+  for (size_t a = 0; a < rays.size(); ++a) {
+    for (size_t b = 0; b < a; ++b) {
+      const double sine = rays[a].cross(rays[b]).norm();
+      largest =
+          std::max(largest, std::atan2(sine, std::abs(rays[a].dot(rays[b]))));
+    }
+  }
+  return largest * kDegreesPerRadian;
+}
+
+class PrecisionOfAdjustment {
+ public:
+  PrecisionOfAdjustment(const Model& model,
+                        const BundleAdjustmentOptions& options,
+                        const AdjustmentColumns& columns,
+                        const AdjustmentBlocks& blocks, AdjustmentDatum datum,
+                        const Context& context)
+      : model_(model),
+        columns_(columns),
+        blocks_(blocks),
+        num_threads_(context.num_threads),
+        begin_(blocks.points.size() + 1, 0),
+        gauges_(FindGauges(options, columns, blocks, datum)) {
+    result_.datum = datum;
+    result_.is_least_squares =
+        options.loss == RobustLoss::kTrivial && !options.IsBounded();
+    result_.num_unknowns = columns.num_unknowns;
+    for (const AdjustmentObservation& o : blocks.observations) {
+      ++begin_[o.point + 1];
+    }
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    for (const ComponentGauge& gauge : gauges_) {
+      result_.datum_defect += gauge.size();
+    }
+    result_.has_covariances =
+        blocks.num_images <= options.max_num_images_direct_sparse;
+  }
+
+  AdjustmentPrecision Run() {
+    DescribeErrors();
+    if (result_.has_covariances) {
+      covariance_.emplace(columns_, blocks_, gauges_, num_threads_);
+      result_.num_undetermined = covariance_->num_undetermined();
+    }
+    result_.redundancy = 2 * static_cast<int64_t>(blocks_.observations.size()) -
+                         result_.num_unknowns + result_.datum_defect +
+                         result_.num_undetermined;
+    if (result_.redundancy > 0) {
+      result_.sigma0_px =
+          std::sqrt(squared_error_ / static_cast<double>(result_.redundancy));
+    }
+    if (result_.has_covariances) {
+      DescribePoints();
+      DescribeImages();
+      DescribeCameras();
+    }
+    return std::move(result_);
+  }
+
+ private:
+  double Variance() const { return result_.sigma0_px * result_.sigma0_px; }
+  std::optional<MatrixXd> CovarianceOf(const MatrixXd& J,
+                                       const std::vector<int32_t>& blocks) {
+    std::optional<MatrixXd> covariance = covariance_->Covariance(J, blocks);
+    if (covariance) *covariance *= Variance();
+    return covariance;
+  }
+
+  // What needs no derivatives: errors, images and points.
+  void DescribeErrors() {
+    const auto indices = ImageIndices(model_);
+    const std::vector<ProjectedError> errors =
+        *ProjectErrors(blocks_, kInfinity, num_threads_);
+    std::vector<Vector3d> centers;
+    for (const ImageGeometry& image : ImageGeometries(model_)) {
+      centers.push_back(Center(image.cam_from_world));
+    }
+    std::map<int32_t, ImagePrecision> images;
+    std::vector<Vector3d> rays;
+    for (size_t i = 0; i < errors.size(); ++i) {
+      const AdjustmentObservation& o = blocks_.observations[i];
+      ObservationPrecision observation;
+      observation.element = o.element;
+      observation.image = indices.at(model_.track_elements[o.element].image_id);
+      observation.residual_px = errors[i].r;
+      const double square = errors[i].r.squaredNorm();
+      squared_error_ += square;
+      result_.observations.push_back(observation);
+      ImagePrecision& image = images[observation.image];
+      if (image.num_observations++ == 0) {
+        image.image = observation.image;
+        parts_.push_back({observation.image, o.frame, o.sensor});
+      }
+      image.rms_px += errors[i].r.cwiseAbs2();
+      image.max_px = std::max(image.max_px, std::sqrt(square));
+      if (result_.points.empty() || result_.points.back().point != o.point) {
+        result_.points.emplace_back();
+        result_.points.back().point = o.point;
+        rays.clear();
+      }
+      PointPrecision& point = result_.points.back();
+      rays.push_back(centers[observation.image] - blocks_.points[o.point]);
+      point.rms_px += square;
+      ++point.num_rays;
+      if (static_cast<int64_t>(i) + 1 == begin_[o.point + 1]) {
+        point.rms_px = std::sqrt(point.rms_px / point.num_rays);
+        point.angle_deg = MeetingAngle(rays);
+      }
+    }
+    std::sort(parts_.begin(), parts_.end());
+    for (auto& [index, image] : images) {
+      image.rms_px =
+          (image.rms_px / static_cast<double>(image.num_observations))
+              .cwiseSqrt();
+      result_.images.push_back(image);
+    }
+  }
+
+  void DescribePoints() {
+    const auto num_points = static_cast<int64_t>(result_.points.size());
+    ParallelFor(num_points, kItems, num_threads_,
+                [&](int64_t begin, int64_t end, int) {
+                  for (int64_t n = begin; n < end; ++n) {
+                    DescribePoint(&result_.points[n]);
+                  }
+                });
+  }
+
+  void DescribePoint(PointPrecision* point) {
+    const PointCovariance covariance(*covariance_, point->point);
+    for (int64_t i = begin_[point->point]; i < begin_[point->point + 1]; ++i) {
+      DescribeRedundancy(covariance.RedundancyOf(i), &result_.observations[i]);
+    }
+    const std::optional<Matrix3d> of_point = covariance.OfPoint();
+    point->sigma.setConstant(kInfinity);
+    if (!of_point) return;
+    point->sigma = (Variance() * of_point->diagonal()).cwiseMax(0).cwiseSqrt();
+  }
+
+  void DescribeRedundancy(const Matrix2d& R,
+                          ObservationPrecision* observation) const {
+    observation->redundancy = R.diagonal().cwiseMax(0).cwiseMin(1);
+    if (!(Variance() > 0)) return;
+    Eigen::SelfAdjointEigenSolver<Matrix2d> eigen;
+    eigen.computeDirect(R);
+    for (int j = 0; j < 2; ++j) {
+      const double r = eigen.eigenvalues()[j];
+      if (r < kControlled) continue;
+      ++observation->num_controlled;
+      const double along =
+          eigen.eigenvectors().col(j).dot(observation->residual_px);
+      observation->chi2 += along * along / (r * Variance());
+    }
+  }
+
+  // R = R_s R_f and c = c_f + R_f'c_s, both by AdjustmentColumns::Pose.
+  void DescribeImages() {
+    for (size_t n = 0; n < parts_.size(); ++n) {
+      const ImageParts& part = parts_[n];
+      std::vector<int32_t> blocks;
+      std::vector<Eigen::Matrix<double, 6, 3>> J;
+      const auto add = [&](int32_t block, const Matrix3d& rotation,
+                           const Matrix3d& center) {
+        if (block == AdjustmentColumns::kHeld) return;
+        blocks.push_back(block);
+        J.emplace_back();
+        J.back() << rotation, center;
+      };
+      const Matrix3d R_frame = RotationOf(blocks_.frames[part.frame]);
+      Matrix3d R = R_frame;
+      Matrix3d lever = Matrix3d::Zero();
+      if (part.sensor >= 0) {
+        const PoseBlock& sensor = blocks_.sensors[part.sensor];
+        const Vector3d c = R_frame.transpose() *
+                           Center({RotationOf(sensor), TranslationOf(sensor)});
+        R = RotationOf(sensor) * R_frame;
+        lever << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+        const AdjustmentColumns::Pose& of_sensor =
+            columns_.sensors[part.sensor];
+        add(of_sensor.rotation, RotationOf(sensor), Matrix3d::Zero());
+        add(of_sensor.center, Matrix3d::Zero(), R_frame.transpose());
+      }
+      const AdjustmentColumns::Pose& of_frame = columns_.frames[part.frame];
+      add(of_frame.rotation, R, lever);
+      add(of_frame.center, Matrix3d::Zero(), Matrix3d::Identity());
+      MatrixXd stacked(6, 3 * static_cast<Index>(J.size()));
+      for (size_t b = 0; b < J.size(); ++b) {
+        stacked.middleCols<3>(static_cast<Index>(3 * b)) = J[b];
+      }
+      const auto covariance = CovarianceOf(stacked, blocks);
+      if (covariance) result_.images[n].covariance = *covariance;
+    }
+  }
+
+  void DescribeCameras() {
+    for (size_t c = 0; c < columns_.cameras.size(); ++c) {
+      const AdjustmentColumns::Camera& camera = columns_.cameras[c];
+      if (camera.params.empty()) continue;
+      std::vector<int32_t> blocks(camera.num_blocks());
+      std::iota(blocks.begin(), blocks.end(), camera.first_block);
+      const auto count = static_cast<Index>(camera.params.size());
+      const MatrixXd J =
+          MatrixXd::Identity(count, 3 * Index{camera.num_blocks()});
+      result_.cameras.push_back(
+          {static_cast<int32_t>(c), camera.params, CovarianceOf(J, blocks)});
+    }
+  }
+
+  struct ImageParts {
+    int32_t image, frame, sensor;
+    bool operator<(const ImageParts& other) const {
+      return image < other.image;
+    }
+  };
+  const Model& model_;
+  const AdjustmentColumns& columns_;
+  const AdjustmentBlocks& blocks_;
+  const int num_threads_;
+  std::vector<int64_t> begin_;  // of points' observations; num_points + 1
+  const std::vector<ComponentGauge> gauges_;
+  std::optional<BlockCovariance> covariance_;
+  std::vector<ImageParts> parts_;  // as result_.images
+  double squared_error_ = 0;
+  AdjustmentPrecision result_;
+};
+
+}  // namespace
+
+AdjustmentPrecision FindPrecision(const Model& model,
+                                  const BundleAdjustmentOptions& options,
+                                  const AdjustmentColumns& columns,
+                                  const AdjustmentBlocks& blocks,
+                                  AdjustmentDatum datum,
+                                  const Context& context) {
+  return PrecisionOfAdjustment(model, options, columns, blocks, datum, context)
+      .Run();
+}
+
+}  // namespace krot::internal

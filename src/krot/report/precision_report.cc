@@ -1,0 +1,344 @@
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "krot/base/numbers.h"
+#include "krot/camera/camera_model.h"
+#include "krot/geometry.h"
+#include "krot/model/rigs.h"
+#include "krot/report/precision_figures.h"
+#include "krot/report/reports.h"
+#include "krot/report/text_table.h"
+
+namespace krot::internal {
+namespace {
+
+using Eigen::Vector3d;
+
+const char* const kPoseNames[] = {"rx", "ry", "rz", "X", "Y", "Z"};
+
+std::string DatumSentence(const AdjustmentPrecision& precision) {
+  if (precision.datum_defect == 0) {
+    return "Datum: what is held fixed; its standard deviations are 0.";
+  }
+  switch (precision.datum) {
+    case AdjustmentDatum::kPoints:
+      return "Datum: free network, inner constraints over all object points.";
+    case AdjustmentDatum::kFirstCamera:
+      return "Datum: the first camera is fixed, and the largest coordinate of "
+             "its longest base.";
+    case AdjustmentDatum::kCameras:
+      break;
+  }
+  return "Datum: free network; the mean centre, the mean rotation and the RMS "
+         "extent of all cameras have no error.";
+}
+
+// What the figures do not hold for; empty if they do.
+std::string ValiditySentence(const AdjustModelSummary& summary) {
+  if (!summary.precision->is_least_squares) {
+    return "A robust loss or a cap has led the adjustment: sigma0 and all "
+           "standard deviations are those of plain least squares around its "
+           "estimate, and only approximate.\n";
+  }
+  if (summary.adjustment.termination !=
+      BundleAdjustmentTermination::kConverged) {
+    return "The adjustment has not converged: all figures are approximate.\n";
+  }
+  return "";
+}
+
+template <typename NameOf>
+std::string CorrelationWords(const Eigen::MatrixXd& covariance,
+                             const NameOf& name_of) {
+  std::string words;
+  for (const Correlation& one : HighCorrelations(covariance)) {
+    words += (words.empty() ? "" : ", ") + name_of(one.a) + "-" +
+             name_of(one.b) + " " + FormatNumber(100 * one.value, 1) + " %";
+  }
+  return words;
+}
+
+// Decimals with which the median of some deviations shows two digits.
+int DecimalsFor(std::vector<double> sigmas) {
+  sigmas.erase(std::remove_if(sigmas.begin(), sigmas.end(),
+                              [](double s) { return !(s > 0 && s < 1e300); }),
+               sigmas.end());
+  if (sigmas.empty()) return 6;
+  const double digits = 1 - std::floor(std::log10(Median(std::move(sigmas))));
+  return static_cast<int>(std::clamp(digits, 0.0, 12.0));
+}
+
+std::vector<std::string> Cells(const Eigen::VectorXd& values, int decimals) {
+  std::vector<std::string> cells;
+  for (const double value : values) {
+    cells.push_back(FormatNumber(value, decimals));
+  }
+  return cells;
+}
+
+void Append(const std::vector<std::string>& more,
+            std::vector<std::string>* cells) {
+  cells->insert(cells->end(), more.begin(), more.end());
+}
+
+std::string ResidualName(const NamedObservation& o) {
+  return "point3D_id " + std::to_string(o.point3D_id) + " on image " +
+         o.image->name + ", 2D point " + std::to_string(o.point2D_idx);
+}
+
+std::string SummarySection(const AdjustModelSummary& summary,
+                           const PrecisionFigures& figures) {
+  const AdjustmentPrecision& precision = *summary.precision;
+  TextTable table;
+  const auto row = [&](const std::string& name, const std::string& value) {
+    table.AddRow({name, value});
+  };
+  row("images", Thousands(summary.adjustment.num_images));
+  row("object points", Thousands(summary.adjustment.num_points));
+  row("image points", Thousands(figures.num_observations));
+  row("observations (image coordinates)",
+      Thousands(2 * figures.num_observations));
+  row("unknowns", Thousands(precision.num_unknowns));
+  row("datum defect", Thousands(precision.datum_defect));
+  if (precision.num_undetermined > 0) {
+    row("unknowns not determined", Thousands(precision.num_undetermined));
+  }
+  row("redundancy", Thousands(precision.redundancy));
+  row("sigma0 a posteriori, px", FormatNumber(precision.sigma0_px, 6));
+  const auto worst = figures.LargestResiduals();
+  double square = 0;
+  for (const NamedObservation& o : figures.all) {
+    square += o.error_px * o.error_px;
+  }
+  row("RMS of image points, px",
+      FormatNumber(
+          std::sqrt(square / static_cast<double>(figures.num_observations)),
+          4));
+  row("largest residual, px", FormatNumber(worst.at(0).error_px, 4));
+  return table.ToString() + "  largest residual: " + ResidualName(worst.at(0)) +
+         "\n" + DatumSentence(precision) + "\n" + ValiditySentence(summary);
+}
+
+std::string CameraSection(const AdjustmentPrecision& precision,
+                          const Model& model) {
+  std::string text;
+  for (const CameraPrecision& one : precision.cameras) {
+    const Camera& camera = model.cameras[one.camera];
+    const std::vector<std::string> names = ParamNames(camera.model_id);
+    text += "Camera " + std::to_string(camera.id) + ", " +
+            std::string(FindCameraModel(camera.model_id)->name) + ", pixels\n";
+    TextTable table;
+    table.AddRow({"parameter", "value", "std. dev."});
+    for (size_t n = 0; n < one.params.size(); ++n) {
+      const double sigma =
+          one.covariance
+              ? Deviations(*one.covariance)[static_cast<Eigen::Index>(n)]
+              : kNaN;
+      const int decimals = DecimalsFor({sigma});
+      table.AddRow({names[one.params[n]],
+                    FormatNumber(camera.params[one.params[n]], decimals),
+                    FormatNumber(sigma, decimals)});
+    }
+    text += table.ToString();
+    if (!one.covariance) {
+      text += "  Not all of these parameters are determined.\n";
+      continue;
+    }
+    const std::string words = CorrelationWords(
+        *one.covariance, [&](Eigen::Index n) { return names[one.params[n]]; });
+    text += words.empty() ? "  No correlation above 95 %.\n"
+                          : "  Correlations above 95 %: " + words + ".\n";
+  }
+  return text;
+}
+
+std::string ImageSection(const AdjustmentPrecision& precision,
+                         const Model& model) {
+  const std::vector<ImageGeometry> geometries = ImageGeometries(model);
+  std::vector<double> lengths;
+  for (const ImagePrecision& image : precision.images) {
+    if (!image.covariance) continue;
+    const Eigen::VectorXd sigma = Deviations(*image.covariance);
+    lengths.insert(lengths.end(), sigma.data() + 3, sigma.data() + 6);
+  }
+  const int decimals = DecimalsFor(std::move(lengths));
+  TextTable table;
+  table.AddRow({"image", "points", "rms vx", "rms vy", "max v", "X", "Y", "Z",
+                "sX", "sY", "sZ", "srx, deg", "sry, deg", "srz, deg"});
+  std::string correlations;
+  for (const ImagePrecision& image : precision.images) {
+    std::vector<std::string> cells = {model.images[image.image].name,
+                                      Thousands(image.num_observations)};
+    Append(Cells(image.rms_px, 3), &cells);
+    cells.push_back(FormatNumber(image.max_px, 3));
+    Append(Cells(Center(geometries[image.image].cam_from_world), decimals),
+           &cells);
+    Eigen::VectorXd sigma = Eigen::VectorXd::Constant(6, kNaN);
+    if (image.covariance) sigma = Deviations(*image.covariance);
+    Append(Cells(sigma.tail(3), decimals), &cells);
+    Append(Cells(sigma.head(3) * kDegreesPerRadian, 5), &cells);
+    table.AddRow(std::move(cells));
+    if (!image.covariance) continue;
+    const std::string words = CorrelationWords(
+        *image.covariance,
+        [](Eigen::Index n) { return std::string(kPoseNames[n]); });
+    if (words.empty()) continue;
+    correlations += "  " + model.images[image.image].name + ": " + words + "\n";
+  }
+  std::string text = table.ToString();
+  if (!correlations.empty()) {
+    text += "Correlations above 95 %\n" + correlations;
+  }
+  return text;
+}
+
+std::string ReliabilitySection(const AdjustmentPrecision& precision,
+                               const PrecisionFigures& figures) {
+  const double mean_r = static_cast<double>(precision.redundancy) /
+                        (2 * static_cast<double>(figures.num_observations));
+  TextTable table;
+  table.AddRow({"mean redundancy number", FormatNumber(mean_r, 3)});
+  table.AddRow({"median smallest detectable error, px",
+                FormatNumber(figures.MedianDetectablePx(), 3)});
+  table.AddRow({"image points not controlled in a direction",
+                Thousands(figures.num_uncontrolled)});
+  table.AddRow({"critical value of w", FormatNumber(figures.critical_w, 2)});
+  table.AddRow({"image points above it", Thousands(figures.num_above)});
+  TextTable worst;
+  worst.AddRow({"image", "2D point", "point3D_id", "vx", "vy", "rx", "ry", "w",
+                "detectable, px"});
+  for (const NamedObservation& o : figures.LargestW()) {
+    const ObservationPrecision& of = *o.precision;
+    worst.AddRow({o.image->name, std::to_string(o.point2D_idx),
+                  std::to_string(o.point3D_id),
+                  FormatNumber(of.residual_px.x(), 3),
+                  FormatNumber(of.residual_px.y(), 3),
+                  FormatNumber(of.redundancy.x(), 3),
+                  FormatNumber(of.redundancy.y(), 3), FormatNumber(o.w, 2),
+                  FormatNumber(o.DetectablePx(precision.sigma0_px), 2)});
+  }
+  return table.ToString() + "Image points with the largest w\n" +
+         worst.ToString();
+}
+
+std::string PointSections(const AdjustmentPrecision& precision,
+                          const PrecisionFigures& figures, const Model& model) {
+  std::ostringstream text;
+  text << "\nRays per object point\n";
+  TextTable rays;
+  rays.AddRow({"rays", "points"});
+  for (const auto& [num_rays, num_points] : figures.num_with_rays) {
+    rays.AddRow({std::to_string(num_rays), Thousands(num_points)});
+  }
+  text << rays.ToString() << "\nIntersection angles, mean "
+       << FormatNumber(figures.mean_angle_deg, 1)
+       << " deg; the smallest (of the two rays nearest to a right angle)\n";
+  TextTable angles;
+  angles.AddRow({"point3D_id", "rays", "angle, deg"});
+  for (const PointPrecision& point : figures.SmallestAngles()) {
+    angles.AddRow({std::to_string(model.points3D[point.point].id),
+                   std::to_string(point.num_rays),
+                   FormatNumber(point.angle_deg, 2)});
+  }
+  text << angles.ToString();
+  std::vector<double> lengths;
+  for (const PointPrecision& point : precision.points) {
+    lengths.insert(lengths.end(), point.sigma.data(), point.sigma.data() + 3);
+  }
+  const int decimals = DecimalsFor(std::move(lengths));
+  text << "\nObject points";
+  if (precision.has_covariances) {
+    const auto cells = Cells(figures.RmsSigma(), decimals);
+    text << "; RMS of the standard deviations: sX " << cells[0] << ", sY "
+         << cells[1] << ", sZ " << cells[2];
+  }
+  text << '\n';
+  TextTable table;
+  table.AddRow({"point3D_id", "rays", "angle, deg", "rms v, px", "X", "Y", "Z",
+                "sX", "sY", "sZ"});
+  for (const PointPrecision& point : precision.points) {
+    const Point3D& of = model.points3D[point.point];
+    std::vector<std::string> cells = {
+        std::to_string(of.id), std::to_string(point.num_rays),
+        FormatNumber(point.angle_deg, 2), FormatNumber(point.rms_px, 3)};
+    Append(Cells(of.xyz, decimals), &cells);
+    Append(Cells(point.sigma, decimals), &cells);
+    table.AddRow(std::move(cells));
+  }
+  text << table.ToString();
+  return text.str();
+}
+
+std::string CheckPointSection(const CheckPoints& check) {
+  std::vector<double> lengths;
+  Vector3d squares = Vector3d::Zero();
+  for (const CheckPoints::Point& point : check.points) {
+    lengths.push_back(point.difference.norm());
+    squares += point.difference.cwiseAbs2();
+  }
+  const int decimals = DecimalsFor(std::move(lengths)) + 1;
+  TextTable table;
+  table.AddRow({"point3D_id", "X", "Y", "Z", "dX", "dY", "dZ", "length"});
+  for (const CheckPoints::Point& point : check.points) {
+    std::vector<std::string> cells = {std::to_string(point.point3D_id)};
+    Append(Cells(point.surveyed, decimals), &cells);
+    Append(Cells(point.difference, decimals), &cells);
+    cells.push_back(FormatNumber(point.difference.norm(), decimals));
+    table.AddRow(std::move(cells));
+  }
+  squares /= static_cast<double>(check.points.size());
+  std::vector<std::string> cells = {"RMS", "", "", ""};
+  Append(Cells(squares.cwiseSqrt(), decimals), &cells);
+  cells.push_back(FormatNumber(std::sqrt(squares.sum()), decimals));
+  table.AddRow(std::move(cells));
+  return "\nCheck points, in the survey's frame and unit, after the similarity "
+         "that fits them best (scale " +
+         FormatLength(check.scale) + ")\n" + table.ToString();
+}
+
+}  // namespace
+
+std::string AdjustmentText(const AdjustmentReport& report, const Model& model) {
+  const AdjustModelSummary& summary = report.summary;
+  std::string text = "KROT " + report.run.version + ", bundle adjustment\n" +
+                     AdjustmentTable(report);
+  if (report.check_points) text += CheckPointSection(*report.check_points);
+  if (!summary.precision) return text;
+  const AdjustmentPrecision& precision = *summary.precision;
+  const PrecisionFigures figures(precision, model);
+  text += "\nPrecision\n" + SummarySection(summary, figures);
+  if (!precision.has_covariances) {
+    text +=
+        "Standard deviations and redundancy numbers are left out: they "
+        "take too long for so many images. Raise --BundleAdjustmentCeres."
+        "max_num_images_direct_sparse_cpu_solver to have them.\n";
+  }
+  if (!precision.cameras.empty()) {
+    text += "\nInterior orientation\n" + CameraSection(precision, model);
+  }
+  text +=
+      "\nExterior orientation: centres, and rotations about the camera's "
+      "own axes; v in px\n" +
+      ImageSection(precision, model);
+  if (precision.has_covariances) {
+    text +=
+        "\nReliability: redundancy numbers r, standardised residuals w "
+        "(data snooping), smallest detectable errors " +
+        FormatNumber(kDelta0, 2) + " sigma0 / sqrt(r)\n" +
+        ReliabilitySection(precision, figures);
+  }
+  return text + PointSections(precision, figures, model);
+}
+
+std::string PrecisionSentence(const AdjustmentPrecision& precision) {
+  return "sigma0 " + FormatNumber(precision.sigma0_px, 4) +
+         " px a posteriori, redundancy " + Thousands(precision.redundancy) +
+         ": " +
+         Thousands(2 * static_cast<int64_t>(precision.observations.size())) +
+         " observed coordinates, " +
+         Counted(precision.num_unknowns, "unknown") + ", datum defect " +
+         std::to_string(precision.datum_defect) + ".";
+}
+
+}  // namespace krot::internal
