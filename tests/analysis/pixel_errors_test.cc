@@ -6,14 +6,13 @@
 #include <limits>
 #include <stdexcept>
 
+#include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
 #include "krot/synthetic/scene.h"
 
 namespace krot::internal {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 SceneOptions SmallScene() {
   SceneOptions options;

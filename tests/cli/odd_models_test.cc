@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -18,8 +19,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using Words = std::vector<std::string>;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 class OddModels : public ::testing::Test {
  protected:

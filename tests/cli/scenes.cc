@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "krot/base/numbers.h"
 #include "krot/convert/build_problem.h"
 #include "krot/model.h"
 
@@ -77,7 +78,6 @@ Model Perturbed(const Model& model, double share, uint64_t seed) {
 
 Model WithoutTranslations(const Model& model) {
   Model result = model;
-  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   for (Frame& frame : result.frames) {
     frame.rig_from_world.translation.setConstant(kNaN);
   }

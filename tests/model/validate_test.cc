@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "krot/base/numbers.h"
 #include "tests/model/tiny_model.h"
 #include "tests/testing/model_matchers.h"
 
@@ -15,7 +16,6 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // What ValidateModel says after this change to a valid model with rigs.

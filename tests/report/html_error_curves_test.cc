@@ -10,10 +10,10 @@
 
 #include <gtest/gtest.h>
 
+#include "krot/base/numbers.h"
+
 namespace krot::internal {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // As real errors: most are small, a few large.
 std::vector<double> SomeErrors(int count) {

@@ -183,6 +183,8 @@ int RunOrFail(const std::string& who,
     return Fail(who, error.what(), error.exit_code());
   } catch (const OptionError& error) {
     return Fail(who, error.what(), kExitOptions);
+  } catch (const NoCeresError& error) {
+    return Fail(who, error.what(), kExitOptions);
   } catch (const CheckpointError& error) {
     return Fail(who, error.what(), kExitOptions);
   } catch (const ModelError& error) {

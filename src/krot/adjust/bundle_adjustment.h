@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -33,10 +34,17 @@ struct BundleAdjustmentResult {
 // run.
 //
 // Requires a valid model (ValidateModel). Throws ModelError for cameras without
-// an image plane and std::invalid_argument for options out of range.
+// an image plane, std::invalid_argument for options out of range and
+// NoCeresError in a build without Ceres.
 BundleAdjustmentResult AdjustBundle(const Model& model,
                                     const BundleAdjustmentOptions& options,
                                     const Context& context = {});
+
+// What adjusts is not in this build.
+class NoCeresError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 // Ceres warns on stderr, through glog, of steps that it could not take, which
 // the summary tells as well. From now on, everything in this process that logs

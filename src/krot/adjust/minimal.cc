@@ -8,8 +8,9 @@ namespace krot::internal {
 BundleAdjustmentResult AdjustBundle(const Model&,
                                     const BundleAdjustmentOptions&,
                                     const Context&) {
-  throw std::invalid_argument(
-      "bundle adjustment is not in this build, which has no Ceres");
+  throw NoCeresError(
+      "bundle adjustment needs Ceres, which this krot was built without; take "
+      "a krot with Ceres");
 }
 
 BundleAdjustmentResult AdjustBundle(const Model& model,
