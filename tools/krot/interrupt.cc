@@ -19,14 +19,14 @@ static_assert(CancelFlag::is_always_lock_free,
               "a signal handler may set lock-free atomics only");
 
 // Made in advance: a signal handler allocates nothing.
-std::array<char, 128> sentence;
+std::array<char, 128> interrupt_sentence;
 size_t sentence_length = 0;
 
 void SetInterrupted() { interrupted.store(true); }
 
 void End() {
   is_ending.store(true);
-  WriteToStderr({sentence.data(), sentence_length});
+  WriteToStderr({interrupt_sentence.data(), sentence_length});
   std::_Exit(kExitInterrupted);
 }
 
@@ -36,8 +36,8 @@ void EndOnInterrupt(const std::string& who) {
   // A bar may stand on a terminal's line.
   const std::string text = (IsStderrTerminal() ? "\n" : "") + who +
                            ": interrupted, nothing was written\n";
-  sentence_length = std::min(text.size(), sentence.size());
-  std::copy_n(text.begin(), sentence_length, sentence.begin());
+  sentence_length = std::min(text.size(), interrupt_sentence.size());
+  std::copy_n(text.begin(), sentence_length, interrupt_sentence.begin());
   OnEndRequest(&End, /*once=*/false);
 }
 

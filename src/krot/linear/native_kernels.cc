@@ -19,14 +19,14 @@ using Vector = Eigen::Map<Eigen::VectorXd>;
 using ConstVector = Eigen::Map<const Eigen::VectorXd>;
 
 ConstTile At(const MatrixTile& tile) {
-  return {tile.numbers, tile.rows, tile.columns,
-          Eigen::OuterStride<>(tile.stride)};
+  return ConstTile(tile.numbers, tile.rows, tile.columns,
+                   Eigen::OuterStride<>(tile.stride));
 }
 
 // What the callers own.
 Tile Mutable(const MatrixTile& tile) {
-  return {const_cast<double*>(tile.numbers), tile.rows, tile.columns,
-          Eigen::OuterStride<>(tile.stride)};
+  return Tile(const_cast<double*>(tile.numbers), tile.rows, tile.columns,
+              Eigen::OuterStride<>(tile.stride));
 }
 
 // So many numbers side by side. Runs are short, often of six: compilers that

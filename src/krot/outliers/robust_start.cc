@@ -259,7 +259,7 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   const std::vector<int64_t> tracks = ConnectedTracks(problem);
   const ProblemSubset part(problem, tracks);
   const bool is_full =
-      problem.num_frames > kCoreFrames &&
+      problem.num_frames > kCoreFrames && !HasFixed(problem) &&
       ReducedCameraSystem(AnchoredStructure(part.problem())).kind() !=
           ReducedCameraSystem::Kind::kSparse;
   Estimate estimate =
