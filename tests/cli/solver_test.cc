@@ -124,7 +124,7 @@ TEST_F(Commands, SolverReportsEveryKeyOfItsContract) {
           "linear_relative_gap", "is_given_back", "contradictions", "finish",
           "same_image", "outliers", "rotations", "fixed", "positions",
           "support_positions", "poses", "not_held", "announced_memory_bytes",
-          "verdict", "collapse", "is_underdetermined", "matches"));
+          "verdict", "collapse", "is_underdetermined", "matches", "distances"));
   EXPECT_THAT(Keys(report["finish"]),
               ::testing::UnorderedElementsAre(
                   "finish", "loss", "termination", "cap", "lowest_cost",

@@ -70,9 +70,10 @@ struct RemovalStart {
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
   double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
-  // From nothing without a bound: no error is far above what noise explains,
-  // so that no observation may have to go, at the start or at the positions
-  // that the model has of its own.
+  // From nothing without a bound: the start's errors are not far above what
+  // noise explains, so that no observation may have to go; or the model has
+  // positions of its own, at which noise explains half of its errors and none
+  // is gross (init_max_error).
   bool nearly_fits = false;
   bool fits_its_positions = false;
 };

@@ -1,7 +1,6 @@
 #include "krot/outliers/filter_steps.h"
 
 #include <algorithm>
-#include <limits>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -37,15 +36,19 @@ void PlaceFromTracks(Norm norm, double level, const Context& context,
                Pixels(MedianError(problem, start->built.start, norm)));
 }
 
-// The largest error at the model's own positions; infinite without any.
-double LargestErrorOf(const Model& model, const OutlierFilterOptions& options,
-                      const Context& context) {
+// Whether the model has positions at which noise explains half of its errors
+// and none is gross.
+bool FitsItsPositions(const Model& model, const OutlierFilterOptions& options,
+                      const Context& context, double explained) {
   BuildProblemOptions build = options.solve.problem;
   build.num_threads = context.num_threads;
   const BuiltProblem own = BuildProblem(model, build);
-  if (!HasOwnStart(own)) return std::numeric_limits<double>::infinity();
-  return Reprojection(model, own)
-      .TrueCost(own.start, options.solve.norm, context.num_threads);
+  const Norm norm = options.solve.norm;
+  return HasOwnStart(own) &&
+         MedianError(own.problem, own.start, norm) <= explained &&
+         Reprojection(model, own)
+                 .TrueCost(own.start, norm, context.num_threads) <=
+             options.solve.init_max_error;
 }
 
 }  // namespace
@@ -77,8 +80,8 @@ RemovalStart FindRemovalStart(const Model& model,
         Reprojection(model, start.built)
             .TrueCost(start.built.start, norm, context.num_threads);
     start.nearly_fits = largest <= kNearlyFits * start.max_error;
-    start.fits_its_positions = LargestErrorOf(model, options, context) <=
-                               kNearlyFits * start.max_error;
+    start.fits_its_positions =
+        FitsItsPositions(model, options, context, start.max_error);
     if (options.spares_what_fits &&
         (start.nearly_fits || start.fits_its_positions)) {
       return start;
