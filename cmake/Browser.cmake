@@ -4,8 +4,8 @@
 # krot_browser_link(<target>)
 #
 # A function createKrot() that makes an instance with a file system of its own;
-# its callMain runs one command. -O1 is for this step alone, in which a minute of
-# optimisation makes the page smaller by 3 % and no command faster.
+# its callMain runs one command. -O1 is for this step alone: to optimise the
+# whole once more takes a minute and makes no command faster.
 function(krot_browser_link target)
   target_link_options(${target} PRIVATE -O1
     -sMODULARIZE=1 -sEXPORT_NAME=createKrot -sINVOKE_RUN=0

@@ -1,13 +1,11 @@
 #!/usr/bin/env bash
 # Tries build-windows/krot.exe under wine: that it makes of the sample what
-# build-linux/krot does, to the bit, and what Windows has in a way of its own. With CLI_TEST,
-# the executable of tests/cli, its tests that need neither colmap nor Linux are
-# run on krot.exe, too.
+# build-linux/krot does, to the bit, and what Windows has in a way of its own.
 #
-# Usage: tools/test_windows.sh [CLI_TEST]
+# Usage: tools/test_windows.sh
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
-(($# <= 1)) || die "usage: tools/test_windows.sh [CLI_TEST]"
+(($# == 0)) || die "usage: tools/test_windows.sh"
 linux=$root/build-linux/krot
 program=$root/build-windows/krot.exe
 [[ -x $linux && -e $program ]] \
@@ -113,11 +111,4 @@ python3 ../interrupt.py wine "$program" solver --input_path model \
 grep "interrupted" ../out
 [[ $(<windows/notes.md) == mine ]] || fails "a file beside the model is lost"
 
-if (($# == 1)); then
-  say "The command line's tests"
-  printf '#!/bin/sh\nexec wine "%s" "$@"\n' "$program" >../krot
-  chmod +x ../krot
-  KROT_UNDER_TEST=$scratch/krot "$1" --gtest_brief=1 "--gtest_filter=$(
-    printf '%s' '*-Documentation*')"
-fi
 say "Done: krot.exe was run $num_tried times"

@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cstdlib>
 #include <stdexcept>
 #include <thread>
 
@@ -24,8 +23,7 @@ void Redirect(int descriptor, const std::filesystem::path& file) {
 
 KrotProcess::KrotProcess(const std::vector<std::string>& arguments,
                          uint64_t max_memory_bytes) {
-  const char* const other = std::getenv("KROT_UNDER_TEST");
-  std::vector<std::string> words = {other == nullptr ? KROT_EXECUTABLE : other};
+  std::vector<std::string> words = {KROT_EXECUTABLE};
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());

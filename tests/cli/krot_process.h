@@ -21,8 +21,7 @@ struct KrotResult {
   std::string err;
 };
 
-// A running `krot`: the one that this build made, or the program that the
-// environment variable KROT_UNDER_TEST names (tools/test_windows.sh).
+// A running `krot`, the one that this build made.
 class KrotProcess {
  public:
   // `max_memory_bytes` bounds its address space; 0: no bound.

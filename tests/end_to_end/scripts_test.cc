@@ -201,6 +201,15 @@ TEST_F(Scripts, ReadAPhotogrammetricProject) {
   for (size_t k = 0; k < scene.points3D.size(); ++k) {
     EXPECT_LT((converted.points3D[k].xyz - scene.points3D[k].xyz).norm(), 1e-6);
   }
+
+  const ScriptResult of_other_files = RunScript(
+      "photogrammetry_to_colmap.py",
+      {"dbat", folder_ / "eo.txt", folder_ / "images.txt", folder_ / "eo.txt",
+       folder_ / "points.txt", folder_ / "other"});
+  EXPECT_EQ(of_other_files.exit_code, 1);
+  EXPECT_THAT(of_other_files.err,
+              ::testing::StartsWith("found no dbat project in "));
+  EXPECT_FALSE(fs::exists(folder_ / "other"));
 }
 
 bool HasColmapAndJq() {

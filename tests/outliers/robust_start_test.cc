@@ -168,11 +168,11 @@ TEST(FindParts, LeavesWholeWhatManyTracksHold) {
 TEST(FindParts, IsNotMisledByGroupsWithoutTracksOfTheirOwn) {
   SceneOptions options = Scene(0, 0);
   options.layout = SceneLayout::kOrbit;
-  options.num_frames = 300;
-  options.num_points = 3000;
+  options.num_frames = 600;
+  options.num_points = 6000;
   options.track_length = 8;
   EXPECT_EQ(FindParts(ProblemOf(SynthesizeScene(options).model), {}),
-            std::vector<int32_t>(300, 0));
+            std::vector<int32_t>(600, 0));
 }
 
 TEST(FindRobustStart, HoldsTheScaleOfPartsThatTenTracksJoinHalfOfThemWrong) {

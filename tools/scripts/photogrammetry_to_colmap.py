@@ -181,9 +181,15 @@ def aicon(name, out):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) == 7 and sys.argv[1] == "dbat":
-        dbat(*sys.argv[2:])
-    elif len(sys.argv) == 4 and sys.argv[1] == "aicon":
-        aicon(*sys.argv[2:])
-    else:
+    commands = {("dbat", 7): dbat, ("aicon", 4): aicon}
+    command = commands.get((sys.argv[1] if sys.argv[1:] else "", len(sys.argv)))
+    if not command:
         sys.exit(__doc__)
+    try:
+        command(*sys.argv[2:])
+    except OSError as error:
+        sys.exit(f"{error.filename}: cannot be read or written: "
+                 f"{error.strerror}")
+    except (AttributeError, IndexError, KeyError, ValueError) as error:
+        sys.exit(f"found no {sys.argv[1]} project in {sys.argv[2:-1]}, expected "
+                 f"the files that --help describes: {error!r}")

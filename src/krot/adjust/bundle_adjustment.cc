@@ -207,7 +207,7 @@ BundleAdjustmentResult AdjustBundle(
   }
   result.model = ApplyBlocks(model, before, blocks);
   if (precision != nullptr && summary.num_parameters > 0 && cost) {
-    context.Note("computing standard deviations and redundancy numbers");
+    context.Stage("computing standard deviations and redundancy numbers");
     *precision =
         FindPrecision(result.model, options, columns, blocks, datum, context);
   }

@@ -15,6 +15,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
+#include "krot/geometry/transform.h"
 #include "krot/linear/blocks.h"
 
 namespace krot::internal {
@@ -27,13 +28,6 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 constexpr int kPoint = 0;
 constexpr int kFrame = 1;
 constexpr int kSensor = 2;
-
-// [a]x, so that [a]x b = a x b.
-Eigen::Matrix3d CrossMatrix(const Vector3d& a) {
-  Eigen::Matrix3d matrix;
-  matrix << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
-  return matrix;
-}
 
 // x -> R(q) x + t for a block qw qx qy qz tx ty tz of unit quaternion, with
 //   R(q) x = x + 2 w (v x x) + 2 v x (v x x),  q = (w, v).

@@ -6,6 +6,7 @@
 
 #include "krot/adjust/precision_system.h"
 #include "krot/geometry.h"
+#include "krot/geometry/transform.h"
 
 namespace krot::internal {
 namespace {
@@ -19,12 +20,6 @@ using Similar = Eigen::Matrix<double, 3, 7>;
 
 // Of the largest eigenvalue of a Gram matrix: below is rounding.
 constexpr double kNothing = 1e-12;
-
-Matrix3d Cross(const Vector3d& x) {
-  Matrix3d matrix;
-  matrix << 0, -x.z(), x.y(), x.z(), 0, -x.x(), -x.y(), x.x(), 0;
-  return matrix;
-}
 
 // x -> x + unit t + omega x (x - O) + s (x - O), for the parts of a component.
 class Motion {
@@ -50,7 +45,8 @@ class Motion {
 
   Similar OfPlace(const Vector3d& x) const {
     Similar rows;
-    rows << unit_ * Matrix3d::Identity(), -Cross(x - origin_), x - origin_;
+    rows << unit_ * Matrix3d::Identity(), -CrossMatrix(x - origin_),
+        x - origin_;
     return rows;
   }
   // R -> R exp(-[omega]), AdjustmentColumns::Pose.

@@ -12,6 +12,7 @@
 #include "krot/base/parallel_for.h"
 #include "krot/check.h"
 #include "krot/geometry.h"
+#include "krot/geometry/transform.h"
 
 namespace krot::internal {
 namespace {
@@ -203,7 +204,7 @@ class PrecisionOfAdjustment {
         const Vector3d c = R_frame.transpose() *
                            Center({RotationOf(sensor), TranslationOf(sensor)});
         R = RotationOf(sensor) * R_frame;
-        lever << 0, -c.z(), c.y(), c.z(), 0, -c.x(), -c.y(), c.x(), 0;
+        lever = CrossMatrix(c);
         const AdjustmentColumns::Pose& of_sensor =
             columns_.sensors[part.sensor];
         add(of_sensor.rotation, RotationOf(sensor), Matrix3d::Zero());

@@ -213,8 +213,7 @@ class PointCovariance {
 // Of an estimate of the model's as it stands, all errors weighing the same.
 // Beyond options.max_num_images_direct_sparse images there are no covariances
 // and redundancy numbers: with n unknowns besides the points they take 16 n^2
-// bytes and O(n^3), for 1000 images some minutes. The same bits at any number
-// of threads.
+// bytes and O(n^3). The same bits at any number of threads.
 AdjustmentPrecision FindPrecision(const Model& model,
                                   const BundleAdjustmentOptions& options,
                                   const AdjustmentColumns& columns,

@@ -145,13 +145,9 @@ void Snooper::Measure() {
       std::max(std::sqrt(Quantile(0.5, &variances)), SmallestSigma(model_)));
   // The median of n exponential variables is spread as the mean of n log(2)^2.
   noise_.degrees_of_freedom = std::pow(std::log(2.0), 2) * redundancy;
-  // w^2 / 2 is F distributed: P(w^2 > x) = (1 + x / nu)^(-nu / 2).
-  const double nu = noise_.degrees_of_freedom;
-  const double log_odds =
-      std::log(static_cast<double>(noise_.num_tested) / options_.false_alarm);
-  noise_.critical_w = given_sigma_
-                          ? std::sqrt(2 * log_odds)
-                          : std::sqrt(nu * std::expm1(2 / nu * log_odds));
+  noise_.critical_w =
+      CriticalW(noise_.num_tested, options_.false_alarm,
+                given_sigma_ ? kInfinity : noise_.degrees_of_freedom);
   for (uint64_t e = 0; e < model_.track_elements.size(); ++e) {
     if (IsTested(e)) tracks_.SetW(e, StandardizedErrorOf(e));
     noise_.num_above += Of(e).w > noise_.critical_w;
@@ -225,6 +221,15 @@ ModelNoise Snooper::TakeNoise() {
 }
 
 }  // namespace
+
+double CriticalW(int64_t num_tested, double false_alarm,
+                 double degrees_of_freedom) {
+  const double log_odds =
+      std::log(static_cast<double>(num_tested) / false_alarm);
+  if (std::isinf(degrees_of_freedom)) return std::sqrt(2 * log_odds);
+  return std::sqrt(degrees_of_freedom *
+                   std::expm1(2 / degrees_of_freedom * log_odds));
+}
 
 // Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
 double StandardizedError(double chi2, int num_directions) {

@@ -42,6 +42,13 @@ struct NoiseSnooping {
 // same probability. NaN of none.
 double StandardizedError(double chi2, int num_directions);
 
+// The w that the largest of so many exceeds by noise with the probability
+// `false_alarm`, where the standard deviation is itself an estimate with so
+// many degrees of freedom: w^2 / 2 is F distributed, and P(w^2 > x) =
+// (1 + x / nu)^(-nu / 2).
+double CriticalW(int64_t num_tested, double false_alarm,
+                 double degrees_of_freedom);
+
 // Of every track the observation with the largest w is removed, if that is
 // above the critical value, and the track is fitted anew; then sigma and the
 // critical value are taken anew, until nothing is above. The largest w is the

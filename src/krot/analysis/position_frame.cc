@@ -11,6 +11,7 @@
 #include "krot/analysis/model_comparison.h"
 #include "krot/base/numbers.h"
 #include "krot/context.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -26,19 +27,6 @@ constexpr double kLeastScatter = 1e-6;
 constexpr double kOnLine = 3e-5;
 // The standard deviation of a turn about the line that is too large, radians.
 constexpr double kLooseTurn = 1.0 / 3;
-
-Vector3d MedianOf(const std::vector<FramePair>& pairs,
-                  Vector3d PosePair::*center) {
-  Vector3d median;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> values;
-    for (const FramePair& pair : pairs) {
-      values.push_back((pair.pose.*center)[axis]);
-    }
-    median[axis] = LowerMedian(std::move(values));
-  }
-  return median;
-}
 
 // How far places lie from their best line and along it, root mean squares.
 struct LineFit {
@@ -131,8 +119,13 @@ class FrameFinder {
       pairs_.push_back(pair);
     }
     if (pairs_.empty()) return;
-    own_origin_ = MedianOf(pairs_, &PosePair::center1);
-    model_origin_ = MedianOf(pairs_, &PosePair::center2);
+    std::vector<Vector3d> own, in_model;
+    for (const FramePair& pair : pairs_) {
+      own.push_back(pair.pose.center1);
+      in_model.push_back(pair.pose.center2);
+    }
+    own_origin_ = MedianPlace(own);
+    model_origin_ = MedianPlace(in_model);
     for (FramePair& pair : pairs_) {
       pair.pose.center1 -= own_origin_;
       pair.pose.center2 -= model_origin_;

@@ -42,7 +42,8 @@ struct PositionFrame {
 // one with the least sum of squares of distances by radii, none of which counts
 // for more than 1; refined on what agrees. Where no majority agrees to its
 // radii, or radii are unknown (zero), the one with the least median. A position
-// is wrong if it is farther off than its radius and 2.6 times the median.
+// is wrong if it is farther off than its radius and 2.6 times the median (more,
+// of few positions).
 //
 // Requires a valid model. Throws ModelError, which begins with `source`, for
 // fewer than three positions of what the model places, for those on a line, up

@@ -35,13 +35,11 @@ struct CommonMove {
 CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
   CommonMove move;
   move.scale = scale;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> shifts;
-    for (const CameraMove& camera : cameras) {
-      shifts.push_back(camera.before[axis] - scale * camera.after[axis]);
-    }
-    move.shift[axis] = LowerMedian(std::move(shifts));
+  std::vector<Vector3d> shifts;
+  for (const CameraMove& camera : cameras) {
+    shifts.push_back(camera.before - scale * camera.after);
   }
+  move.shift = MedianPlace(shifts);
   return move;
 }
 
@@ -94,6 +92,22 @@ double Radius(const std::vector<CameraMove>& cameras,
 }
 
 }  // namespace
+
+Eigen::Matrix3d CrossMatrix(const Vector3d& a) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+  return matrix;
+}
+
+Vector3d MedianPlace(const std::vector<Vector3d>& places) {
+  Vector3d median;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> values;
+    for (const Vector3d& place : places) values.push_back(place[axis]);
+    median[axis] = LowerMedian(std::move(values));
+  }
+  return median;
+}
 
 std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
                                 bool scale_is_free) {

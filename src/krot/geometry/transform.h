@@ -6,6 +6,12 @@
 
 namespace krot::internal {
 
+// [a]x, so that [a]x b = a x b.
+Eigen::Matrix3d CrossMatrix(const Eigen::Vector3d& a);
+
+// The median (LowerMedian) of each coordinate; there must be one place.
+Eigen::Vector3d MedianPlace(const std::vector<Eigen::Vector3d>& places);
+
 // A camera of two models of one scene, which have the same axes.
 struct CameraMove {
   Eigen::Vector3d before = Eigen::Vector3d::Zero();  // its centre

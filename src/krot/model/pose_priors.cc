@@ -11,6 +11,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "krot/base/numbers.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/sqlite_rows.h"
 
 namespace krot::internal {
@@ -127,12 +128,7 @@ void TakeIntoLocalFrame(const Model& model, SqliteDatabase* database,
     }
     places.push_back(EarthCentred(prior.position));
   }
-  Vector3d median;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<double> values;
-    for (const Vector3d& place : places) values.push_back(place[axis]);
-    median[axis] = LowerMedian(std::move(values));
-  }
+  const Vector3d median = MedianPlace(places);
   size_t nearest = 0;
   for (size_t n = 0; n < places.size(); ++n) {
     if ((places[n] - median).norm() < (places[nearest] - median).norm()) {

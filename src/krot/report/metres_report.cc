@@ -23,10 +23,10 @@ std::string PositionFrameSentence(const PositionFrame& frame) {
       Metres(frame.own_from_model.scale);
   if (frame.radius) {
     text += "; every radius is " + Metres(*frame.radius) +
-            ", 2.6 times that, as the file has none";
+            " by their scatter, as the file has none";
   } else if (frame.tolerance > 1) {
     text += "; up to " + FormatNumber(frame.tolerance, 1) +
-            " radii count as agreement, 2.6 times the median";
+            " radii count as agreement, by their scatter";
   }
   return text;
 }

@@ -16,7 +16,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kHighCorrelation = 0.95;
-constexpr double kFalseAlarm = 0.05;  // as NoiseOptions
 
 }  // namespace
 
@@ -41,12 +40,9 @@ PrecisionFigures::PrecisionFigures(const AdjustmentPrecision& precision,
     num_tested += o.precision->num_controlled > 0;
     num_uncontrolled += o.precision->num_controlled < 2;
   }
-  const auto nu = static_cast<double>(precision.redundancy);
   if (num_tested > 0) {
-    critical_w = std::sqrt(
-        nu *
-        std::expm1(2 / nu *
-                   std::log(static_cast<double>(num_tested) / kFalseAlarm)));
+    critical_w = CriticalW(num_tested, NoiseOptions().false_alarm,
+                           static_cast<double>(precision.redundancy));
   }
   for (const NamedObservation& o : all) num_above += o.w > critical_w;
 }
@@ -65,6 +61,7 @@ std::vector<NamedObservation> PrecisionFigures::Worst(const Key& key) const {
   worst.resize(count);
   return worst;
 }
+
 std::vector<NamedObservation> PrecisionFigures::LargestResiduals() const {
   return Worst([](const NamedObservation& o) { return o.error_px; });
 }

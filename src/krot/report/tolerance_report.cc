@@ -135,9 +135,15 @@ Json LengthsJson(const std::vector<ToleranceLength>& lengths) {
   return json;
 }
 
-// Six significant digits.
-std::string LengthText(const std::optional<double>& length) {
+// Six significant digits. Of proved ends the last one is `outwards`, -1 or 1,
+// of the number: more is not proved.
+std::string LengthText(std::optional<double> length, int outwards = 0) {
   if (!length) return "-";
+  if (outwards != 0 && *length > 0) {
+    constexpr double kSame = 1e-9;  // units of the last digit
+    const double unit = std::pow(10, std::floor(std::log10(*length)) - 5);
+    length = unit * outwards * std::ceil(outwards * *length / unit - kSame);
+  }
   std::ostringstream text;
   text << std::setprecision(6) << *length;
   return text.str();
@@ -161,9 +167,9 @@ std::string LengthTable(const ToleranceSummary& summary) {
   std::string contradictions;
   bool has_free = false;
   for (const ToleranceLength& length : lengths) {
-    table.AddRow({length.name, LengthText(length.low.proved),
-                  LengthText(length.high.proved), FormatLength(length.length),
-                  LengthText(length.metres),
+    table.AddRow({length.name, LengthText(length.low.proved, -1),
+                  LengthText(length.high.proved, 1),
+                  FormatLength(length.length), LengthText(length.metres),
                   length.metres ? FormatLength(length.tolerance) : "-"});
     has_free = has_free || !length.low.proved;
     if (!length.IsContradicted() || !is_metric) continue;

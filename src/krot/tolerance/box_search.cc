@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -20,9 +19,6 @@ constexpr int kGrowth = 2;
 constexpr int kMaxRounds = 12;
 // Bisection along the segment from the centre ends with this share of it.
 constexpr double kSegmentStep = 1.0 / 1024;
-
-// The relative rounding error of the few operations behind a proof.
-constexpr double kRoundingOfSums = 8 * std::numeric_limits<double>::epsilon();
 
 // The same pulls in a part of the problem; none unless it holds all.
 std::optional<Pulls> AllInPart(const ProblemSubset& part, const Pulls& pulls) {
@@ -125,7 +121,7 @@ class EndSearch {
     }
     end.reached += constant;
     if (end.proved && moving.size() < pulls.size()) {
-      *end.proved += constant + kRoundingOfSums * size;
+      *end.proved += constant + kProofRounding * size;
     }
     return end;
   }
@@ -289,8 +285,8 @@ LengthRange FindLength(const ToleranceProblem& problem, const Pair& targets,
   if (IsConstant(whole, targets)) {
     const double size = PositionOf(whole, problem.centre(), targets[0]).norm();
     range.low.proved =
-        std::max(at_centre - kRoundingOfSums * (size + at_centre), 0.);
-    range.high.proved = at_centre + kRoundingOfSums * (size + at_centre);
+        std::max(at_centre - kProofRounding * (size + at_centre), 0.);
+    range.high.proved = at_centre + kProofRounding * (size + at_centre);
     return range;
   }
   const std::optional<ProblemSubset> usable =
@@ -335,8 +331,8 @@ LengthRange FindLength(const ToleranceProblem& problem, const Pair& targets,
   }
   range.num_programmes = search.num_programmes();
   if (!is_proved) return range;
-  range.low.proved = std::max(*least * (1 - kRoundingOfSums), 0.);
-  range.high.proved = farthest.norm() * (1 + kRoundingOfSums);
+  range.low.proved = std::max(*least * (1 - kProofRounding), 0.);
+  range.high.proved = farthest.norm() * (1 + kProofRounding);
   return range;
 }
 

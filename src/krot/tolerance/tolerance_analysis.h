@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,10 @@ using Pulls = std::vector<Pull>;
 
 double Along(const KnownRotationProblem& problem, const Estimate& estimate,
              const Pulls& pulls);
+
+// The relative rounding error of the few operations behind a proof's check.
+inline constexpr double kProofRounding =
+    8 * std::numeric_limits<double>::epsilon();
 
 // A row that keeps the scale where nothing else does: direction'x of a view's
 // centre or a point stays what it is at the start.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <Eigen/LU>
@@ -22,8 +21,6 @@ constexpr double kFarAway = 1e4;
 // A proof is tried once the gap is below so many times the tolerance, because a
 // later one, with a smaller gap, may fail.
 constexpr double kFirstProof = 20;
-// The relative rounding error of the few operations after the check.
-constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
 
 // The upper bound of the sum that the multipliers prove, if any.
 std::optional<double> Prove(const KnownRotationProblem& problem,
@@ -48,7 +45,7 @@ std::optional<double> Prove(const KnownRotationProblem& problem,
   const ExtentCheck check = CheckExtent(problem, options.norm, certificate);
   if (!check.is_accepted) return std::nullopt;
   return check.extent - kept +
-         kRounding * (std::abs(check.extent) + std::abs(kept));
+         kProofRounding * (std::abs(check.extent) + std::abs(kept));
 }
 
 // The largest distance of a frame or a point from a pull's position.

@@ -118,8 +118,8 @@ class FixedConstants {
 };
 
 // What pulls from outside at the centre of a view or at a point, world
-// coordinates. Forces balance with it that add up to the pull
-// at the view's frame, and to its negative at the point.
+// coordinates. Forces balance with it that add up to the pull at the view's
+// frame, and to its negative at the point.
 struct Pull {
   enum class Kind { kView, kPoint };
   Kind kind = Kind::kView;
@@ -143,9 +143,9 @@ std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull);
 // beside them whose forces balance exactly, with pulls if there are any, how
 // far away those are at most, and what the constants of the rows add up to.
 //
-// Forces balance but for g; changing those of a spanning
-// forest balances them exactly. The change F_i of a force is one of
-// (delta lambda_i; y_i) by E_i^-T F_i.
+// Forces balance but for g; changing those of a spanning forest balances them
+// exactly. The change F_i of a force is one of (delta lambda_i; y_i) by
+// E_i^-T F_i.
 //
 // Of what RefuseNumbers lets pass: Balance first and, unless it refuses, the
 // others.
