@@ -33,7 +33,7 @@ TEST_F(Scarcity, OfMemoryEndsWithASentence) {
   Save(SynthesizeScene(options).model, folder_ / "input");
   const KrotResult result =
       RunKrot({"solver", "--input_path", folder_ / "input", "--output_path",
-               folder_ / "output"},
+               folder_ / "output", "--log_level", "0"},
               100 * kMegabyte);
   EXPECT_EQ(result.exit_code, 6);
   EXPECT_THAT(result.err, IsOneSentence("krot solver", "out of memory"));
