@@ -447,26 +447,62 @@ Model WithFewObservationsOf(size_t image, int num_kept, const Model& model) {
 
 Eigen::Vector2d Position(const Point2D& point) { return {point.x, point.y}; }
 
-TEST(CheckModel, CallsAnImageWeaklyHeldWhoseObservationsAreInOneCorner) {
-  Model model = Scene(4, 10, 5);
-  Image& image = model.images[7];
-  const Eigen::Vector2d corner = Position(image.points2D[0]);
+// The image keeps the observations nearest to one of its own.
+Model WithObservationsInOneCorner(size_t image, size_t num_kept,
+                                  const Model& model) {
+  const Image& kept = model.images[image];
+  const Eigen::Vector2d corner = Position(kept.points2D[0]);
+  const auto distance = [&](const Point2D& point) {
+    return (Position(point) - corner).norm();
+  };
   std::vector<double> distances;
-  for (const Point2D& point : image.points2D) {
-    distances.push_back((Position(point) - corner).norm());
+  for (const Point2D& point : kept.points2D) {
+    distances.push_back(distance(point));
   }
   std::sort(distances.begin(), distances.end());
   std::vector<char> is_removed;
   for (const TrackElement& element : model.track_elements) {
-    const Point2D& point = image.points2D[element.point2D_idx];
-    is_removed.push_back(element.image_id == image.id &&
-                         (Position(point) - corner).norm() > distances[16]);
+    is_removed.push_back(element.image_id == kept.id &&
+                         distance(kept.points2D[element.point2D_idx]) >=
+                             distances[num_kept]);
   }
-  model = RemoveObservations(model, is_removed).model;
+  return RemoveObservations(model, is_removed).model;
+}
+
+TEST(CheckModel, CallsAnImageWeaklyHeldWhoseObservationsAreInOneCorner) {
+  const Model model = WithObservationsInOneCorner(7, 17, Scene(4, 10, 5));
   const ModelCheck check = CheckModel(model, {}, {});
   EXPECT_THAT(Images(check, ImageVerdict::kWeaklyHeld),
               ElementsAre(model.images[7].id));
   EXPECT_FALSE(check.IsAnythingWrong());
+}
+
+// Less than half of them contradict, but more than three times the noise would
+// have, and what agrees does not hold the image.
+TEST(CheckModel, CallsAnImageWrongThatIsWeaklyHeldAndContradicted) {
+  SceneOptions options;
+  options.num_frames = 10;
+  options.num_points = 6000;
+  options.track_length = 5;
+  options.pixel_noise = 1;
+  const Model scene = SynthesizeScene(options).ground_truth;
+  for (const int percent : {0, 10, 45}) {
+    Model model = WithObservationsInOneCorner(7, 120, scene);
+    const ImageId id = model.images[7].id;
+    int num = 0;
+    for (size_t e = 0; e < model.track_elements.size(); ++e) {
+      if (model.track_elements[e].image_id != id) continue;
+      if (++num * percent % 100 < percent) Pixel(&model, e).y += 40;
+    }
+    const ModelCheck check = CheckModel(model, {}, {});
+    if (percent < 45) {
+      EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty()) << percent;
+      continue;
+    }
+    EXPECT_THAT(Images(check, ImageVerdict::kWrong), ElementsAre(id));
+    EXPECT_EQ(check.images[7].fault, ImageFault::kUnsupported);
+    EXPECT_GT(check.images[7].num_tested, 2 * check.images[7].num_wrong);
+  }
 }
 
 TEST(CheckModel, CallsAnImageWrongThatNothingHolds) {

@@ -191,25 +191,37 @@ class Checker {
     return worst;
   }
 
-  // Those that neither tracks nor matches hold, all at once: so few
-  // observations bend nothing. False if there are none.
+  // Those that neither tracks nor matches hold. The few observations of most
+  // bend nothing, so they go at once; where more contradict than noise
+  // explains, only the one that is held most weakly goes. False if there are
+  // none.
   bool CallUnsupported() {
     const double spread =
         MedianOfSound([&](size_t n) { return sums_[n].CenterSpread(); });
-    bool is_any = false;
+    std::vector<int32_t> few;
+    int32_t weakest = -1;
     for (size_t n = 0; n < check_.images.size(); ++n) {
-      ImageCheck& image = check_.images[n];
-      if (image.verdict == ImageVerdict::kWrong ||
-          image.num_tested - image.num_wrong >= kFewestAgree ||
-          RelativeKept(n) >= 1 ||
+      const ImageCheck& image = check_.images[n];
+      if (image.verdict == ImageVerdict::kWrong || RelativeKept(n) >= 1 ||
           (check_.pairs && check_.pairs->images[n].kept_matches > 0) ||
           sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
         continue;
       }
-      image.fault = ImageFault::kUnsupported;
-      is_any = CallWrong(static_cast<int32_t>(n));
+      const auto id = static_cast<int32_t>(n);
+      if (image.num_tested - image.num_wrong < kFewestAgree) {
+        few.push_back(id);
+      } else if (ContradictionExponent(n) > LeastExponent(n) &&
+                 (weakest < 0 ||
+                  sums_[n].CenterSpread() > sums_[weakest].CenterSpread())) {
+        weakest = id;
+      }
     }
-    return is_any;
+    if (few.empty() && weakest >= 0) few.push_back(weakest);
+    for (const int32_t n : few) {
+      check_.images[n].fault = ImageFault::kUnsupported;
+      CallWrong(n);
+    }
+    return !few.empty();
   }
 
   // A bound exp(-x) on the probability of a test is low enough, over all
