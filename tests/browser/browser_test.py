@@ -24,7 +24,10 @@ if __name__ == "__main__":
     krot_page.OPEN_BROWSER = browser
     krot_page.KROT, krot_page.PAGE, krot_page.SAMPLE = (
         pathlib.Path(path).resolve() for path in sys.argv[2:5])
-    tests = sys.argv[5:] or ["computing_test", "using_test"]
-    if browser is Chromium and not sys.argv[5:]:  # one browser is enough for words
-        tests.append("refusing_test")
+    # One browser is enough for all that the page computes and says.
+    tests = sys.argv[5:] or {
+        Chromium: ["computing_test", "using_test", "refusing_test"],
+        Firefox: ["computing_test.Computing."
+                  "test_solves_the_sample_as_the_command_line_does",
+                  "using_test"]}[browser]
     unittest.main(module=None, argv=sys.argv[:1] + tests, verbosity=2)
