@@ -23,8 +23,6 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-// Of the largest eigenvalue: below is rounding.
-constexpr double kNoDirection = 1e-13;
 // Of a pose's system with ones on the diagonal: what nothing holds.
 constexpr double kSingularPose = 1e-9;
 // Below, series of a density that is nearly even lose nothing.
@@ -149,14 +147,7 @@ class ImageAdder {
       rows.push_back(row);
     }
     if (rows.size() < 2) return;
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> of_H(H);
-    Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
-    for (int j = 0; j < 3; ++j) {
-      const double value = of_H.eigenvalues()[j];
-      root.col(j) *= value > kNoDirection * of_H.eigenvalues()[2]
-                         ? 1 / std::sqrt(value)
-                         : 0;
-    }
+    const Matrix3d root = RootOfInverse(H);
     for (const PoseRow& row : rows) {
       const Matrix23 B = row.F.rightCols<3>() * root;
       const Eigen::Matrix2d R = Eigen::Matrix2d::Identity() - B * B.transpose();

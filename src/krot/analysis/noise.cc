@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
+
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
@@ -232,6 +234,17 @@ double CriticalW(int64_t num_tested, double false_alarm,
 }
 
 // Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
+Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> of_H(H);
+  Eigen::Matrix3d root = of_H.eigenvectors();
+  for (int j = 0; j < 3; ++j) {
+    const double value = of_H.eigenvalues()[j];
+    root.col(j) *=
+        value > kNoDirection * of_H.eigenvalues()[2] ? 1 / std::sqrt(value) : 0;
+  }
+  return root;
+}
+
 double StandardizedError(double chi2, int num_directions) {
   if (num_directions == 2) return std::sqrt(chi2);
   if (num_directions == 0) return kNaN;

@@ -37,6 +37,12 @@ struct NoiseSnooping {
   bool is_sigma_kept = false;
 };
 
+// Of the largest eigenvalue of a sum of squares: below is rounding.
+inline constexpr double kNoDirection = 1e-13;
+
+// G with G G' = H^+.
+Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H);
+
 // The w of a sum of squares in so many directions, in [0, 2], each divided by
 // its variance: of a single direction the w of two that is exceeded with the
 // same probability. NaN of none.

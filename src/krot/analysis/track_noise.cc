@@ -23,8 +23,6 @@ using Eigen::Vector4d;
 constexpr int kMaxIterations = 50;
 // Of the sum of squares, that a step may still promise.
 constexpr double kTolerance = 1e-8;
-// Of the largest eigenvalue of A'A: below is rounding.
-constexpr double kSingular = 1e-13;
 
 ObservationNoise NotTested(double w) {
   ObservationNoise noise;
@@ -145,7 +143,7 @@ class TrackNoise::Track {
       }
       const double scale = H.trace();
       if (!(scale > 0)) return;
-      H.diagonal().array() += (damping + kSingular) * scale;
+      H.diagonal().array() += (damping + kNoDirection) * scale;
       const Vector3d step = -H.ldlt().solve(g);
       if (!(-g.dot(step) > kTolerance * cost_)) return;
       Vector4d X = X_ + TangentBasis(X_) * step;
@@ -174,13 +172,7 @@ class TrackNoise::Track {
   void Describe() {
     Matrix3d H = Matrix3d::Zero();
     for (const Row& row : rows_) H.noalias() += row.J.transpose() * row.J;
-    const Eigen::SelfAdjointEigenSolver<Matrix3d> of_H(H);
-    Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
-    for (int j = 0; j < 3; ++j) {
-      const double value = of_H.eigenvalues()[j];
-      root.col(j) *=
-          value > kSingular * of_H.eigenvalues()[2] ? 1 / std::sqrt(value) : 0;
-    }
+    const Matrix3d root = RootOfInverse(H);
     for (size_t n = 0; n < rows_.size(); ++n) {
       const uint64_t e = elements_[n];
       const Eigen::Matrix<double, 2, 3> B = rows_[n].J * root;

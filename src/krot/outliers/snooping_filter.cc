@@ -21,9 +21,6 @@
 namespace krot::internal {
 namespace {
 
-// Of the largest eigenvalue: below is rounding.
-constexpr double kNotHeld = 1e-13;
-
 // Of an input, and what is still left of it.
 class SnoopingFilter {
  public:
@@ -187,13 +184,7 @@ class SnoopingFilter {
         H += J.transpose() * J;
         rows.push_back(J);
       }
-      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> of_H(H);
-      Eigen::Matrix3d root = of_H.eigenvectors();  // root root' = H^-1
-      for (int j = 0; j < 3; ++j) {
-        const double value = of_H.eigenvalues()[j];
-        const bool is_held = value > kNotHeld * of_H.eigenvalues()[2];
-        root.col(j) *= is_held ? 1 / std::sqrt(value) : 0;
-      }
+      const Eigen::Matrix3d root = RootOfInverse(H);
       for (const Eigen::Matrix<double, 2, 3>& J : rows) {
         const Eigen::Matrix<double, 2, 3> B = J * root;
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> of_R;
