@@ -81,7 +81,7 @@ class Motion {
 
   // Those combinations, as columns, that move nothing that is held.
   MatrixXd Free() const {
-    Eigen::Matrix<double, 7, 7> gram = Eigen::Matrix<double, 7, 7>::Zero();
+    MatrixXd gram = MatrixXd::Zero(7, 7);
     const auto hold = [&](const Similar& rows, bool is_length) {
       gram += rows.transpose() * rows / (is_length ? unit_ * unit_ : 1);
     };
@@ -93,8 +93,7 @@ class Motion {
     }
     if (component_.has_fixed_scale) gram(6, 6) += 1;
     if (gram.isZero(0)) return MatrixXd::Identity(7, 7);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 7, 7>> eigen(
-        gram);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
     Index count = 0;
     while (count < 7 &&
            eigen.eigenvalues()[count] <= kNothing * eigen.eigenvalues()[6]) {

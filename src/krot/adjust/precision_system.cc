@@ -2,7 +2,6 @@
 
 #include <numeric>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "krot/linear/dense_inverse.h"
@@ -37,10 +36,8 @@ void TakeOffGauge(const MatrixXd& gauge, MatrixXd* motions) {
       for (Index n = 0; n < gauge.rows(); n += 3) {
         weighted.middleRows<3>(n) /= motion.segment<3>(n).norm() + still;
       }
-      const Eigen::VectorXd share = (weighted.transpose() * gauge)
-                                        .ldlt()
-                                        .solve(weighted.transpose() * motion);
-      motion -= gauge * share;
+      const Eigen::FullPivLU<MatrixXd> lu(weighted.transpose() * gauge);
+      motion -= gauge * lu.solve(weighted.transpose() * motion);
     }
   }
 }
@@ -124,9 +121,8 @@ void BlockCovariance::Invert() {
   }
   for (const ComponentGauge& gauge : gauges_) {
     const MatrixXd moves = scale_.cwiseInverse().asDiagonal() * gauge.blocks;
-    const Eigen::LLT<MatrixXd> llt(moves.transpose() * moves);
-    const MatrixXd unit = llt.matrixU().solve<Eigen::OnTheRight>(moves);
-    C_.noalias() += unit * unit.transpose();
+    const Eigen::FullPivLU<MatrixXd> lu(moves.transpose() * moves);
+    C_.noalias() += moves * lu.solve(moves.transpose());
   }
   MatrixXd motions = InvertSemidefinite(num_threads_, &C_);
   num_undetermined_ += motions.cols();
