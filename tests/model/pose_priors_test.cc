@@ -105,6 +105,27 @@ TEST_F(PosePriors, AreReadOfEveryColmap) {
   }
 }
 
+// The same places, as COLMAP 3.10 and later write them, and as 3.8 did.
+TEST_F(PosePriors, OfTheImagesTableAreLatitudeLongitudeAndHeight) {
+  const Vector3d places[] = {{47.5, 9.25, 400}, {47.501, 9.25, 410}};
+  Write(std::string(kImageForm) + "INSERT INTO pose_priors VALUES (1, " +
+        BlobOfPosition(places[0]) + ", 0, NULL), (2, " +
+        BlobOfPosition(places[1]) + ", 0, NULL);");
+  const auto expected = Read();
+  std::filesystem::remove(folder_ / "database.db");
+  Write(
+      "UPDATE images SET prior_tx = 47.5, prior_ty = 9.25, prior_tz = 400 "
+      "WHERE image_id = 1;"
+      "UPDATE images SET prior_tx = 47.501, prior_ty = 9.25, prior_tz = 410 "
+      "WHERE image_id = 2;");
+  const auto positions = Read();
+  ASSERT_EQ(positions.size(), 2u);  // the third image's are NULL
+  for (size_t n = 0; n < 2; ++n) {
+    EXPECT_EQ(positions[n].index, expected[n].index);
+    EXPECT_EQ(positions[n].region.centre, expected[n].region.centre);
+  }
+}
+
 // On the equator a degree of longitude is that of a circle of the semi-major
 // axis a, and one of latitude nearly that of a (1 - e^2).
 TEST_F(PosePriors, InLatitudesAndLongitudesBecomeEastNorthAndUp) {
@@ -152,7 +173,7 @@ TEST_F(PosePriors, AreRefusedWhereTheyCannotBeMeant) {
     std::filesystem::remove(folder_ / "database.db");
   }
   Write("");
-  EXPECT_THAT(ModelErrorOf([&] { Read(); }), HasSubstr("pose_priors"));
+  EXPECT_THAT(ModelErrorOf([&] { Read(); }), HasSubstr("found no pose prior"));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 
@@ -32,7 +33,7 @@ struct PosePrior {
   int64_t coordinate_system = kCartesian;
 };
 
-// None unless it holds these many finite doubles.
+// None unless it holds so many finite doubles.
 template <typename Matrix>
 std::optional<Matrix> MatrixOf(std::string_view blob) {
   Matrix matrix;
@@ -55,30 +56,43 @@ std::vector<PosePrior> ReadRows(SqliteDatabase* database, const Model& model) {
     image_of_id.emplace(images.Integer(0), found->second);
   }
   // COLMAP 4 names the sensor, too, older ones the image alone, 3.10 without a
-  // covariance.
+  // covariance. Before, EXIF's latitude, longitude and height were the image's
+  // prior_t.
+  constexpr int kOldest = 3;
   std::optional<SqliteRows> rows;
   int form = 0;
-  for (const char* columns :
-       {"corr_data_id, position, coordinate_system, position_covariance, "
-        "corr_sensor_type",
-        "image_id, position, coordinate_system, position_covariance",
-        "image_id, position, coordinate_system"}) {
+  for (const auto& [table, columns] :
+       {std::make_pair("pose_priors",
+                       "corr_data_id, position, coordinate_system, "
+                       "position_covariance, corr_sensor_type"),
+        std::make_pair(
+            "pose_priors",
+            "image_id, position, coordinate_system, position_covariance"),
+        std::make_pair("pose_priors", "image_id, position, coordinate_system"),
+        std::make_pair("images", "image_id, prior_tx, prior_ty, prior_tz")}) {
     try {
-      rows.emplace(database, "pose_priors", columns);
+      rows.emplace(database, table, columns);
       break;
     } catch (const ModelError&) {
-      if (++form == 3) throw;
+      if (form++ == kOldest) throw;
     }
   }
   std::vector<PosePrior> priors;
   while (rows->Next()) {
     if (form == 0 && rows->Integer(4) != kCamera) continue;
     const auto image = image_of_id.find(rows->Integer(0));
-    const auto position = MatrixOf<Vector3d>(rows->Blob(1));
-    if (image == image_of_id.end() || !position) continue;
-    PosePrior prior{image->second, *position, std::nullopt, rows->Integer(2)};
-    if (form < 2) prior.covariance = MatrixOf<Matrix3d>(rows->Blob(3));
-    priors.push_back(std::move(prior));
+    if (image == image_of_id.end()) continue;
+    PosePrior prior{image->second, Vector3d::Constant(kNaN), std::nullopt,
+                    kWgs84};
+    if (form == kOldest) {
+      for (int c = 0; c < 3; ++c) prior.position[c] = rows->Real(c + 1);
+    } else {
+      const auto position = MatrixOf<Vector3d>(rows->Blob(1));
+      if (position) prior.position = *position;
+      prior.coordinate_system = rows->Integer(2);
+      if (form < 2) prior.covariance = MatrixOf<Matrix3d>(rows->Blob(3));
+    }
+    if (prior.position.allFinite()) priors.push_back(std::move(prior));
   }
   std::sort(priors.begin(), priors.end(),
             [](const auto& a, const auto& b) { return a.image < b.image; });
@@ -173,8 +187,8 @@ std::vector<KnownPosition> ReadPosePriors(const std::filesystem::path& path,
   database.RequireUnchanged();
   if (priors.empty()) {
     database.Fail(
-        "found no pose prior of the model's images, expected positions in its "
-        "table pose_priors; colmap feature_extractor takes them from EXIF");
+        "found no pose prior of the model's images, expected positions; colmap "
+        "feature_extractor takes them from EXIF");
   }
   const auto is_geodetic = [](const PosePrior& prior) {
     return prior.coordinate_system == kWgs84;

@@ -13,8 +13,8 @@ inline bool IsDatabase(const FileBytes& file) {
   return file.bytes.rfind("SQLite format 3", 0) == 0;
 }
 
-// The positions in the table `pose_priors` of COLMAP's database (3.10 to 4.x),
-// of images that the model has, by name. Latitudes and longitudes (WGS84) are
+// The pose priors in COLMAP's database (3.8 to 4.x) of images that the model
+// has, by name. Latitudes and longitudes (WGS84) are
 // taken into the frame of east, north and up at the one that is nearest to the
 // median of all, in metres; `options.on_note` is told. Regions are those that a
 // Gaussian of the prior's covariance, along the same axes, leaves one time in

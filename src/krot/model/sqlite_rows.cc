@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <system_error>
 
+#include "krot/base/numbers.h"
 #include "krot/base/system.h"
 #include "krot/model.h"
 
@@ -200,6 +201,14 @@ void SqliteRows::FailType(int column, const std::string& type) const {
 int64_t SqliteRows::Integer(int column) const {
   if (Type(column) != SQLITE_INTEGER) FailType(column, "integer");
   return sqlite3_column_int64(statement_.get(), column);
+}
+
+double SqliteRows::Real(int column) const {
+  if (Type(column) == SQLITE_NULL) return kNaN;
+  if (Type(column) != SQLITE_INTEGER && Type(column) != SQLITE_FLOAT) {
+    FailType(column, "number");
+  }
+  return sqlite3_column_double(statement_.get(), column);
 }
 
 std::string SqliteRows::Text(int column) const {

@@ -69,6 +69,7 @@ class SqliteRows {
   bool Next();
 
   int64_t Integer(int column) const;
+  double Real(int column) const;  // or an integer; NaN for NULL
   std::string Text(int column) const;
   std::string_view Blob(int column) const;  // until Next; empty for NULL
 
