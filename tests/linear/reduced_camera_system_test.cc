@@ -266,6 +266,29 @@ TEST(ReducedCameraSystem, IsSolvedByIterationsWhereASparseFactorWouldFillUp) {
   EXPECT_LT((x - expected).norm(), 1e-4 * expected.norm());
 }
 
+// Where a sparse factor would fill up; with a chain it takes the factor.
+TEST(ReducedCameraSystem, IsSolvedRoughlyWithoutAFactor) {
+  constexpr auto kRough = ReducedCameraSystem::Use::kRoughSolution;
+  constexpr int kFrames = 900;
+  EXPECT_EQ(ReducedCameraSystem(MakeChain(kFrames, 7), nullptr, kRough).kind(),
+            ReducedCameraSystem::Kind::kSparse);
+  const BlockStructure structure = MakeRandomStructure(kFrames, 1);
+  ReducedCameraSystem system(structure, nullptr, kRough);
+  ReducedCameraSystem exact(structure);
+  ASSERT_EQ(system.kind(), ReducedCameraSystem::Kind::kIterative);
+  const VectorXd rhs = RandomVector(system.num_columns());
+  for (ReducedCameraSystem* one : {&system, &exact}) {
+    FillAtRandom(structure, 0, one);
+    ASSERT_TRUE(one->Factorize(2));
+  }
+  const VectorXd expected = Solve(&exact, rhs);
+  const VectorXd x = system.Solve(rhs, 1e-2);
+  // From 0, conjugate gradients leave an error e with e'A e = e'b.
+  EXPECT_LT((expected - x).dot(rhs), 1e-2 * expected.dot(rhs));
+  EXPECT_GT((expected - x).dot(rhs), 0);
+  EXPECT_EQ(system.kind(), ReducedCameraSystem::Kind::kIterative);
+}
+
 // Tracks with gaps across the fixed frame, on top of a chain that is large
 // enough to stay positive definite; two of their frames stand apart.
 TEST(ReducedCameraSystem, LosesSquaresAsTheDenseMatrixDoes) {

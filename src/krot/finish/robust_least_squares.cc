@@ -19,6 +19,8 @@ constexpr int kMaxTries = 8;  // of one step
 constexpr double kFactor = 2;
 constexpr double kLeastFall = 3e-4;
 constexpr double kLeastDamping = 1e-3;
+// Of a step: it is a model's that does not hold far from here.
+constexpr double kTolerance = 1e-2;
 // A smaller scale is that of rounding; pixels.
 constexpr double kLeastScale = 1e-6;
 
@@ -32,7 +34,8 @@ class RobustLeastSquares {
               context.num_threads),
         structure_(AnchoredStructure(problem)),
         rig_from_world_(RigFromWorldRotations(problem)),
-        least_squares_(structure_, {context.num_threads}),
+        least_squares_(structure_, {context.num_threads},
+                       ReducedCameraSystem::Use::kRoughSolution),
         target_(3 * problem.observations.size()),
         estimate_(*estimate) {}
 
@@ -114,7 +117,7 @@ void RobustLeastSquares::Linearize() {
 bool RobustLeastSquares::FindStep() {
   Linearize();
   if (!least_squares_.Factorize()) return false;
-  least_squares_.Solve(nullptr, target_.data(), &step_);
+  least_squares_.Solve(nullptr, target_.data(), kTolerance, &step_, nullptr);
   // A point that no observation sees has no rows, and stays.
   for (Eigen::Vector3d& s : step_.points) {
     if (!s.allFinite()) s.setZero();

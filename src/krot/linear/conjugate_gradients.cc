@@ -149,12 +149,13 @@ double IncompleteCholesky::Operations(const BlockPattern& pattern) {
 
 bool ConjugateGradients::Factorize(const BlockPattern& pattern,
                                    std::vector<Matrix3d> blocks,
-                                   int num_threads) {
+                                   int num_threads, bool has_factor) {
   pattern_ = &pattern;
   blocks_ = std::move(blocks);
   num_threads_ = num_threads;
+  has_factor_ = has_factor;
   Whiten();
-  return incomplete_.Factorize(pattern, blocks_);
+  return !has_factor || incomplete_.Factorize(pattern, blocks_);
 }
 
 // A block without rows, as of a frame that nothing holds, stays 0.
@@ -173,6 +174,7 @@ void ConjugateGradients::Whiten() {
 }
 
 VectorXd ConjugateGradients::Precondition(const VectorXd& residual) const {
+  if (!has_factor_) return residual;
   // Scaled, as the exponents of single precision end early.
   const double scale = residual.cwiseAbs().maxCoeff();
   if (!(scale > 0)) return VectorXd::Zero(residual.size());

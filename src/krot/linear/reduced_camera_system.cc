@@ -29,17 +29,8 @@ constexpr double kSolves = 12;
 // The iterations that a solve is thought to take. They grow from 30 to 200 and
 // more on the way to an optimum.
 constexpr int kLikelyIterations = 100;
-
-double DenseCost(const BlockPattern& pattern) {
-  const double n = 3.0 * pattern.num_columns();
-  return n * n * n / 3 + kSolves * kNumberRead * n * n / 2;
-}
-
-double IterativeCost(const BlockPattern& pattern, int num_iterations) {
-  return kSparseOperation * IncompleteCholesky::Operations(pattern) +
-         kSolves * num_iterations * kNumberRead * 9 *
-             static_cast<double>(pattern.num_blocks());
-}
+// Those of a rough one.
+constexpr int kRoughIterations = 30;
 
 // That of a factor without any fill. Its columns of c blocks take 27 c^2, and
 // the sum of these is least where all are alike.
@@ -56,8 +47,8 @@ double Regularized(double diagonal, double regularization) {
 }  // namespace
 
 ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
-                                         Ranks* ranks)
-    : column_of_frame_(structure.num_frames(), -1) {
+                                         Ranks* ranks, Use use)
+    : use_(use), column_of_frame_(structure.num_frames(), -1) {
   int32_t num_free = 0;
   for (int64_t f = 0; f < structure.num_frames(); ++f) {
     if (!structure.frame_is_fixed[f]) column_of_frame_[f] = 3 * num_free++;
@@ -72,11 +63,29 @@ ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
   }
 }
 
+double ReducedCameraSystem::DenseCost() const {
+  const auto n = static_cast<double>(num_columns_);
+  const double solves = use_ == Use::kRoughSolution ? 1 : kSolves;
+  return n * n * n / 3 + solves * kNumberRead * n * n / 2;
+}
+
+double ReducedCameraSystem::IterativeCost(int num_iterations) const {
+  const double products = num_iterations * kNumberRead * 9 *
+                          static_cast<double>(pattern_.num_blocks());
+  if (use_ == Use::kRoughSolution) return products;
+  return kSparseOperation * IncompleteCholesky::Operations(pattern_) +
+         kSolves * products;
+}
+
 // The size of a sparse factor is looked at only where it may be the cheapest.
+// Without a preconditioner a long chain takes many more iterations than what
+// hangs together so closely that its factor would fill.
 ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
-  const double dense = DenseCost(pattern_);
-  const double iterative = IterativeCost(pattern_, kLikelyIterations);
-  const double cost = std::min(dense, iterative);
+  const bool is_rough = use_ == Use::kRoughSolution;
+  const double dense = DenseCost();
+  const double iterative =
+      IterativeCost(is_rough ? kRoughIterations : kLikelyIterations);
+  const double cost = is_rough ? dense : std::min(dense, iterative);
   if (LeastSparseCost(pattern_) < cost) {
     const SparseFactorSize factor = FindSparseFactorSize(pattern_);
     if (kSparseOperation * factor.operations < cost &&
@@ -240,8 +249,9 @@ bool ReducedCameraSystem::Factorize(int num_threads) {
   AddUpParts();
   if (kind_ == Kind::kIterative) {
     const int num_iterations = std::exchange(most_iterations_, 0);
-    if (IterativeCost(pattern_, num_iterations) <= DenseCost(pattern_) &&
-        iterative_.Factorize(pattern_, Blocks(), num_threads)) {
+    if (IterativeCost(num_iterations) <= DenseCost() &&
+        iterative_.Factorize(pattern_, Blocks(), num_threads,
+                             use_ == Use::kManySolutions)) {
       return true;
     }
     GoOnDensely();

@@ -65,9 +65,11 @@ class IncompleteCholesky {
 class ConjugateGradients {
  public:
   // `blocks` in the order of the pattern, those of the diagonal whole. False if
-  // there is no preconditioner. Keeps a reference to the pattern.
+  // there is no preconditioner; without `has_factor` it is W alone. Keeps a
+  // reference to the pattern.
   bool Factorize(const BlockPattern& pattern,
-                 std::vector<Eigen::Matrix3d> blocks, int num_threads);
+                 std::vector<Eigen::Matrix3d> blocks, int num_threads,
+                 bool has_factor = true);
 
   // Ends when |error|_A, by the preconditioner's estimate, has fallen to
   // `tolerance`, relative; false if it does not. An iteration reads A and the
@@ -83,6 +85,7 @@ class ConjugateGradients {
 
   const BlockPattern* pattern_ = nullptr;
   int num_threads_ = 1;
+  bool has_factor_ = true;
   std::vector<Eigen::Matrix3d> blocks_;  // of W A W'
   std::vector<Eigen::Matrix3d> W_;       // per block column; lower triangles
   IncompleteCholesky incomplete_;
@@ -99,12 +102,16 @@ class ConjugateGradients {
 //
 // Up to a few hundred frames it has a dense Cholesky factor; with more,
 // whatever is predicted to take the least time: a dense one, a sparse one in a
-// fill-reducing order, or conjugate gradients with an incomplete one.
+// fill-reducing order, or conjugate gradients with an incomplete one. For one
+// rough solution of each matrix these do without.
 class ReducedCameraSystem {
  public:
+  enum class Use { kManySolutions, kRoughSolution };
+
   // Where ranks share the points they make one each, of their shares.
   explicit ReducedCameraSystem(const BlockStructure& structure,
-                               Ranks* ranks = nullptr);
+                               Ranks* ranks = nullptr,
+                               Use use = Use::kManySolutions);
 
   enum class Kind { kDense, kSparse, kIterative };
 
@@ -149,6 +156,8 @@ class ReducedCameraSystem {
   };
   using SparseMatrix = Eigen::SparseMatrix<double>;
 
+  double DenseCost() const;
+  double IterativeCost(int num_iterations) const;
   Kind CheapestKind();
   Block BlockOf(int part, int32_t a, int32_t b);
   template <typename Visit>
@@ -160,6 +169,7 @@ class ReducedCameraSystem {
   bool FactorizeDirectly();
   void GoOnDensely();
 
+  const Use use_;
   Kind kind_ = Kind::kDense;
   int num_threads_ = 1;
   int64_t num_columns_ = 0;

@@ -26,13 +26,13 @@ constexpr double kToleranceBeforeRefinement = 1e-4;
 }  // namespace
 
 SchurComplement::SchurComplement(const BlockStructure& structure,
-                                 const Context& context)
+                                 const Context& context, Use use)
     : structure_(structure),
       num_threads_(structure.num_observations() < kFewObservations
                        ? 1
                        : context.num_threads),
       ranks_(context.ranks),
-      reduced_(structure, ranks_),
+      reduced_(structure, ranks_, use),
       parts_(structure.point_begin, reduced_.num_parts(), ranks_),
       fine_parts_(structure.point_begin, kFineParts) {}
 
@@ -87,9 +87,9 @@ struct CentredLeastSquares<kRows>::Sightings {
 
 template <int kRows>
 CentredLeastSquares<kRows>::CentredLeastSquares(const BlockStructure& structure,
-                                                const Context& context)
+                                                const Context& context, Use use)
     : structure_(structure),
-      schur_(structure, context),
+      schur_(structure, context, use),
       rows_(structure.num_observations() * kBlock),
       Q_(rows_.size()),
       R_(structure.num_points()),

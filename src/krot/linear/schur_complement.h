@@ -27,8 +27,11 @@ class SchurComplement {
   // Of a solution whose error nothing takes away afterwards, relative.
   static constexpr double kTolerance = 1e-10;
 
+  using Use = ReducedCameraSystem::Use;
+
   // Keeps a reference to `structure`.
-  SchurComplement(const BlockStructure& structure, const Context& context);
+  SchurComplement(const BlockStructure& structure, const Context& context,
+                  Use use = Use::kManySolutions);
 
   // add(k, part) adds what is left of point k to that part of reduced().
   template <typename Add>
@@ -107,8 +110,11 @@ class SchurComplement {
 template <int kRows>  // per observation: 3 or 4
 class CentredLeastSquares {
  public:
+  using Use = ReducedCameraSystem::Use;
+
   // Keeps a reference to `structure`.
-  CentredLeastSquares(const BlockStructure& structure, const Context& context);
+  CentredLeastSquares(const BlockStructure& structure, const Context& context,
+                      Use use = Use::kManySolutions);
 
   double* rows(int64_t i) { return &rows_[i * kBlock]; }  // B_i, row-major
 
@@ -119,6 +125,9 @@ class CentredLeastSquares {
   // null for 0. If `image` is not null it becomes A x; it may be r.
   void Solve(const BlockVector* g, const double* r, BlockVector* x,
              double* image = nullptr);
+  // To a relative error in the energy norm.
+  void Solve(const BlockVector* g, const double* r, double tolerance,
+             BlockVector* x, double* image);
   // The same with a step of iterative refinement, which removes the effect of
   // the regularisation.
   void SolveRefined(const BlockVector* g, const double* r, BlockVector* x,
@@ -133,8 +142,6 @@ class CentredLeastSquares {
   void FindSightings(int64_t k, Sightings* sightings);
   void AddPoint(int64_t k, int part);
   void AddHighLeverage(int part, const Sightings& sightings);
-  void Solve(const BlockVector* g, const double* r, double tolerance,
-             BlockVector* x, double* image);
 
   const BlockStructure& structure_;
   SchurComplement schur_;
