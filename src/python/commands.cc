@@ -107,6 +107,7 @@ Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
   const ConstModelPointer input = known.WithRotations(model, &run);
   options.solve.problem.fixed = known.Fixed(*input);
   options.solve.problem.positions = known.Positions(*input);
+  options.has_other_rotations = run.rotations.has_value();
   return RunSolve(input, options, context, progress, "solver", run);
 }
 

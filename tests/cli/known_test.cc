@@ -95,6 +95,34 @@ TEST_F(Known, RotationsOfSomeImagesLeaveTheOthersTheirsAndAreCounted) {
   EXPECT_THAT(Load(folder_ / "output"), IsModel(Load(folder_ / "plain")));
 }
 
+TEST_F(Known, RotationsFromElsewhereLeaveTheBoundToTheNoise) {
+  SceneOptions options = SmallScene();
+  options.outlier_ratio = 0.02;
+  const Model truth = SynthesizeScene(options).ground_truth;
+  Save(truth, folder_ / "input");
+  std::ofstream(folder_ / "rotations.txt") << RotationLines(truth);
+  // No error counts as gross, so that the model's own positions fit.
+  std::vector<std::string> arguments = {"solver",
+                                        "--Solver.init",
+                                        "feasible",
+                                        "--input_path",
+                                        folder_ / "input",
+                                        "--output_path",
+                                        folder_ / "output",
+                                        "--report_path",
+                                        folder_ / "output.json",
+                                        "--overwrite",
+                                        "1",
+                                        "--Problem.init_max_error",
+                                        "1e6"};
+  EXPECT_EQ(RunKrot(arguments).exit_code, 0);
+  EXPECT_TRUE(Report("output")["outliers"].is_null());
+  arguments.insert(arguments.end(),
+                   {"--rotations_path", folder_ / "rotations.txt"});
+  EXPECT_EQ(RunKrot(arguments).exit_code, 0);
+  EXPECT_GT(Report("output")["outliers"]["num_removed"], 0);
+}
+
 // Every image's rotation as somebody else has it.
 template <typename Change>
 std::string ChangedRotationLines(Model model, const Change& change) {

@@ -308,6 +308,21 @@ TEST(FilterOutliers, SparesWhatFitsTheModelsOwnPositionsAndNothingElse) {
   }
 }
 
+TEST(FilterOutliers, PositionsMadeWithOtherRotationsSpareNothing) {
+  const SyntheticScene scene = SynthesizeScene(Scene(0.1, 0));
+  OutlierFilterOptions options;
+  options.find_conflicts = false;
+  options.spares_what_fits = true;
+  options.solve.init = SolveInit::kFeasible;
+  options.solve.init_max_error = INFINITY;  // no error counts as gross
+  for (const bool are_others : {false, true}) {
+    options.has_other_rotations = are_others;
+    const OutlierFilterResult result =
+        FilterOutliers(scene.ground_truth, options, {});
+    EXPECT_EQ(result.summary.is_spared, !are_others);
+  }
+}
+
 TEST(FilterOutliers, ChoosesABoundWhereNoneIsGiven) {
   const SyntheticScene scene = SynthesizeScene(Scene(0.05, 0));
   OutlierFilterOptions options;

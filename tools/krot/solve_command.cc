@@ -77,6 +77,7 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
   KnownPositions known = ReadKnownPositions(command.paths, model, log);
   options.solve.problem.positions = std::move(known.positions);
   report->position_frame = std::move(known.frame);
+  options.has_other_rotations = report->run.rotations.has_value();
   options.solve.checkpoint = checkpoint;
   Context context = how;
   SolveProgress progress(log, SolveProgress::GoalsOf(options.solve));

@@ -72,8 +72,8 @@ struct RemovalStart {
   double max_error = 0;  // the bound: as asked for, or chosen; 0: noise's
   // From nothing without a bound: the start's errors are not far above what
   // noise explains, so that no observation may have to go; or the model has
-  // positions of its own, at which noise explains half of its errors and none
-  // is gross (init_max_error).
+  // positions of its own, made with these rotations, at which noise explains
+  // half of its errors and none is gross (init_max_error).
   bool nearly_fits = false;
   bool fits_its_positions = false;
 };
@@ -94,8 +94,9 @@ struct TolerantSolveOptions {
   // asked for, and noise does not explain the lowest maximum (RemovalStart);
   // then what it does not explain is removed.
   std::optional<double> max_error;
-  // As OutlierFilterOptions has it.
+  // As OutlierFilterOptions has them.
   bool has_start_from_nothing = false;
+  bool has_other_rotations = false;
   bool find_conflicts = false;  // the proof of how many had to go
 };
 

@@ -117,6 +117,9 @@ struct OutlierFilterOptions {
   // Whether the model's own positions come from nothing but rotations and
   // tracks: then weak parts are looked for there, too.
   bool has_start_from_nothing = false;
+  // Whether the model's rotations are others than those that its positions were
+  // made with, so that these do not show which observations fit.
+  bool has_other_rotations = false;
   bool make_profile = false;   // kConflicts: fill OutlierFilterSummary::profile
   bool find_conflicts = true;  // the proof, most of the time
   // From nothing, without max_error: whether a model stays as it is, unsolved,

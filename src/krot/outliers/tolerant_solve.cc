@@ -81,6 +81,7 @@ RemovalStart FindRemovalStart(const Model& model,
             .TrueCost(start.built.start, norm, context.num_threads);
     start.nearly_fits = largest <= kNearlyFits * start.max_error;
     start.fits_its_positions =
+        !options.has_other_rotations &&
         FitsItsPositions(model, options, context, start.max_error);
     if (options.spares_what_fits &&
         (start.nearly_fits || start.fits_its_positions)) {
@@ -111,6 +112,7 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
   filter.spares_what_fits = spares_what_fits;
   filter.find_conflicts = options.find_conflicts;
   filter.has_start_from_nothing = options.has_start_from_nothing;
+  filter.has_other_rotations = options.has_other_rotations;
   filter.solve = options.solve;
   filter.solve.on_built = nullptr;
   filter.solve.find_lowest = options.solve.describe_certificate;
