@@ -70,7 +70,8 @@ compile_need() {
 
 mkdir -p "$needs/include" "$sources"
 toolchain=()
-options=("-DCeres_DIR=$needs/lib/cmake/Ceres")
+# Whole unless asked otherwise, whatever an earlier build there was.
+options=("-DCeres_DIR=$needs/lib/cmake/Ceres" -DKROT_MINIMAL=OFF)
 if [[ $system == windows ]]; then
   toolchain=("-DCMAKE_TOOLCHAIN_FILE=$root/cmake/Windows.cmake"
     "-DCMAKE_FIND_ROOT_PATH=$needs;/usr/x86_64-w64-mingw32"
