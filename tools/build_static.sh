@@ -74,7 +74,7 @@ toolchain=()
 options=("-DCeres_DIR=$needs/lib/cmake/Ceres" -DKROT_MINIMAL=OFF)
 if [[ $system == windows ]]; then
   toolchain=("-DCMAKE_TOOLCHAIN_FILE=$root/cmake/Windows.cmake"
-    "-DCMAKE_FIND_ROOT_PATH=$needs;/usr/x86_64-w64-mingw32"
+    "-DCMAKE_FIND_ROOT_PATH=$needs"
     -DEigen3_DIR=/usr/share/eigen3/cmake)
   options+=("${toolchain[@]}" -DBoost_NO_BOOST_CMAKE=ON
     -DZLIB_LIBRARY=/usr/x86_64-w64-mingw32/lib/libz.a)
