@@ -2,8 +2,7 @@
 # Builds COLMAP 3.8 from Debian's sources with the patches of colmap-3.8/, GUI
 # included, against a KROT installed for it, and compares its commands with
 # krot's on the bundled sample: same translations and points, to the bit.
-# Installs what is missing. Takes most of an hour on two cores from nothing; may
-# be run again, and goes on where it was.
+# Installs what is missing. May be run again, and goes on where it was.
 #
 # Usage: third_party_patches/test_colmap_3.8.sh FOLDER
 set -euo pipefail

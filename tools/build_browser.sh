@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds build-wasm/krot.html, the solver as a page that needs no installation,
-# by Debian's emscripten; installs what is missing. About ten minutes on two cores.
+# by Debian's emscripten; installs what is missing.
 #
 # Usage: tools/build_browser.sh
 set -euo pipefail

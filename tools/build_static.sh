@@ -2,9 +2,9 @@
 # Builds krot as one file that needs nothing beside it: for any 64-bit Linux on
 # x86, build-linux/krot, or for Windows by mingw-w64, build-windows/krot.exe.
 # The libraries that Debian has no static form of are built from Debian's
-# sources, Ceres without SuiteSparse, which has GPL parts. About half an hour on
-# two cores; with -DKROT_MINIMAL=ON, without bundle adjustment, databases, photos
-# and project files, a quarter of an hour.
+# sources, Ceres without SuiteSparse, which has GPL parts, and without CUDA, which
+# has no static form. With -DKROT_MINIMAL=ON there are no bundle adjustment, no
+# databases, photos and project files, and Ceres is not built.
 #
 # Usage: tools/build_static.sh linux|windows [CMAKE_OPTION...]
 set -euo pipefail
@@ -70,10 +70,11 @@ compile_need() {
 
 mkdir -p "$needs/include" "$sources"
 toolchain=()
-options=("-DCeres_DIR=$needs/lib/cmake/Ceres")
+# Whole unless asked otherwise, whatever an earlier build there was.
+options=("-DCeres_DIR=$needs/lib/cmake/Ceres" -DKROT_MINIMAL=OFF)
 if [[ $system == windows ]]; then
   toolchain=("-DCMAKE_TOOLCHAIN_FILE=$root/cmake/Windows.cmake"
-    "-DCMAKE_FIND_ROOT_PATH=$needs;/usr/x86_64-w64-mingw32"
+    "-DCMAKE_FIND_ROOT_PATH=$needs"
     -DEigen3_DIR=/usr/share/eigen3/cmake)
   options+=("${toolchain[@]}" -DBoost_NO_BOOST_CMAKE=ON
     -DZLIB_LIBRARY=/usr/x86_64-w64-mingw32/lib/libz.a)
@@ -106,10 +107,10 @@ fi
 if [[ -z $is_minimal ]]; then
   get_source ceres-solver
   # Without glog it logs by itself: nothing but what ends the process.
-  build_need ceres-solver -DMINIGLOG=ON -DGFLAGS=OFF -DSUITESPARSE=OFF \
-    -DCXSPARSE=OFF -DLAPACK=OFF -DEIGENSPARSE=ON -DSCHUR_SPECIALIZATIONS=OFF \
-    -DBUILD_TESTING=OFF -DBUILD_EXAMPLES=OFF -DBUILD_BENCHMARKS=OFF \
-    -DCMAKE_CXX_FLAGS=-DMAX_LOG_LEVEL=-3
+  build_need ceres-solver -DMINIGLOG=ON -DGFLAGS=OFF -DCUDA=OFF \
+    -DSUITESPARSE=OFF -DCXSPARSE=OFF -DLAPACK=OFF -DEIGENSPARSE=ON \
+    -DSCHUR_SPECIALIZATIONS=OFF -DBUILD_TESTING=OFF -DBUILD_EXAMPLES=OFF \
+    -DBUILD_BENCHMARKS=OFF -DCMAKE_CXX_FLAGS=-DMAX_LOG_LEVEL=-3
 fi
 
 target=krot build_krot "$folder" -DKROT_STATIC=ON -DKROT_NATIVE=OFF \

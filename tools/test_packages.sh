@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # Makes the Debian packages, installs them into a bare Debian 12 below FOLDER,
 # and there solves the sample, builds a program of one's own against the library,
-# and installs pykrot by pip. Needs root, for the bare Debian; takes ten minutes
-# on two cores.
+# and installs pykrot by pip. Needs root, for the bare Debian.
 #
 # Usage: tools/test_packages.sh FOLDER
 set -euo pipefail

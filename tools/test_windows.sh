@@ -72,6 +72,17 @@ for folder in text crlf; do
 done
 diff -q text.out crlf.out || fails "line ends have changed the model"
 
+say "Adjustment, database, and a project file as Windows writes it"
+printf 'input_path=windows\r\nBundleAdjustment.max_num_iterations=3\r\n' >run.ini
+"$linux" bundle_adjuster --project_path run.ini --output_path linux_adjusted \
+  2>../err | grep ' error ' >../text
+runs 0 "" bundle_adjuster --project_path run.ini --output_path adjusted
+# Ceres gives no fixed bits, but the same errors as they are printed.
+diff ../text <(grep ' error ' ../out) || fails "another adjustment"
+runs 0 "" model_checker --input_path adjusted --report_path report.json \
+  --database_path "Z:$root/tools/sample/database.db"
+grep -q '"database": {' report.json || fails "the matches were not examined"
+
 say "The output folder is replaced as a whole"
 echo mine >windows/notes.md
 runs 5 "already holds a model" solver --input_path model --output_path windows
