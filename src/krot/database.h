@@ -145,7 +145,8 @@ struct CheckedImage {
 struct Explanation {
   std::vector<int32_t> images;  // ascending
   // Matches that it gives up: of the wrong images' kept pairs, each image by
-  // itself, and of the contradictory pairs between the others.
+  // itself, none of images that fit better moved or turned, and of the
+  // contradictory pairs between the others.
   int64_t cost = 0;
 };
 
@@ -178,8 +179,10 @@ struct PairCheck {
 // Measures each match in true pixels, through the cameras' lenses, against the
 // epipolar lines of the model's poses. The tolerance follows from the noise of
 // the better pairs. An image is wrong if the cheapest explanation says so and
-// it has at least three decided pairs. What matches cannot see stays unseen:
-// equal structures whose wrong matches agree with wrong poses, and motion along
+// it has at least three decided pairs, unless a quarter of its matches agree
+// with its pose and no other fits them better; and if another pose halves the
+// sum of its squared errors. What matches cannot see stays unseen: equal
+// structures whose wrong matches agree with wrong poses, and motion along
 // epipolar lines.
 //
 // Requires a valid model and a database read for it. Same bits at any number of

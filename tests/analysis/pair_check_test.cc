@@ -91,6 +91,26 @@ TEST(ExplainContradictions, TellsOfAnotherThatGivesUpAboutAsMuch) {
   EXPECT_FALSE(far.runner_up);
 }
 
+TEST(ExplainContradictions, ThatEndsEarlyIsAnExplanationAndSaysSo) {
+  std::mt19937 random(6);
+  std::vector<int64_t> costs(100);
+  for (int64_t& cost : costs) cost = 400 + random() % 100;
+  std::vector<ContradictoryPair> contradictions;
+  for (int32_t a = 0; a < 100; ++a) {
+    for (int32_t b = a + 1; b < 100; ++b) {
+      if (random() % 8 != 0) continue;
+      contradictions.push_back(
+          {a, b, 50 + static_cast<int64_t>(random() % 50)});
+    }
+  }
+  const Explanations found =
+      ExplainContradictions(costs, contradictions, 1000000);
+  EXPECT_FALSE(found.is_proved);
+  std::vector<bool> is_wrong(100);
+  for (const int32_t i : found.cheapest.images) is_wrong[i] = true;
+  EXPECT_EQ(CostOf(is_wrong, costs, contradictions), found.cheapest.cost);
+}
+
 // Exact poses, noise of half a pixel, cameras with a lens.
 Model Scene() {
   SceneOptions options;
@@ -186,6 +206,63 @@ TEST(CheckPairs, BlamesTheMatchesOfASinglePairThatContradicts) {
   EXPECT_EQ(check.num_contradictory, 1);
   EXPECT_TRUE(check.pairs[worst - database.pairs.begin()].has_wrong_matches);
   EXPECT_EQ(check.cheapest.cost, static_cast<int64_t>(matches.size()));
+}
+
+// So that most of its matches agree.
+TEST(CheckPairs, FindsAnImageThatIsTurnedOrMovedWithinTheTolerance) {
+  const Model model = Scene();
+  const Database database = DatabaseOf(model);
+  for (const bool is_turned : {true, false}) {
+    Model changed = model;
+    Change(4, is_turned ? 0.12 : 0, is_turned ? 0 : 0.004, &changed);
+    const PairCheck check = CheckPairs(changed, database);
+    EXPECT_GT(check.images[4].kept_matches,
+              check.images[4].contradictory_matches);
+    EXPECT_THAT(WrongImages(check), ElementsAre(4));
+    EXPECT_THAT(check.cheapest.images, ElementsAre(4));
+    EXPECT_EQ(check.images[4].fault,
+              is_turned ? PoseFault::kRotation : PoseFault::kPosition);
+    if (is_turned) {
+      EXPECT_NEAR(check.images[4].turned_by_deg, 0.12, 0.01);
+    } else {
+      EXPECT_NEAR(check.images[4].moved_by, 0.004, 0.0004);
+    }
+  }
+}
+
+// As a model that is not adjusted.
+TEST(CheckPairs, CallsNoImageMisplacedWhereMostWouldFitBetterElsewhere) {
+  Model model = Scene();
+  const Database database = DatabaseOf(model);
+  for (int image = 0; image < 12; ++image) {
+    Change(image, image % 2 == 0 ? 0.12 : -0.12, 0, &model);
+  }
+  EXPECT_THAT(WrongImages(CheckPairs(model, database)), IsEmpty());
+}
+
+// Of a scene with structures that look alike.
+TEST(CheckPairs, BlamesNoImageThatMostOfItsMatchesContradictAndNoPoseFits) {
+  const Model model = Scene();
+  Database database = DatabaseOf(model);
+  int64_t wrong = 0, right = 0;
+  for (VerifiedPair& pair : database.pairs) {
+    if (pair.image1 != 3 && pair.image2 != 3) continue;
+    auto& matches = pair.matches;
+    if (wrong > 2 * right) {
+      right += static_cast<int64_t>(matches.size());
+      continue;
+    }
+    wrong += static_cast<int64_t>(matches.size());
+    for (size_t k = 0; k + 1 < matches.size(); ++k) {
+      std::swap(matches[k][1], matches[k + 1][1]);
+    }
+  }
+  ASSERT_GT(2 * wrong, 3 * right);
+  const PairCheck check = CheckPairs(model, database);
+  EXPECT_GT(check.images[3].contradictory_matches,
+            check.images[3].kept_matches);
+  EXPECT_THAT(WrongImages(check), IsEmpty());
+  EXPECT_THAT(check.cheapest.images, IsEmpty());
 }
 
 TEST(CheckPairs, NamesGroupsThatAgreeInsideAndContradictEachOther) {

@@ -33,7 +33,8 @@ class Command:
     @property
     def title(self):
         return (self.name + (", text" if self.format == "TXT" else "") +
-                (", checkpoint" if self.checkpoint else ""))
+                (", checkpoint" if self.checkpoint else "") +
+                (", database" if "@database.db" in self.words else ""))
 
 
 SOLVED = ["--input_path", "@input", "--output_path", "@out", "--overwrite", "1"]
@@ -48,6 +49,15 @@ COMMANDS = [
             ("out",), checkpoint="steps"),
     Command("point_triangulator", SOLVED + ["--report_path", "@report.json"],
             ("out",), ("report.json",)),
+    Command("model_checker",
+            SOLVED + ["--database_path", "@database.db", "--report_path",
+                      "@report.json", "--certificate_path", "@proof.json"],
+            ("out",), ("report.json", "proof.json")),
+    Command("point_triangulator",
+            SOLVED + ["--database_path", "@database.db"], ("out",)),
+    Command("solver",
+            SOLVED + ["--database_path", "@database.db", "--Solver.init",
+                      "feasible"], ("out",)),
     Command("bundle_adjuster", SOLVED + ["--report_path", "@report.json"],
             ("out",), ("report.json",)),
     Command("bundle_adjuster", SOLVED, ("out",), (), "TXT"),
@@ -129,7 +139,10 @@ class Place:
                        stdout=subprocess.DEVNULL)
 
     def _make_models(self):
-        for name, seed in ("input", 3), ("old", 4):
+        database = ["--database_path", self.pristine / "database.db"]
+        if "@database.db" not in self.command.words:
+            database = []
+        for name, seed, more in ("input", 3, database), ("old", 4, []):
             self._krot("model_synthesizer", "--output_path",
                        self.pristine / name, "--output_type",
                        self.command.format, "--Scene.num_frames", "6",
@@ -137,7 +150,7 @@ class Place:
                        "--Scene.pixel_noise", "0.5",
                        "--Scene.start_translation_noise", "0.003",
                        "--Scene.start_point_noise", "0.003", "--random_seed",
-                       str(seed))
+                       str(seed), *more)
         for name in self.command.folders:
             out = self.pristine / name
             shutil.copytree(self.pristine / "old", out)
@@ -162,6 +175,8 @@ class Place:
         if self.command.name in group:
             words += [f"--{group[self.command.name]}.num_threads",
                       str(threads)]
+        if self.command.name == "model_checker":
+            words += ["--num_threads", str(threads)]
         return subprocess.Popen(
             [self.krot, self.command.name, *words],
             env={**os.environ, **(environment or {})}, text=True,

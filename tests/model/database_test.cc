@@ -90,6 +90,32 @@ TEST(Database, TakesNoPairsThatColmapDoesNotUse) {
   EXPECT_EQ(database.num_watermarks, 1);
 }
 
+// As other programs write them, and COLMAP reads them.
+TEST(Database, TakesPairIdsWithTheLargerImageIdFirst) {
+  const TempFolder folder;
+  {
+    DatabaseWriter writer(folder / "database.db");
+    writer.AddImage(1, "a.jpg", kKeypoints);
+    writer.AddImage(2, "b.jpg", kKeypoints);
+    writer.AddImage(3, "c.jpg", kKeypoints);
+    writer.AddPair(1, 2, {{0, 1}, {2, 2}}, 2);
+    writer.AddPair(1, 3, {{0, 2}}, 2);
+    writer.AddPair(2, 3, {{0, 1}}, 2);
+    writer.Execute(
+        "UPDATE two_view_geometries SET pair_id = 2147483647 * 2 + 1 WHERE "
+        "pair_id = 2147483647 + 2");
+    // Once more, with one match that is known.
+    writer.AddPair(1, 2, {{1, 0}, {0, 1}}, 2);
+  }
+  const Database database = ReadDatabase(folder / "database.db", ThreeImages());
+  ASSERT_EQ(database.pairs.size(), 3);
+  EXPECT_EQ(database.pairs[0].image1, 0);
+  EXPECT_EQ(database.pairs[0].image2, 1);
+  EXPECT_THAT(database.pairs[0].matches,
+              ElementsAre(ElementsAre(0u, 1u), ElementsAre(1u, 0u),
+                          ElementsAre(2u, 2u)));
+}
+
 TEST(Database, LeavesItsFolderAsItWas) {
   const TempFolder folder;
   {
@@ -119,6 +145,23 @@ TEST(Database, SeesWhatARunningProgramHasCommittedAndDoesNotBlockIt) {
   writer.Execute("DELETE FROM two_view_geometries");
   EXPECT_TRUE(
       ReadDatabase(folder / "database.db", ThreeImages()).pairs.empty());
+}
+
+// Its log holds what was committed last, and needs no index of SQLite's.
+TEST(Database, SeesWhatAProgramThatDiedHasCommittedAndWritesNothing) {
+  const TempFolder folder;
+  DatabaseWriter writer(folder / "running.db");
+  WriteImages(&writer);
+  writer.AddImage(6, "c.jpg", kKeypoints);
+  const std::string log = ReadBytes(folder / "running.db-wal");
+  ASSERT_FALSE(log.empty());
+  const TempFolder copy;
+  WriteBytes(copy / "database.db", ReadBytes(folder / "running.db"));
+  WriteBytes(copy / "database.db-wal", log);
+  EXPECT_EQ(ReadDatabase(copy / "database.db", ThreeImages()).num_images, 3);
+  EXPECT_THAT(FileNames(copy.path()),
+              ElementsAre("database.db", "database.db-wal"));
+  EXPECT_EQ(ReadBytes(copy / "database.db-wal"), log);
 }
 
 TEST(Database, TakesKeypointsFromTheModelWhosePhotosWereUndistortedSince) {
@@ -180,7 +223,11 @@ TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
       {"ALTER TABLE two_view_geometries DROP COLUMN config",
        "the table two_view_geometries is not COLMAP's (no such column: "
        "config)"},
-      {"DELETE FROM images", "found none of the model's images"},
+      {"DELETE FROM images",
+       "found none of the model's images, such as \"a.jpg\", expected"},
+      {"UPDATE images SET name = 'left/' || name",
+       "found none of the model's images, such as \"a.jpg\", but others, such "
+       "as \"left/"},
       {"UPDATE images SET image_id = -1 WHERE image_id = 2",
        "found image id -1, expected 0 to 2147483646"},
       {"UPDATE images SET name = x'00' WHERE image_id = 2",
@@ -213,9 +260,9 @@ TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {
        "found 3 columns, expected 2"},
       {"UPDATE two_view_geometries SET pair_id = 12 WHERE pair_id > 4294967297",
        ""},
-      {"UPDATE two_view_geometries SET pair_id = 2147483647 * 5 + 2 WHERE "
+      {"UPDATE two_view_geometries SET pair_id = 2147483647 * 5 + 5 WHERE "
        "pair_id > 4294967297",
-       "found pair id 10737418237"},
+       "found pair id 10737418240"},
   };
   for (const Case& bad : cases) {
     const TempFolder folder;

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <queue>
 #include <tuple>
+#include <utility>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -16,27 +16,35 @@
 
 namespace krot::internal {
 
-MatchNoise EstimateMatchNoise(
-    const std::vector<std::vector<double>>& errors_px) {
+MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
+                              const std::vector<double>& parallax_px) {
   constexpr double kAlpha = 0.05;
   constexpr double kMedianOverSigma = 0.6745;  // of |x|, Gaussian
+  constexpr double kLeastParallax = 5;         // median errors
   const auto median_of = [](const std::vector<double>& errors) {
     return errors[errors.size() / 2];
   };
-  std::vector<double> medians;
+  std::vector<const std::vector<double>*> pairs, with_parallax;
   size_t num_matches = 0;
-  for (const std::vector<double>& errors : errors_px) {
+  for (size_t p = 0; p < errors_px.size(); ++p) {
+    const std::vector<double>& errors = errors_px[p];
     if (errors.empty()) continue;
-    medians.push_back(median_of(errors));
+    pairs.push_back(&errors);
     num_matches += errors.size();
+    if (parallax_px[p] >= kLeastParallax * median_of(errors)) {
+      with_parallax.push_back(&errors);
+    }
   }
-  if (medians.empty()) return {};
-  std::sort(medians.begin(), medians.end());
-  const double largest_median = 2 * medians[medians.size() / 4];
+  if (pairs.empty()) return {};
+  if (!with_parallax.empty()) pairs = std::move(with_parallax);
+  std::sort(pairs.begin(), pairs.end(), [&](const auto* a, const auto* b) {
+    return median_of(*a) < median_of(*b);
+  });
+  const double largest_median = 2 * median_of(*pairs[pairs.size() / 4]);
   std::vector<double> better;
-  for (const std::vector<double>& errors : errors_px) {
-    if (errors.empty() || median_of(errors) > largest_median) continue;
-    better.insert(better.end(), errors.begin(), errors.end());
+  for (const std::vector<double>* errors : pairs) {
+    if (median_of(*errors) > largest_median) break;
+    better.insert(better.end(), errors->begin(), errors->end());
   }
   std::nth_element(better.begin(), better.begin() + better.size() / 2,
                    better.end());
@@ -51,12 +59,28 @@ MatchNoise EstimateMatchNoise(
 
 namespace {
 
-double SignedMatchError(const WitnessMatch& match,
-                        const Eigen::Matrix3d& rotation,
-                        const Eigen::Vector3d& center) {
+// A match's signed error under a pose of its image, and its derivatives by the
+// parameters of a change: those of its numerator, which is what changes.
+double MatchError(const WitnessMatch& match, const Eigen::Matrix3d& rotation,
+                  const Eigen::Vector3d& center, PoseChange change,
+                  Eigen::Vector3d* gradient) {
   const Eigen::Matrix3d world_from_cam = rotation.transpose();
-  return EpipolarMatch(world_from_cam * match.ray, match.other_ray)
-      .SignedErrorPx(match.other_center - center);
+  const PixelRay ray = world_from_cam * match.ray;
+  const EpipolarMatch epipolar(ray, match.other_ray);
+  const Eigen::Vector3d baseline = match.other_center - center;
+  const double allowed = (epipolar.gradient * baseline).norm();
+  if (!(allowed > 0)) {
+    *gradient = Eigen::Vector3d::Zero();
+    return 0;
+  }
+  if (change == PoseChange::kMove) {
+    *gradient = -epipolar.normal / allowed;
+  } else {
+    // A rotation vector w in camera axes moves the ray d by -(R^T w) x d.
+    *gradient = -rotation * ray.ray.cross(match.other_ray.ray.cross(baseline)) /
+                allowed;
+  }
+  return epipolar.normal.dot(baseline) / allowed;
 }
 
 // Rotation and centre after a step: a rotation vector in camera axes, or a
@@ -70,31 +94,28 @@ void ApplyStep(PoseChange change, const Eigen::Vector3d& step,
   }
 }
 
-// Of a match's signed error by the three parameters of the change: forward
-// differences of steps that are small beside what a pixel stands for.
-Eigen::Vector3d ErrorGradient(const WitnessMatch& match, PoseChange change,
-                              double step, const Eigen::Matrix3d& rotation,
-                              const Eigen::Vector3d& center, double error) {
-  Eigen::Vector3d gradient;
-  for (int i = 0; i < 3; ++i) {
-    Eigen::Matrix3d next_rotation = rotation;
-    Eigen::Vector3d next_center = center;
-    ApplyStep(change, step * Eigen::Vector3d::Unit(i), &next_rotation,
-              &next_center);
-    gradient[i] =
-        (SignedMatchError(match, next_rotation, next_center) - error) / step;
-  }
-  return gradient;
-}
-
-double SumOfErrors(const std::vector<WitnessMatch>& matches,
-                   const Eigen::Matrix3d& rotation,
-                   const Eigen::Vector3d& center) {
+// The sum of absolute errors under a pose, and the step that lowers it.
+struct FitStep {
   double sum = 0;
+  Eigen::Vector3d step = Eigen::Vector3d::Zero();
+};
+
+FitStep StepAt(const std::vector<WitnessMatch>& matches,
+               const Eigen::Matrix3d& rotation, const Eigen::Vector3d& center,
+               PoseChange change, double noise_px) {
+  FitStep at;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
   for (const WitnessMatch& match : matches) {
-    sum += std::abs(SignedMatchError(match, rotation, center));
+    Eigen::Vector3d gradient;
+    const double error = MatchError(match, rotation, center, change, &gradient);
+    const double weight = 1 / std::max(std::abs(error), noise_px);
+    normal += weight * gradient * gradient.transpose();
+    right_side -= weight * error * gradient;
+    at.sum += std::abs(error);
   }
-  return sum;
+  at.step = normal.ldlt().solve(right_side);
+  return at;
 }
 
 }  // namespace
@@ -103,60 +124,44 @@ RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
                                const RigidTransform& cam_from_world,
                                PoseChange change, double noise_px) {
   constexpr int kMaxIterations = 50;
-  constexpr double kDifferenceStep = 1e-7;  // radians, or of the baselines
-  constexpr double kLeastGain = 1e-4;       // of the sum, for another iteration
+  constexpr double kLeastGain = 1e-4;  // of the sum, for another iteration
   Eigen::Matrix3d rotation = cam_from_world.rotation;
   Eigen::Vector3d center = Center(cam_from_world);
-  double shortest = std::numeric_limits<double>::infinity();
-  for (const WitnessMatch& match : matches) {
-    shortest = std::min(shortest, (match.other_center - center).norm());
-  }
-  if (!(shortest > 0) || matches.empty()) return cam_from_world;
-  const double difference_step =
-      kDifferenceStep * (change == PoseChange::kMove ? shortest : 1);
-  double sum = SumOfErrors(matches, rotation, center);
-  for (int i = 0; i < kMaxIterations; ++i) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
-    for (const WitnessMatch& match : matches) {
-      const double error = SignedMatchError(match, rotation, center);
-      const Eigen::Vector3d gradient = ErrorGradient(
-          match, change, difference_step, rotation, center, error);
-      const double weight = 1 / std::max(std::abs(error), noise_px);
-      normal += weight * gradient * gradient.transpose();
-      right_side -= weight * error * gradient;
-    }
-    Eigen::Vector3d step = normal.ldlt().solve(right_side);
-    if (!step.allFinite()) break;
+  if (matches.empty()) return cam_from_world;
+  FitStep at = StepAt(matches, rotation, center, change, noise_px);
+  for (int i = 0; i < kMaxIterations && at.step.allFinite(); ++i) {
     // Halved until the sum falls.
-    double next_sum = sum;
+    FitStep next{at.sum, at.step};
     Eigen::Matrix3d next_rotation;
     Eigen::Vector3d next_center;
-    for (int halvings = 0; halvings < 20 && next_sum >= sum; ++halvings) {
+    for (int halvings = 0; halvings < 20 && next.sum >= at.sum; ++halvings) {
       next_rotation = rotation;
       next_center = center;
-      ApplyStep(change, step, &next_rotation, &next_center);
-      next_sum = SumOfErrors(matches, next_rotation, next_center);
-      step /= 2;
+      ApplyStep(change, at.step, &next_rotation, &next_center);
+      next = StepAt(matches, next_rotation, next_center, change, noise_px);
+      at.step /= 2;
     }
-    if (!(next_sum < sum)) break;
+    if (!(next.sum < at.sum)) break;
     rotation = next_rotation;
     center = next_center;
-    const bool is_last = next_sum > (1 - kLeastGain) * sum;
-    sum = next_sum;
+    const bool is_last = next.sum > (1 - kLeastGain) * at.sum;
+    at = next;
     if (is_last) break;
   }
   return {rotation, -rotation * center};
 }
 
-int64_t NumAgreeing(const std::vector<WitnessMatch>& matches,
-                    const RigidTransform& cam_from_world, double tolerance_px) {
+std::vector<double> EpipolarErrors(const std::vector<WitnessMatch>& matches,
+                                   const RigidTransform& cam_from_world) {
   const Eigen::Vector3d center = Center(cam_from_world);
-  return std::count_if(
-      matches.begin(), matches.end(), [&](const WitnessMatch& match) {
-        return std::abs(SignedMatchError(match, cam_from_world.rotation,
-                                         center)) <= tolerance_px;
-      });
+  const Eigen::Matrix3d world_from_cam = cam_from_world.rotation.transpose();
+  std::vector<double> errors;
+  errors.reserve(matches.size());
+  for (const WitnessMatch& match : matches) {
+    errors.push_back(EpipolarMatch(world_from_cam * match.ray, match.other_ray)
+                         .ErrorPx(match.other_center - center));
+  }
+  return errors;
 }
 
 void NearestPoint::Add(const Eigen::Vector3d& point,
@@ -225,9 +230,10 @@ class CellSearch {
       Look(std::move(cell), 0, all_);
     }
     while (!cells_.empty() && best_.num_cells < max_cells_ &&
-           cells_.top().upper_bound() > best_.num_explained) {
-      const Cell cell = cells_.top();
-      cells_.pop();
+           cells_.front().upper_bound() > best_.num_explained) {
+      std::pop_heap(cells_.begin(), cells_.end(), IsLessPromising());
+      const Cell cell = std::move(cells_.back());
+      cells_.pop_back();
       first_part_[cell.order] = best_.num_cells;
       const double half = cell.half_width / 2;
       for (const double ds : {-half, half}) {
@@ -244,7 +250,7 @@ class CellSearch {
     best_.upper_bound = std::max(best_.num_explained, unresolved_);
     if (!cells_.empty()) {
       best_.upper_bound =
-          std::max(best_.upper_bound, cells_.top().upper_bound());
+          std::max(best_.upper_bound, cells_.front().upper_bound());
     }
     for (int64_t face = 0; face < 3; ++face) DescribeCell(face);
     return best_;
@@ -263,20 +269,21 @@ class CellSearch {
   struct Condition {
     Eigen::Vector3d normal;
     Eigen::Matrix<double, 4, 3> gradient;
-    double normal_change;    // of normal . b at most, per half width
-    double gradient_change;  // of |gradient b| at most, per half width
+    // Of normal . b, and of the tolerance times |gradient b|, together at most,
+    // per half width.
+    double change;
   };
 
-  static Condition ConditionOn(int face, const EpipolarMatch& match) {
+  Condition ConditionOn(int face, const EpipolarMatch& match) const {
     Condition condition;
     for (int i = 0; i < 3; ++i) {
       condition.normal[i] = match.normal[(face + i) % 3];
       condition.gradient.col(i) = match.gradient.col((face + i) % 3);
     }
-    condition.normal_change =
-        std::abs(condition.normal[1]) + std::abs(condition.normal[2]);
-    condition.gradient_change =
-        condition.gradient.col(1).norm() + condition.gradient.col(2).norm();
+    condition.change = std::abs(condition.normal[1]) +
+                       std::abs(condition.normal[2]) +
+                       tolerance_px_ * (condition.gradient.col(1).norm() +
+                                        condition.gradient.col(2).norm());
     return condition;
   }
 
@@ -286,21 +293,25 @@ class CellSearch {
     cell.num_sure = num_sure;
     cell.order = best_.num_cells++;
     first_part_.push_back(-1);
-    cell.open.reserve(open.size());
+    open_.clear();
     int64_t num_at_centre = num_sure;
+    int64_t num_possible = num_sure + static_cast<int64_t>(open.size());
     const Eigen::Vector3d b(1, cell.s, cell.t);
+    const auto square = [](double x) { return x * x; };
     for (const int32_t k : open) {
       const Condition& condition = conditions_[cell.face][k];
       const double distance = std::abs(condition.normal.dot(b));
-      const double allowed = tolerance_px_ * (condition.gradient * b).norm();
-      const double change =
-          cell.half_width *
-          (condition.normal_change + tolerance_px_ * condition.gradient_change);
-      if (distance <= allowed) ++num_at_centre;
-      if (distance + change <= allowed) {
+      const double change = cell.half_width * condition.change;
+      const double allowed =
+          square(tolerance_px_) * (condition.gradient * b).squaredNorm();
+      if (square(distance) <= allowed) ++num_at_centre;
+      if (square(distance + change) <= allowed) {
         ++cell.num_sure;
-      } else if (distance - change <= kMoreThanRounding * allowed) {
-        cell.open.push_back(k);
+      } else if (distance <= change ||
+                 square(distance - change) <= kMoreThanRounding * allowed) {
+        open_.push_back(k);
+      } else if (--num_possible <= best_.num_explained) {
+        return;
       }
     }
     if (num_at_centre > best_.num_explained) {
@@ -308,20 +319,25 @@ class CellSearch {
       for (int i = 0; i < 3; ++i) best_.baseline[(cell.face + i) % 3] = b[i];
       best_.baseline.normalize();
     }
-    if (cell.upper_bound() <= best_.num_explained) return;
+    const int64_t upper_bound =
+        cell.num_sure + static_cast<int64_t>(open_.size());
+    if (upper_bound <= best_.num_explained) return;
     constexpr double kSmallest = 1e-12;
     if (cell.half_width < kSmallest) {
-      unresolved_ = std::max(unresolved_, cell.upper_bound());
+      unresolved_ = std::max(unresolved_, upper_bound);
       return;
     }
-    cells_.push(std::move(cell));
+    cell.open = open_;
+    cells_.push_back(std::move(cell));
+    std::push_heap(cells_.begin(), cells_.end(), IsLessPromising());
   }
 
   const double tolerance_px_;
   const int64_t max_cells_;
   std::array<std::vector<Condition>, 3> conditions_;
   std::vector<int32_t> all_;
-  std::priority_queue<Cell, std::vector<Cell>, IsLessPromising> cells_;
+  std::vector<Cell> cells_;    // a heap
+  std::vector<int32_t> open_;  // of the cell that is looked at
   BaselineSearch best_;
   int64_t unresolved_ = 0;
   std::vector<int64_t> first_part_;  // of each cell, -1: it is not divided

@@ -14,6 +14,7 @@
 #include "krot/database.h"
 #include "krot/geometry.h"
 #include "krot/model.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 
@@ -73,6 +74,47 @@ struct EpipolarMatch {
   double ErrorPx(const Eigen::Vector3d& baseline) const {
     return std::abs(SignedErrorPx(baseline));
   }
+  // The error for the worst baseline, which is that until the rays are
+  // parallel.
+  double ParallaxPx() const { return ErrorPx(normal); }
+};
+
+// Rays of a database's matches through the cameras of its model.
+class MatchRays {
+ public:
+  // Keeps references.
+  MatchRays(const Model& model, const Database& database)
+      : geometries(ImageGeometries(model)),
+        model_(model),
+        database_(database) {}
+
+  // Of Model::images[image], which has a pose.
+  PixelRay World(const PixelRay& ray, int32_t image) const {
+    const Eigen::Matrix3d world_from_cam =
+        geometries[image].cam_from_world.rotation.transpose();
+    return world_from_cam * ray;
+  }
+
+  // Calls visit(ray1, ray2), in camera axes, for each match of a pair whose
+  // pixels have rays.
+  template <typename Visit>
+  void ForEach(const VerifiedPair& pair, const Visit& visit) const {
+    const Camera& camera1 = model_.cameras[geometries[pair.image1].camera];
+    const Camera& camera2 = model_.cameras[geometries[pair.image2].camera];
+    for (const auto& [keypoint1, keypoint2] : pair.matches) {
+      const auto ray1 =
+          RayOf(camera1, database_.keypoints[pair.image1][keypoint1]);
+      const auto ray2 =
+          RayOf(camera2, database_.keypoints[pair.image2][keypoint2]);
+      if (ray1 && ray2) visit(*ray1, *ray2);
+    }
+  }
+
+  const std::vector<ImageGeometry> geometries;  // as Model::images
+
+ private:
+  const Model& model_;
+  const Database& database_;
 };
 
 struct MatchNoise {
@@ -86,9 +128,12 @@ struct MatchNoise {
 // largest exceeds sigma sqrt(2 ln(N / alpha)) with a probability below
 // alpha = 0.05. Sigma is that of the pairs whose median error is at most twice
 // that of the best quarter: so a few wrong poses do not hide among the noise,
-// as long as half of the images are right. Zeros without errors.
-MatchNoise EstimateMatchNoise(
-    const std::vector<std::vector<double>>& errors_px);
+// as long as half of the images are right. Pairs without a parallax of five
+// times their error do not count where others have one: photos from one place,
+// as of a camera that stands still, have less noise between them. `parallax_px`
+// has the median parallax of each pair. Zeros without errors.
+MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
+                              const std::vector<double>& parallax_px);
 
 // A match of one image, whose pose is in question, with another, whose pose is
 // known.
@@ -112,9 +157,9 @@ RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
                                const RigidTransform& cam_from_world,
                                PoseChange change, double noise_px);
 
-// How many of the matches are within the tolerance under a pose of their image.
-int64_t NumAgreeing(const std::vector<WitnessMatch>& matches,
-                    const RigidTransform& cam_from_world, double tolerance_px);
+// The errors of the matches under a pose of their image: Sampson's distances.
+std::vector<double> EpipolarErrors(const std::vector<WitnessMatch>& matches,
+                                   const RigidTransform& cam_from_world);
 
 // The point with the least weighted sum of squared distances to lines.
 class NearestPoint {
@@ -172,14 +217,23 @@ struct Explanations {
   bool is_proved = true;
 };
 
+// Decides which images are wrong, and what is wrong with them, of pairs that
+// were measured, counted and searched: fills `cheapest`, `runner_up` and the
+// images of `check`. `errors_px` are those of each pair under the model's
+// poses. Same bits at any number of threads.
+void JudgePoses(const MatchRays& rays, const Database& database,
+                const std::vector<std::vector<double>>& errors_px,
+                int num_threads, PairCheck* check);
+
 // The set of images that, called wrong, costs least: an image costs
 // `image_costs[i]` matches, a contradiction between two images that are not
 // called wrong its own. Image by image it is settled whether calling it
-// wrong pays whatever the others are; what is left is branched on, `max_nodes`
-// times at most for each explanation.
+// wrong pays whatever the others are; what is left is branched on, until
+// `max_visits` pairs have been looked at for the cheapest, and as many for all
+// others: about a second each.
 Explanations ExplainContradictions(
     const std::vector<int64_t>& image_costs,
     const std::vector<ContradictoryPair>& contradictions,
-    int64_t max_nodes = 100000);
+    int64_t max_visits = 200000000);
 
 }  // namespace krot::internal

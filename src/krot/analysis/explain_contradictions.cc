@@ -19,14 +19,17 @@ struct Edge {
 class CoverSearch {
  public:
   CoverSearch(const std::vector<int64_t>& image_costs,
-              const std::vector<ContradictoryPair>& contradictions,
-              int64_t max_nodes)
-      : costs_(image_costs), edges_(image_costs.size()), max_nodes_(max_nodes) {
+              const std::vector<ContradictoryPair>& contradictions)
+      : costs_(image_costs), edges_(image_costs.size()) {
     for (const ContradictoryPair& pair : contradictions) {
       edges_[pair.image1].push_back({pair.image2, pair.num_matches});
       edges_[pair.image2].push_back({pair.image1, pair.num_matches});
     }
   }
+
+  // Searches until so many pairs have been looked at from now on.
+  void Allow(int64_t visits) { visits_left_ = visits; }
+  bool IsAtEnd() const { return visits_left_ < 0; }
 
   // The cheapest explanation; with `forced` that image is called so.
   Explanation Run(std::optional<std::pair<int32_t, Choice>> forced) {
@@ -36,7 +39,6 @@ class CoverSearch {
     }
     if (forced) choices[forced->first] = forced->second;
     best_ = {{}, std::numeric_limits<int64_t>::max()};
-    num_nodes_ = 0;
     Branch(std::move(choices));
     return best_;
   }
@@ -47,7 +49,8 @@ class CoverSearch {
  private:
   // The matches of an image's contradictions with images of this choice.
   int64_t Against(size_t image, Choice choice,
-                  const std::vector<Choice>& choices) const {
+                  const std::vector<Choice>& choices) {
+    visits_left_ -= static_cast<int64_t>(edges_[image].size());
     int64_t matches = 0;
     for (const Edge& edge : edges_[image]) {
       if (choices[edge.neighbour] == choice) matches += edge.num_matches;
@@ -56,7 +59,7 @@ class CoverSearch {
   }
 
   // Settles the images for which one choice pays whatever the others are.
-  void Settle(std::vector<Choice>* choices) const {
+  void Settle(std::vector<Choice>* choices) {
     for (bool has_changed = true; has_changed;) {
       has_changed = false;
       for (size_t i = 0; i < choices->size(); ++i) {
@@ -76,7 +79,7 @@ class CoverSearch {
   // What the choices cost at least, and whether and where one is open: at the
   // image with the most matches against other open ones.
   int64_t LowerBound(const std::vector<Choice>& choices,
-                     std::optional<size_t>* open) const {
+                     std::optional<size_t>* open) {
     int64_t bound = 0, twice_between_right = 0, most = -1;
     for (size_t i = 0; i < choices.size(); ++i) {
       const int64_t sure = Against(i, Choice::kRight, choices);
@@ -94,7 +97,7 @@ class CoverSearch {
   }
 
   void Branch(std::vector<Choice> choices) {
-    if (++num_nodes_ > max_nodes_) {
+    if (IsAtEnd()) {
       is_proved_ = false;
       // Whatever is still open is called right: an explanation all the same.
       if (best_.cost < std::numeric_limits<int64_t>::max()) return;
@@ -123,8 +126,7 @@ class CoverSearch {
 
   const std::vector<int64_t>& costs_;
   std::vector<std::vector<Edge>> edges_;
-  const int64_t max_nodes_;
-  int64_t num_nodes_ = 0;
+  int64_t visits_left_ = 0;
   bool is_proved_ = true;
   Explanation best_;
 };
@@ -154,14 +156,16 @@ int64_t CommonCost(const Explanation& a, const Explanation& b,
 
 Explanations ExplainContradictions(
     const std::vector<int64_t>& image_costs,
-    const std::vector<ContradictoryPair>& contradictions, int64_t max_nodes) {
-  CoverSearch search(image_costs, contradictions, max_nodes);
+    const std::vector<ContradictoryPair>& contradictions, int64_t max_visits) {
+  CoverSearch search(image_costs, contradictions);
   Explanations explanations;
+  search.Allow(max_visits);
   explanations.cheapest = search.Run(std::nullopt);
   const std::vector<int32_t>& wrong = explanations.cheapest.images;
   const auto is_wrong = [&](int32_t image) {
     return std::binary_search(wrong.begin(), wrong.end(), image);
   };
+  search.Allow(max_visits);
   // Another explanation calls one of the wrong images right, or one image of
   // a pair wrong whose matches are called wrong now.
   for (int32_t i = 0; i < static_cast<int32_t>(image_costs.size()); ++i) {
@@ -171,6 +175,7 @@ Explanations ExplainContradictions(
           return !is_wrong(edge.neighbour);
         });
     if (!counts) continue;
+    if (search.IsAtEnd()) break;
     Explanation other = search.Run(
         std::make_pair(i, is_wrong(i) ? Choice::kRight : Choice::kWrong));
     const int64_t common =
@@ -183,7 +188,7 @@ Explanations ExplainContradictions(
       explanations.runner_up = std::move(other);
     }
   }
-  explanations.is_proved = search.is_proved();
+  explanations.is_proved = search.is_proved() && !search.IsAtEnd();
   return explanations;
 }
 

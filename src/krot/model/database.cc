@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "krot/model/sqlite_rows.h"
 
@@ -37,6 +39,7 @@ ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
   ImageOfId join;
   std::vector<bool> is_taken(model.images.size());
   SqliteRows rows(database, "images", "image_id, name");
+  std::string other;  // a name that the model does not have
   while (rows.Next()) {
     const int64_t id = rows.Integer(0);
     const std::string name = rows.Text(1);
@@ -45,7 +48,10 @@ ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
                      ", expected 0 to " + std::to_string(kMaxNumImages - 1));
     }
     const auto found = image_of_name.find(name);
-    if (found == image_of_name.end()) continue;
+    if (found == image_of_name.end()) {
+      if (other.empty()) other = name;
+      continue;
+    }
     if (is_taken[found->second] || !join.emplace(id, found->second).second) {
       database->Fail("found image \"" + name +
                      "\" twice, expected unique names");
@@ -55,8 +61,9 @@ ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
   if (join.empty()) {
     database->Fail(
         "found none of the model's images, such as \"" +
-        (model.images.empty() ? std::string() : model.images[0].name) +
-        "\", expected the database that the model was made from");
+        (model.images.empty() ? std::string() : model.images[0].name) + "\"" +
+        (other.empty() ? "" : ", but others, such as \"" + other + "\"") +
+        ", expected the database that the model was made from");
   }
   return join;
 }
@@ -178,19 +185,32 @@ void RequireKeypoint(const Database& read, const Model& model, int32_t image,
                 std::to_string(read.keypoints[image].size()) + " keypoints");
 }
 
+// The matches of a pair that is there under both orders of its ids.
+void AddMatches(VerifiedPair from, VerifiedPair* to) {
+  if (from.image1 != to->image1) {
+    for (auto& match : from.matches) std::swap(match[0], match[1]);
+  }
+  auto& matches = to->matches;
+  matches.insert(matches.end(), from.matches.begin(), from.matches.end());
+  std::sort(matches.begin(), matches.end());
+  matches.erase(std::unique(matches.begin(), matches.end()), matches.end());
+}
+
 void ReadPairs(const Model& model, const ImageOfId& join,
                SqliteDatabase* database, Database* read) {
   SqliteRows rows(database, "two_view_geometries",
                   "pair_id, rows, cols, data, config");
+  std::map<std::pair<int32_t, int32_t>, size_t> pair_of_images;
   std::vector<uint32_t> elements;
   int64_t columns = 0;
   while (rows.Next()) {
     const int64_t pair_id = rows.Integer(0);
     const int64_t config = rows.Integer(4);
     const int64_t id1 = pair_id / kMaxNumImages, id2 = pair_id % kMaxNumImages;
-    if (pair_id < 0 || id1 >= id2) {
+    // COLMAP reads the larger id first, too, as other programs write it.
+    if (pair_id < 0 || id1 == id2) {
       database->Fail("found pair id " + std::to_string(pair_id) +
-                     ", expected 2147483647 times an image id plus a larger "
+                     ", expected 2147483647 times an image id plus another "
                      "one");
     }
     if (config < 0 || config > kMaxConfig) {
@@ -221,7 +241,13 @@ void ReadPairs(const Model& model, const ImageOfId& join,
       RequireKeypoint(*read, model, pair.image2, elements[2 * i + 1],
                       *database);
     }
-    read->pairs.push_back(std::move(pair));
+    const auto [known, is_new] = pair_of_images.emplace(
+        std::minmax(pair.image1, pair.image2), read->pairs.size());
+    if (is_new) {
+      read->pairs.push_back(std::move(pair));
+    } else {
+      AddMatches(pair, &read->pairs[known->second]);
+    }
   }
 }
 

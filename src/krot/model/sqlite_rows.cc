@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <new>
 #include <system_error>
 
 #include "krot/base/numbers.h"
@@ -66,6 +67,14 @@ std::string UriOf(const std::string& path) {
   return uri;
 }
 
+// SQLite's ways to files that take no locks, on Unix and on Windows.
+std::string VfsWithoutLocks() {
+  for (const char* name : {"unix-none", "win32-none"}) {
+    if (sqlite3_vfs_find(name) != nullptr) return name;
+  }
+  return "";
+}
+
 }  // namespace
 
 SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
@@ -74,13 +83,20 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
   // SQLite looks for the log beside the file that a link stands for.
   std::error_code error;
   path_ = std::filesystem::canonical(path, error).generic_string();
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   if (error) Fail("cannot be opened: " + error.message());
   before_ = States();
-  // Without a log or a journal nobody is writing: no locks are needed, and
-  // SQLite need not create files of its own beside the database.
-  is_immutable_ = before_[1].size == 0 && !before_[2].exists;
-  const std::string uri =
-      UriOf(path_) + (is_immutable_ ? "?mode=ro&immutable=1" : "?mode=ro");
+  // Without a journal, and without a log or the log's index, nobody is writing:
+  // no locks are needed, and SQLite need not create files of its own beside the
+  // database. A log alone is what a program left that did not end well.
+  const bool has_log = before_[1].size > 0;
+  const std::string without_locks = VfsWithoutLocks();
+  is_unlocked_ =
+      !before_[2].exists &&
+      (!has_log || (!without_locks.empty() &&
+                    !std::filesystem::exists(path_ + "-shm", error)));
+  std::string uri = UriOf(path_) + "?mode=ro";
+  if (is_unlocked_) uri += has_log ? "&vfs=" + without_locks : "&immutable=1";
   sqlite3* database = nullptr;
   const int status = sqlite3_open_v2(
       uri.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
@@ -89,6 +105,10 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
   sqlite3_busy_timeout(database, 5000);  // milliseconds
   sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  if (is_unlocked_) {  // keeps the log's index in memory
+    Require(sqlite3_exec(database, "PRAGMA locking_mode = EXCLUSIVE", nullptr,
+                         nullptr, nullptr));
+  }
   // All that follows is of one state of the database.
   Require(sqlite3_exec(database, "BEGIN", nullptr, nullptr, nullptr));
   for (const FileState& file : before_) bytes_left_ += file.size;
@@ -109,7 +129,7 @@ std::array<SqliteDatabase::FileState, 3> SqliteDatabase::States() const {
 }
 
 void SqliteDatabase::RequireUnchanged() const {
-  if (!is_immutable_ || States() == before_) return;
+  if (!is_unlocked_ || States() == before_) return;
   Fail("was changed while it was read; wait until COLMAP has ended");
 }
 
@@ -129,6 +149,7 @@ void SqliteDatabase::Require(int status) const {
   if (status == SQLITE_OK || status == SQLITE_ROW || status == SQLITE_DONE) {
     return;
   }
+  if ((status & 0xff) == SQLITE_NOMEM) throw std::bad_alloc();
   // What is read without locks may be half of one state and half of the next.
   RequireUnchanged();
   const std::string reason =
@@ -223,7 +244,11 @@ std::string_view SqliteRows::Blob(int column) const {
   if (Type(column) == SQLITE_NULL) return {};
   if (Type(column) != SQLITE_BLOB) FailType(column, "blob");
   const void* bytes = sqlite3_column_blob(statement_.get(), column);
-  if (bytes == nullptr) return {};
+  if (bytes == nullptr) {  // no bytes, or no memory for them
+    const int status = sqlite3_errcode(database_.database_.get());
+    if (status == SQLITE_NOMEM) database_.Require(status);
+    return {};
+  }
   return {static_cast<const char*>(bytes),
           static_cast<size_t>(sqlite3_column_bytes(statement_.get(), column))};
 }

@@ -51,7 +51,7 @@ class SqliteDatabase {
 
   const std::string name_;
   std::string path_;
-  bool is_immutable_ = false;
+  bool is_unlocked_ = false;
   std::array<FileState, 3> before_;
   std::unique_ptr<sqlite3, int (*)(sqlite3*)> database_;
   int64_t bytes_left_ = 0;

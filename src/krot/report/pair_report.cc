@@ -128,7 +128,7 @@ std::string PoseFaultWords(const CheckedImage& image) {
     case PoseFault::kPosition:
       return "position: moved by " + FormatNumber(image.moved_by, 3);
     case PoseFault::kRotation:
-      if (image.num_agreeing_turned > image.num_agreeing_moved) {
+      if (2 * image.num_agreeing_turned >= image.num_matches) {
         return "rotation: turned by " + FormatNumber(image.turned_by_deg, 2) +
                " degrees";
       }
@@ -152,12 +152,20 @@ std::string PairSentence(const PairCheck& check) {
       std::to_string(num_checked) + " pairs of images contradict";
   const std::string tolerance =
       " (tolerance " + FormatNumber(check.tolerance_px, 2) + " px)";
-  if (check.num_contradictory == 0) {
-    return "By the matches none of " + std::to_string(num_checked) +
-           " pairs of images contradicts the poses" + tolerance + ".";
-  }
   const auto num_images =
       static_cast<int64_t>(WronglyPosedImages(check).size());
+  if (check.num_contradictory == 0) {
+    std::string sentence = "By the matches none of " +
+                           std::to_string(num_checked) +
+                           " pairs of images contradicts the poses" + tolerance;
+    if (num_images > 0) {
+      sentence +=
+          ", but " + Counted(num_images, "image") +
+          (num_images == 1 ? " is wrong and fits" : " are wrong and fit") +
+          " the matches better moved or turned";
+    }
+    return sentence + ".";
+  }
   const auto num_pairs =
       static_cast<int64_t>(WronglyMatchedPairs(check).size());
   const auto num_groups = static_cast<int64_t>(check.groups.size());
@@ -197,7 +205,7 @@ std::string PairTable(const PairCheck& check, int max_rows) {
   text +=
       "What matches do not show: equal structures whose wrong matches agree "
       "with the poses, motion\nalong an image's epipolar lines, and changes "
-      "within the tolerance.\n";
+      "within the noise.\n";
   return text + GroupTable(check, num_rows) + WrongImageTable(check, num_rows) +
          WrongPairTable(check, num_rows);
 }
