@@ -200,20 +200,19 @@ class Checker {
         MedianOfSound([&](size_t n) { return sums_[n].CenterSpread(); });
     std::vector<int32_t> few;
     int32_t weakest = -1;
-    for (size_t n = 0; n < check_.images.size(); ++n) {
+    for (int32_t n = 0; n < static_cast<int32_t>(sums_.size()); ++n) {
       const ImageCheck& image = check_.images[n];
-      if (image.verdict == ImageVerdict::kWrong || RelativeKept(n) >= 1 ||
+      if (IsWrong(n) || RelativeKept(n) >= 1 ||
           (check_.pairs && check_.pairs->images[n].kept_matches > 0) ||
           sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
         continue;
       }
-      const auto id = static_cast<int32_t>(n);
       if (image.num_tested - image.num_wrong < kFewestAgree) {
-        few.push_back(id);
+        few.push_back(n);
       } else if (ContradictionExponent(n) > LeastExponent(n) &&
                  (weakest < 0 ||
                   sums_[n].CenterSpread() > sums_[weakest].CenterSpread())) {
-        weakest = id;
+        weakest = n;
       }
     }
     if (few.empty() && weakest >= 0) few.push_back(weakest);
