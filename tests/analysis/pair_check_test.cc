@@ -230,6 +230,25 @@ TEST(CheckPairs, FindsAnImageThatIsTurnedOrMovedWithinTheTolerance) {
   }
 }
 
+// That no baseline explains them says nothing of a rotation.
+TEST(CheckPairs, ProvesNoRotationWrongByMatchesThatAreWrong) {
+  Model model = Scene();
+  Database database = DatabaseOf(model);
+  for (VerifiedPair& pair : database.pairs) {
+    if (pair.image1 != 4) continue;
+    for (size_t k = 0; k + 1 < pair.matches.size(); ++k) {
+      std::swap(pair.matches[k][1], pair.matches[k + 1][1]);
+    }
+    break;
+  }
+  Change(4, 0, 0.008, &model);
+  const PairCheck check = CheckPairs(model, database);
+  EXPECT_EQ(check.num_contradictory, 1);
+  EXPECT_THAT(WrongImages(check), ElementsAre(4));
+  EXPECT_EQ(check.images[4].fault, PoseFault::kPosition);
+  EXPECT_FALSE(check.images[4].is_rotation_proved_wrong);
+}
+
 // As a model that is not adjusted.
 TEST(CheckPairs, CallsNoImageMisplacedWhereMostWouldFitBetterElsewhere) {
   Model model = Scene();

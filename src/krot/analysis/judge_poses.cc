@@ -258,7 +258,7 @@ class PoseJudge {
 
   PoseFits FitsOf(int32_t i) const {
     std::vector<WitnessMatch> matches;
-    int64_t most_explained = 0, contradictory = 0;
+    std::vector<size_t> begin;  // of each witness
     NearestPoint to_baselines;
     const std::vector<size_t> witnesses = Witnesses(i);
     int64_t num_matches = 0;
@@ -271,11 +271,10 @@ class PoseJudge {
       const Eigen::Vector3d center =
           Center(rays_.geometries[other].cam_from_world);
       if (checked.state == PairState::kContradictory) {
-        most_explained += checked.most_explained;
-        contradictory += checked.num_matches;
         to_baselines.Add(center, checked.best_baseline,
                          static_cast<double>(checked.num_explained));
       }
+      begin.push_back(matches.size());
       rays_.ForEach(database_.pairs[p], [&](const PixelRay& ray1,
                                             const PixelRay& ray2) {
         matches.push_back({is_first ? ray1 : ray2,
@@ -283,8 +282,8 @@ class PoseJudge {
       });
     }
     PoseFits fits;
+    begin.push_back(matches.size());
     fits.num_matches = static_cast<int64_t>(matches.size());
-    fits.is_rotation_proved_wrong = 4 * most_explained < contradictory;
     const RigidTransform& as_it_is = rays_.geometries[i].cam_from_world;
     const std::vector<double> errors = EpipolarErrors(matches, as_it_is);
     std::vector<double> moved, turned;
@@ -302,6 +301,18 @@ class PoseJudge {
       }
     }
     fits.turned = Fit(matches, as_it_is, PoseChange::kTurn, &turned);
+    // Of matches that are right, as they agree with another rotation.
+    int64_t most_explained = 0, contradictory = 0;
+    for (size_t w = 0; w < witnesses.size(); ++w) {
+      const CheckedPair& checked = check_.pairs[witnesses[w]];
+      if (checked.state != PairState::kContradictory) continue;
+      const int64_t num_agreeing = NumAgreeing(
+          {turned.begin() + begin[w], turned.begin() + begin[w + 1]});
+      if (2 * num_agreeing < checked.num_matches) continue;
+      most_explained += checked.most_explained;
+      contradictory += checked.num_matches;
+    }
+    fits.is_rotation_proved_wrong = 4 * most_explained < contradictory;
     fits.num_agreeing = NumAgreeing(errors);
     fits.num_agreeing_moved = NumAgreeing(moved);
     fits.num_agreeing_turned = NumAgreeing(turned);
