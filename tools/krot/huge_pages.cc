@@ -12,8 +12,16 @@
 #include <cstdlib>
 #include <new>
 
-#if defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
+// A sanitizer has its own: GCC says so in one way, Clang in another.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define KROT_IS_SANITIZED
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define KROT_IS_SANITIZED
+#endif
+#endif
+
+#if defined(__linux__) && !defined(KROT_IS_SANITIZED)
 #include <sys/mman.h>
 
 namespace {
