@@ -184,8 +184,20 @@ SqliteRows::SqliteRows(SqliteDatabase* database, const std::string& table,
 void SqliteRows::Prepare(const std::string& sql) {
   sqlite3_stmt* statement = nullptr;
   sqlite3* database = database_.database_.get();
-  const int status =
-      sqlite3_prepare_v2(database, sql.c_str(), -1, &statement, nullptr);
+  const auto prepare = [&] {
+    return sqlite3_prepare_v2(database, sql.c_str(), -1, &statement, nullptr);
+  };
+  int status = prepare();
+  if (status == SQLITE_NOMEM) status = prepare();
+  if (status == SQLITE_NOMEM) {     // or so it calls damage to the schema
+    constexpr int kMuch = 1 << 20;  // beside a schema
+    void* const memory = sqlite3_malloc(kMuch);
+    if (memory == nullptr) throw std::bad_alloc();
+    sqlite3_free(memory);
+    database_.Fail(
+        "cannot be read (its tables make no sense): it is damaged; copy it "
+        "anew");
+  }
   if (status == SQLITE_ERROR) {
     database_.Fail("the table " + table_ + " is not COLMAP's (" +
                    sqlite3_errmsg(database) +
