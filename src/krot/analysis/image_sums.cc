@@ -10,6 +10,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/camera/camera_model.h"
+#include "krot/geometry/transform.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -138,10 +139,7 @@ class ImageAdder {
       const Matrix23 by_cam = (E->bottomRows<2>() -
                                E->bottomRows<2>() * x_cam / depth * E->row(0)) /
                               depth;
-      Matrix3d cross;
-      cross << 0, -x_cam.z(), x_cam.y(), x_cam.z(), 0, -x_cam.x(), -x_cam.y(),
-          x_cam.x(), 0;
-      row.F << -by_cam * cross, -by_cam * pose.rotation;
+      row.F << -by_cam * CrossMatrix(x_cam), -by_cam * pose.rotation;
       if (!row.F.allFinite()) continue;
       H.noalias() += row.F.rightCols<3>().transpose() * row.F.rightCols<3>();
       rows.push_back(row);

@@ -233,7 +233,6 @@ double CriticalW(int64_t num_tested, double false_alarm,
                    std::expm1(2 / degrees_of_freedom * log_odds));
 }
 
-// Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
 Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> of_H(H);
   Eigen::Matrix3d root = of_H.eigenvectors();
@@ -245,6 +244,7 @@ Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H) {
   return root;
 }
 
+// Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
 double StandardizedError(double chi2, int num_directions) {
   if (num_directions == 2) return std::sqrt(chi2);
   if (num_directions == 0) return kNaN;

@@ -149,7 +149,15 @@ void SqliteDatabase::Require(int status) const {
   if (status == SQLITE_OK || status == SQLITE_ROW || status == SQLITE_DONE) {
     return;
   }
-  if ((status & 0xff) == SQLITE_NOMEM) throw std::bad_alloc();
+  if ((status & 0xff) == SQLITE_NOMEM) {  // so it calls some damage, too
+    constexpr int kMuch = 1 << 20;        // beside a row
+    void* const memory = sqlite3_malloc(kMuch);
+    if (memory == nullptr) throw std::bad_alloc();
+    sqlite3_free(memory);
+    Fail(
+        "cannot be read (its tables make no sense): it is damaged; copy it "
+        "anew");
+  }
   // What is read without locks may be half of one state and half of the next.
   RequireUnchanged();
   const std::string reason =
@@ -189,15 +197,6 @@ void SqliteRows::Prepare(const std::string& sql) {
   };
   int status = prepare();
   if (status == SQLITE_NOMEM) status = prepare();
-  if (status == SQLITE_NOMEM) {     // or so it calls damage to the schema
-    constexpr int kMuch = 1 << 20;  // beside a schema
-    void* const memory = sqlite3_malloc(kMuch);
-    if (memory == nullptr) throw std::bad_alloc();
-    sqlite3_free(memory);
-    database_.Fail(
-        "cannot be read (its tables make no sense): it is damaged; copy it "
-        "anew");
-  }
   if (status == SQLITE_ERROR) {
     database_.Fail("the table " + table_ + " is not COLMAP's (" +
                    sqlite3_errmsg(database) +
@@ -205,12 +204,21 @@ void SqliteRows::Prepare(const std::string& sql) {
   }
   database_.Require(status);
   statement_.reset(statement);
+  num_rows_ = 0;
 }
 
 bool SqliteRows::Next() {
-  const int status = sqlite3_step(statement_.get());
+  int status = sqlite3_step(statement_.get());
+  if (status == SQLITE_NOMEM) {  // once more, from the first row
+    sqlite3_reset(statement_.get());
+    int64_t row = 0;
+    do {
+      status = sqlite3_step(statement_.get());
+    } while (status == SQLITE_ROW && row++ < num_rows_);
+  }
   database_.Require(status);
   if (status != SQLITE_ROW) return false;
+  ++num_rows_;
   int64_t bytes = 0;
   for (int i = 0; i < sqlite3_column_count(statement_.get()); ++i) {
     if (Type(i) == SQLITE_BLOB || Type(i) == SQLITE_TEXT) {
@@ -247,7 +255,7 @@ double SqliteRows::Real(int column) const {
 std::string SqliteRows::Text(int column) const {
   if (Type(column) != SQLITE_TEXT) FailType(column, "text");
   const auto* text = sqlite3_column_text(statement_.get(), column);
-  if (text == nullptr) database_.Require(SQLITE_NOMEM);
+  if (text == nullptr) throw std::bad_alloc();
   return {reinterpret_cast<const char*>(text),
           static_cast<size_t>(sqlite3_column_bytes(statement_.get(), column))};
 }
@@ -257,8 +265,9 @@ std::string_view SqliteRows::Blob(int column) const {
   if (Type(column) != SQLITE_BLOB) FailType(column, "blob");
   const void* bytes = sqlite3_column_blob(statement_.get(), column);
   if (bytes == nullptr) {  // no bytes, or no memory for them
-    const int status = sqlite3_errcode(database_.database_.get());
-    if (status == SQLITE_NOMEM) database_.Require(status);
+    if (sqlite3_errcode(database_.database_.get()) == SQLITE_NOMEM) {
+      throw std::bad_alloc();
+    }
     return {};
   }
   return {static_cast<const char*>(bytes),

@@ -46,7 +46,8 @@ class SqliteDatabase {
   // more where it is damaged.
   void Account(int64_t bytes);
 
-  // Throws unless SQLite's status is one of success.
+  // Throws unless SQLite's status is one of success; std::bad_alloc where memory
+  // is short. What SQLite calls so a second time while there is some is damage.
   void Require(int status) const;
 
   const std::string name_;
@@ -99,6 +100,7 @@ class SqliteRows {
 
   SqliteDatabase& database_;
   const std::string table_;
+  int64_t num_rows_ = 0;  // so far
   std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)> statement_;
 };
 
