@@ -149,19 +149,17 @@ void SqliteDatabase::Require(int status) const {
   if (status == SQLITE_OK || status == SQLITE_ROW || status == SQLITE_DONE) {
     return;
   }
+  std::string reason =
+      database_ ? sqlite3_errmsg(database_.get()) : sqlite3_errstr(status);
   if ((status & 0xff) == SQLITE_NOMEM) {  // so it calls some damage, too
     constexpr int kMuch = 1 << 20;        // beside a row
     void* const memory = sqlite3_malloc(kMuch);
     if (memory == nullptr) throw std::bad_alloc();
     sqlite3_free(memory);
-    Fail(
-        "cannot be read (its tables make no sense): it is damaged; copy it "
-        "anew");
+    reason = "its tables make no sense";
   }
   // What is read without locks may be half of one state and half of the next.
   RequireUnchanged();
-  const std::string reason =
-      database_ ? sqlite3_errmsg(database_.get()) : sqlite3_errstr(status);
   if (status == SQLITE_BUSY || status == SQLITE_LOCKED) {
     Fail("is locked by another program; wait until COLMAP has ended");
   }
