@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/linear/block_matrix.h"
+#include "tests/linear/random_blocks.h"
 #include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {

@@ -1,11 +1,13 @@
 #include "krot/linear/schur_complement.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "tests/linear/random_blocks.h"
 #include "tests/oracle/dense_algebra.h"
 
 namespace krot::internal {
@@ -145,6 +147,32 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesTheNormalEquationsAsDenseQrDoes) {
         EXPECT_LE((this->Stack(x) - expected).norm(), 1e-9L * expected.norm());
       }
     }
+  }
+}
+
+// With points that one frame alone sees, or twice.
+TYPED_TEST(CentredLeastSquaresTest, SolvesRoughlyWithoutFormingTheSystem) {
+  using System = CentredLeastSquares<TypeParam::value>;
+  this->structure_ = MakeRandomStructure(900, 1);
+  System exact(this->structure_, {2});
+  System rough(this->structure_, {2}, System::Use::kRoughSolutions);
+  System one_thread(this->structure_, {1}, System::Use::kRoughSolutions);
+  this->Fill(0, &exact);
+  for (System* system : {&exact, &rough, &one_thread}) {
+    std::copy_n(exact.rows(0),
+                3 * TypeParam::value * this->structure_.num_observations(),
+                system->rows(0));
+    ASSERT_TRUE(system->Factorize());
+  }
+  const Eigen::VectorXd r = this->RandomRows();
+  Eigen::VectorXd expected(r.size()), image(r.size());
+  BlockVector x, same;
+  exact.Solve(nullptr, r.data(), &x, expected.data());
+  for (const double tolerance : {1e-2, 1e-8}) {
+    rough.Solve(nullptr, r.data(), tolerance, &x, image.data());
+    EXPECT_LT((image - expected).norm(), 2 * tolerance * expected.norm());
+    one_thread.Solve(nullptr, r.data(), tolerance, &same, nullptr);
+    EXPECT_EQ(x.frames, same.frames);
   }
 }
 

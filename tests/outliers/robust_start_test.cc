@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -161,6 +164,45 @@ TEST(FindParts, LeavesWholeWhatManyTracksHold) {
     const std::vector<int32_t> parts =
         FindParts(ProblemOf(SynthesizeScene(SceneInParts(layout)).model), {});
     EXPECT_EQ(parts, std::vector<int32_t>(24, 0));
+  }
+}
+
+TEST(Groups, ShareTheTracksThatFramesOfBothSee) {
+  const KnownRotationProblem problem =
+      ProblemOf(SynthesizeScene(SceneInParts(SceneLayout::kStreet)).model);
+  std::vector<int32_t> each(problem.num_frames), threes(problem.num_frames);
+  for (int32_t f = 0; f < problem.num_frames; ++f) {
+    each[f] = f;
+    threes[f] = f % 3;
+  }
+  Groups groups(problem, each);
+  for (const std::vector<int32_t>& group_of : {each, threes}) {
+    groups.Merge(group_of);
+    std::map<std::pair<int32_t, int32_t>, double> expected;
+    std::vector<int64_t> num_tracks(problem.num_frames, 0);
+    for (int32_t k = 0; k < problem.num_points; ++k) {
+      std::map<int32_t, std::set<int32_t>> seen;  // frames of each group
+      for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
+           ++i) {
+        const int32_t frame = FrameOf(problem, i);
+        seen[group_of[frame]].insert(frame);
+      }
+      for (const auto& [a, frames] : seen) {
+        num_tracks[a] += frames.size() >= 2 || groups.sizes()[a] == 1;
+        for (const auto& [b, others] : seen) {
+          if (a < b) ++expected[{a, b}];
+        }
+      }
+    }
+    std::map<std::pair<int32_t, int32_t>, double> shared;
+    for (const auto& [a, b, strength] : groups.Pairs()) {
+      shared[{a, b}] = strength;
+    }
+    EXPECT_EQ(shared, expected);
+    const std::vector<Groups::Count> counts = groups.Counts(true);
+    for (int32_t f = 0; f < problem.num_frames; ++f) {
+      EXPECT_EQ(counts[f].num_tracks, num_tracks[f]);
+    }
   }
 }
 

@@ -25,9 +25,9 @@ exchanged: one per cent of the observations change their points with another of
 
 Rivals call wrong: `mean`: an image whose mean error is more than twice the median
 image's; `2 px`: an observation of more than 2 px, an image with more than half of
-its observations above. What each calls wrong without the fault is not counted. A
-planted image that keeps fewer than ten observations is not counted: little says
-that it is wrong.
+its observations above. What each calls wrong without the fault is not counted.
+Planted images that keep fewer than ten observations are a column of their own:
+little says that they are wrong, but nothing holds them either.
 """
 
 import copy
@@ -281,7 +281,7 @@ class Counts:
     """Of one fault: planted, found, and called of what is not."""
 
     def __init__(self):
-        self.planted = self.thin = 0
+        self.planted = self.thin = self.thin_found = 0
         self.found = dict.fromkeys(("krot", "mean", "2 px"), 0)
         self.called = dict.fromkeys(self.found, 0)
         self.asked = set()
@@ -289,6 +289,7 @@ class Counts:
     def add(self, planted, called, before, thin=frozenset()):
         self.planted += len(planted - thin)
         self.thin += len(planted & thin)
+        self.thin_found += len(planted & thin & called["krot"])
         self.asked |= set(called)
         for rival, those in called.items():
             found = planted & those - thin
@@ -297,7 +298,7 @@ class Counts:
                 those - planted - before[rival])
 
     def row(self):
-        cells = [str(self.planted), str(self.thin)]
+        cells = [str(self.planted), f"{self.thin_found} of {self.thin}"]
         for rival, found in self.found.items():
             if rival not in self.asked:
                 cells += ["–", "–"]
@@ -412,8 +413,8 @@ def main():
                 trial(base, pathlib.Path(name), random.Random(seed),
                       counts[fault])
         print(f"\n{path or 'scenes'}, {seed} seeds\n\n"
-              "| fault | planted | too few left | krot: recall | precision | "
-              "mean: recall | precision | 2 px: recall | precision |\n"
+              "| fault | planted | and with few left, found | krot: recall | "
+              "precision | mean: recall | precision | 2 px: recall | precision |\n"
               "|---|---|---|---|---|---|---|---|---|")
         for fault, row in counts.items():
             print(f"| {fault} | {row.row()} |", flush=True)

@@ -137,7 +137,8 @@ class BoundedSystem {
         loop_(static_cast<int64_t>(problem.observations.size()), context),
         structure_(AnchoredStructure(problem, context)),
         rig_from_world_(RigFromWorldRotations(problem)),
-        least_squares_(structure_, context),
+        least_squares_(structure_, context,
+                       ReducedCameraSystem::Use::kRoughSolutions),
         root_(problem.observations.size()),
         correction_(problem.observations.size()),
         d_(problem.observations.size()) {}
@@ -229,6 +230,8 @@ class BoundedSystem {
   const Cap& cap() const { return cap_; }
 
  private:
+  // Of a direction, in the energy norm: the next step corrects it anyway.
+  static constexpr double kTolerance = 1e-3;
   // No step is followed farther.
   static constexpr double kFurthest = 2;
 
@@ -313,7 +316,7 @@ class BoundedSystem {
     });
     // A rank may have no observation.
     double* const rows = d_.empty() ? nullptr : d_[0].data();
-    least_squares_.Solve(nullptr, rows, &dx_, rows);
+    least_squares_.Solve(nullptr, rows, kTolerance, &dx_, rows);
     loop_.ForEach([&](int64_t i) {
       Vector3d& d = d_[i];
       const Root& U = root_[i];

@@ -35,7 +35,7 @@ class RobustLeastSquares {
         structure_(AnchoredStructure(problem)),
         rig_from_world_(RigFromWorldRotations(problem)),
         least_squares_(structure_, {context.num_threads},
-                       ReducedCameraSystem::Use::kRoughSolution),
+                       ReducedCameraSystem::Use::kRoughSolutions),
         target_(3 * problem.observations.size()),
         estimate_(*estimate) {}
 

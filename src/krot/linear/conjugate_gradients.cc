@@ -28,8 +28,6 @@ constexpr float kShiftGrowth = 10;
 // relative to the block's trace.
 constexpr float kLeastPivot = 1e-7F;
 constexpr double kLeastWhitenedPivot = 1e-14;
-// More iterations would not end either, or not soon.
-constexpr int kMaxIterations = 2000;
 // Products are summed in so many parts.
 constexpr int64_t kNumChunks = 4;
 
@@ -182,7 +180,7 @@ VectorXd ConjugateGradients::Precondition(const VectorXd& residual) const {
   return scale * incomplete_.Solve(scaled).cast<double>();
 }
 
-VectorXd ConjugateGradients::Multiply(const VectorXd& x) const {
+VectorXd ConjugateGradients::MultiplyBlocks(const VectorXd& x) const {
   const int64_t columns_per_chunk =
       NumChunks(pattern_->num_columns(), kNumChunks);
   std::vector<VectorXd> parts(
@@ -209,21 +207,36 @@ VectorXd ConjugateGradients::Multiply(const VectorXd& x) const {
   return parts[0];
 }
 
+VectorXd ConjugateGradients::Whitened(const VectorXd& x) const {
+  VectorXd y(x.size());
+  for (int64_t k = 0; k < x.size(); k += 3) {
+    y.segment<3>(k) = W_[k / 3] * x.segment<3>(k);
+  }
+  return y;
+}
+
+VectorXd ConjugateGradients::Unwhitened(const VectorXd& y) const {
+  VectorXd x(y.size());
+  for (int64_t k = 0; k < y.size(); k += 3) {
+    x.segment<3>(k) = W_[k / 3].transpose() * y.segment<3>(k);
+  }
+  return x;
+}
+
 // From y = 0. With M the preconditioner, |error|_A^2 = r'A^-1 r is about r'M r.
 bool ConjugateGradients::Solve(const VectorXd& rhs, double tolerance,
-                               VectorXd* x) {
-  VectorXd residual(rhs.size());
-  for (int64_t k = 0; k < rhs.size(); k += 3) {
-    residual.segment<3>(k) = W_[k / 3] * rhs.segment<3>(k);
-  }
+                               VectorXd* x, int max_iterations,
+                               const Multiply& other_blocks) {
+  VectorXd residual = Whitened(rhs);
   VectorXd y = VectorXd::Zero(rhs.size());
   VectorXd preconditioned = Precondition(residual);
   VectorXd direction = preconditioned;
   double error = residual.dot(preconditioned);
   const double end = tolerance * tolerance * error;
   num_iterations_ = 0;
-  while (error > end && num_iterations_ < kMaxIterations) {
-    const VectorXd image = Multiply(direction);
+  while (error > end && num_iterations_ < max_iterations) {
+    VectorXd image = MultiplyBlocks(direction);
+    if (other_blocks) image += Whitened(other_blocks(Unwhitened(direction)));
     const double curvature = direction.dot(image);
     if (!(curvature > 0)) break;  // rounding
     const double step = error / curvature;
@@ -235,11 +248,8 @@ bool ConjugateGradients::Solve(const VectorXd& rhs, double tolerance,
     error = residual.dot(preconditioned);
     ++num_iterations_;
   }
-  x->resize(rhs.size());
-  for (int64_t k = 0; k < rhs.size(); k += 3) {
-    x->segment<3>(k) = W_[k / 3].transpose() * y.segment<3>(k);
-  }
-  return num_iterations_ < kMaxIterations;
+  *x = Unwhitened(y);
+  return num_iterations_ < max_iterations;
 }
 
 }  // namespace krot::internal

@@ -29,8 +29,8 @@ constexpr double kSolves = 12;
 // The iterations that a solve is thought to take. They grow from 30 to 200 and
 // more on the way to an optimum.
 constexpr int kLikelyIterations = 100;
-// Those of a rough one.
-constexpr int kRoughIterations = 30;
+// Those of all rough solutions of a matrix.
+constexpr int kRoughIterations = 60;
 
 // That of a factor without any fill. Its columns of c blocks take 27 c^2, and
 // the sum of these is least where all are alike.
@@ -38,6 +38,15 @@ double LeastSparseCost(const BlockPattern& pattern) {
   const auto num_blocks = static_cast<double>(pattern.num_blocks());
   return kSparseOperation * 27 * num_blocks * num_blocks /
          pattern.num_columns();
+}
+
+BlockPattern DiagonalPattern(int32_t num_columns) {
+  BlockPattern pattern;
+  for (int32_t j = 0; j < num_columns; ++j) {
+    pattern.row.push_back(j);
+    pattern.begin.push_back(j + 1);
+  }
+  return pattern;
 }
 
 double Regularized(double diagonal, double regularization) {
@@ -57,34 +66,46 @@ ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
   parts_.resize(kNumParts);
   if (num_free <= kAlwaysDenseFrames) {
     pattern_ = FullPattern(num_free);
-  } else {
-    pattern_ = PairsThatSharePoints(structure, ranks);
-    kind_ = CheapestKind();
+    return;
+  }
+  std::vector<int64_t> num_observations = {structure.num_observations()};
+  if (ranks != nullptr) {
+    ranks->Reduce([](int64_t a, int64_t b) { return a + b; },
+                  &num_observations);
+  }
+  num_observations_ = static_cast<double>(num_observations[0]);
+  pattern_ = PairsThatSharePoints(structure, ranks);
+  kind_ = CheapestKind();
+  if (kind_ == Kind::kImplicit) {
+    pairs_ = std::exchange(pattern_, DiagonalPattern(num_free));
   }
 }
 
 double ReducedCameraSystem::DenseCost() const {
   const auto n = static_cast<double>(num_columns_);
-  const double solves = use_ == Use::kRoughSolution ? 1 : kSolves;
+  const double solves = use_ == Use::kRoughSolutions ? 1 : kSolves;
   return n * n * n / 3 + solves * kNumberRead * n * n / 2;
 }
 
 double ReducedCameraSystem::IterativeCost(int num_iterations) const {
   const double products = num_iterations * kNumberRead * 9 *
                           static_cast<double>(pattern_.num_blocks());
-  if (use_ == Use::kRoughSolution) return products;
   return kSparseOperation * IncompleteCholesky::Operations(pattern_) +
          kSolves * products;
+}
+
+double ReducedCameraSystem::ImplicitCost(int num_iterations) const {
+  return num_iterations * kNumberRead * 9 * num_observations_;
 }
 
 // The size of a sparse factor is looked at only where it may be the cheapest.
 // Without a preconditioner a long chain takes many more iterations than what
 // hangs together so closely that its factor would fill.
 ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
-  const bool is_rough = use_ == Use::kRoughSolution;
+  const bool is_rough = use_ == Use::kRoughSolutions;
   const double dense = DenseCost();
-  const double iterative =
-      IterativeCost(is_rough ? kRoughIterations : kLikelyIterations);
+  const double iterative = is_rough ? ImplicitCost(kRoughIterations)
+                                    : IterativeCost(kLikelyIterations);
   const double cost = is_rough ? dense : std::min(dense, iterative);
   if (LeastSparseCost(pattern_) < cost) {
     const SparseFactorSize factor = FindSparseFactorSize(pattern_);
@@ -94,7 +115,8 @@ ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
       return Kind::kSparse;
     }
   }
-  return iterative < dense ? Kind::kIterative : Kind::kDense;
+  if (dense <= iterative) return Kind::kDense;
+  return is_rough ? Kind::kImplicit : Kind::kIterative;
 }
 
 void ReducedCameraSystem::SetZero() {
@@ -247,11 +269,14 @@ bool ReducedCameraSystem::FactorizeDirectly() {
 bool ReducedCameraSystem::Factorize(int num_threads) {
   num_threads_ = num_threads;
   AddUpParts();
+  if (kind_ == Kind::kImplicit) {
+    return iterative_.Factorize(pattern_, Blocks(), num_threads,
+                                /*has_factor=*/false);
+  }
   if (kind_ == Kind::kIterative) {
     const int num_iterations = std::exchange(most_iterations_, 0);
     if (IterativeCost(num_iterations) <= DenseCost() &&
-        iterative_.Factorize(pattern_, Blocks(), num_threads,
-                             use_ == Use::kManySolutions)) {
+        iterative_.Factorize(pattern_, Blocks(), num_threads)) {
       return true;
     }
     GoOnDensely();
@@ -260,14 +285,23 @@ bool ReducedCameraSystem::Factorize(int num_threads) {
 }
 
 void ReducedCameraSystem::GoOnDensely() {
+  if (kind_ == Kind::kImplicit) pattern_ = std::move(pairs_);
   kind_ = Kind::kDense;
   iterative_ = {};
 }
 
-Eigen::VectorXd ReducedCameraSystem::Solve(const Eigen::VectorXd& rhs,
-                                           double tolerance) {
+Eigen::VectorXd ReducedCameraSystem::Solve(
+    const Eigen::VectorXd& rhs, double tolerance,
+    const ConjugateGradients::Multiply& other_blocks) {
   Eigen::VectorXd x = rhs;
   if (num_columns_ == 0) return x;
+  if (kind_ == Kind::kImplicit) {
+    const int limit = static_cast<int>(DenseCost() / ImplicitCost(1));
+    if (!iterative_.Solve(rhs, tolerance, &x, limit, other_blocks)) {
+      GoOnDensely();
+    }
+    return x;
+  }
   if (kind_ == Kind::kIterative) {
     const bool has_ended = iterative_.Solve(rhs, tolerance, &x);
     most_iterations_ = std::max(most_iterations_, iterative_.num_iterations());
@@ -295,6 +329,9 @@ int64_t ReducedCameraSystem::MemoryBytes() const {
       break;
     case Kind::kIterative:  // the incomplete factor in single precision
       numbers += 1.3 * block_numbers;
+      break;
+    case Kind::kImplicit:  // with what it is multiplied by
+      numbers += 9 * num_observations_;
       break;
   }
   return static_cast<int64_t>(8 * numbers);

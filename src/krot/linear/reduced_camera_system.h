@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -64,6 +65,9 @@ class IncompleteCholesky {
 // have, and so flexibly [Notay 2000]. The same bits at any number of threads.
 class ConjugateGradients {
  public:
+  // What blocks that do not stand in the pattern add to A x.
+  using Multiply = std::function<Eigen::VectorXd(const Eigen::VectorXd& x)>;
+
   // `blocks` in the order of the pattern, those of the diagonal whole. False if
   // there is no preconditioner; without `has_factor` it is W alone. Keeps a
   // reference to the pattern.
@@ -72,16 +76,20 @@ class ConjugateGradients {
                  bool has_factor = true);
 
   // Ends when |error|_A, by the preconditioner's estimate, has fallen to
-  // `tolerance`, relative; false if it does not. An iteration reads A and the
-  // preconditioner once.
-  bool Solve(const Eigen::VectorXd& rhs, double tolerance, Eigen::VectorXd* x);
+  // `tolerance`, relative; false if it does not within `max_iterations`, each
+  // of which reads A and the preconditioner once. By default more would not end
+  // either, or not soon.
+  bool Solve(const Eigen::VectorXd& rhs, double tolerance, Eigen::VectorXd* x,
+             int max_iterations = 2000, const Multiply& other_blocks = nullptr);
 
   int num_iterations() const { return num_iterations_; }  // of the last Solve
 
  private:
   void Whiten();
   Eigen::VectorXd Precondition(const Eigen::VectorXd& residual) const;
-  Eigen::VectorXd Multiply(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd MultiplyBlocks(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd Whitened(const Eigen::VectorXd& x) const;    // W x
+  Eigen::VectorXd Unwhitened(const Eigen::VectorXd& y) const;  // W'y
 
   const BlockPattern* pattern_ = nullptr;
   int num_threads_ = 1;
@@ -103,17 +111,19 @@ class ConjugateGradients {
 // Up to a few hundred frames it has a dense Cholesky factor; with more,
 // whatever is predicted to take the least time: a dense one, a sparse one in a
 // fill-reducing order, or conjugate gradients with an incomplete one. For one
-// rough solution of each matrix these do without.
+// or two rough solutions of each matrix, conjugate gradients do without a
+// factor, and without the matrix: its blocks on the diagonal are all that is
+// formed (Kind::kImplicit), and Solve is told how to multiply by the others.
 class ReducedCameraSystem {
  public:
-  enum class Use { kManySolutions, kRoughSolution };
+  enum class Use { kManySolutions, kRoughSolutions };
 
   // Where ranks share the points they make one each, of their shares.
   explicit ReducedCameraSystem(const BlockStructure& structure,
                                Ranks* ranks = nullptr,
                                Use use = Use::kManySolutions);
 
-  enum class Kind { kDense, kSparse, kIterative };
+  enum class Kind { kDense, kSparse, kIterative, kImplicit };
 
   Kind kind() const { return kind_; }
   int num_parts() const { return static_cast<int>(parts_.size()); }
@@ -135,14 +145,19 @@ class ReducedCameraSystem {
                       const std::vector<char>& is_apart,
                       const double* const G[3]);
 
+  // Into the first of the parts.
+  void AddUpParts();
   // Adds up the parts, and factorises with growing regularisation until there
   // is a factor; false if there never is.
   bool Factorize(int num_threads);
 
   // The relative error in the energy norm is about `tolerance` at most, and
   // that of rounding. Where conjugate gradients do not end, a dense factor
-  // takes their place.
-  Eigen::VectorXd Solve(const Eigen::VectorXd& rhs, double tolerance);
+  // takes their place: at once or, if the matrix was not formed, from the next
+  // Factorize on. `other_blocks` serves Kind::kImplicit.
+  Eigen::VectorXd Solve(
+      const Eigen::VectorXd& rhs, double tolerance,
+      const ConjugateGradients::Multiply& other_blocks = nullptr);
 
   // What a system of this structure occupies, with its parts.
   int64_t MemoryBytes() const;
@@ -158,11 +173,11 @@ class ReducedCameraSystem {
 
   double DenseCost() const;
   double IterativeCost(int num_iterations) const;
+  double ImplicitCost(int num_iterations) const;
   Kind CheapestKind();
   Block BlockOf(int part, int32_t a, int32_t b);
   template <typename Visit>
   void ForEachRun(const Visit& visit) const;
-  void AddUpParts();
   std::vector<Eigen::Matrix3d> Blocks() const;
   bool FactorizeDensely(double regularization);
   bool FactorizeSparsely(double regularization);
@@ -170,6 +185,7 @@ class ReducedCameraSystem {
   void GoOnDensely();
 
   const Use use_;
+  double num_observations_ = 0;
   Kind kind_ = Kind::kDense;
   int num_threads_ = 1;
   int64_t num_columns_ = 0;
@@ -177,6 +193,7 @@ class ReducedCameraSystem {
   // Per part, each block column of the pattern as three columns of numbers.
   // Once they are added up, parts_[0] is the sum.
   BlockPattern pattern_;
+  BlockPattern pairs_;  // the whole pattern where pattern_ is the diagonal
   std::vector<std::vector<double>> parts_;
   DenseCholesky dense_;
   int64_t num_sparse_numbers_ = 0;

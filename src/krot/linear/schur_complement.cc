@@ -38,31 +38,59 @@ SchurComplement::SchurComplement(const BlockStructure& structure,
 
 bool SchurComplement::Factorize() {
   if (ranks_ == nullptr) return reduced_.Factorize(num_threads_);
+  if (is_implicit()) {  // all ranks iterate, and need the diagonal
+    if (ranks_->IsFirst()) reduced_.AddUpParts();
+    std::vector<std::vector<double>>& parts = *reduced_.parts();
+    ranks_->Broadcast(&parts[0]);
+    for (size_t n = 1; n < parts.size(); ++n) {
+      parts[n].assign(parts[0].size(), 0.0);
+    }
+    return reduced_.Factorize(num_threads_);
+  }
   bool has_factor = !ranks_->IsFirst() || reduced_.Factorize(num_threads_);
   ranks_->Broadcast(&has_factor);
   return has_factor;
 }
 
-void SchurComplement::SolveReduced(const std::vector<std::vector<double>>& rhs,
+void SchurComplement::Share(VectorXd* numbers) const {
+  if (ranks_ == nullptr) return;
+  std::vector<double> shared(numbers->data(),
+                             numbers->data() + numbers->size());
+  ranks_->Broadcast(&shared);
+  *numbers = VectorXd::Map(shared.data(), numbers->size());
+}
+
+void SchurComplement::SolveReduced(VectorXd rhs,
                                    const std::vector<Vector3d>* g_t,
-                                   double tolerance, std::vector<Vector3d>* t) {
-  std::vector<double> solution(reduced_.num_columns());
-  if (ranks_ == nullptr || ranks_->IsFirst()) {
-    VectorXd sum = VectorXd::Zero(reduced_.num_columns());
-    for (const std::vector<double>& part : rhs) {
-      sum += VectorXd::Map(part.data(), sum.size());
-    }
+                                   double tolerance, std::vector<Vector3d>* t,
+                                   const AddProduct& add_product) {
+  const auto add_g_t = [&] {
     for (size_t f = 0; g_t != nullptr && f < g_t->size(); ++f) {
       const int32_t column = reduced_.column(static_cast<int32_t>(f));
-      if (column >= 0) sum.segment<3>(column) += (*g_t)[f];
+      if (column >= 0) rhs.segment<3>(column) += (*g_t)[f];
     }
-    VectorXd::Map(solution.data(), sum.size()) = reduced_.Solve(sum, tolerance);
+  };
+  VectorXd solution = VectorXd::Zero(rhs.size());
+  if (is_implicit()) {
+    add_g_t();
+    Share(&rhs);
+    solution = reduced_.Solve(rhs, tolerance, [&](const VectorXd& x) {
+      VectorXd product = SumOverPoints(
+          [&](int64_t k, int, double* y) { add_product(k, x.data(), y); });
+      Share(&product);
+      return product;
+    });
+  } else {
+    if (ranks_ == nullptr || ranks_->IsFirst()) {
+      add_g_t();
+      solution = reduced_.Solve(rhs, tolerance);
+    }
+    Share(&solution);
   }
-  if (ranks_ != nullptr) ranks_->Broadcast(&solution);
   t->assign(structure_.num_frames(), Vector3d::Zero());
   for (size_t f = 0; f < t->size(); ++f) {
     const int32_t column = reduced_.column(static_cast<int32_t>(f));
-    if (column >= 0) (*t)[f] = Vector3d::Map(&solution[column]);
+    if (column >= 0) (*t)[f] = solution.segment<3>(column);
   }
 }
 
@@ -93,7 +121,11 @@ CentredLeastSquares<kRows>::CentredLeastSquares(const BlockStructure& structure,
       rows_(structure.num_observations() * kBlock),
       Q_(rows_.size()),
       R_(structure.num_points()),
-      order_(OrderByFrame(structure)) {}
+      order_(OrderByFrame(structure)) {
+  if (!schur_.is_implicit()) return;
+  factors_.resize(structure.num_observations());
+  num_factors_.resize(structure.num_points());
+}
 
 // Sets Q and R, too.
 template <int kRows>
@@ -146,6 +178,7 @@ template <int kRows>
 void CentredLeastSquares<kRows>::AddPoint(int64_t k, int part) {
   thread_local Sightings s;
   FindSightings(k, &s);
+  if (schur_.is_implicit()) return KeepFactors(k, part, s);
   ReducedCameraSystem& reduced = schur_.reduced();
   for (size_t f = 0; f < s.frames.size(); ++f) {
     if (s.is_high[f]) continue;
@@ -154,6 +187,48 @@ void CentredLeastSquares<kRows>::AddPoint(int64_t k, int part) {
   const double* const G[3] = {s.G[0].data(), s.G[1].data(), s.G[2].data()};
   reduced.SubtractSquare(part, s.frames, s.is_high, G);
   AddHighLeverage(part, s);
+}
+
+// Adds the blocks on the diagonal alone.
+template <int kRows>
+void CentredLeastSquares<kRows>::KeepFactors(int64_t k, int part,
+                                             const Sightings& s) {
+  Matrix3d sum = s.fixed_G;
+  for (size_t f = 0; f < s.frames.size(); ++f) sum += s.FrameG(f);
+  ReducedCameraSystem& reduced = schur_.reduced();
+  FrameFactor* factor = &factors_[structure_.point_begin[k]];
+  num_factors_[k] = static_cast<int32_t>(s.frames.size());
+  for (size_t f = 0; f < s.frames.size(); ++f, ++factor) {
+    const Matrix3d G = s.FrameG(f);
+    Matrix3d others = sum - G;
+    if (s.is_high[f]) {
+      others = s.fixed_G;
+      for (size_t g = 0; g < s.frames.size(); ++g) {
+        if (g != f) others += s.FrameG(g);
+      }
+    }
+    const Matrix3d block = G.transpose() * others;
+    reduced.AddBlock(part, s.frames[f], s.frames[f], block.data());
+    factor->column = reduced.column(s.frames[f]);
+    std::copy_n(G.data(), 9, factor->G);
+  }
+}
+
+template <int kRows>
+void CentredLeastSquares<kRows>::AddProduct(int64_t k, const double* c,
+                                            double* product) const {
+  const FrameFactor* const begin = &factors_[structure_.point_begin[k]];
+  const FrameFactor* const end = begin + num_factors_[k];
+  Vector3d sum = Vector3d::Zero();
+  for (const FrameFactor* factor = begin; factor != end; ++factor) {
+    sum.noalias() +=
+        Matrix3d::Map(factor->G) * Vector3d::Map(c + factor->column);
+  }
+  for (const FrameFactor* factor = begin; factor != end; ++factor) {
+    const auto G = Matrix3d::Map(factor->G);
+    const Vector3d others = sum - G * Vector3d::Map(c + factor->column);
+    Vector3d::Map(product + factor->column).noalias() -= G.transpose() * others;
+  }
 }
 
 template <int kRows>
@@ -211,7 +286,9 @@ void CentredLeastSquares<kRows>::Solve(const BlockVector* g, const double* r,
     }
   };
   schur_.Solve(reduce, g == nullptr ? nullptr : &g->frames, tolerance,
-               &x->frames);
+               &x->frames, [this](int64_t k, const double* c, double* product) {
+                 AddProduct(k, c, product);
+               });
   schur_.ForEachPoint([&](int64_t k) {
     const int64_t begin = structure_.point_begin[k];
     const int64_t end = structure_.point_begin[k + 1];

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -40,18 +42,23 @@ class SchurComplement {
   }
   // False if there is no factor even when it is regularised.
   bool Factorize();
+  // Whether reduced() is never formed, but for its blocks on the diagonal.
+  bool is_implicit() const {
+    return reduced_.kind() == ReducedCameraSystem::Kind::kImplicit;
+  }
 
-  // Solves for the frames. reduce(k, part, rhs) adds to the right-hand side,
-  // whose numbers stand in the columns of reduced(), what is left of point k;
-  // `g_t`, if it is not null, is added to that. Fixed frames are 0.
+  // add_product(k, x, y) adds to y what all blocks of point k but those on the
+  // diagonal are, times x. Numbers stand in the columns of reduced().
+  using AddProduct = std::function<void(int64_t k, const double* x, double* y)>;
+
+  // Solves for the frames. reduce(k, part, rhs) adds to the right-hand side
+  // what is left of point k; `g_t`, if it is not null, is added to that. Fixed
+  // frames are 0. `add_product` is needed if is_implicit().
   template <typename Reduce>
   void Solve(const Reduce& reduce, const std::vector<Eigen::Vector3d>* g_t,
-             double tolerance, std::vector<Eigen::Vector3d>* t) {
-    std::vector<std::vector<double>> rhs;
-    parts_.Sum(
-        num_threads_, reduced_.num_columns(),
-        [&](int64_t k, int part) { reduce(k, part, rhs[part].data()); }, &rhs);
-    SolveReduced(rhs, g_t, tolerance, t);
+             double tolerance, std::vector<Eigen::Vector3d>* t,
+             const AddProduct& add_product = nullptr) {
+    SolveReduced(SumOverPoints(reduce), g_t, tolerance, t, add_product);
   }
 
   // visit(k) for every point, on all threads.
@@ -65,9 +72,26 @@ class SchurComplement {
   const BlockStructure& structure() const { return structure_; }
 
  private:
-  void SolveReduced(const std::vector<std::vector<double>>& rhs,
+  // Of what add(k, part, sum) adds; on the first rank.
+  template <typename Add>
+  Eigen::VectorXd SumOverPoints(const Add& add) const {
+    std::vector<std::vector<double>> parts;
+    parts_.Sum(
+        num_threads_, reduced_.num_columns(),
+        [&](int64_t k, int part) { add(k, part, parts[part].data()); }, &parts);
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(reduced_.num_columns());
+    if (ranks_ != nullptr && !ranks_->IsFirst()) return sum;
+    for (const std::vector<double>& part : parts) {
+      sum += Eigen::VectorXd::Map(part.data(), sum.size());
+    }
+    return sum;
+  }
+  // All ranks get the first one's.
+  void Share(Eigen::VectorXd* numbers) const;
+  void SolveReduced(Eigen::VectorXd rhs,
                     const std::vector<Eigen::Vector3d>* g_t, double tolerance,
-                    std::vector<Eigen::Vector3d>* t);
+                    std::vector<Eigen::Vector3d>* t,
+                    const AddProduct& add_product);
 
   const BlockStructure& structure_;
   const int num_threads_;
@@ -104,6 +128,9 @@ class SchurComplement {
 // |Q_f|^2 > 1/2. As |Q|^2 = 3, there are fewer than six such frames, and of
 // them the sum is taken, in which nothing cancels.
 //
+// Where conjugate gradients need no more than products S c, blocks of two
+// frames are not formed: (S c)_f = S_ff c_f - G_f' sum_{g != f} G_g c_g.
+//
 // Fill rows; Factorize; then Solve and Multiply as often as need be, until the
 // rows are filled anew. What is fixed has s_k = 0 and c_f = 0, and so has a
 // direction that no row tells.
@@ -138,9 +165,16 @@ class CentredLeastSquares {
  private:
   static constexpr int kBlock = 3 * kRows;
   struct Sightings;
+  // G_f of a free frame.
+  struct FrameFactor {
+    int32_t column;
+    double G[9];
+  };
 
   void FindSightings(int64_t k, Sightings* sightings);
   void AddPoint(int64_t k, int part);
+  void KeepFactors(int64_t k, int part, const Sightings& sightings);
+  void AddProduct(int64_t k, const double* c, double* product) const;
   void AddHighLeverage(int part, const Sightings& sightings);
 
   const BlockStructure& structure_;
@@ -149,6 +183,10 @@ class CentredLeastSquares {
   std::vector<double> Q_;
   std::vector<UpperTriangle> R_;
   std::vector<int32_t> order_;  // of a point's observations by frame
+  // If the system is implicit: those of point k from point_begin[k] on, and how
+  // many.
+  std::vector<FrameFactor> factors_;
+  std::vector<int32_t> num_factors_;
 };
 
 }  // namespace krot::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
-#include <unordered_map>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -13,72 +13,122 @@
 
 namespace krot::internal {
 
-template <typename Visit>
-void Groups::ForEachTrack(const Visit& visit) const {
-  std::vector<std::pair<int32_t, int32_t>> seen;  // group, frame
-  std::vector<std::pair<int32_t, int32_t>> groups;
-  for (int32_t k = 0; k < problem_.num_points; ++k) {
-    seen.clear();
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
+Groups::Groups(const KnownRotationProblem& problem,
+               const std::vector<int32_t>& group_of)
+    : sizes_(problem.num_frames, 1), begin_{0} {
+  std::vector<int32_t> frames;
+  for (int32_t k = 0; k < problem.num_points; ++k) {
+    frames.clear();
+    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
          ++i) {
-      const int32_t frame = FrameOf(problem_, i);
-      seen.emplace_back(group_of_[frame], frame);
+      frames.push_back(FrameOf(problem, i));
     }
-    std::sort(seen.begin(), seen.end());
-    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-    groups.clear();
-    for (const auto& [group, frame] : seen) {
-      if (groups.empty() || groups.back().first != group) {
-        groups.emplace_back(group, 0);
-      }
-      ++groups.back().second;
-    }
-    visit(groups);
+    std::sort(frames.begin(), frames.end());
+    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    for (const int32_t frame : frames) sights_.push_back({frame, 1});
+    begin_.push_back(static_cast<int64_t>(sights_.size()));
   }
+  Merge(group_of);
+}
+
+void Groups::Merge(const std::vector<int32_t>& new_group) {
+  std::vector<int32_t> sizes(sizes_.size(), 0);
+  for (size_t g = 0; g < sizes.size(); ++g) sizes[new_group[g]] += sizes_[g];
+  sizes_ = std::move(sizes);
+  std::vector<Sight> track;
+  int64_t end = 0;  // of what has been merged
+  for (size_t k = 0; k + 1 < begin_.size(); ++k) {
+    track.assign(sights_.begin() + begin_[k], sights_.begin() + begin_[k + 1]);
+    for (Sight& sight : track) sight.group = new_group[sight.group];
+    std::sort(track.begin(), track.end(),
+              [](const Sight& a, const Sight& b) { return a.group < b.group; });
+    const int64_t begin = begin_[k] = end;
+    for (const Sight& sight : track) {
+      if (end > begin && sights_[end - 1].group == sight.group) {
+        sights_[end - 1].num_frames += sight.num_frames;
+      } else {
+        sights_[end++] = sight;
+      }
+    }
+  }
+  begin_.back() = end;
+  sights_.resize(end);
 }
 
 std::vector<GroupPair> Groups::Pairs() const {
-  std::unordered_map<uint64_t, int64_t> shared;
-  ForEachTrack([&](const std::vector<std::pair<int32_t, int32_t>>& groups) {
-    for (size_t a = 0; a < groups.size(); ++a) {
-      for (size_t b = a + 1; b < groups.size(); ++b) {
-        ++shared[static_cast<uint64_t>(groups[a].first) << 32 |
-                 static_cast<uint32_t>(groups[b].first)];
+  std::vector<std::vector<int32_t>> tracks_of(sizes_.size());
+  for (size_t k = 0; k + 1 < begin_.size(); ++k) {
+    for (int64_t n = begin_[k]; n + 1 < begin_[k + 1]; ++n) {
+      tracks_of[sights_[n].group].push_back(static_cast<int32_t>(k));
+    }
+  }
+  std::vector<GroupPair> pairs;
+  std::vector<int64_t> num_shared(sizes_.size(), 0);
+  std::vector<int32_t> sharing;
+  for (int32_t a = 0; a < static_cast<int32_t>(sizes_.size()); ++a) {
+    sharing.clear();
+    for (const int32_t k : tracks_of[a]) {
+      for (int64_t n = begin_[k + 1] - 1; sights_[n].group > a; --n) {
+        const int32_t b = sights_[n].group;
+        if (num_shared[b]++ == 0) sharing.push_back(b);
       }
     }
-  });
-  std::vector<GroupPair> pairs;
-  for (const auto& [key, count] : shared) {
-    pairs.push_back({static_cast<int32_t>(key >> 32),
-                     static_cast<int32_t>(key & 0xffffffffu),
-                     static_cast<double>(count)});
+    for (const int32_t b : sharing) {
+      pairs.push_back(
+          {a, b, static_cast<double>(std::exchange(num_shared[b], 0))});
+    }
   }
   return pairs;
 }
 
 std::vector<Groups::Count> Groups::Counts(bool compares_scales) const {
-  const std::vector<int32_t> sizes = Sizes();
-  std::vector<Count> counts(sizes.size());
-  ForEachTrack([&](const std::vector<std::pair<int32_t, int32_t>>& groups) {
+  std::vector<Count> counts(sizes_.size());
+  for (size_t k = 0; k + 1 < begin_.size(); ++k) {
     int32_t num_frames = 0;
-    for (const auto& [group, count] : groups) num_frames += count;
-    for (const auto& [group, count] : groups) {
-      counts[group].num_located += num_frames - count >= 2;
-      if (count < std::min(2, sizes[group])) continue;
-      ++counts[group].num_tracks;
-      counts[group].num_shared +=
-          num_frames - count >= (compares_scales ? 2 : 1);
+    for (int64_t n = begin_[k]; n < begin_[k + 1]; ++n) {
+      num_frames += sights_[n].num_frames;
     }
-  });
+    for (int64_t n = begin_[k]; n < begin_[k + 1]; ++n) {
+      const auto [group, own] = sights_[n];
+      const int32_t others = num_frames - own;
+      counts[group].num_located += others >= 2;
+      if (own < std::min(2, sizes_[group])) continue;
+      ++counts[group].num_tracks;
+      counts[group].num_shared += others >= (compares_scales ? 2 : 1);
+    }
+  }
   return counts;
 }
 
+namespace {
+
+bool IsStronger(const GroupPair& x, const GroupPair& y) {
+  return std::make_tuple(-x.strength, x.a, x.b) <
+         std::make_tuple(-y.strength, y.a, y.b);
+}
+
+// Keeps of all pairs the strongest of each group.
+void KeepStrongest(size_t num_groups, std::vector<GroupPair>* pairs) {
+  std::vector<const GroupPair*> strongest(num_groups, nullptr);
+  for (const GroupPair& pair : *pairs) {
+    for (const int32_t group : {pair.a, pair.b}) {
+      const GroupPair*& own = strongest[group];
+      if (own == nullptr || IsStronger(pair, *own)) own = &pair;
+    }
+  }
+  std::vector<GroupPair> kept;
+  for (const GroupPair& pair : *pairs) {
+    if (strongest[pair.a] == &pair || strongest[pair.b] == &pair) {
+      kept.push_back(pair);
+    }
+  }
+  *pairs = std::move(kept);
+}
+
+}  // namespace
+
 void SortStrongestFirst(std::vector<GroupPair>* pairs) {
-  std::sort(pairs->begin(), pairs->end(),
-            [](const GroupPair& x, const GroupPair& y) {
-              return std::make_tuple(-x.strength, x.a, x.b) <
-                     std::make_tuple(-y.strength, y.a, y.b);
-            });
+  std::sort(pairs->begin(), pairs->end(), IsStronger);
 }
 
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
@@ -90,10 +140,10 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
       part_of[f] = static_cast<int32_t>(sets.Find(f));
     }
   };
+  find_all();
+  Groups groups(problem, part_of);
   for (bool goes_on = true; goes_on;) {
-    find_all();
-    const Groups groups(problem, part_of);
-    const std::vector<int32_t> sizes = groups.Sizes();
+    const std::vector<int32_t>& sizes = groups.sizes();
     const std::vector<Groups::Count> counts =
         groups.Counts(options.compares_scales);
     const auto is_open = [&](int32_t group) {
@@ -110,6 +160,7 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
       pair.strength /= static_cast<double>(std::max<int64_t>(
           1, std::min(counts[pair.a].num_tracks, counts[pair.b].num_tracks)));
     }
+    KeepStrongest(sizes.size(), &pairs);
     SortStrongestFirst(&pairs);
     // Each becomes one with at most one other at a time, as it has other tracks
     // in common afterwards.
@@ -125,6 +176,8 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
       sets.Unite(a, b);
       goes_on = true;
     }
+    find_all();
+    groups.Merge(part_of);
   }
   std::vector<int32_t> number(problem.num_frames, -1);
   int32_t count = 0;

@@ -26,13 +26,18 @@ struct GroupPair {
   double strength = 0;  // how many tracks both see, or their share
 };
 
-// Groups of frames, and what they see of the tracks.
+// Groups of frames, and what they see of the tracks. O(observations).
 class Groups {
  public:
-  Groups(const KnownRotationProblem& problem, std::vector<int32_t> group_of)
-      : problem_(problem), group_of_(std::move(group_of)) {}
+  // Starts with the group of every frame.
+  Groups(const KnownRotationProblem& problem,
+         const std::vector<int32_t>& group_of);
 
-  // Every two groups that share tracks.
+  // All frames of group g go over to group new_group[g].
+  void Merge(const std::vector<int32_t>& new_group);
+
+  // Every two groups a < b that share tracks, with how many. O(sum over tracks
+  // of their squared numbers of groups).
   std::vector<GroupPair> Pairs() const;
   // Per group: the tracks that two of its frames see or, if it is one, this
   // one, in all and of these those that others see, too: two others at least,
@@ -44,19 +49,19 @@ class Groups {
     int64_t num_located = 0;
   };
   std::vector<Count> Counts(bool compares_scales) const;
-  std::vector<int32_t> Sizes() const {
-    std::vector<int32_t> sizes(group_of_.size(), 0);
-    for (const int32_t group : group_of_) ++sizes[group];
-    return sizes;
-  }
+  // The number of frames of each group.
+  const std::vector<int32_t>& sizes() const { return sizes_; }
 
  private:
-  // visit(group, how many of its frames see the track), for every track.
-  template <typename Visit>
-  void ForEachTrack(const Visit& visit) const;
+  // How many frames of a group see a track.
+  struct Sight {
+    int32_t group;
+    int32_t num_frames;
+  };
 
-  const KnownRotationProblem& problem_;
-  const std::vector<int32_t> group_of_;  // per frame
+  std::vector<int32_t> sizes_;
+  std::vector<int64_t> begin_;  // of each track's sights, and their end
+  std::vector<Sight> sights_;   // by track, then by group
 };
 
 // Equal ones by their numbers.

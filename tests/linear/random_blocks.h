@@ -62,4 +62,21 @@ inline Eigen::MatrixXd RandomNormalEquations(int num_frames, int num_terms,
   return matrix;
 }
 
+// Points of two to four frames by chance, some of them twice in a frame.
+inline BlockStructure MakeRandomStructure(unsigned num_frames, unsigned seed) {
+  std::mt19937 random(seed);
+  BlockStructure structure;
+  structure.point_begin = {0};
+  for (unsigned k = 0; k < 2 * num_frames; ++k) {
+    for (auto n = 2 + random() % 3; n > 0; --n) {
+      structure.frame_of.push_back(static_cast<int32_t>(random() % num_frames));
+    }
+    structure.point_begin.push_back(
+        static_cast<int64_t>(structure.frame_of.size()));
+  }
+  structure.frame_is_fixed.assign(num_frames, 0);
+  structure.frame_is_fixed[3] = structure.frame_is_fixed[8] = 1;
+  return structure;
+}
+
 }  // namespace krot::internal
