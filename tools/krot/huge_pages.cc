@@ -12,8 +12,8 @@
 #include <cstdlib>
 #include <new>
 
-// Sanitizers bring their own operator new. GCC and Clang tell of them in
-// different ways.
+// Sanitizers bring their own operator new. GCC and Clang show in different ways
+// that one is used.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define KROT_IS_SANITIZED
 #elif defined(__has_feature)

@@ -8,9 +8,8 @@ namespace krot::internal {
 
 // What SIGINT and SIGTERM do to a command.
 
-// From now on they end the process at once, with a sentence that begins with
-// `who` and with kExitInterrupted. This is for as long as nothing has been
-// written.
+// From now on they end the process at once, with kExitInterrupted and a
+// sentence that begins with `who`. For as long as nothing has been written.
 void EndOnInterrupt(const std::string& who);
 
 // From now on the first one sets the returned flag: what has begun is

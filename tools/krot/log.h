@@ -14,7 +14,7 @@ struct LogOptions {
   std::string path;        // of the log of the run (run_log.h); "": none
 };
 
-// Is given every line and table, whatever the level; may be empty.
+// Receives every line and table, whatever the level; may be empty.
 using LogSink = std::function<void(const std::string& text)>;
 void SetLogSink(LogSink sink);
 

@@ -4,7 +4,7 @@
 
 namespace krot::internal {
 
-// Where something was run, without which times mean nothing.
+// The machine of a run, without which times mean nothing.
 struct Machine {
   std::string cpu;  // model name; "unknown" where the system does not say
   int cores = 0;    // hardware threads

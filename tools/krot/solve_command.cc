@@ -184,7 +184,7 @@ std::string PositionsConflictWords(const SolveSummary& summary) {
                            "observation");
 }
 
-// Where no model can be written, at most a proof is.
+// Ends the command if there is no model to write; at most a proof is written.
 void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   if (report.outliers &&

@@ -130,7 +130,7 @@ struct AdjustmentComponent {
   bool is_held = false;  // something in it is fixed
 };
 
-// In the order of their first frames. O(observations).
+// All components, in the order of their first frames. O(observations).
 std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
                                                 bool refine_sensors);
 

@@ -25,7 +25,7 @@ using Eigen::Vector3d;
 
 constexpr int64_t kItems = 64;  // per chunk of a parallel loop
 
-// Of all pairs of a point's rays the angle nearest to a right one; degrees.
+// The angle between two of a point's rays that is nearest to 90; degrees.
 double MeetingAngle(const std::vector<Vector3d>& rays) {
   double largest = 0;
   for (size_t a = 0; a < rays.size(); ++a) {

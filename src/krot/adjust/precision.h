@@ -72,7 +72,7 @@ struct CameraPrecision {
 struct PointPrecision {
   int32_t point = 0;  // in Model::points3D
   int num_rays = 0;
-  // Of the angles between two of its rays, the nearest to a right one; degrees.
+  // The angle between two of its rays that is nearest to 90; degrees.
   double angle_deg = 0;
   double rms_px = 0;
   // Standard deviations of X, Y, Z; NaN if unknown, infinite if not determined.

@@ -154,7 +154,7 @@ namespace {
 // do not move them this far.
 constexpr double kSamePixel = 0.01;
 
-// Where the 2D points of a model stand in its tracks.
+// For every 2D point of a model its elements in the tracks.
 class TrackIndex {
  public:
   explicit TrackIndex(const Model& model)

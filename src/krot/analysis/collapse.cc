@@ -35,7 +35,7 @@ Centres CentresOf(const Model& model) {
 // How the cameras that see a point lie to it; infinite with fewer than two.
 struct Shape {
   double nearest = kInfinity;   // distance of a camera
-  double nearness = kInfinity;  // of the nearest to the median camera
+  double nearness = kInfinity;  // nearest distance over the median one
   double angle = kInfinity;     // between the first ray and another, radians
 };
 

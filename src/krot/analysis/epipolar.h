@@ -119,7 +119,7 @@ class MatchRays {
 
 struct MatchNoise {
   double sigma_px = 0;      // per axis and keypoint
-  double tolerance_px = 0;  // 95 %: no Gaussian error exceeds it
+  double tolerance_px = 0;  // above all Gaussian errors, 95 %
 };
 
 // Estimates the noise from the errors of each pair of images (Sampson's

@@ -24,8 +24,8 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-// With a pose's system scaled to ones on the diagonal: nothing holds directions
-// with smaller eigenvalues.
+// A pose's system is scaled to ones on its diagonal. Nothing holds directions
+// whose eigenvalues are below this.
 constexpr double kSingularPose = 1e-9;
 // For smaller lambda the density is nearly even, and a series replaces formulas
 // that would lose digits.

@@ -134,8 +134,8 @@ class PoseJudge {
     return pairs;
   }
 
-  // Finds images whose errors another pose halves, so that nobody is judged by
-  // them. Of neighbours the one that gains most comes first.
+  // Finds images whose errors another pose halves, so that no image is judged
+  // by them. Of neighbours the one that gains most comes first.
   void FindMisplaced() {
     const auto num_images = static_cast<int32_t>(check_.images.size());
     std::vector<std::optional<PoseFits>> fits(num_images);

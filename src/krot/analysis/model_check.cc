@@ -230,8 +230,8 @@ class Checker {
                     options_.false_alarm);
   }
 
-  // The same for an image of whose 2D points tracks keep few: the fewer, the
-  // less has to speak against it.
+  // The same for an image with few of its 2D points in tracks: the fewer they
+  // are, the less evidence is needed.
   double LeastExponent(size_t n) const {
     return LeastExponent() + std::min(0.0, std::log(RelativeKept(n)));
   }
@@ -284,7 +284,7 @@ class Checker {
                std::max<size_t>(1, model_.images[n].points2D.size()));
   }
 
-  // Below 1 if its share is small beside the median image's.
+  // Below 1 if that share is small compared with the median image's.
   double RelativeKept(size_t n) const {
     return median_kept_ > 0 ? KeptShare(n) / (kFewKept * median_kept_) : 1;
   }

@@ -82,7 +82,7 @@ bool IsRelated(const SideFit& side) {
   return side.relative_median <= kUnrelated;
 }
 
-// None: neither fits.
+// The reading that fits the model best; none if neither side fits.
 std::optional<Reading> Choose(const Model& model,
                               const std::optional<SideFit>& tracks,
                               const std::optional<SideFit>& images) {

@@ -43,10 +43,10 @@ struct CameraErrors {
   PixelErrorStatistics errors;
 };
 
-// In the order of Model::images and Model::cameras, those without observations
-// included. `errors_px` as PixelErrors gives them; throws
-// std::invalid_argument if their number is not that of the track elements.
-// O(observations).
+// The errors of every image or camera, as Model::images and Model::cameras,
+// also of those without observations. `errors_px` as PixelErrors gives them;
+// throws std::invalid_argument if their number is not that of the track
+// elements. O(observations).
 std::vector<ImageErrors> ErrorsByImage(const Model& model,
                                        const std::vector<double>& errors_px);
 std::vector<CameraErrors> ErrorsByCamera(const Model& model,

@@ -247,7 +247,7 @@ Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H) {
   return root;
 }
 
-// Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
+// P(chi^2 > x) is erfc(sqrt(x / 2)) for one direction, exp(-x / 2) for two.
 double StandardizedError(double chi2, int num_directions) {
   if (num_directions == 2) return std::sqrt(chi2);
   if (num_directions == 0) return kNaN;

@@ -18,7 +18,7 @@ namespace krot::internal {
 struct WrongPosition {
   size_t index = 0;     // in the list of positions
   std::string name;     // "a.jpg" or "3D point 12"
-  double distance = 0;  // of what the model has there; units of the positions
+  double distance = 0;  // from the model's place; units of the positions
   double radius = 0;    // the position's, in that direction
 };
 

@@ -265,7 +265,7 @@ class BoundedPath {
   double target_mu_ = 0;     // that the direction aims at
   double gain_ = 0;          // what the last step took off the barrier cost
   int num_idle_ = 0;         // steps in a row
-  bool is_centred_ = false;  // after a failed step; not again
+  bool is_centred_ = false;  // the multipliers, after a failed step
   BoundedSummary summary_;
 };
 

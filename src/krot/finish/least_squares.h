@@ -12,7 +12,7 @@
 
 namespace krot::internal {
 
-// Of all estimates with every error below a cap, the least squares:
+// The least squares among all estimates with every error below a cap:
 //
 //   min 1/2 sum rho(|e_i|^2)   subject to   ||e_i||_p <= cap,  e_i = v_i / w_i,
 //

@@ -19,7 +19,7 @@ constexpr int kMaxTries = 8;  // of one step
 constexpr double kFactor = 2;
 constexpr double kLeastFall = 3e-4;
 constexpr double kLeastDamping = 1e-3;
-// Of a step's linear system: its model does not hold far from here anyway.
+// Of a step's linear solve: the linear model does not hold far from here.
 constexpr double kTolerance = 1e-2;
 // In pixels: a smaller scale would be that of rounding.
 constexpr double kLeastScale = 1e-6;

@@ -91,10 +91,10 @@ RemovalStart FindRemovalStart(const Model& model,
 struct TolerantSolveOptions {
   SolveModelOptions solve;
   // The bound in pixels, > 0: a few observations are removed so that all others
-  // keep it. Without one all stay, unless the start is from nothing, no
-  // certificate is asked for, and noise does not explain the lowest maximum
-  // (RemovalStart); then the observations that noise does not explain are
-  // removed.
+  // keep it. Without one all stay, unless the start is from nothing and noise
+  // does not explain the lowest maximum (RemovalStart); then the observations
+  // that noise does not explain are removed. If a certificate is asked for,
+  // this is only so for a model of which SolveModel serves no observation.
   std::optional<double> max_error;
   // As in OutlierFilterOptions.
   bool has_start_from_nothing = false;

@@ -19,7 +19,7 @@ namespace krot::internal {
 struct MatchTracksOptions {
   double max_error_px = 4;  // of an observation; > 0
   double min_angle_deg =
-      1.5;  // between two of a point's rays, the largest; >= 0
+      1.5;  // the largest between two of a point's rays; >= 0
   // Whether the model's own tracks count as matches; else they are ignored.
   bool keeps_tracks = false;
 };

@@ -71,7 +71,7 @@ struct PartOptions {
   // Whether only tracks count that two frames of the group and two others see,
   // as only these compare the scales.
   bool compares_scales = true;
-  double min_share = 0;  // of its tracks, that it shares
+  double min_share = 0;  // the share of its tracks that it shares
 };
 
 // The part of every frame, numbered from 0 in the order of their first frames.

@@ -66,8 +66,8 @@ class RemovalSearch {
                 const Context& context);
 
   // max_error in true pixels, > 0. Solves at most `max_programmes`; with 0 of
-  // them the result is what is above the bound at built.start, less what points
-  // take back.
+  // them the result is what is above the bound at built.start or, if that is
+  // less, at the last search's estimate, but for what points take back.
   Removal Find(double max_error, int max_programmes);
 
  private:
