@@ -40,8 +40,8 @@ Progress ProgressOf(const BundleAdjustmentIteration& iteration) {
   return {"adjustment", line, std::nullopt};
 }
 
-// The adjustment with its progress on stderr. Throws CommandError where there
-// is nothing to write afterwards.
+// Adjusts, with progress on stderr. Throws CommandError if there is nothing to
+// write afterwards.
 AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
                          Context context, const LogOptions& log) {
   options.adjustment.callback =
@@ -70,14 +70,14 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
   }
 }
 
-// Surveyed points of the model; empty without a file. Throws ModelError where
-// they are too few to compare with.
+// The surveyed points of the model; empty without a file. Throws ModelError if
+// there are too few to compare with.
 std::vector<KnownPosition> ReadCheckPoints(const std::string& path,
                                            const Model& model,
                                            const LogOptions& log) {
   if (path.empty()) return {};
   LogInput(path);
-  // Their radius has no meaning here.
+  // The radius of the check points is not used.
   std::vector<KnownPosition> points =
       ReadPointPositions(ReadFileBytes(path), model, {1.0, WarnOn(log)});
   if (!CompareWithSurvey(model, points)) {

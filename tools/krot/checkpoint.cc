@@ -13,7 +13,8 @@
 namespace krot::internal {
 namespace {
 
-// Ends the run, as an interrupt would, where it goes beyond the steps.
+// When the steps that the file holds are used up, ends the run as an interrupt
+// would.
 class CheckpointAlone : public CheckpointFile {
  public:
   using CheckpointFile::CheckpointFile;
@@ -31,7 +32,7 @@ void AppendValues(const T& values, std::string* bytes) {
                 sizeof(values[0]) * static_cast<size_t>(values.size()));
 }
 
-// What a model's digest leaves out: where the solve starts.
+// The digest of where the solve starts, which a model's digest leaves out.
 std::string StartDigest(const Model& model) {
   std::string bytes;
   for (const Frame& frame : model.frames) {
@@ -45,7 +46,7 @@ std::string FileDigest(const std::string& path) {
   return path.empty() ? "none" : Sha256(ReadFileBytes(path).bytes);
 }
 
-// Of all that the result depends on.
+// The digest of all that the result depends on.
 std::string RunDigest(const CheckpointOptions& options, const ModelPaths& paths,
                       const Model& model) {
   std::string text = "krot " KROT_VERSION "\n" + options.settings;

@@ -5,8 +5,8 @@
 
 namespace krot::internal {
 
-// The commands of `krot`, one .cc file each. They return an exit code or
-// throw what tools/krot.cc turns into one.
+// The commands of `krot`, one .cc file each. They return an exit code, or throw
+// an exception that krot.cc turns into one.
 int RunSolver(const std::vector<std::string>& arguments);
 int RunBundleAdjuster(const std::vector<std::string>& arguments);
 int RunPointTriangulator(const std::vector<std::string>& arguments);

@@ -8,7 +8,7 @@
 
 namespace krot::internal {
 
-// What every command takes.
+// Options that every command takes.
 struct CommonOptions {
   uint64_t random_seed = 0;
   LogOptions log;

@@ -1,4 +1,4 @@
-// By Boost.Program_options.
+// Implemented with Boost.Program_options.
 
 #include "tools/krot/given_options.h"
 
@@ -39,8 +39,8 @@ OptionAssignment ToAssignment(const po::option& option) {
   return {option.string_key, text, "--" + option.string_key};
 }
 
-// The file as Boost reads it: without a byte order mark, and without comments
-// behind a semicolon that begins a line or follows a blank.
+// The file as Boost can read it: without a byte order mark, and without
+// comments after a semicolon that begins a line or follows a blank.
 std::string IniText(const std::string& path, std::istream* stream) {
   const FileBytes file{path, {std::istreambuf_iterator<char>(*stream), {}}};
   std::istringstream lines{std::string(WithoutByteOrderMark(file))};

@@ -1,4 +1,4 @@
-// Where there is no Boost: by hand, and no project files.
+// For builds without Boost: parsed by hand, and without project files.
 
 #include "krot/options/option_table.h"
 #include "tools/krot/given_options.h"

@@ -25,7 +25,8 @@ std::string Replaced(const std::string& text, const std::string& characters,
   return replaced;
 }
 
-// For roff: a hyphen that is typed is a minus, and no line starts a request.
+// Escapes text for roff: a typed hyphen is a minus, and no line starts a
+// request.
 std::string Roff(const std::string& text) {
   std::string roff = Replaced(Replaced(text, "\\", "\\"), "-", "\\");
   if (!roff.empty() && (roff[0] == '.' || roff[0] == '\'')) {
@@ -40,7 +41,7 @@ std::string RoffHead(const std::string& title, const std::string& summary) {
          Roff(title) + " \\- " + Roff(summary) + "\n.SH SYNOPSIS\n.B ";
 }
 
-// Within '...' of a shell.
+// Escapes text that stands within '...' of a shell.
 std::string Quoted(const std::string& text) {
   std::string quoted;
   for (const char c : text) quoted += c == '\'' ? "'\\''" : std::string(1, c);

@@ -11,8 +11,8 @@ namespace krot::internal {
 // What --help may print: --help or -h, --help=man, --help=bash, --help=zsh.
 enum class HelpFormat { kText, kMan, kBash, kZsh };
 
-// The help that the arguments ask for, if they do. Throws OptionError for a
-// format that there is not.
+// The kind of help that the arguments ask for, if any. Throws OptionError for a
+// format that does not exist.
 std::optional<HelpFormat> AskedHelp(const std::vector<std::string>& arguments);
 
 // A line of `krot help`.
@@ -25,7 +25,8 @@ struct CommandSummary {
 // krot-solver(1).
 std::string ManPage(const OptionTable& table);
 
-// That of krot itself: its commands, and its exit codes as lines "  code text".
+// The manual page of krot itself: its commands, and its exit codes, which are
+// given as lines "  code text".
 std::string ManPage(const std::vector<CommandSummary>& commands,
                     const std::string& exit_codes);
 

@@ -1,18 +1,19 @@
-// Replaces the global operator new of a program: what is large lies in huge
-// pages, where the system gives them to those who ask (in
-// /sys/kernel/mm/transparent_hugepage/enabled, "madvise", as Debian has it).
-// Solves of millions of observations fill and free arrays of gigabytes: page by
-// page of 4 kB, the system's part of that is a quarter of the time. Not in a
-// library, whose users choose their own.
+// Replaces the global operator new of a program, so that large arrays lie in
+// huge pages where the system gives them on request (where
+// /sys/kernel/mm/transparent_hugepage/enabled says "madvise", as on Debian).
+// Solves of millions of observations fill and free arrays of gigabytes; with
+// pages of 4 kB the system takes a quarter of the time. Not in a library, whose
+// users choose their own operator new.
 //
-// Operator delete may stay as it is: all of this is freed by std::free.
+// Operator delete stays as it is, as all of this memory is freed by std::free.
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <new>
 
-// A sanitizer has its own: GCC says so in one way, Clang in another.
+// Sanitizers bring their own operator new. GCC and Clang show in different ways
+// that one is used.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define KROT_IS_SANITIZED
 #elif defined(__has_feature)
@@ -27,11 +28,11 @@
 namespace {
 
 constexpr std::size_t kHugePage = std::size_t{2} << 20;
-// To be aligned an array takes up to one more of address space: little beside
-// these.
+// Alignment takes up to one more huge page of address space, which is little
+// for arrays of this size.
 constexpr std::size_t kLarge = 8 * kHugePage;
 
-// Null where there is no such memory.
+// Ordinary memory; null if there is none.
 void* TryAllocateAsEver(std::size_t size, std::size_t alignment) {
   return alignment <= alignof(std::max_align_t)
              ? std::malloc(std::max<std::size_t>(size, 1))
@@ -45,7 +46,7 @@ void* TryAllocate(std::size_t size, std::size_t alignment) {
       posix_memalign(&memory, std::max(alignment, kHugePage), size) != 0) {
     return TryAllocateAsEver(size, alignment);
   }
-  // Advice: where it is not taken, pages are small.
+  // Only advice: if the system does not take it, pages are small.
   madvise(memory, size & ~(kHugePage - 1), MADV_HUGEPAGE);
   return memory;
 }

@@ -33,7 +33,7 @@ void End() {
 }  // namespace
 
 void EndOnInterrupt(const std::string& who) {
-  // A bar may stand on a terminal's line.
+  // The sentence begins on a new line, as a progress bar may stand on this one.
   const std::string text = (IsStderrTerminal() ? "\n" : "") + who +
                            ": interrupted, nothing was written\n";
   sentence_length = std::min(text.size(), interrupt_sentence.size());

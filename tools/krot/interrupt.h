@@ -6,15 +6,15 @@
 
 namespace krot::internal {
 
-// What SIGINT and SIGTERM do.
+// What SIGINT and SIGTERM do to a command.
 
-// From now on they end the process at once, with a sentence of `who` and
-// kExitInterrupted: for as long as nothing has been written.
+// From now on they end the process at once, with kExitInterrupted and a
+// sentence that begins with `who`. For as long as nothing has been written.
 void EndOnInterrupt(const std::string& who);
 
-// From now on the first one sets the returned flag, so that what has begun is
-// completed, or cut short by who looks at it; a second one ends the process at
-// once.
+// From now on the first one sets the returned flag: what has begun is
+// completed, or cut short by those who look at the flag. A second one ends the
+// process at once.
 const CancelFlag& DeferInterrupts();
 
 // Sets that flag.

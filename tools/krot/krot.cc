@@ -1,4 +1,5 @@
-// krot COMMAND [options]: the command table, and what becomes of exceptions.
+// krot COMMAND [options]: the command table, and which exit code and sentence
+// an exception becomes.
 
 #include <algorithm>
 #include <atomic>
@@ -163,7 +164,7 @@ int RunCommand(const std::vector<std::string>& arguments) {
   return RequireCommand(name).run({arguments.begin() + 1, arguments.end()});
 }
 
-// One line on stderr, whatever the message holds.
+// Prints the message as one line on stderr, whatever it holds.
 int Fail(const std::string& who, std::string message, int exit_code) {
   std::replace(message.begin(), message.end(), '\n', ' ');
   EndProgress();
@@ -204,7 +205,7 @@ int RunOrFail(const std::string& who,
   }
 }
 
-std::string out_of_memory;  // as a sentence, while there is some
+std::string out_of_memory;  // the sentence, made while there is memory
 std::atomic<bool> has_memory_ended{false};
 
 [[noreturn]] void OnMemoryEnd() {
@@ -212,9 +213,9 @@ std::atomic<bool> has_memory_ended{false};
   throw std::bad_alloc();
 }
 
-// Libraries whose destructors allocate (nlohmann/json, Ceres) end the process
-// where memory does: with the sentence and the code of any other place, at
-// least. What was thrown is not always told.
+// Libraries whose destructors allocate (nlohmann/json, Ceres) terminate the
+// process when memory ends. Then at least the sentence and the exit code are
+// the usual ones. It may be unknown here what was thrown.
 [[noreturn]] void EndWithoutUnwinding() {
   try {
     if (const std::exception_ptr error = std::current_exception()) {

@@ -25,11 +25,12 @@ void LogToSink(const std::string& text) {
   if (log_sink) log_sink(text);
 }
 
-// In one piece: a signal's sentence begins a line of its own.
+// In one piece, so that a signal's sentence begins a line of its own.
 void Write(const std::string& text) { std::cerr << text << std::flush; }
 
-// The longest beginning of the text that takes no more than `columns`, without
-// control characters. Beyond ASCII a character counts as a wide one.
+// The longest beginning of the text that takes at most `columns`, with blanks
+// for control characters. Beyond ASCII every character counts as two columns
+// wide.
 std::string Cut(const std::string& text, int columns) {
   std::string cut;
   int used = 0;
@@ -44,7 +45,7 @@ std::string Cut(const std::string& text, int columns) {
   return cut;
 }
 
-// The line on stderr that tells that work goes on.
+// The line on stderr that shows that work goes on.
 class ProgressLine {
  public:
   // Never destroyed: its thread sleeps when the process ends.
@@ -55,12 +56,12 @@ class ProgressLine {
 
   void Show(const LogOptions& options, const Progress& progress);
   void Begin(const LogOptions& options, const std::string& words);
-  // Other text, on lines of its own.
+  // Prints other text, on lines of its own.
   void Say(const std::string& text);
   void End();
 
  private:
-  // All of these with the mutex locked.
+  // These are called with the mutex locked.
   void Leave();
   void LeaveStage();
   void Print(const std::string& addition);
@@ -68,7 +69,7 @@ class ProgressLine {
   void StartWatching();
   void Watch();
 
-  std::mutex mutex_;  // of all that follows
+  std::mutex mutex_;  // for all that follows
   std::condition_variable has_changed_;
   bool is_watched_ = false;
   bool is_terminal_ = false;
@@ -78,10 +79,10 @@ class ProgressLine {
   Progress progress_;
   std::set<std::string> told_;  // stages that have left a line
   const Clock::time_point begun_ = Clock::now();
-  Clock::time_point updated_;  // its words
+  Clock::time_point updated_;  // when its words changed
   Clock::time_point printed_;
-  bool is_printed_ = false;    // the present words
-  bool says_seconds_ = false;  // behind them
+  bool is_printed_ = false;    // the present words are
+  bool says_seconds_ = false;  // after the words
   bool line_is_open_ = false;  // on a terminal
 };
 
@@ -143,12 +144,12 @@ void ProgressLine::Leave() {
   if (is_active_ && !is_printed_) Print("");
   if (!line_is_open_) return;
   if (!is_phase_ && says_seconds_) Print("");
-  Write(is_phase_ ? "\r\033[K" : "\n");  // a phase leaves nothing
+  Write(is_phase_ ? "\r\033[K" : "\n");  // a phase leaves no line
   line_is_open_ = false;
 }
 
-// The same stages follow each other again and again in a hard solve: only the
-// first time they leave a line behind.
+// In a hard solve the same stages follow each other again and again. They leave
+// a line behind the first time only.
 void ProgressLine::LeaveStage() {
   const bool is_first = told_.insert(progress_.stage).second;
   if (is_active_ && (is_first || is_phase_)) Leave();
@@ -160,7 +161,7 @@ void ProgressLine::Print(const std::string& addition) {
   Progress whole = progress_;
   whole.words += addition;
   if (is_terminal_) {
-    // Back to the margin; what is left of a longer line is erased.
+    // Goes back to the margin, and erases what is left of a longer line.
     constexpr int kUsual = 80;
     const int columns = TerminalColumns().value_or(kUsual);
     Write('\r' + FitProgress(whole, columns) + "\033[K");
@@ -173,7 +174,7 @@ void ProgressLine::Print(const std::string& addition) {
   says_seconds_ = !addition.empty();
 }
 
-// Between two lines, or two states of one.
+// Seconds between two lines, or two states of one.
 double ProgressLine::Pause() const {
   if (is_terminal_) return 0.1;
   return std::clamp(Seconds(Clock::now() - begun_).count() / 10, 2.0, 60.0);

@@ -4,7 +4,7 @@
 
 namespace krot::internal {
 
-// Where something was run: times mean nothing without it.
+// The machine of a run, without which times mean nothing.
 struct Machine {
   std::string cpu;  // model name; "unknown" where the system does not say
   int cores = 0;    // hardware threads
@@ -15,7 +15,7 @@ struct Machine {
 
 Machine ThisMachine();
 
-// "AMD EPYC, 2 cores, load 1.0; GCC 12.2.0, Release".
+// For example "AMD EPYC, 2 cores, load 1.0; GCC 12.2.0, Release".
 std::string MachineLine(const Machine& machine);
 
 }  // namespace krot::internal

@@ -83,7 +83,8 @@ std::optional<DistanceReport> ReadKnownDistances(const ModelPaths& paths,
 
 namespace {
 
-// What else holds the scale, metres for a unit; none if nothing does.
+// The scale that something else holds, in metres per unit; none if nothing
+// does.
 std::optional<double> HeldScale(const SolveReport& report) {
   if (report.position_frame) return report.position_frame->own_from_model.scale;
   const SolveSummary& summary = report.summary;

@@ -13,39 +13,40 @@
 
 namespace krot::internal {
 
-// What is known in metres of a model: positions in a frame of their own, and
+// What is known about a model in metres: positions in a frame of their own, and
 // distances.
 
-// The distances of `path` in these models of the same images; none if there is
-// no path. Throws ModelError.
+// Measures the distances in the file `path` in these models of the same images;
+// none if the path is empty. Throws ModelError.
 std::optional<DistanceReport> MeasureFile(
     const std::string& path, const std::vector<const Model*>& models,
     const LogOptions& log, bool may_lack_metres = true);
 
-// The distances of a command that solves, in its input; none without a path.
-// Throws ModelError, too, where they are to set the scale, contradict each
-// other, and several sets of them are the largest.
+// Measures the known distances in the input of a command that solves; none
+// without a path. Throws ModelError, also if they are to set the scale,
+// contradict each other, and several sets of them are the largest.
 std::optional<DistanceReport> ReadKnownDistances(const ModelPaths& paths,
                                                  const Model& model,
                                                  const LogOptions& log);
 
-// Measures the report's distances in what was solved, and tells of
-// contradictions. They set the scale unless something else holds it.
+// Measures the report's distances in the solved model, and warns of
+// contradictions. The distances set the scale unless something else holds it.
 void MeasureSolved(const Model& solved, const LogOptions& log,
                    SolveReport* report);
 
-// The model in the positions' frame, or by the scale of distances, measured
-// anew there; none if it stays as it was solved.
+// The solved model in the positions' frame, or with the scale of the distances,
+// and its errors in the report; none if it stays as it was solved.
 std::optional<Model> InOutputFrame(const ModelPaths& paths, const Model& solved,
                                    SolveReport* report);
 
 struct KnownPositions {
   std::vector<KnownPosition> positions;  // in the model's frame
-  std::optional<PositionFrame> frame;    // that the files have of their own
+  std::optional<PositionFrame> frame;    // the files' own frame, if any
 };
 
-// What paths.*positions_path know of the model; tells on stderr of a frame that
-// was found, and of wrong positions. Throws ModelError.
+// Reads the known positions of paths.*positions_path. If they are in their own
+// frame, says on stderr how it was found, and which positions are wrong. Throws
+// ModelError.
 KnownPositions ReadKnownPositions(const ModelPaths& paths, const Model& model,
                                   const LogOptions& log);
 

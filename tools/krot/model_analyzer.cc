@@ -63,7 +63,7 @@ void AddAnalyzerOptions(AnalyzerOptions* options, OptionParser* parser) {
                    &options->common, parser);
 }
 
-// The path under either of its names.
+// The model's path, under whichever of its two names.
 std::string ModelPath(const AnalyzerOptions& options,
                       const OptionParser& parser) {
   if (parser.IsGiven("path") && parser.IsGiven("input_path")) {
@@ -85,7 +85,7 @@ WriteModelOptions CopyOptions(const AnalyzerOptions& options,
   return write_options;
 }
 
-// What can be known before the model is read.
+// Checks what can be known before the model is read.
 void CheckAnalyzerPaths(const AnalyzerOptions& options,
                         const std::string& input_path,
                         const OptionParser& parser) {
@@ -115,7 +115,7 @@ void WriteColoredCopy(const AnalyzerOptions& options,
              CopyOptions(options, input_path));
 }
 
-// A model whose tracks cannot be followed is shown by what its images say.
+// A model whose tracks cannot be followed is shown as its images have it.
 ValidModel ReadToShow(const std::string& path, const AnalyzerOptions& options,
                       const OptionParser& parser) {
   try {
@@ -126,7 +126,7 @@ ValidModel ReadToShow(const std::string& path, const AnalyzerOptions& options,
   return ReadValidModel(path, "follow_images", options.common.log);
 }
 
-// What the certificate says of the model; "" if none is given.
+// What the certificate says about the model; "" if none is given.
 std::string CertificateText(const AnalyzerOptions& options,
                             const Model& model) {
   if (options.certificate_path.empty()) return "";

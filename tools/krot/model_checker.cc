@@ -60,7 +60,7 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                    &command->common, parser);
 }
 
-// What can be known before the model is read.
+// Checks what can be known before the model is read.
 WriteModelOptions CheckPaths(const CheckerCommand& command,
                              const OptionParser& parser) {
   const ModelPaths& paths = command.paths;
@@ -97,7 +97,8 @@ WriteModelOptions CheckPaths(const CheckerCommand& command,
   return write_options;
 }
 
-// The wrong observations as those that a filter removed, to be shown like them.
+// Lists the wrong observations as if a filter had removed them, to show them
+// alike.
 OutlierFilterSummary Suspects(const ModelCheck& check) {
   OutlierFilterSummary summary;
   for (const WrongObservation& one : check.observations) {

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In --output_path, under COLMAP's names.
+// These files go to --output_path, under COLMAP's names.
 constexpr char kErrorsName[] = "errors.csv";
 constexpr char kTableName[] = "errors_summary.txt";
 
@@ -95,7 +95,7 @@ WriteModelOptions OverlayWriteOptions(const ComparerOptions& options) {
   return write;
 }
 
-// What can be known before the models are read.
+// Checks what can be known before the models are read.
 void CheckComparerPaths(const ComparerOptions& options,
                         const OptionParser& parser) {
   if (options.overlay_path.empty()) {

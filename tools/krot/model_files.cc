@@ -32,7 +32,7 @@ ModelFormat OutputFormat(const ModelPaths& paths) {
   return input_format;
 }
 
-// What is written as it was read and takes no part; "" if there is nothing.
+// What takes no part and is written as it was read; "" if there is nothing.
 std::string KeptWords(const Model& model) {
   int64_t num_images = 0;
   for (const Frame& frame : model.frames) {
@@ -59,7 +59,7 @@ std::string KeptWords(const Model& model) {
   return words.empty() ? words : words + ": kept as read, and left out";
 }
 
-// COLMAP's files are not for reports.
+// Refuses names of COLMAP's files for other files.
 void CheckSideName(const std::string& option, const std::string& path) {
   constexpr std::array<const char*, 5> kStems = {"cameras", "rigs", "frames",
                                                  "images", "points3D"};
@@ -208,7 +208,7 @@ ValidModel ReadValidModel(const std::string& path,
   if (!read.contradictions.Any()) return read;
   if (on_contradiction == "refuse") throw ModelError(read.contradictions.first);
   RequireSettled(path, read.contradictions);
-  // Of a model without there is one thing to say alone: nothing to solve.
+  // If no model has tracks, "nothing to solve" is the only thing to say.
   if (HasTrack(read.model)) {
     LogLine(log, 1,
             "warning: " + path + ContradictionSentence(read.contradictions));

@@ -28,26 +28,25 @@ struct ModelPaths {
   std::string distances_path;  // "": none is known
   std::string positions_frame = "model";
   std::string output_frame = "model";
-  std::optional<double> position_radius;  // of lines without one
+  std::optional<double> position_radius;  // of lines that have none
   std::string report_path;
   std::string html_path;
   bool write_on_interrupt = false;
 };
 
-// The output is required unless its meaning is given: "Where ... goes".
+// The output is optional if its meaning is given, as "Where ... goes".
 void AddModelPaths(
     ModelPaths* paths, OptionParser* parser,
     const char* output_meaning = nullptr,
     const char* report_meaning = "Where the report goes, as JSON");
-// Of a command that takes other rotations than the model's.
+// For commands that take other rotations than the model's.
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
-// Of a command that may hold images and points.
+// For commands that can keep images and points fixed.
 void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
-// Of a command that keeps cameras within a radius of where they are known to
-// be.
+// For commands that keep cameras within a radius of known positions.
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser);
 void AddDistancesPath(std::string* path, OptionParser* parser);
-// Of a command whose estimate is of use before its end.
+// For commands whose estimate is of use before its end.
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser);
 void AddOverwrite(bool* overwrite, OptionParser* parser);
 
@@ -58,46 +57,47 @@ void AddOverwrite(bool* overwrite, OptionParser* parser);
 WriteModelOptions CheckModelPaths(const ModelPaths& paths,
                                   const LogOptions& log);
 
-// Whether a file beside the model, a report or a certificate, can be written to
-// `path`, the value of --`option`; "": none is. `folder_to_come` will exist by
-// then. Throws OptionError if it would take the place of one of COLMAP's files,
-// WriteError if it cannot be written.
+// Checks that a file other than the model's, as a report or a certificate, can
+// be written to `path`, the value of --`option`; "" stands for none.
+// `folder_to_come` will exist by then. Throws OptionError if the name is that
+// of one of COLMAP's files, WriteError if it cannot be written.
 void CheckSidePath(const std::string& option, const std::string& path,
                    const std::string& folder_to_come = "");
 
-// Ends a command that was interrupted and has written what it had by then.
+// Ends a command that was interrupted, after it has written its best estimate.
 [[noreturn]] void ThrowInterrupted(const ModelPaths& paths);
 
-// What to do where tracks and images contradict each other; every command that
-// reads a model asks.
+// What to do where tracks and images contradict each other. Every command that
+// reads a model has this option.
 void AddOnContradiction(std::string* on_contradiction, OptionParser* parser);
 
 struct ValidModel {
   Model model;
-  Contradictions contradictions;  // that the files hold
+  Contradictions contradictions;  // of the files
   PoseChecks poses;
 };
 
-// Reads and validates, and tells on stderr of contradictions and of what is odd
-// about the poses. Throws ModelError.
+// Reads and validates a model. Warns on stderr of contradictions, and of poses
+// that look wrong. Throws ModelError.
 ValidModel ReadValidModel(const std::string& path,
                           const std::string& on_contradiction,
                           const LogOptions& log);
 
-// The model to work on: read and validated, with the rotations of
-// paths.rotations_path, if there is one; fills in what `run` says of the
-// input. Throws ModelError, and CommandError for a model without observations
-// if it needs some.
+// Reads and validates the model to work on, with the rotations of
+// paths.rotations_path if there are some, and fills in what `run` says about
+// the input. Throws ModelError, and CommandError if the model has no
+// observations but needs some.
 Model ReadInput(const ModelPaths& paths, const LogOptions& log, RunRecord* run,
                 bool needs_observations = true);
 
-// Of a result that is not given back: points that fit only as they have
-// degenerated, and, of a model that contradicts itself, an images' side that
-// is worse than it was.
+// Warns of a result, which is not the input given back, in which points fit
+// only because they have degenerated, and of one whose images' side is worse
+// than before, if the model contradicts itself.
 void WarnOfDegeneration(const Model& input, const Model& written,
                         const LogOptions& log);
 
-// What paths.fixed_*_path name of the model. Throws ModelError.
+// The images and points of the model that paths.fixed_*_path name. Throws
+// ModelError.
 FixedParts ReadFixedParts(const ModelPaths& paths, const Model& model,
                           const LogOptions& log);
 

@@ -134,8 +134,8 @@ SceneOptions ToSceneOptions(const SynthesizerOptions& options) {
   return scene;
 }
 
-// What the ranges above cannot tell: sensors turned too far apart to see a
-// point in common.
+// Refuses what the options' ranges cannot tell: sensors turned too far apart to
+// see a point in common.
 SyntheticScene Synthesize(const SceneOptions& options) {
   try {
     return SynthesizeScene(options);

@@ -11,33 +11,33 @@
 
 namespace krot::internal {
 
-// COLMAP's manner of options: --name value, --name=value, and
-// --project_path FILE.ini, whose [Group] sections hold the same names;
-// explicit flags win over the file.
+// Options in COLMAP's manner: --name value, --name=value, and --project_path
+// FILE.ini, whose [Group] sections hold the same names. The command line wins
+// over the file.
 class OptionParser : public OptionTable {
  public:
-  // Of `program` `command`, as messages and help call it.
+  // Options of `program` `command`, which is what messages and help call it.
   OptionParser(const std::string& command, std::string summary,
                const std::string& program = "krot");
 
   void AddPath(const std::string& name, std::string* value, bool required,
                const std::string& range, const std::string& description);
-  // A file that the command writes: Parse refuses one that another path, of an
-  // output or an input, names already.
+  // A file that the command writes. Parse refuses a path that another option,
+  // for output or input, names already.
   void AddOutputFile(const std::string& name, std::string* value,
                      const std::string& description);
 
-  // What to do once all values are set, before the work begins.
+  // Sets what happens once all values are set, before the work begins.
   void OnParsed(std::function<void()> action) {
     on_parsed_ = std::move(action);
   }
 
-  // Sets the values. Returns false, with nothing set, if the arguments ask
-  // for help. Throws OptionError for the first thing wrong.
+  // Sets the values. Returns false, with nothing set, if the arguments ask for
+  // help. Throws OptionError for the first mistake.
   bool Parse(const std::vector<std::string>& arguments);
 
-  // As Parse was asked for it: a text, a manual page, or what a shell needs to
-  // complete this command.
+  // The help that Parse was asked for: a text, a manual page, or what a shell
+  // needs to complete this command.
   std::string Help() const;
 
  private:

@@ -94,7 +94,7 @@ OutlierFilterResult Filter(const OutlierCommand& command, const Model& model) {
   return result;
 }
 
-// What can be known before the model is read.
+// Checks what can be known before the model is read.
 WriteModelOptions CheckPaths(const OutlierCommand& command) {
   const ModelPaths& paths = command.paths;
   const WriteModelOptions write_options =
@@ -119,7 +119,7 @@ WriteModelOptions CheckPaths(const OutlierCommand& command) {
   return write_options;
 }
 
-// Models to look at.
+// Writes models that are there to be looked at.
 void WriteViews(const OutlierCommand& command,
                 const OutlierFilterSummary& summary,
                 const WriteModelOptions& write_options, const Model& input,

@@ -30,8 +30,8 @@ void LeaveJpeg(j_common_ptr info) {
 
 void SayNothing(j_common_ptr) {}
 
-// Nothing with a destructor lives between setjmp and longjmp but `photo`, which
-// is the caller's.
+// Between setjmp and longjmp nothing with a destructor is alive but `photo`,
+// which belongs to the caller.
 bool ReadJpeg(const std::string& bytes, Photo* photo) {
   jpeg_decompress_struct info;
   JpegErrors errors;

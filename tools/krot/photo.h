@@ -7,7 +7,8 @@
 
 namespace krot::internal {
 
-// Pixels of a photo: rows from the top, three bytes (red, green, blue) each.
+// The pixels of a photo: rows from the top, three bytes (red, green, blue)
+// each.
 struct Photo {
   int width = 0;
   int height = 0;
@@ -22,11 +23,11 @@ std::optional<Photo> ReadPhoto(const std::string& path);
 // top); what lies outside of the photo is grey.
 Photo CropPhoto(const Photo& photo, int left, int top, int size);
 
-// The same in so many pixels, at most as many as it has; each the mean of those
-// that it takes the place of.
+// The photo in width x height pixels, at most as many as it has; each is the
+// mean of the pixels that it replaces.
 Photo ShrinkPhoto(const Photo& photo, int width, int height);
 
-// As the bytes of a JPEG file.
+// The photo as the bytes of a JPEG file.
 std::vector<uint8_t> EncodeJpeg(const Photo& photo);
 
 }  // namespace krot::internal

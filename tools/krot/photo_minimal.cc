@@ -1,4 +1,4 @@
-// Where there are no libraries that read photos: none can be read.
+// For builds without libraries that read photos: none can be read.
 
 #include "tools/krot/photo.h"
 

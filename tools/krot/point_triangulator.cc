@@ -19,7 +19,7 @@
 namespace krot::internal {
 namespace {
 
-// COLMAP's call: points from the matches of a database.
+// COLMAP's own use of the command: points from the matches of a database.
 struct MatchesCommand {
   std::string database_path;
   std::string image_path;
@@ -66,8 +66,8 @@ void RefuseOfOtherKind(const MatchesCommand& command,
   }
 }
 
-// Each point's colour becomes the mean of its pixels, where they are in photos
-// of their camera's size.
+// Each point's colour becomes the mean of its pixels, in all photos that have
+// the size of their camera.
 void TakeColors(const std::string& image_path, const LogOptions& log,
                 Model* model) {
   std::unordered_map<Point3DId, std::array<double, 4>> sums;

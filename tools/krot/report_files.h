@@ -8,10 +8,10 @@
 
 namespace krot::internal {
 
-// --html_path, which commands with a report have.
+// Adds --html_path, which all commands with a report have.
 void AddHtmlPath(std::string* html_path, OptionParser* parser);
 
-// Writes the report and its page (HtmlPage); not where the path is "". Throws
+// Writes the report and its page (HtmlPage), each unless its path is "". Throws
 // WriteError.
 void WriteReports(const std::string& report_path, const std::string& html_path,
                   const std::string& report_json, const Model& before,

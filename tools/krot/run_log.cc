@@ -32,7 +32,7 @@ class RunLog {
   }
 
   void Plain(const std::string& line) const {
-    // A log that no longer fits on the disk ends no run.
+    // A full disk, on which the log no longer fits, does not end the run.
     static_cast<void>(descriptor_.Write(line + '\n'));
   }
   void Timed(const std::string& line) const {

@@ -8,17 +8,19 @@
 namespace krot::internal {
 
 // The file of --log_path: all that is needed to repeat a run and to ask about
-// it. Version, machine, every option's value and the digest of every file that
-// was read; then each line of stderr, whatever the level, with the seconds; at
-// last the exit code. It is written as it comes, so that a crash leaves it.
+// it. It has the version, the machine, every option's value and the digest of
+// every file that was read; then each line of stderr, whatever the level, with
+// the seconds; at last the exit code. It is written line by line, so that it is
+// there after a crash.
 
-// Begins it, in place of what the file held. Throws WriteError.
+// Begins the log and replaces what the file held. Throws WriteError.
 void BeginRunLog(const std::string& file, const OptionParser& parser);
 
-// The files of a folder that was read, or one file; nothing if there is no log.
+// Logs the files of a folder that was read, or one file. Does nothing without a
+// log.
 void LogInput(const std::filesystem::path& path);
 
-// Ends it; a run that has none ends without.
+// Ends the log, if there is one.
 void EndRunLog(int exit_code);
 
 }  // namespace krot::internal

@@ -19,7 +19,8 @@ fs::path Normal(const std::string& path) {
 bool IsSamePath(const std::string& a, const std::string& b) {
   if (a.empty() || b.empty()) return false;
   std::error_code error;
-  // Also where names differ in case alone and the file system does not care.
+  // This is also true if names differ only in case, and the file system ignores
+  // it.
   if (fs::equivalent(a, b, error) && !error) return true;
   return Normal(a) == Normal(b);
 }

@@ -51,11 +51,11 @@ std::string MemoryWords(const SolveSummary& summary) {
   return "about " + FormatBytes(summary.needed_bytes) + " will be needed";
 }
 
-// Peaks have been as far below what was announced as this (docs/method/
-// joint_solver.md, "Memory").
+// The announced memory has been up to so many times the peak
+// (docs/method/joint_solver.md, "Memory").
 constexpr double kMostAnnounced = 1.3;
 
-// What surely does not fit is not begun.
+// Refuses to begin what surely does not fit in memory.
 void CheckMemory(const SolveSummary& summary) {
   const int64_t free = FreeMemoryBytes();
   const auto least = static_cast<int64_t>(
@@ -67,8 +67,8 @@ void CheckMemory(const SolveSummary& summary) {
                          " are free; --Problem.min_track_length 3 takes less");
 }
 
-// The solve with its progress on stderr. Throws CommandError where there is
-// nothing to write afterwards.
+// Solves, with progress on stderr. Throws CommandError if there is nothing to
+// write afterwards.
 Model Solve(const SolveCommand& command, const Model& model, const Context& how,
             Checkpoint* checkpoint, SolveReport* report) {
   const LogOptions& log = command.common.log;
@@ -103,8 +103,8 @@ Model Solve(const SolveCommand& command, const Model& model, const Context& how,
   return std::move(result.model);
 }
 
-// Positions and points from the matches of a database. Throws CommandError
-// where there is nothing to make them from.
+// Makes positions and points from the matches of a database. Throws
+// CommandError if there is nothing to make them from.
 Model PlaceByMatches(const SolveCommand& command, const Model& model,
                      SolveReport* report, double* seconds) {
   const LogOptions& log = command.common.log;
@@ -165,7 +165,8 @@ void WriteCertificates(const SolveCommand& command,
                    summary.position_factor->certificate);
 }
 
-// "; in conflict are the positions of a.jpg, b.jpg and 12 observations".
+// For example "; in conflict are the positions of a.jpg, b.jpg and 12
+// observations".
 std::string PositionsConflictWords(const SolveSummary& summary) {
   constexpr size_t kMost = 5;
   const std::vector<SupportPosition>& positions = summary.support_positions;
@@ -183,7 +184,7 @@ std::string PositionsConflictWords(const SolveSummary& summary) {
                            "observation");
 }
 
-// Where no model can be written: all that is left is a proof, maybe.
+// Ends the command if there is no model to write; at most a proof is written.
 void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
   const SolveSummary& summary = report.summary;
   if (report.outliers &&
@@ -226,8 +227,8 @@ void ThrowIfNoStart(const SolveCommand& command, const SolveReport& report) {
   }
 }
 
-// What an interrupted solve has to show for itself: an estimate of a round, of
-// all observations.
+// An interrupted solve has something to write if a round has given an estimate
+// of all observations.
 void ThrowIfNothingSoFar(const SolveReport& report) {
   if (report.summary.termination != SolveTermination::kInterrupted) return;
   if (!report.outliers && !report.summary.rounds.empty()) return;
@@ -236,7 +237,7 @@ void ThrowIfNothingSoFar(const SolveReport& report) {
       "interrupted before there was an estimate, nothing was written");
 }
 
-// Of errors that fell to nothing without saying anything.
+// Warns of errors that fell to zero and say nothing.
 void WarnOfEmptyFall(const LogOptions& log, const SolveSummary& summary) {
   const bool is_zero = IsZeroUpToRounding(summary.cost_final) &&
                        !IsZeroUpToRounding(summary.cost_initial);
@@ -268,8 +269,8 @@ void WarnOfMissedGap(const SolveCommand& command, const SolveSummary& summary) {
   }
 }
 
-// One wrong observation can set the maximum, for which all others pay. On
-// models without such the mean error rises by up to a half after a finish.
+// One wrong observation can set the maximum, and all others pay for it. On
+// models without any the mean error rises by up to a half after a finish.
 void PointToOutlierFilter(const LogOptions& log, const SolveReport& report) {
   constexpr double kMuch = 2;
   const PixelErrorStatistics& before = report.summary.pixel_error_before;

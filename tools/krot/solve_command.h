@@ -10,8 +10,8 @@
 
 namespace krot::internal {
 
-// What `solver` and `point_triangulator` have in common: check the paths,
-// read, solve, write, report.
+// What `solver` and `point_triangulator` have in common: they check the paths,
+// read, solve, write and report.
 struct SolveCommand {
   std::string name;
   std::string method_name;  // for the report; "": that of the solve
@@ -19,25 +19,28 @@ struct SolveCommand {
   std::string certificate_path;         // "": not wanted
   std::string conflicts_path;           // "": not wanted
   std::string factor_certificate_path;  // "": not wanted
-  // "": the model's tracks. Else positions and points come from this database's
-  // matches and the model's rotations, and the solve starts there.
+  // "": the model's tracks are used. Otherwise positions and points are made
+  // from this database's matches and the model's rotations, and the solve
+  // starts there.
   std::string database_path;
   CheckpointOptions checkpoint;
   CommonOptions common;
   TolerantSolveOptions options;  // its callbacks are set by the run
-  Context context;               // likewise, and the flag
+  Context context;               // likewise, and so is the flag
 
-  // Where several processes solve the model together (tools/krot_mpi): what
-  // this one takes of it; and, of the one that writes, the whole as it was read
-  // and as it is solved. Empty: this one has it all.
+  // For several processes that solve the model together (tools/krot_mpi):
+  // take_share gives the part that this process solves; join puts the whole
+  // together, as it was read and as it is solved, in the process that writes
+  // it. Empty: this process has it all.
   std::function<Model(const Model& whole)> take_share;
   std::function<bool(Model* model, Model* solved, SolveSummary* summary)> join;
 };
 
-// Returns an exit code or throws. Nothing is written before the solve is done:
-// then the model, the certificate, the report and the page, each whole or not
-// at all. Where one cannot be written those before it stay. Without a start
-// there is the certificate alone, if it is proved that there is none.
+// Returns an exit code or throws. Nothing is written before the solve is done;
+// then the model, the certificate, the report and the page are, each whole or
+// not at all. If one cannot be written, those before it stay. If there is no
+// start, only the certificate is written, and only if it proves that there is
+// none.
 int RunSolveCommand(const SolveCommand& command);
 
 }  // namespace krot::internal

@@ -9,7 +9,7 @@
 namespace krot::internal {
 namespace {
 
-// Errors of what is exact are near 0.
+// Errors of exact models are near 0.
 std::string Pixels(double value) {
   return (value >= 0.01 ? FormatNumber(value, 4) : Scientific(value)) + " px";
 }

@@ -8,14 +8,14 @@
 
 namespace krot::internal {
 
-// Tells the user on stderr that a solve is alive: what its sweeps, its joint
+// Shows the user on stderr that a solve is alive: what its sweeps, its joint
 // iterations and those of the finish have reached (ShowProgress).
 class SolveProgress {
  public:
-  // What fills the bar of a stage, except for the way to a start, whose end is
-  // not known: the gain of a sweep falling to the
-  // tolerance or the sweeps' number rising to the maximum; the gap of the
-  // iterations falling to the one asked for.
+  // When a stage's bar is full: when the gain of a sweep has fallen to the
+  // tolerance or the number of sweeps has risen to the maximum; when the gap of
+  // the iterations has fallen to the one asked for. The search for a start has
+  // no bar, since its end is not known.
   struct Goals {
     double sweep_tolerance = 0;
     int max_sweeps = 0;
@@ -30,14 +30,14 @@ class SolveProgress {
   SolveProgress(const SolveProgress&) = delete;
   SolveProgress& operator=(const SolveProgress&) = delete;
 
-  // Sets the callbacks that tell of sweeps, iterations, stages and choices;
-  // they keep a reference to this.
+  // Sets the callbacks for sweeps, iterations, stages and notes; they keep a
+  // reference to this.
   void Follow(SolveModelOptions* options, Context* context);
 
-  // What each callback tells.
+  // What is shown for each callback.
   Progress Describe(int sweep, const Sweep& state);
   Progress Describe(int iteration,
-                    const JointIteration& state);  // or to a start
+                    const JointIteration& state);  // or the search for a start
   Progress Describe(const BoundedIterate& state);  // of the finish
 
  private:

@@ -10,7 +10,7 @@
 namespace krot::internal {
 namespace {
 
-// Why sweeps alone, where nobody asked for them by name.
+// Says why only sweeps are used, where nobody asked for them by name.
 void ExplainMethod(const SolveCommand& command) {
   const SolveModelOptions& options = command.options.solve;
   if (options.method == EffectiveMethod(options)) return;
@@ -22,8 +22,8 @@ void ExplainMethod(const SolveCommand& command) {
                      "bound");
 }
 
-// From rotations and matches alone: nothing of the model's places takes part,
-// and everything moves.
+// Prepares a start from rotations and matches alone: no position of the model
+// takes part, and everything moves.
 void ResolveDatabase(const OptionParser& parser, SolveCommand* command) {
   if (command->database_path.empty()) return;
   TolerantSolveOptions& options = command->options;
@@ -45,8 +45,8 @@ void ResolveDatabase(const OptionParser& parser, SolveCommand* command) {
   if (!options.max_error) {
     options.max_error = MatchTracksOptions().max_error_px;
   }
-  // Matches have heavy tails: with true rotations the sample's centres are a
-  // third nearer to the truth so.
+  // The tails of matches are heavy: with true rotations this brings the
+  // sample's centres a third nearer to the truth.
   if (!parser.IsGiven("Solver.finish_loss")) {
     options.solve.finish.loss.kind = ErrorLoss::Kind::kCauchy;
   }

@@ -27,12 +27,13 @@ using Json = nlohmann::ordered_json;
 
 constexpr size_t kMaxShown = 20;
 constexpr size_t kMaxPhotosOfTrack = 6;
-// Pixels around an observation; more where its point projects further away.
+// Half the side of a crop, pixels; larger where the point projects farther
+// away.
 constexpr double kSmallestHalf = 32;
 constexpr double kLargestHalf = 128;
 constexpr double kMargin = 1.3;
 
-// An observation to cut out, and where it goes in the JSON.
+// An observation to cut out, and its place in the JSON.
 struct Cut {
   size_t suspect = 0;
   size_t place = 0;
@@ -54,7 +55,7 @@ class SuspectCrops {
     ListCuts();
   }
 
-  // How many photos could not be read.
+  // Adds the crops. Returns how many photos could not be read.
   int64_t AddCrops(const std::string& image_path);
   std::string Text() const { return json_.dump(); }
 
@@ -85,7 +86,7 @@ std::optional<Vector2d> SuspectCrops::Projection(int32_t image,
                       geometry.cam_from_world * result_.points3D[*k].xyz);
 }
 
-// The track of a removed observation, that one first.
+// Adds the track of a removed observation, which itself comes first.
 void SuspectCrops::AddTrack(const RemovedObservation& removed) {
   const Point3D& point = input_.points3D[*points_.Find(removed.point3D_id)];
   std::vector<TrackElement> track(
@@ -124,7 +125,7 @@ void SuspectCrops::ListCuts() {
   }
 }
 
-// Coordinates in the crop, of photos that may have been scaled since.
+// A crop and the coordinates in it; photos may have been scaled since.
 Json SuspectCrops::Crop(const Photo& photo, const Camera& camera,
                         const Cut& cut) const {
   const Vector2d scale(photo.width / static_cast<double>(camera.width),

@@ -94,7 +94,8 @@ void CollectObservations(const Model& model, int min_track_length,
   for (const bool has : has_observation) blocks->num_images += has ? 1 : 0;
 }
 
-// A sensor that moved would take the images of a fixed frame along.
+// A sensor through which a fixed frame sees is fixed, too: otherwise the
+// frame's images would move along.
 void MarkFixed(const FixedParts& fixed, AdjustmentBlocks* blocks) {
   blocks->frame_is_fixed = fixed.frames;
   blocks->frame_is_fixed.resize(blocks->frames.size(), 0);
@@ -154,7 +155,7 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
 
 namespace {
 
-// To the bit: a NaN stays, too.
+// Compares bits, so that a NaN counts as unchanged, too.
 bool IsSame(const PoseBlock& a, const PoseBlock& b) {
   return std::memcmp(a.data(), b.data(), sizeof(PoseBlock)) == 0;
 }

@@ -78,9 +78,9 @@ Model ApplyBlocks(const Model& model, const AdjustmentBlocks& before,
 std::vector<int> RefinedParams(int camera_model,
                                const BundleAdjustmentOptions& options);
 
-// The unknowns that move. Points aside, they are in blocks of three columns,
-// which are numbered in the order frames, sensors, cameras, cap. Nothing that
-// is fixed or takes part in no observation moves.
+// The unknowns that move. Apart from the points they are in blocks of three
+// columns, which are numbered in the order frames, sensors, cameras, cap.
+// Nothing moves that is fixed, or that has no observation.
 struct AdjustmentColumns {
   static constexpr int32_t kHeld = -1;
   // The blocks of theta and c, where x -> R exp([theta]x) (x - c).
@@ -88,8 +88,8 @@ struct AdjustmentColumns {
     int32_t rotation = kHeld;
     int32_t center = kHeld;
   };
-  // As many blocks as the refined parameters need. Columns that are left over
-  // in the last block stand for nothing.
+  // As many blocks as the refined parameters need. Unused columns of the last
+  // block stand for nothing.
   struct Camera {
     int32_t first_block = kHeld;
     std::vector<int> params;
@@ -119,8 +119,8 @@ struct AdjustmentColumns {
 void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
                const BlockVector& direction, double step, AdjustmentBlocks* to);
 
-// The frames, refined sensors and points that hang together, as indices of
-// AdjustmentBlocks; those alone that take part.
+// A connected component: its frames, refined sensors and points, as indices of
+// AdjustmentBlocks. Only what takes part is in one.
 struct AdjustmentComponent {
   std::vector<size_t> frames;
   std::vector<size_t> sensors;
@@ -130,17 +130,17 @@ struct AdjustmentComponent {
   bool is_held = false;  // something in it is fixed
 };
 
-// In the order of their first frames. O(observations).
+// All components, in the order of their first frames. O(observations).
 std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
                                                 bool refine_sensors);
 
-// Moves every connected component of `after` by a similarity that gives it the
-// centroid of its camera centres, their RMS distance to it, and the mean
-// rotation that it has in `before`, all of those cameras that keep their place
-// among the others (krot/geometry/transform.h). Errors change only by rounding.
-// The scale stays if a constant sensor_from_rig with a translation fixes it,
-// and the rotation if rotations are constant. Nothing is done if frames or
-// points are constant, or to a component with anything fixed. O(observations).
+// Moves every connected component of `after` by a similarity, so that the
+// centroid of its camera centres, their RMS distance to it and the mean
+// rotation are those of `before`. Only cameras that keep their place among the
+// others count (krot/geometry/transform.h). Errors change only by rounding. The
+// scale stays if a constant sensor_from_rig with a translation fixes it, and
+// the rotation if rotations are constant. Nothing is done if frames or points
+// are constant, or to a component with anything fixed. O(observations).
 void RestoreSimilarity(const BundleAdjustmentOptions& options,
                        const AdjustmentBlocks& before, AdjustmentBlocks* after);
 
@@ -150,8 +150,8 @@ struct ProjectedError {
   double w;           // depth, > 0
 };
 
-// Those of all observations. None if a point is not in front of its camera, or
-// an error not below `max_error`. O(observations).
+// The errors of all observations. None if a point is not in front of its
+// camera, or if an error is not below `max_error`. O(observations).
 std::optional<std::vector<ProjectedError>> ProjectErrors(
     const AdjustmentBlocks& blocks, double max_error, int num_threads);
 
@@ -173,8 +173,8 @@ struct DifferentiatedPixel {
 // Differentiates forwards through lens and distortion, and in closed form by
 // focal lengths and principal point, in which the pixel is affine. If
 // `J_params` is not null it gets the derivatives by the camera's parameters, 2
-// x num_params, row by row. Throws as ProjectRay does; not finite where that is
-// not.
+// x num_params, row by row. Throws as ProjectRay does; not finite where its
+// pixel is not.
 DifferentiatedPixel DifferentiatePixel(int model_id, const double* params,
                                        const Eigen::Vector2d& ray,
                                        double* J_params);
@@ -223,11 +223,11 @@ void AdjustBelowCap(const BundleAdjustmentOptions& options,
                     const Context& context, const AdjustmentColumns& columns,
                     AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);
 
-// Moves nearly to a local minimum of the largest error. The cap is one more
-// unknown for that, with a weight beside which the squared errors hardly count.
-// Counts iterations in the summary and sets its lowest_max_error, which is that
-// of the start if it cannot be lowered, and blocks->cap2, 5e-4 above that. In
-// the end all errors are below this cap.
+// Moves nearly to a local minimum of the largest error: the cap becomes an
+// unknown, with a weight beside which the squared errors hardly count. Counts
+// iterations in the summary and sets its lowest_max_error, which is that of the
+// start if it cannot be lowered, and blocks->cap2, for a cap 5e-4 above that.
+// In the end all errors are below this cap.
 void LowerMaxError(const BundleAdjustmentOptions& options,
                    const Context& context, const AdjustmentColumns& columns,
                    AdjustmentBlocks* blocks, BundleAdjustmentSummary* summary);

@@ -139,8 +139,8 @@ class BarrierSystem {
   ReducedCameraSystem::Kind kind() const { return schur_.reduced().kind(); }
 
  private:
-  // Those of the poses of frame and sensor, of sixteen parameters, and of the
-  // cap.
+  // The most blocks of an observation: the poses of its frame and sensor,
+  // sixteen parameters, and the cap.
   static constexpr int kMaxBlocks = 4 + 6 + 1;
   // A point's pivots are no smaller than this share of its trace.
   static constexpr double kLeastPivot = 1e-14;
@@ -338,7 +338,7 @@ class BarrierSystem {
   BlockVector diagonal_;
   BlockVector gradient_;
   Direction direction_;
-  // Those of the blocks, per part of the sum.
+  // Sums over the blocks' observations, one for each part of the loop.
   std::vector<std::vector<Eigen::Vector3d>> part_diagonal_, part_gradient_;
 };
 

@@ -32,18 +32,18 @@ constexpr double kMultiplierRange = 100;
 // all further steps would be short.
 constexpr double kCentring = 0.2;
 constexpr double kFallingStep = 0.5;
-// The trust region shrinks after a step of less than this share of the one that
-// the linearised errors allow. Its radius stays between the other two.
+// The trust region shrinks after a step of less than this share of the longest
+// one that the linearised errors allow. Its radius stays between the other two.
 constexpr double kPoorShare = 0.3;
 constexpr double kLeastRadius = 1e-6;
 constexpr double kLargestRadius = 1e6;
-// Where the cap is lowered, it begins at so many times the largest error, and
-// its weight is so many times that of the squared errors: these raise the
+// A cap that is lowered begins at so many times the largest error. Its square
+// has so many times the weight of the squared errors, which therefore raise the
 // square of the lowest maximum by at most twice the inverse, relative.
 constexpr double kFirstCap = 1.1;
 constexpr double kCapWeight = 1e4;
-// The cap of the least squares that follow is so far above the lowest maximum,
-// and their start is at least so far below the cap, relative.
+// The least squares that follow have a cap so far above the lowest maximum, and
+// start at least so far below the cap, relative.
 constexpr double kCapRoom = 5e-4;
 constexpr double kLeastRoom = 1e-4;
 
@@ -71,9 +71,9 @@ class BarrierPath {
         radius_(kLargestRadius),
         summary_(*summary) {}
 
-  // Begin where the cap stays, and where it is lowered.
+  // Begin with a cap that stays, or with one that is lowered.
   void BeginBelowCap() { Begin(kStartWeight * cost_ / count(), 0); }
-  // Here mu is that for which the cap has no slope.
+  // For this mu the cap has no slope at the start.
   void BeginAtCap() {
     const double cap_weight = kCapWeight * cost_ / cap2();
     double sum = 0;
@@ -86,7 +86,7 @@ class BarrierPath {
                       &summary_.num_iterations);
   }
 
-  // FollowPath's.
+  // The steps of FollowPath.
   bool Factorize() { return true; }  // TakeStep does, for every radius
   bool IsThere() const { return false; }
   void FindDirection(double) {}
@@ -150,7 +150,7 @@ class BarrierPath {
                          });
   }
 
-  // As bundle adjustment's summary has it.
+  // The name of the linear solver, as the summary has it.
   const char* SolverName() const {
     switch (system_.kind()) {
       case ReducedCameraSystem::Kind::kSparse:

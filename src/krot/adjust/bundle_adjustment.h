@@ -24,8 +24,8 @@ struct BundleAdjustmentResult {
 // After it, every connected component without anything fixed is moved so that
 // it has its former centroid of camera centres, their former RMS distance to it
 // (unless a constant rig baseline fixes the scale) and its former mean
-// rotation, without the runaways (krot/geometry/transform.h). Stored point
-// errors are not updated.
+// rotation. Cameras that ran away do not count (krot/geometry/transform.h).
+// Stored point errors are not updated.
 //
 // A step that takes a point behind a camera that sees it is rejected; with a
 // cap, so is a step that takes an error to the cap. With a cap the result has
@@ -40,7 +40,7 @@ BundleAdjustmentResult AdjustBundle(const Model& model,
                                     const BundleAdjustmentOptions& options,
                                     const Context& context = {});
 
-// What adjusts is not in this build.
+// Thrown by a build without Ceres, which cannot adjust.
 class NoCeresError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

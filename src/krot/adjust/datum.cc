@@ -15,13 +15,15 @@ using Eigen::Index;
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
-// Translation, in units of the component's size, rotation, and scale.
+// The columns: translation, in units of the component's size, rotation, and
+// scale.
 using Similar = Eigen::Matrix<double, 3, 7>;
 
-// Of the largest eigenvalue of a Gram matrix: below is rounding.
+// Relative to the largest eigenvalue of a Gram matrix: less is rounding.
 constexpr double kNothing = 1e-12;
 
-// x -> x + unit t + omega x (x - O) + s (x - O), for the parts of a component.
+// The small similarities x -> x + unit t + omega x (x - O) + s (x - O) of a
+// component, and how they move its parts.
 class Motion {
  public:
   Motion(const AdjustmentColumns& columns, const AdjustmentBlocks& blocks,
@@ -61,7 +63,8 @@ class Motion {
     return rows;
   }
 
-  // visit(block or kHeld, rows, whether a length) for all that is not a point.
+  // visit(block or kHeld, rows, whether a length) for everything but the
+  // points.
   template <typename Visit>
   void ForEachBlock(const Visit& visit) const {
     for (size_t n = 0; n < component_.frames.size(); ++n) {
@@ -79,7 +82,7 @@ class Motion {
     }
   }
 
-  // Those combinations, as columns, that move nothing that is held.
+  // The combinations of the 7 columns that move nothing that is held.
   MatrixXd Free() const {
     MatrixXd gram = MatrixXd::Zero(7, 7);
     const auto hold = [&](const Similar& rows, bool is_length) {
@@ -102,8 +105,8 @@ class Motion {
     return eigen.eigenvectors().leftCols(count);
   }
 
-  // Adds what the datum holds, 7 columns, lengths in units of the component's
-  // size: of blocks, and of points.
+  // Adds what the datum holds, for blocks and for points: 7 columns, lengths in
+  // units of the component's size.
   void Hold(AdjustmentDatum datum, const std::vector<int32_t>& points,
             MatrixXd* held_blocks, MatrixXd* held_points) const {
     if (datum == AdjustmentDatum::kPoints) {
@@ -172,7 +175,8 @@ ComponentGauge GaugeOf(const AdjustmentColumns& columns,
     if (block != AdjustmentColumns::kHeld)
       similar.middleRows<3>(3 * block) = rows;
   });
-  // A motion that moves points alone is theirs to say: they are not determined.
+  // A motion that moves points alone is no gauge: these points are not
+  // determined.
   MatrixXd moves = similar * free;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(moves.transpose() *
                                                       moves);
@@ -200,7 +204,7 @@ ComponentGauge GaugeOf(const AdjustmentColumns& columns,
   if (datum == AdjustmentDatum::kFirstCamera && !is_whole) {
     datum = AdjustmentDatum::kCameras;
   }
-  // Where cameras or points alone do not hold all of it, both do.
+  // Where cameras or points alone do not hold all motions, both do.
   MatrixXd held_blocks = MatrixXd::Zero(similar.rows(), 7);
   MatrixXd held_points = MatrixXd::Zero(gauge.of_points.rows(), 7);
   for (const AdjustmentDatum more :

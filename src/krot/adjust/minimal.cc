@@ -1,4 +1,4 @@
-// Where there is no Ceres: nothing can be adjusted.
+// For builds without Ceres: nothing can be adjusted.
 
 #include "krot/adjust/precision.h"
 #include "krot/base/check.h"

@@ -25,7 +25,7 @@ using Eigen::Vector3d;
 
 constexpr int64_t kItems = 64;  // per chunk of a parallel loop
 
-// Where a point's rays meet, nearest to a right angle; degrees.
+// The angle between two of a point's rays that is nearest to 90; degrees.
 double MeetingAngle(const std::vector<Vector3d>& rays) {
   double largest = 0;
   for (size_t a = 0; a < rays.size(); ++a) {
@@ -96,7 +96,7 @@ class PrecisionOfAdjustment {
     return covariance;
   }
 
-  // What needs no derivatives: errors, images and points.
+  // Describes what needs no derivatives: errors, images and points.
   void DescribeErrors() {
     const auto indices = ImageIndices(model_);
     const std::vector<ProjectedError> errors =
@@ -183,7 +183,7 @@ class PrecisionOfAdjustment {
     }
   }
 
-  // R = R_s R_f and c = c_f + R_f'c_s, both by AdjustmentColumns::Pose.
+  // With R = R_s R_f and c = c_f + R_f'c_s, both as in AdjustmentColumns::Pose.
   void DescribeImages() {
     for (size_t n = 0; n < parts_.size(); ++n) {
       const ImageParts& part = parts_[n];

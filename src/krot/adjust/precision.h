@@ -33,7 +33,7 @@ enum class AdjustmentDatum {
   // The mean of the frames' centres, their RMS distance to it and their mean
   // rotation: what RestoreSimilarity holds.
   kCameras,
-  kPoints,       // inner constraints over all points: the least trace of theirs
+  kPoints,       // inner constraints over all points: least trace of theirs
   kFirstCamera,  // the first frame, and the coordinate of the frame farthest
                  // from it that differs most; kCameras where parts are fixed
 };
@@ -56,22 +56,23 @@ struct ImagePrecision {
   int64_t num_observations = 0;
   Eigen::Vector2d rms_px = Eigen::Vector2d::Zero();  // of x and y
   double max_px = 0;
-  // Of rotation about the camera's own axes x, y, z, radians, then of the
-  // centre X, Y, Z, scene units. None if it is unknown, or not determined.
+  // The covariance of the rotation about the camera's own axes x, y, z,
+  // radians, and of the centre X, Y, Z, scene units. None if it is unknown, or
+  // not determined.
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
 };
 
 struct CameraPrecision {
   int32_t camera = 0;       // in Model::cameras
   std::vector<int> params;  // that were refined
-  // Of these; none if it is unknown, or not determined.
+  // The covariance of these; none if it is unknown, or not determined.
   std::optional<Eigen::MatrixXd> covariance;
 };
 
 struct PointPrecision {
   int32_t point = 0;  // in Model::points3D
   int num_rays = 0;
-  // Between two of its rays, where that is nearest to a right angle; degrees.
+  // The angle between two of its rays that is nearest to 90; degrees.
   double angle_deg = 0;
   double rms_px = 0;
   // Standard deviations of X, Y, Z; NaN if unknown, infinite if not determined.
@@ -90,13 +91,13 @@ struct AdjustmentPrecision {
   int64_t redundancy = 0;
   double sigma0_px = kNaN;  // NaN without redundancy
   bool has_covariances = false;
-  std::vector<ObservationPrecision> observations;  // as in the blocks
+  std::vector<ObservationPrecision> observations;  // as in AdjustmentBlocks
   std::vector<ImagePrecision> images;    // with observations, ascending
   std::vector<CameraPrecision> cameras;  // with refined parameters
   std::vector<PointPrecision> points;    // with observations, ascending
 };
 
-// AdjustBundle, and the precision of what it leads to; none where nothing was
+// AdjustBundle, and the precision of its result; none where nothing was
 // adjusted.
 BundleAdjustmentResult AdjustBundle(
     const Model& model, const BundleAdjustmentOptions& options,

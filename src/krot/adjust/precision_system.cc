@@ -14,17 +14,18 @@ using Eigen::Matrix2d;
 using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 
-// An unknown that a motion without errors moves by more is not determined.
+// An unknown is not determined if a motion that changes no error moves it by
+// more than this share of its largest move.
 constexpr double kMoves = 1e-6;
 
-// The rows of a point of C B (G'B)^-1, given those of the blocks.
+// A point's rows of C B (G'B)^-1, given those of the blocks.
 MatrixXd PointW(const TrackRows& rows, const MatrixXd& held,
                 const MatrixXd& W) {
   return rows.Solve(rows.SolveTransposed(held) - rows.G() * rows.Pick(W));
 }
 
-// Takes off a motion what is gauge in it, such that it moves as few blocks as
-// possible: the least sum of what they move by, by iterated weights.
+// Subtracts gauge motions from each motion so that it moves as few blocks as
+// possible: least is the sum of what they move by, by iterated weights.
 void TakeOffGauge(const MatrixXd& gauge, MatrixXd* motions) {
   constexpr int kIterations = 50;
   constexpr double kStill = 1e-12;  // of the largest motion
@@ -152,7 +153,7 @@ bool BlockCovariance::IsDetermined(const TrackRows& rows) const {
          kMoves * by_blocks.norm() * motions.norm();
 }
 
-// B (G'B)^-1, B without what is not determined, which holds nothing.
+// B (G'B)^-1. What is not determined holds nothing, and has no rows in B.
 void BlockCovariance::HoldDetermined(const ComponentGauge& gauge,
                                      MatrixXd* held_blocks,
                                      MatrixXd* held_points) const {
@@ -167,7 +168,7 @@ void BlockCovariance::HoldDetermined(const ComponentGauge& gauge,
   }
   Eigen::FullPivLU<MatrixXd> lu(gauge.blocks.transpose() * *held_blocks +
                                 gauge.of_points.transpose() * *held_points);
-  if (!lu.isInvertible()) {  // Nothing of it is determined: all of it holds.
+  if (!lu.isInvertible()) {  // Nothing of it is determined: use all of B.
     *held_blocks = gauge.held_blocks;
     *held_points = gauge.held_points;
     lu.compute(gauge.blocks.transpose() * *held_blocks +

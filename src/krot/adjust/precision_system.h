@@ -25,8 +25,8 @@ class TrackRows {
   using MatrixXd = Eigen::MatrixXd;
   using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
-  // Of observations begin, ..., end - 1. Keeps a reference to the derivatives.
-  // A point that does not move has Q = 0.
+  // Takes observations begin, ..., end - 1. Keeps a reference to the
+  // derivatives. A point that does not move has Q = 0.
   TrackRows(const ErrorJacobians& jacobians, bool moves, int64_t begin,
             int64_t end)
       : jacobians_(jacobians), begin_(begin), end_(end) {
@@ -50,7 +50,7 @@ class TrackRows {
     }
   }
 
-  // On which the rows depend, ascending.
+  // The blocks on which the rows depend, ascending.
   const std::vector<int32_t>& blocks() const { return blocks_; }
   int64_t begin() const { return begin_; }
   int64_t end() const { return end_; }
@@ -71,7 +71,7 @@ class TrackRows {
   }
   const MatrixXd& G() const { return G_; }  // Q'F
 
-  // Of the three unknowns of the point.
+  // How many of the point's three unknowns are not determined.
   int NumUndetermined() const {
     return static_cast<int>(std::isinf(R_.r00)) + std::isinf(R_.r11) +
            std::isinf(R_.r22);
@@ -88,7 +88,7 @@ class TrackRows {
     }
     return x;
   }
-  // The rows of the track's blocks.
+  // The rows of `all` that belong to the track's blocks.
   MatrixXd Pick(const MatrixXd& all) const {
     MatrixXd own(3 * static_cast<Index>(blocks_.size()), all.cols());
     for (size_t a = 0; a < blocks_.size(); ++a) {
@@ -115,14 +115,15 @@ struct ComponentGauge {
   Eigen::MatrixXd blocks;       // 3 num_blocks x q: how the blocks move
   std::vector<int32_t> points;  // that move, ascending
   Eigen::MatrixXd of_points;    // 3 points.size() x q
-  // B, likewise: the datum is B'x = 0.
+  // B, with the same rows: the datum is B'x = 0.
   Eigen::MatrixXd held_blocks;
   Eigen::MatrixXd held_points;
 
   int64_t size() const { return blocks.cols(); }
 };
 
-// One per component that is free to move by something. O(observations).
+// One for each component that can move in some way without changing an error.
+// O(observations).
 std::vector<ComponentGauge> FindGauges(const BundleAdjustmentOptions& options,
                                        const AdjustmentColumns& columns,
                                        const AdjustmentBlocks& blocks,
@@ -130,11 +131,12 @@ std::vector<ComponentGauge> FindGauges(const BundleAdjustmentOptions& options,
 
 // ---- Covariances, for noise of one pixel ----
 
-// Of all unknowns besides the points, whose reduced camera system is inverted:
+// The covariance of all unknowns besides the points, by inverting their reduced
+// camera system,
 //
 //   C = (sum F'F - G'G)^-,   x_k = R^-1 (Q'r - G t) for the point,
 //
-// with what the gauge leaves free held, and then S C S' in the datum.
+// where what the gauge leaves free is held; then S C S' is in the datum.
 class BlockCovariance {
  public:
   // Keeps references to `columns` and `gauges`.
@@ -145,8 +147,8 @@ class BlockCovariance {
   // Unknowns beyond the gauge that no observation determines.
   int64_t num_undetermined() const { return num_undetermined_; }
 
-  // J S C S' J', J by the columns of so many blocks; none if not all of them
-  // that J needs are determined.
+  // J S C S' J', where J has columns for `blocks`; none if J needs an unknown
+  // that is not determined.
   std::optional<Eigen::MatrixXd> Covariance(
       const Eigen::MatrixXd& J, const std::vector<int32_t>& blocks) const;
 
@@ -178,18 +180,18 @@ class BlockCovariance {
   const Eigen::Index size_;
   ErrorJacobians jacobians_;
   std::vector<int64_t> begin_;  // of points' observations; num_points + 1
-  // Of each point, -1: none; and where in it.
+  // For each point its gauge, -1: none, and its place among the gauge's points.
   std::vector<std::pair<int, Eigen::Index>> gauge_of_;
   Eigen::VectorXd scale_;  // of unknowns: units in which diagonals are 1
   Eigen::MatrixXd C_;
-  Eigen::MatrixXd motions_;  // that no observation sees
+  Eigen::MatrixXd motions_;  // that change no error
   std::vector<char> is_determined_;
   std::vector<DatumChange> changes_;
   int64_t num_undetermined_ = 0;
 };
 
-// Of one point and its observations, which may be asked of at the same time as
-// others.
+// The covariance of a point and the redundancy of its observations. Different
+// points may be asked for at the same time.
 class PointCovariance {
  public:
   // Keeps a reference.
@@ -197,7 +199,7 @@ class PointCovariance {
 
   // I - Q Q' - (F - Q G) C (F - Q G)' of one of its observations.
   Eigen::Matrix2d RedundancyOf(int64_t i) const;
-  // Of the point, in the datum; none if it is not determined.
+  // The point's covariance in the datum; none if it is not determined.
   std::optional<Eigen::Matrix3d> OfPoint() const;
 
  private:
@@ -210,7 +212,7 @@ class PointCovariance {
 
 // ---- All of it ----
 
-// Of an estimate of the model's as it stands, all errors weighing the same.
+// The precision of the model's estimate as it stands, with equal weights.
 // Beyond options.max_num_images_direct_sparse images there are no covariances
 // and redundancy numbers: with n unknowns besides the points they take 16 n^2
 // bytes and O(n^3). The same bits at any number of threads.

@@ -51,7 +51,7 @@ Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
   return NearestRotation(sum).value_or(Matrix3d::Identity());
 }
 
-// How far away what a frame sees typically is.
+// For each frame the typical distance of the points that it sees.
 std::vector<double> TypicalDistances(
     const AdjustmentBlocks& blocks,
     const std::vector<AdjustmentObservation>& of) {
@@ -67,7 +67,7 @@ std::vector<double> TypicalDistances(
                       static_cast<int32_t>(blocks.frames.size()), {});
 }
 
-// Those of a component's frames that keep their place among the others once the
+// The frames of a component that keep their place among the others, once the
 // world has turned.
 std::vector<size_t> HeldFrames(const AdjustmentBlocks& before,
                                const AdjustmentBlocks& after,

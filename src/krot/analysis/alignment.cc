@@ -154,7 +154,7 @@ namespace {
 // do not move them this far.
 constexpr double kSamePixel = 0.01;
 
-// Where the 2D points of a model stand in its tracks.
+// For every 2D point of a model its elements in the tracks.
 class TrackIndex {
  public:
   explicit TrackIndex(const Model& model)
@@ -202,9 +202,9 @@ class TrackIndex {
   std::vector<std::optional<uint64_t>> others_;
 };
 
-// Pairs the track elements of a 2D point, in which e1 and e2 are the last:
-// whatever their points are if there is one on either side, those of points
-// with the same id otherwise.
+// Pairs the track elements of a 2D point; e1 and e2 are the last ones of either
+// model. If there is only one in each, they are a pair whatever their points
+// are; otherwise those of points with the same id are.
 void PairElements(const TrackIndex& index1, const TrackIndex& index2,
                   uint64_t e1, uint64_t e2, std::vector<ElementPair>* pairs) {
   if (!index1.Other(e1) && !index2.Other(e2)) {
@@ -265,7 +265,7 @@ struct Vote {
   bool has_same_id = false;
 };
 
-// One for each two points that share any, ordered by both indices.
+// One vote for every two points that share any, ordered by both indices.
 std::vector<Vote> CountVotes(const Model& model1, const Model& model2,
                              const std::vector<ElementPair>& observations,
                              const TrackIndex& index1,
@@ -291,8 +291,8 @@ std::vector<Vote> CountVotes(const Model& model1, const Model& model2,
   return votes;
 }
 
-// The position of the best vote for every point of one model: the earliest of
-// those that nothing beats.
+// For every point of one model, the index of its best vote; the earliest of
+// equal ones.
 std::unordered_map<int32_t, size_t> BestVotes(const std::vector<Vote>& votes,
                                               int32_t IndexPair::*point) {
   std::unordered_map<int32_t, size_t> best;

@@ -32,10 +32,10 @@ Centres CentresOf(const Model& model) {
   return centres;
 }
 
-// How a point lies to the cameras that see it; infinite without two of them.
+// How the cameras that see a point lie to it; infinite with fewer than two.
 struct Shape {
   double nearest = kInfinity;   // distance of a camera
-  double nearness = kInfinity;  // of the nearest to the median camera
+  double nearness = kInfinity;  // nearest distance over the median one
   double angle = kInfinity;     // between the first ray and another, radians
 };
 
@@ -63,14 +63,15 @@ Shape ShapeOf(const Vector3d& xyz, const std::vector<int32_t>& images,
   return shape;
 }
 
-// Where nothing is known of it before, any fall counts.
+// Whether a value has become degenerate, and a hundred times smaller than
+// before. An infinite value before means that it was not known.
 bool HasFallen(double before, double after) {
   return after < kDegenerate && !(before < kDegenerate) &&
          !(after > kFall * before);
 }
 
-// The diagonal of the box around the points by the distance of the nearest
-// camera.
+// The diagonal of the box around the points, relative to the distance of the
+// nearest camera.
 class Extent {
  public:
   void Add(const Point3D& point, const Shape& shape) {

@@ -8,26 +8,26 @@
 
 namespace krot::internal {
 
-// Geometry that fits observations because it has degenerated, of a model that
-// was estimated: a point in a camera's centre is on any of its rays, parallel
-// rays meet anywhere, and where all points are one all cameras see the same.
-// None of that shows in errors, which may fall to zero by it.
+// Degenerate geometry of an estimated model, which fits observations for no
+// good reason: a point in a camera's centre lies on all of its rays, parallel
+// rays meet at infinity, and where all points are one all cameras see the same.
+// Errors do not show this; they may even fall to zero by it.
 struct Collapse {
   int64_t num_points = 0;  // that two cameras see
-  // By id: whose nearest camera has come to be less than a millionth as far
-  // away as the median of those that see it.
+  // Ids of points whose nearest camera has come closer than a millionth of the
+  // median distance of the cameras that see them.
   std::vector<Point3DId> in_camera;
-  // Whose rays have come to be within a millionth of a radian of each other.
+  // Ids of points whose rays have come within a millionth of a radian of each
+  // other.
   std::vector<Point3DId> at_infinity;
-  // Whether all points have come to lie closer together than a millionth of
-  // the distance of the nearest camera.
+  // Whether all points have come to lie within a millionth of the distance of
+  // the nearest camera.
   bool is_in_one_place = false;
 
   bool Any() const {
     return is_in_one_place || !in_camera.empty() || !at_infinity.empty();
   }
-  // Whether most of the points are part of it: then nothing is left of the
-  // scene.
+  // Whether most points are part of it: then nothing is left of the scene.
   bool IsWhole() const {
     return is_in_one_place ||
            2 * static_cast<int64_t>(in_camera.size() + at_infinity.size()) >
@@ -35,9 +35,10 @@ struct Collapse {
   }
 };
 
-// What degenerated between two models with the same images, of the points of
-// the second, which are among the first's: what was a hundred times less so, or
-// had no finite position, before. Requires valid models. O(observations).
+// Finds what has degenerated between two models with the same images. The
+// second model's points must be among the first's. Only what was a hundred
+// times less degenerate before, or had no finite position, counts. Requires
+// valid models. O(observations).
 Collapse FindCollapse(const Model& before, const Model& after,
                       const Context& context = {});
 

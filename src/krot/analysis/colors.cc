@@ -25,7 +25,7 @@ constexpr std::array<std::array<uint8_t, 3>, 6> kStops = {{{58, 110, 165},
                                                            {190, 0, 60}}};
 constexpr std::array<uint8_t, 3> kUnknown = {128, 128, 128};
 
-// NaN if none is finite.
+// The largest finite error of the point's track; NaN if none is finite.
 double LargestError(const std::vector<double>& errors_px,
                     const Point3D& point) {
   double largest_px = std::numeric_limits<double>::quiet_NaN();
@@ -85,7 +85,7 @@ uint64_t MaxId(const std::vector<Record>& records) {
   return max_id;
 }
 
-// Sensors other than cameras have ids of their own.
+// The largest id of a camera or another sensor, as they share one range of ids.
 uint64_t MaxSensorId(const Model& model) {
   uint64_t max_id = MaxId(model.cameras);
   for (const Rig& rig : model.rigs) {
@@ -99,8 +99,8 @@ uint64_t MaxSensorId(const Model& model) {
   return max_id;
 }
 
-// The least power of ten above `max_id1`, for ids up to `max_id2`. The largest
-// value of the type is no id.
+// The least power of ten above `max_id1`, which is added to ids up to
+// `max_id2`. The largest value of the type is no id.
 template <typename Id>
 Id Offset(uint64_t max_id1, uint64_t max_id2, const std::string& kind) {
   constexpr uint64_t kLimit = std::numeric_limits<Id>::max();
@@ -204,7 +204,7 @@ Model Join(Model model1, Model model2) {
 Model OverlayModels(const Model& model1, const Model& model2, int num_threads) {
   Model first = model1;
   Model second = model2;
-  DropUnknownPoints3D(&first);  // ids that the other model may bear
+  DropUnknownPoints3D(&first);  // the other model may use these ids
   DropUnknownPoints3D(&second);
   Renumber(Offsets(first, second), &second);
   Mark("1/", kOverlayColor1, &first);

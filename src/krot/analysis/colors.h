@@ -14,15 +14,15 @@ namespace krot::internal {
 std::array<uint8_t, 3> ErrorColor(double error_px, double top_px);
 
 // Gives every point the colour of the largest finite error of its track, so
-// that COLMAP's GUI shows several models on one scale (its own colours by error
-// are relative to each model's). `errors_px` as PixelErrors gives them; throws
-// std::invalid_argument if their number is not that of the track elements or
-// top_px is not a positive number. O(observations).
+// that COLMAP's GUI shows several models on one scale (its own colours are
+// relative to each model's errors). `errors_px` as PixelErrors gives them;
+// throws std::invalid_argument if their number is not that of the track
+// elements or top_px is not a positive number. O(observations).
 void ColorPointsByError(const std::vector<double>& errors_px, double top_px,
                         Model* model);
 
-// How OverlayModels tells the two apart: blue and vermilion, which colour-blind
-// eyes tell apart, too [Okabe and Ito].
+// The colours of the two models in an overlay: blue and vermilion, which
+// colour-blind readers can tell apart, too [Okabe and Ito].
 inline constexpr std::array<uint8_t, 3> kOverlayColor1 = {0, 114, 178};
 inline constexpr std::array<uint8_t, 3> kOverlayColor2 = {213, 94, 0};
 

@@ -10,7 +10,8 @@ using namespace internal;
 
 namespace {
 
-// Whether there is an image to be moved; `moved` gets its pose.
+// Moves images whose position alone is wrong to where their matches fit, unless
+// other images share their frame. Returns whether there are any.
 bool MoveImages(const PairCheck& pairs, Model* moved) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(*moved);
   std::vector<int> num_images(moved->frames.size(), 0);

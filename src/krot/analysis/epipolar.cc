@@ -59,8 +59,8 @@ MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
 
 namespace {
 
-// A match's signed error under a pose of its image, and its derivatives by the
-// parameters of a change: those of its numerator, which is what changes.
+// A match's signed error under a pose of its image, and its derivatives by a
+// change of that pose. The denominator is taken to be constant.
 double MatchError(const WitnessMatch& match, const Eigen::Matrix3d& rotation,
                   const Eigen::Vector3d& center, PoseChange change,
                   Eigen::Vector3d* gradient) {
@@ -83,8 +83,8 @@ double MatchError(const WitnessMatch& match, const Eigen::Matrix3d& rotation,
   return epipolar.normal.dot(baseline) / allowed;
 }
 
-// Rotation and centre after a step: a rotation vector in camera axes, or a
-// shift of the centre.
+// Changes the rotation or the centre by a step: a rotation vector in camera
+// axes, or a shift of the centre.
 void ApplyStep(PoseChange change, const Eigen::Vector3d& step,
                Eigen::Matrix3d* rotation, Eigen::Vector3d* center) {
   if (change == PoseChange::kMove) {
@@ -94,7 +94,7 @@ void ApplyStep(PoseChange change, const Eigen::Vector3d& step,
   }
 }
 
-// The sum of absolute errors under a pose, and the step that lowers it.
+// The sum of absolute errors under a pose, and the step that is to lower it.
 struct FitStep {
   double sum = 0;
   Eigen::Vector3d step = Eigen::Vector3d::Zero();
@@ -130,7 +130,7 @@ RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
   if (matches.empty()) return cam_from_world;
   FitStep at = StepAt(matches, rotation, center, change, noise_px);
   for (int i = 0; i < kMaxIterations && at.step.allFinite(); ++i) {
-    // Halved until the sum falls.
+    // The step is halved until the sum falls.
     FitStep next{at.sum, at.step};
     Eigen::Matrix3d next_rotation;
     Eigen::Vector3d next_center;
@@ -194,8 +194,8 @@ struct Cell {
   }
 };
 
-// The most promising first; of equals the smallest, which is the nearest to an
-// answer.
+// The highest upper bound comes first; of equals the smallest cell, which is
+// the nearest to an answer.
 struct IsLessPromising {
   bool operator()(const Cell& a, const Cell& b) const {
     return std::make_tuple(a.upper_bound(), -a.half_width, -a.order) <
@@ -203,7 +203,8 @@ struct IsLessPromising {
   }
 };
 
-// So that interval arithmetic, which rounds outwards, gives up no less.
+// A match is given up only if it is off by more than rounding. So the checker's
+// interval arithmetic, which rounds outwards, gives it up, too.
 constexpr double kMoreThanRounding = 1 + 1e-10;
 
 class CellSearch {
@@ -257,7 +258,8 @@ class CellSearch {
   }
 
  private:
-  // As BaselineCertificate has them. No deeper than kSmallest is small.
+  // Appends a cell and its parts as BaselineCertificate has them. The recursion
+  // is no deeper than kSmallest allows.
   void DescribeCell(int64_t order) {
     const int64_t first = first_part_[order];
     best_.cells += first < 0 ? '0' : '1';
@@ -269,8 +271,8 @@ class CellSearch {
   struct Condition {
     Eigen::Vector3d normal;
     Eigen::Matrix<double, 4, 3> gradient;
-    // Of normal . b, and of the tolerance times |gradient b|, together at most,
-    // per half width.
+    // By how much |normal . b| and the tolerance times |gradient b| change at
+    // most, taken together, per half width of a cell.
     double change;
   };
 
@@ -287,7 +289,7 @@ class CellSearch {
     return condition;
   }
 
-  // Sorts the matches that the surrounding cell left open, counts what the
+  // Sorts the matches that the surrounding cell left open, counts how many the
   // centre explains, and keeps the cell if it may hold a better direction.
   void Look(Cell cell, int64_t num_sure, const std::vector<int32_t>& open) {
     cell.num_sure = num_sure;
@@ -340,7 +342,7 @@ class CellSearch {
   std::vector<int32_t> open_;  // of the cell that is looked at
   BaselineSearch best_;
   int64_t unresolved_ = 0;
-  std::vector<int64_t> first_part_;  // of each cell, -1: it is not divided
+  std::vector<int64_t> first_part_;  // of each cell; -1: it is not divided
 };
 
 }  // namespace

@@ -29,8 +29,8 @@ inline PixelRay operator*(const Eigen::Matrix3d& rotation,
   return {rotation * pixel.ray, rotation * pixel.by_pixel};
 }
 
-// In camera axes; none if no ray less than 90 degrees off the axis projects to
-// the pixel, and for cameras without an image plane.
+// The ray of a pixel in camera axes; none if no ray less than 90 degrees off
+// the axis projects to the pixel, and for cameras without an image plane.
 inline std::optional<PixelRay> RayOf(const Camera& camera,
                                      const Eigen::Vector2d& pixel) {
   const CameraModelInfo* info = FindCameraModel(camera.model_id);
@@ -64,9 +64,9 @@ struct EpipolarMatch {
   }
 
   // How far the two pixels must move together, in pixels and to first order,
-  // until both lie on their epipolar lines (Sampson's distance), with the side
-  // on which they are. The baseline's length does not matter; 0 where it gives
-  // no lines.
+  // until both lie on their epipolar lines (Sampson's distance); the sign says
+  // on which side they are. The baseline's length does not matter; 0 where it
+  // gives no lines.
   double SignedErrorPx(const Eigen::Vector3d& baseline) const {
     const double change = (gradient * baseline).norm();
     return change > 0 ? normal.dot(baseline) / change : 0;
@@ -74,8 +74,8 @@ struct EpipolarMatch {
   double ErrorPx(const Eigen::Vector3d& baseline) const {
     return std::abs(SignedErrorPx(baseline));
   }
-  // The error for the worst baseline, which is that until the rays are
-  // parallel.
+  // The error for the worst baseline: how far the pixels must move until the
+  // rays are parallel.
   double ParallaxPx() const { return ErrorPx(normal); }
 };
 
@@ -88,7 +88,7 @@ class MatchRays {
         model_(model),
         database_(database) {}
 
-  // Of Model::images[image], which has a pose.
+  // The ray in world axes; Model::images[image] must have a pose.
   PixelRay World(const PixelRay& ray, int32_t image) const {
     const Eigen::Matrix3d world_from_cam =
         geometries[image].cam_from_world.rotation.transpose();
@@ -119,19 +119,19 @@ class MatchRays {
 
 struct MatchNoise {
   double sigma_px = 0;      // per axis and keypoint
-  double tolerance_px = 0;  // no Gaussian error of all exceeds it, 95 %
+  double tolerance_px = 0;  // above all Gaussian errors, 95 %
 };
 
-// From the errors of each pair of images (Sampson's distances, pixels), each
-// list ascending; empty lists do not count. A match of a sound model lies
-// within the tolerance, however many there are: of N Gaussian errors the
-// largest exceeds sigma sqrt(2 ln(N / alpha)) with a probability below
-// alpha = 0.05. Sigma is that of the pairs whose median error is at most twice
-// that of the best quarter: so a few wrong poses do not hide among the noise,
-// as long as half of the images are right. Pairs without a parallax of five
-// times their error do not count where others have one: photos from one place,
-// as of a camera that stands still, have less noise between them. `parallax_px`
-// has the median parallax of each pair. Zeros without errors.
+// Estimates the noise from the errors of each pair of images (Sampson's
+// distances, pixels; each list ascending, empty lists do not count). The
+// tolerance is sigma sqrt(2 ln(N / alpha)): the largest of N Gaussian errors
+// exceeds it with a probability below alpha = 0.05, so that all matches of a
+// sound model are within it. Sigma comes from the pairs whose median error is
+// at most twice the lower quartile of all medians, so that a few wrong poses do
+// not raise it, as long as half of the images are right. `parallax_px` has the
+// median parallax of each pair. Pairs with less than five times their median
+// error do not count where others have more: photos from one place, as of a
+// camera that stands still, have less noise between them. Zeros without errors.
 MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
                               const std::vector<double>& parallax_px);
 
@@ -148,11 +148,11 @@ enum class PoseChange {
   kTurn   // another rotation, the same centre
 };
 
-// The pose, changed in one of the two ways, for which the matches have the
-// least sum of absolute errors: Sampson's distances, by iteratively reweighted
-// least squares from the pose as it is. `noise_px`, positive, is the error
-// below which matches weigh the same. A local minimum; the pose itself if there
-// are no matches. O(iterations * matches), at most 50 iterations.
+// The pose after the change, a move or a turn, that minimises the matches' sum
+// of absolute errors (Sampson's distances): iteratively reweighted least
+// squares from the given pose. Matches whose errors are below `noise_px`,
+// positive, weigh the same. A local minimum; the given pose if there are no
+// matches. O(iterations * matches), at most 50 iterations.
 RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
                                const RigidTransform& cam_from_world,
                                PoseChange change, double noise_px);
@@ -176,32 +176,31 @@ class NearestPoint {
   Eigen::Vector3d right_side_ = Eigen::Vector3d::Zero();
 };
 
-// The most matches that one baseline explains.
+// The baseline that explains most matches.
 struct BaselineSearch {
   int64_t num_explained = 0;  // by `baseline`: ErrorPx <= tolerance_px
-  // No baseline explains more. Equal to num_explained unless the search ended
-  // early.
+  // No baseline explains more than this. Equal to num_explained unless the
+  // search ended early.
   int64_t upper_bound = 0;
   Eigen::Vector3d baseline = Eigen::Vector3d::UnitZ();  // of length 1
   int64_t num_cells = 0;                                // that were looked at
-  // The proof of upper_bound, for BaselineCertificate: which cells were
-  // divided.
+  // The proof of upper_bound for BaselineCertificate: which cells were divided.
   std::string cells;
 };
 
 // Branch and bound over the half sphere of all directions, exact up to
-// rounding: each cell of a cube's three faces is given up once no direction in
-// it can explain more matches than the best one found, and is divided
-// otherwise. Ends early after `max_cells` cells, and at cells that are no
-// longer than 1e-12. Same result on every machine. O(cells * matches); a
-// thousand matches, half of them wrong, take milliseconds.
+// rounding. A cell on one of a cube's three faces is given up once no direction
+// in it can explain more matches than the best one found; otherwise it is
+// divided. Ends early after `max_cells` cells, and at cells that are no longer
+// than 1e-12. The same result on every machine. O(cells * matches); a thousand
+// matches, half of them wrong, take milliseconds.
 //
 // Throws std::invalid_argument unless tolerance_px > 0 and max_cells > 0.
 BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
                               double tolerance_px, int64_t max_cells = 1000000);
 
-// A pair that contradicts the poses, by the matches that are lost if these are
-// called wrong.
+// A pair that contradicts the poses, and the number of its matches: so many are
+// lost if these are called wrong.
 struct ContradictoryPair {
   int32_t image1 = 0;
   int32_t image2 = 0;  // another image
@@ -210,27 +209,29 @@ struct ContradictoryPair {
 
 struct Explanations {
   Explanation cheapest;
-  // The cheapest of those that call one of its images right, or an image wrong
-  // that is in a contradiction between two right ones, and that give up at most
-  // a tenth more than it, where the two differ; none if there is none.
+  // The cheapest of the other explanations: each calls one of these images
+  // right, or one image wrong of a pair whose matches are called wrong here.
+  // None unless it costs at most a tenth more than `cheapest`, where the two
+  // differ.
   std::optional<Explanation> runner_up;
-  bool is_proved = true;
+  bool is_proved = true;  // false: the search ended at max_visits
 };
 
-// Decides which images are wrong, and what is wrong with them, of pairs that
-// were measured, counted and searched: fills `cheapest`, `runner_up` and the
-// images of `check`. `errors_px` are those of each pair under the model's
-// poses. Same bits at any number of threads.
+// Decides which images are wrong, and what is wrong with them, once the pairs
+// are measured and counted and the baselines of contradictory ones are found.
+// Fills `cheapest`, `runner_up` and the images of `check`. `errors_px` are
+// those of each pair under the model's poses. Same bits at any number of
+// threads.
 void JudgePoses(const MatchRays& rays, const Database& database,
                 const std::vector<std::vector<double>>& errors_px,
                 int num_threads, PairCheck* check);
 
-// The set of images that, called wrong, costs least: an image costs
-// `image_costs[i]` matches, a contradiction between two images that are not
-// called wrong its own. Image by image it is settled whether calling it
-// wrong pays whatever the others are; what is left is branched on, until
-// `max_visits` pairs have been looked at for the cheapest, and as many for all
-// others: about a second each.
+// Finds the images that are best called wrong, at the least cost: an image
+// costs `image_costs[i]` matches, a contradiction between two images that are
+// not called wrong costs its own. Images for which one choice pays, whatever
+// the others are, are settled first. The rest is branched on, until
+// `max_visits` pairs have been visited for the cheapest explanation, and as
+// many for the runner-up: about a second each.
 Explanations ExplainContradictions(
     const std::vector<int64_t>& image_costs,
     const std::vector<ContradictoryPair>& contradictions,

@@ -27,11 +27,11 @@ class CoverSearch {
     }
   }
 
-  // Searches until so many pairs have been looked at from now on.
+  // From now on, so many pairs may be visited.
   void Allow(int64_t visits) { visits_left_ = visits; }
   bool IsAtEnd() const { return visits_left_ < 0; }
 
-  // The cheapest explanation; with `forced` that image is called so.
+  // The cheapest explanation; if `forced`, with this choice for this image.
   Explanation Run(std::optional<std::pair<int32_t, Choice>> forced) {
     std::vector<Choice> choices(costs_.size(), Choice::kOpen);
     for (size_t i = 0; i < edges_.size(); ++i) {
@@ -76,8 +76,8 @@ class CoverSearch {
     }
   }
 
-  // What the choices cost at least, and whether and where one is open: at the
-  // image with the most matches against other open ones.
+  // A lower bound for the cost of the choices. If images are open, *open is the
+  // one with the most matches against other open ones.
   int64_t LowerBound(const std::vector<Choice>& choices,
                      std::optional<size_t>* open) {
     int64_t bound = 0, twice_between_right = 0, most = -1;
@@ -99,7 +99,7 @@ class CoverSearch {
   void Branch(std::vector<Choice> choices) {
     if (IsAtEnd()) {
       is_proved_ = false;
-      // Whatever is still open is called right: an explanation all the same.
+      // What is still open is called right, which is an explanation, too.
       if (best_.cost < std::numeric_limits<int64_t>::max()) return;
       std::replace(choices.begin(), choices.end(), Choice::kOpen,
                    Choice::kRight);
@@ -131,8 +131,8 @@ class CoverSearch {
   Explanation best_;
 };
 
-// What both give up: images that both call wrong, and pairs of which neither
-// calls an image wrong.
+// The cost that both have: images that both call wrong, and pairs of which
+// neither calls an image wrong.
 int64_t CommonCost(const Explanation& a, const Explanation& b,
                    const std::vector<int64_t>& image_costs,
                    const std::vector<ContradictoryPair>& contradictions) {

@@ -46,7 +46,7 @@ namespace {
 constexpr int64_t kMostTriples = 50'000;
 constexpr size_t kMostScored = 300;
 
-// Both lower is better.
+// How well a similarity fits the positions; a lower score is better.
 struct Judgement {
   double score = kInfinity;
   double tolerance = 1;  // misfits below it agree
@@ -60,8 +60,8 @@ Judgement JudgeByRadii(const std::vector<double>& misfits) {
   return judgement;
 }
 
-// By the misfit that a majority does not exceed, of at least four where there
-// are as many: three places always fit a little.
+// The score is the misfit that a majority does not exceed: at least four where
+// there are as many, since any three places nearly fit.
 Judgement JudgeBySpread(std::vector<double> misfits) {
   const size_t count =
       std::max(misfits.size() / 2 + 1, std::min<size_t>(misfits.size(), 4));
@@ -114,8 +114,8 @@ class FrameSearch {
     return true;
   }
 
-  // On what agrees with the best, and on twice as far: three places say less
-  // than all of them.
+  // Fits the positions that agree with the best similarity, within the
+  // tolerance or twice that, as three places say less than all of them.
   void Refine() {
     for (int refit = 0; refit < kMaxRefits; ++refit) {
       bool is_better = false;
@@ -134,7 +134,7 @@ class FrameSearch {
   std::optional<Similarity> best_;
 };
 
-// At most kMostScored of them, always the same.
+// At most kMostScored pairs, always the same.
 std::vector<FramePair> Sample(std::vector<FramePair> pairs) {
   if (pairs.size() <= kMostScored) return pairs;
   std::mt19937_64 generator(2);

@@ -11,15 +11,16 @@
 
 namespace krot::internal {
 
-// The robust similarity behind FindPositionFrame (position_frame.h).
+// The robust similarity search behind FindPositionFrame (position_frame.h).
 
-// The distance that one of a thousand exceeds, by the median: of a Gaussian in
-// three dimensions.
+// In units of the median distance: one of a thousand Gaussian errors in three
+// dimensions is farther off.
 inline constexpr double kFarByMedian = 2.6;
 inline constexpr int kMaxRefits = 20;
 
-// A position of what the model places. `pose.center1` is the position, from the
-// median of all, and `pose.center2` the model's place, likewise.
+// A known position, and where the model places it. `pose.center1` is the
+// position, relative to the median of all positions; `pose.center2` is the
+// model's place, relative to the median of all places.
 struct FramePair {
   size_t index = 0;
   PosePair pose;
@@ -28,11 +29,11 @@ struct FramePair {
 
 std::vector<PosePair> PosesOf(const std::vector<FramePair>& pairs);
 
-// What the model has there less the position.
+// The model's place, taken to the positions' frame, minus the position.
 Eigen::Vector3d OffsetAt(const Similarity& own_from_model,
                          const FramePair& pair);
 
-// Distances by radii, or as they are where radii are unknown.
+// Distances in radii, or in the positions' unit where radii are unknown.
 std::vector<double> MisfitsOf(const std::vector<FramePair>& pairs,
                               const Similarity& own_from_model);
 
@@ -43,8 +44,8 @@ std::vector<FramePair> Within(const std::vector<FramePair>& pairs,
 // kFarByMedian times the misfit that a majority does not exceed.
 double SpreadTolerance(const std::vector<double>& misfits);
 
-// By consensus or, where radii are unknown or no majority agrees to them, by
-// the least median. None if all triples are on a line.
+// By consensus within the radii or, where these are unknown or no majority
+// agrees, by the least median. None if all triples are on a line.
 std::optional<Similarity> SearchFrame(const std::vector<FramePair>& pairs,
                                       bool has_radii);
 

@@ -24,19 +24,21 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-// Of a pose's system with ones on the diagonal: what nothing holds.
+// A pose's system is scaled to ones on its diagonal. Nothing holds directions
+// whose eigenvalues are below this.
 constexpr double kSingularPose = 1e-9;
-// Below, series of a density that is nearly even lose nothing.
+// For smaller lambda the density is nearly even, and a series replaces formulas
+// that would lose digits.
 constexpr double kFlat = 1e-4;
-// Of an image's median distance: nearer points, in the camera, would drown all
-// others in rounding.
+// Relative to an image's median distance: nearer points are left out, as a
+// point in the camera would drown all others in rounding.
 constexpr double kNearest = 1e-6;
 
 // An observation at the least squares of its track.
 struct PoseRow {
   int32_t image = 0;
   Vector2d error;
-  Matrix26 F;  // by its camera's rotation, from the left, and its centre
+  Matrix26 F;  // by the camera's rotation (from the left) and centre
 };
 
 void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
@@ -55,7 +57,8 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
   }
 }
 
-// Rotations and centres have different units: the diagonal becomes 1.
+// Finds the step. As rotations and centres have different units, the diagonal
+// is scaled to 1 first.
 void Solve(ImageSums* sums) {
   Vector6 scale = sums->M.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
@@ -69,7 +72,8 @@ void Solve(ImageSums* sums) {
   sums->step = scale.cwiseProduct(of_M.eigenvectors() * y);
 }
 
-// 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'.
+// 1 / sqrt of the smallest eigenvalue of A - B C^-1 B'; infinite if nothing
+// holds.
 double LargestSpread(const Matrix3d& A, const Matrix3d& B, const Matrix3d& C) {
   const Matrix3d S = A - B * C.ldlt().solve(B.transpose());
   if (!S.allFinite()) return kInfinity;
@@ -157,7 +161,7 @@ class ImageAdder {
   const ModelNoise& noise_;
   std::vector<int32_t> image_of_;  // by track element
   std::vector<ImageSums> sums_;
-  std::vector<double> nearest_;  // of a point, by image; scene units
+  std::vector<double> nearest_;  // distance of a point, by image; scene units
 };
 
 }  // namespace
@@ -174,7 +178,7 @@ double ImageSums::TurnSpread() const {
 
 namespace {
 
-// Of the density lambda exp(-lambda u) / (1 - exp(-lambda)) on [0, 1].
+// The mean of the density lambda exp(-lambda u) / (1 - exp(-lambda)) on [0, 1].
 double MeanInDisc(double lambda) {
   return lambda < kFlat ? 0.5 - lambda / 12
                         : 1 / lambda - 1 / std::expm1(lambda);

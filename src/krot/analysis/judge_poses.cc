@@ -14,7 +14,7 @@
 namespace krot::internal {
 namespace {
 
-constexpr size_t kMinDecidedPairs = 3;  // of an image that is called wrong
+constexpr size_t kMinDecidedPairs = 3;  // for an image to be called wrong
 
 // How an image's pose, and the best others, fit its matches with images that
 // are not called wrong.
@@ -25,12 +25,12 @@ struct PoseFits {
   int64_t num_agreeing_turned = 0;
   RigidTransform moved;
   RigidTransform turned;
-  // By how much either lowers the sum of squared errors, which count up to the
-  // tolerance: px^2.
+  // By how much each change lowers the sum of squared errors, which count up to
+  // the tolerance: px^2.
   double gain_moved = 0;
   double gain_turned = 0;
-  // The better of the two halves the sum, of the matches that agree with it or
-  // with the pose as it is.
+  // Whether the better change halves the sum, over the matches that agree with
+  // it or with the pose as it is.
   bool is_misplaced = false;
   bool is_rotation_proved_wrong = false;
 
@@ -78,8 +78,8 @@ class PoseJudge {
   }
 
  private:
-  // The cheapest explanation of the contradictions that misplaced images leave,
-  // in which no image that fits where it is is called wrong.
+  // Finds the cheapest explanation of the contradictions between images that
+  // are not misplaced. Images that were acquitted are not called wrong.
   void Explain() {
     std::vector<ContradictoryPair> contradictions;
     int64_t most = 1;
@@ -103,7 +103,7 @@ class PoseJudge {
     if (check_.runner_up) AddMisplaced(&*check_.runner_up);
   }
 
-  // They give up nothing: their matches fit another pose.
+  // Misplaced images cost no matches, as theirs fit another pose.
   void AddMisplaced(Explanation* explanation) const {
     for (size_t i = 0; i < is_misplaced_.size(); ++i) {
       if (is_misplaced_[i] != 0) {
@@ -124,8 +124,8 @@ class PoseJudge {
     return checked.image1 == image ? checked.image2 : checked.image1;
   }
 
-  // The pairs of an image with images that are right: the others have two
-  // faults.
+  // The pairs of an image with right images. In other pairs the fault may be
+  // the other image's.
   std::vector<size_t> Witnesses(int32_t image) const {
     std::vector<size_t> pairs;
     for (const size_t p : pairs_of_[image]) {
@@ -134,8 +134,8 @@ class PoseJudge {
     return pairs;
   }
 
-  // Images whose errors another pose halves, by which neighbours are not to be
-  // judged: of neighbours the one that gains most comes first.
+  // Finds images whose errors another pose halves, so that no image is judged
+  // by them. Of neighbours the one that gains most comes first.
   void FindMisplaced() {
     const auto num_images = static_cast<int32_t>(check_.images.size());
     std::vector<std::optional<PoseFits>> fits(num_images);
@@ -169,8 +169,9 @@ class PoseJudge {
     }
   }
 
-  // Whose mean squared error, in pairs that do not contradict, is more than
-  // twice the median image's, so that half of it would still be noise.
+  // Images whose mean squared error, in pairs that do not contradict, is more
+  // than twice the median image's: half of it would still be no less than
+  // noise.
   std::vector<int32_t> ImagesAboveNoise() const {
     std::vector<std::pair<double, int32_t>> means;
     std::vector<double> all;
@@ -196,9 +197,9 @@ class PoseJudge {
     return above;
   }
 
-  // Of the images of the cheapest explanation those are right whose matches
-  // agree with them, as far as those of a pair that does not contradict, and
-  // with no other pose better. Returns whether there are any.
+  // Acquits images of the cheapest explanation: a quarter of their matches
+  // agree with their poses, as in pairs that do not contradict, and no other
+  // pose fits clearly better. Returns whether there are any.
   bool Acquit() {
     std::vector<int32_t> called;
     for (const int32_t i : check_.cheapest.images) {
@@ -232,8 +233,8 @@ class PoseJudge {
     return bounded * bounded;
   }
 
-  // From where the pose is, and then from what agrees with it, so that the
-  // others do not bend it.
+  // Fits all matches from `start`, and then those that agree with the result,
+  // so that the others do not bend it.
   RigidTransform Fit(const std::vector<WitnessMatch>& matches,
                      const RigidTransform& start, PoseChange change,
                      std::vector<double>* errors_px) const {
@@ -258,7 +259,7 @@ class PoseJudge {
 
   PoseFits FitsOf(int32_t i) const {
     std::vector<WitnessMatch> matches;
-    std::vector<size_t> begin;  // of each witness
+    std::vector<size_t> begin;  // by witness
     NearestPoint to_baselines;
     const std::vector<size_t> witnesses = Witnesses(i);
     int64_t num_matches = 0;
@@ -287,8 +288,8 @@ class PoseJudge {
     const RigidTransform& as_it_is = rays_.geometries[i].cam_from_world;
     const std::vector<double> errors = EpipolarErrors(matches, as_it_is);
     std::vector<double> moved, turned;
-    // From where it is, and from where the best baselines meet: far off there
-    // are other minima.
+    // A move starts where the image is, and where the best baselines meet:
+    // there may be another minimum, far off.
     fits.moved = Fit(matches, as_it_is, PoseChange::kMove, &moved);
     if (const auto met = to_baselines.Solve()) {
       std::vector<double> other;
@@ -301,7 +302,8 @@ class PoseJudge {
       }
     }
     fits.turned = Fit(matches, as_it_is, PoseChange::kTurn, &turned);
-    // Of matches that are right, as they agree with another rotation.
+    // Only pairs count of which half of the matches agree after a turn, so that
+    // these are right, not wrong matches.
     int64_t most_explained = 0, contradictory = 0;
     for (size_t w = 0; w < witnesses.size(); ++w) {
       const CheckedPair& checked = check_.pairs[witnesses[w]];
@@ -381,7 +383,7 @@ class PoseJudge {
   const int num_threads_;
   PairCheck& check_;
   std::vector<double> sums_px2_;               // of each pair
-  std::vector<std::vector<size_t>> pairs_of_;  // of each image, checked ones
+  std::vector<std::vector<size_t>> pairs_of_;  // of each image: checked pairs
   std::vector<char> is_misplaced_;             // images
   std::vector<char> is_right_;                 // images that were acquitted
 };

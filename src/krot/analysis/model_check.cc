@@ -17,20 +17,20 @@ using namespace internal;
 
 namespace {
 
-// An image may be so many times as noisy as most and still be sound.
+// An image with so many times the noise of most may still be sound.
 constexpr double kNoisyImage = 3;
-// Of the squared errors: another pose takes so much of them away.
+// A misplaced image: another pose takes this share of its squared errors away.
 constexpr double kExplained = 0.5;
-// The same, of the median image, where the model is adjusted: 0.005 at most of
-// real ones, and 0.1 to 0.2 of their minimax solutions.
+// If a pose takes less from the median image's, the model is adjusted: 0.005 at
+// most for real ones, and 0.1 to 0.2 for their minimax solutions.
 constexpr double kNotAdjusted = 0.1;
-// Of the share of its 2D points that the median image keeps in tracks.
+// An image keeps few tracks below this part of the median image's share.
 constexpr double kFewKept = 1.0 / 3;
-// Median deviations: three standard deviations of Gaussian values.
+// In median deviations: three standard deviations of Gaussian values.
 constexpr double kStandsOut = 4.5;
-// Three observations determine a pose, and as many check it.
+// Observations that must agree: three determine a pose, and as many check it.
 constexpr int64_t kFewestAgree = 6;
-// Of the median image's standard deviation.
+// Relative to the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 
 class Checker {
@@ -112,7 +112,7 @@ class Checker {
     }
   }
 
-  // False for -1.
+  // Calls image n wrong; does nothing and returns false for -1.
   bool CallWrong(int32_t n) {
     if (n < 0) return false;
     check_.images[n].verdict = ImageVerdict::kWrong;
@@ -126,7 +126,7 @@ class Checker {
     return check_.images[n].verdict == ImageVerdict::kWrong;
   }
 
-  // Of every image that is not wrong, what others check and contradict.
+  // Counts, of images that are not wrong, what others check and contradict.
   void Count() {
     for (ImageCheck& image : check_.images) {
       if (image.verdict != ImageVerdict::kWrong) {
@@ -144,8 +144,8 @@ class Checker {
     }
   }
 
-  // -1: none. Sets its fault. Contradictions come first, as they bend what the
-  // others see.
+  // The image that most speaks against, -1: none; sets its fault.
+  // Contradictions come before misplacements, as they bend what the others see.
   int32_t WorstImage() {
     int32_t worst = -1;
     double most = 0;
@@ -191,10 +191,10 @@ class Checker {
     return worst;
   }
 
-  // Those that neither tracks nor matches hold. The few observations of most
-  // bend nothing, so they go at once; where more contradict than noise
-  // explains, only the one that is held most weakly goes. False if there are
-  // none.
+  // Calls images wrong that neither tracks nor matches hold. Those with few
+  // agreeing observations bend nothing, so all go at once. If there are none,
+  // the most weakly held one goes of those that are contradicted more than
+  // noise explains. False if nothing goes.
   bool CallUnsupported() {
     const double spread =
         MedianOfSound([&](size_t n) { return sums_[n].CenterSpread(); });
@@ -223,15 +223,15 @@ class Checker {
     return !few.empty();
   }
 
-  // A bound exp(-x) on the probability of a test is low enough, over all
-  // images, from this x on.
+  // From this x on a bound exp(-x) on the probability of a test is low enough,
+  // over all images.
   double LeastExponent() const {
     return std::log(static_cast<double>(model_.images.size()) /
                     options_.false_alarm);
   }
 
-  // And for one of whose 2D points tracks keep few: the fewer, the less has to
-  // speak against it.
+  // The same for an image with few of its 2D points in tracks: the fewer they
+  // are, the less evidence is needed.
   double LeastExponent(size_t n) const {
     return LeastExponent() + std::min(0.0, std::log(RelativeKept(n)));
   }
@@ -242,8 +242,8 @@ class Checker {
            ContradictionExponent(n) > LeastExponent(n);
   }
 
-  // Of the bound on the probability that three times the noise contradicts so
-  // many of its observations; 0: that is to be expected.
+  // exp(-exponent) bounds the probability that three times the noise
+  // contradicts so many of its observations; 0 if as many are to be expected.
   double ContradictionExponent(size_t n) const {
     const ImageCheck& image = check_.images[n];
     const double ratio = snooping_.noise.critical_w / kNoisyImage;
@@ -256,7 +256,7 @@ class Checker {
            sums_[n].GainExponent(*snooping_.noise.sigma_px) > LeastExponent();
   }
 
-  // Below, an image is noisier than the spread of the others' noise explains.
+  // With less, an image is noisier than the spread of the others explains.
   double LeastLambda() const {
     const auto log_lambda = [&](size_t n) {
       return std::log(
@@ -268,8 +268,8 @@ class Checker {
                              }));
   }
 
-  // Its errors fill the disc to which the model was filtered, and as evenly as
-  // those of chance matches.
+  // Whether its errors fill the disc to which the model was filtered, as evenly
+  // as those of chance matches.
   bool IsChance(size_t n, double least_lambda) const {
     const ErrorsInDisc& errors = in_disc_[n];
     return errors.num > 0 && errors.lambda < least_lambda &&
@@ -277,14 +277,14 @@ class Checker {
            errors.Exponent(0) < -std::log(options_.false_alarm);
   }
 
-  // Of the image's 2D points, those in tracks.
+  // The share of the image's 2D points that are in tracks.
   double KeptShare(size_t n) const {
     return static_cast<double>(check_.images[n].num_observations) /
            static_cast<double>(
                std::max<size_t>(1, model_.images[n].points2D.size()));
   }
 
-  // Below 1 where they are few beside the median image's.
+  // Below 1 if that share is small compared with the median image's.
   double RelativeKept(size_t n) const {
     return median_kept_ > 0 ? KeptShare(n) / (kFewKept * median_kept_) : 1;
   }
@@ -323,7 +323,7 @@ class Checker {
     check_.points = snooping_.noise.points;
   }
 
-  // Of every track, what was removed is snooped by itself.
+  // Snoops what was removed of each track by itself: does it agree on a point?
   void FindSecondPoints() {
     NoiseOptions options = noise_options_;
     options.sigma_px = check_.sigma_px;

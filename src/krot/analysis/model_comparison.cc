@@ -27,7 +27,7 @@ ModelCounts Count(const ModelCorrespondence& correspondence) {
           static_cast<int64_t>(correspondence.observations.size())};
 }
 
-// Of each image from the points that it sees; NaN without any.
+// The median distance of each image from the points it sees; NaN without any.
 std::vector<double> TypicalDistances(const Model& model,
                                      const std::vector<ImageGeometry>& images) {
   const IdIndex<ImageId> index(model.images);
@@ -81,7 +81,7 @@ PoseDifference Difference(const PosePair& pose,
           (pose.center1 - world1_from_world2 * pose.center2).norm()};
 }
 
-// Of the centroid of the second model's centres.
+// How far the alignment moves the centroid of the second model's centres.
 double DistanceMoved(const std::vector<PosePair>& poses,
                      const Similarity& world1_from_world2) {
   if (poses.empty()) return 0;
@@ -144,7 +144,7 @@ void ComparePoints(const Model& model1, const Model& model2,
   summary->worst_points = std::move(moved);
 }
 
-// Those of the shared observations, in both models.
+// Summarises the errors of the shared observations in both models.
 void CompareSharedErrors(const std::vector<ElementPair>& observations,
                          const std::vector<double>& errors1_px,
                          const std::vector<double>& errors2_px,

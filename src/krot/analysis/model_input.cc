@@ -19,11 +19,11 @@
 namespace krot::internal {
 namespace {
 
-// Of the image's larger side. 2D points that have nothing to do with their 3D
-// points are about half of it off.
+// Relative to the image's larger side. 2D points that have nothing to do with
+// their 3D points are off by about half of it.
 constexpr double kUnrelated = 0.1;
-// How many times the median error of two sides that are both right may differ,
-// and by how many pixels in any case.
+// The median errors of two sides that are both right differ at most by this
+// factor, and this many pixels.
 constexpr double kClearly = 2;
 constexpr double kPixel = 1;
 // What rounding may add to the largest error, relative.
@@ -36,8 +36,8 @@ struct SideFit {
   bool is_any_finite = false;
 };
 
-// Of the tracks of a valid model and so many elements that do not exist. None
-// without an observation that has a pose.
+// Measures the tracks of a valid model, and counts `num_unknown` elements that
+// do not exist as infinite errors. None if there is nothing to measure.
 std::optional<SideFit> Measure(const Model& model, int64_t num_unknown) {
   const std::vector<double> errors_px = PixelErrors(model);
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
@@ -71,8 +71,8 @@ Model Followed(Reading reading, const Model& model) {
   return copy;
 }
 
-// Of a side whose observations `reading` holds, beside those of kBoth: whether
-// it is most of them, without the worst.
+// Whether the side that `reading` follows is better without the other: it has
+// at least half of the observations of kBoth, and a smaller largest error.
 bool IsBetterAlone(const Model& model, Reading reading, const SideFit& both) {
   const std::optional<SideFit> alone = Measure(Followed(reading, model), 0);
   return alone && 2 * alone->count >= both.count && alone->px.max < both.px.max;
@@ -82,7 +82,7 @@ bool IsRelated(const SideFit& side) {
   return side.relative_median <= kUnrelated;
 }
 
-// None: neither fits.
+// The reading that fits the model best; none if neither side fits.
 std::optional<Reading> Choose(const Model& model,
                               const std::optional<SideFit>& tracks,
                               const std::optional<SideFit>& images) {
@@ -170,8 +170,8 @@ std::optional<std::pair<double, double>> WorseImagesSide(const Model& before,
 
 namespace {
 
-// A model speaks against rotations if half of its observations fit with its
-// own, to this share of the image's larger side.
+// The median error is small with the model's own rotations if it is at most
+// this share of the largest image side.
 constexpr double kFits = 0.01;
 // A wrong convention multiplies errors by far more than this.
 constexpr double kFarSmaller = 5;
@@ -185,7 +185,8 @@ std::optional<double> FiniteMedian(std::vector<double> errors) {
   return std::isfinite(median) ? std::optional<double>(median) : std::nullopt;
 }
 
-// Leaves those that differ, if any do: those of the images that were turned.
+// Keeps the errors that differ, if any do: those of the images that were
+// turned.
 void KeepChanged(std::vector<double>* before, std::vector<double>* after) {
   size_t num_kept = 0;
   for (size_t n = 0; n < before->size(); ++n) {

@@ -15,7 +15,7 @@ namespace krot::internal {
 
 // The figures of COLMAP's model_analyzer, computed as COLMAP 3.8 does.
 struct ColmapStatistics {
-  int64_t num_rigs = 0;  // 0, as frames, if the files hold none
+  int64_t num_rigs = 0;  // 0, like num_frames, if the files hold none
   int64_t num_cameras = 0;
   int64_t num_frames = 0;
   int64_t num_images = 0;
@@ -43,10 +43,10 @@ struct CameraErrors {
   PixelErrorStatistics errors;
 };
 
-// In the order of Model::images and Model::cameras, those without observations
-// included. `errors_px` as PixelErrors gives them; throws
-// std::invalid_argument if their number is not that of the track elements.
-// O(observations).
+// The errors of every image or camera, as Model::images and Model::cameras,
+// also of those without observations. `errors_px` as PixelErrors gives them;
+// throws std::invalid_argument if their number is not that of the track
+// elements. O(observations).
 std::vector<ImageErrors> ErrorsByImage(const Model& model,
                                        const std::vector<double>& errors_px);
 std::vector<CameraErrors> ErrorsByCamera(const Model& model,
@@ -69,20 +69,20 @@ std::vector<WorstObservation> WorstObservations(
 // Track length -> number of points that have it.
 std::map<int64_t, int64_t> TrackLengthHistogram(const Model& model);
 
-// The focal length of a camera that one image has for itself, and the median
-// one of such cameras of the same kind and size, pixels.
+// The focal length of a camera that a single image uses, and the median of such
+// cameras of the same kind and size, pixels.
 struct OddFocalLength {
   double own = 0;
   double others = 0;
 };
-// As Model::images: of those whose focal length stands out among at least five,
-// by a tenth and by three times the median deviation; none of the others. A
-// model with a camera for each image, though one camera took them, has such
-// where the focal length was fitted to too little.
+// Per image: given if its focal length stands out among at least five such
+// cameras, by a tenth and by three times the median deviation. This happens
+// where each image has a camera of its own, though one camera took them all,
+// and the focal length was fitted to too little.
 std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
     const Model& model);
 
-// Of all observations whose image has a pose. Zero if there are none.
+// Over all observations whose image has a pose. Zero if there are none.
 struct DepthStatistics {
   double min = 0;     // scene units
   double median = 0;  // the lower one of two

@@ -40,7 +40,8 @@ void CheckOptions(const Model& model, const NoiseOptions& options) {
   }
 }
 
-// Of two ranks the lower one. Requires some; changes their order.
+// A quantile; between two ranks the lower one. Requires values; changes their
+// order.
 double Quantile(double share, std::vector<double>* values) {
   const auto rank = static_cast<std::ptrdiff_t>(
       share * static_cast<double>(values->size() - 1));
@@ -67,7 +68,7 @@ std::optional<double> TailScale(double ratio) {
   return std::sqrt(kMedians[2] / std::expm1(high));
 }
 
-// Keypoints come as single precision numbers: no model has less noise.
+// Keypoints are stored in single precision: no model has less noise than that.
 double SmallestSigma(const Model& model) {
   uint64_t size = 0;
   for (const Camera& camera : model.cameras) {
@@ -78,7 +79,7 @@ double SmallestSigma(const Model& model) {
 
 class Snooper {
  public:
-  // Without a sigma it is measured.
+  // Measures sigma if none is given, here or in the options.
   Snooper(const Model& model, const NoiseOptions& options,
           const Context& context, std::optional<double> sigma_px = {})
       : model_(model),
@@ -112,7 +113,7 @@ class Snooper {
         Of(e).num_controlled);
   }
   void Fit(const std::vector<int64_t>& points);
-  // Sigma, w and what is above.
+  // Sets sigma, each w, and how many are above the critical value.
   void Measure();
   std::vector<SnoopedObservation> RemoveWorst(const Point3D& point) const;
 
@@ -145,7 +146,8 @@ void Snooper::Measure() {
   if (variances.empty()) return;
   noise_.sigma_px = given_sigma_.value_or(
       std::max(std::sqrt(Quantile(0.5, &variances)), SmallestSigma(model_)));
-  // The median of n exponential variables is spread as the mean of n log(2)^2.
+  // The median of n exponential variables has the variance of a mean of n
+  // log(2)^2.
   noise_.degrees_of_freedom = std::pow(std::log(2.0), 2) * redundancy;
   noise_.critical_w =
       CriticalW(noise_.num_tested, options_.false_alarm,
@@ -167,7 +169,8 @@ std::vector<SnoopedObservation> Snooper::RemoveWorst(
   for (const SnoopedObservation& one : seen) {
     if (one.w > worst.w) worst = one;
   }
-  // The others decide where the point is, and then whether it is seen.
+  // The seen ones decide where the point is; only then does it matter who sees
+  // it.
   if (!(worst.w > noise_.critical_w)) return not_seen;
   if (seen.size() > 2) return {worst};
   for (SnoopedObservation& one : seen) {
@@ -244,7 +247,7 @@ Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H) {
   return root;
 }
 
-// Of one direction P(chi^2 > x) = erfc(sqrt(x / 2)), of two exp(-x / 2).
+// P(chi^2 > x) is erfc(sqrt(x / 2)) for one direction, exp(-x / 2) for two.
 double StandardizedError(double chi2, int num_directions) {
   if (num_directions == 2) return std::sqrt(chi2);
   if (num_directions == 0) return kNaN;
@@ -261,7 +264,8 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
   const auto num_tested = snooper.noise().num_tested;
   const auto sigma = snooper.noise().sigma_px;
   NoiseSnooping result = snooper.Snoop();
-  // The median is that of outliers where they are more than a half.
+  // Then sigma has followed the removals down, and the first one is kept
+  // instead.
   if (2 * static_cast<int64_t>(result.removed.size()) > num_tested) {
     result = Snooper(model, options, context, sigma).Snoop();
     result.is_sigma_kept = true;

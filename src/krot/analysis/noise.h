@@ -18,12 +18,13 @@ inline constexpr double kLeastNoisePx = 1e-3;
 // An observation that is no noise.
 struct SnoopedObservation {
   uint64_t element = 0;  // in Model::track_elements
-  // As it was removed, of two the larger one; infinite: not in front.
+  // When it was removed; of a track of two the larger one. Infinite: the point
+  // is not in front of the camera.
   double w = 0;
-  // Where the rest of its track leads to, pixels; where nothing is left, where
-  // its last two did. NaN if that is not in front of its camera.
+  // Its error where the rest of its track places the point, pixels; if nothing
+  // is left, where the last two did. NaN if that is not in front of its camera.
   double error_px = 0;
-  // One of two that contradict each other: which is wrong cannot be told.
+  // One of two that contradict each other: which one is wrong cannot be told.
   bool is_of_two = false;
 };
 
@@ -31,36 +32,36 @@ struct NoiseSnooping {
   ModelNoise noise;                         // of what is left
   std::vector<SnoopedObservation> removed;  // largest w first
   std::vector<double> sigma_path_px;        // before each removal, and at last
-  // Whether sigma stayed as it was at first: taken anew it fell until more than
-  // half of the observations were gone, as it does where their noise has no
-  // sigma in common.
+  // Whether sigma was kept as it was at first, because it fell, when measured
+  // anew, until more than half of the observations were gone. This happens
+  // where observations have no common noise.
   bool is_sigma_kept = false;
 };
 
-// Of the largest eigenvalue of a sum of squares: below is rounding.
+// Relative to the largest eigenvalue of a sum of squares: less is rounding.
 inline constexpr double kNoDirection = 1e-13;
 
 // G with G G' = H^+.
 Eigen::Matrix3d RootOfInverse(const Eigen::Matrix3d& H);
 
 // The w of a sum of squares in so many directions, in [0, 2], each divided by
-// its variance: of a single direction the w of two that is exceeded with the
-// same probability. NaN of none.
+// its variance. For a single direction it is the w of two that is exceeded with
+// the same probability; NaN for none.
 double StandardizedError(double chi2, int num_directions);
 
-// The w that the largest of so many exceeds by noise with the probability
-// `false_alarm`, where the standard deviation is itself an estimate with so
-// many degrees of freedom: w^2 / 2 is F distributed, and P(w^2 > x) =
-// (1 + x / nu)^(-nu / 2).
+// The critical value: noise makes the largest of so many w exceed it with the
+// probability `false_alarm`. The standard deviation is itself an estimate with
+// so many degrees of freedom, nu: w^2 / 2 is F distributed, and P(w^2 > x) = (1
+// + x / nu)^(-nu / 2).
 double CriticalW(int64_t num_tested, double false_alarm,
                  double degrees_of_freedom);
 
-// Of every track the observation with the largest w is removed, if that is
-// above the critical value, and the track is fitted anew; then sigma and the
-// critical value are taken anew, until nothing is above. The largest w is the
-// removal that lowers the track's sum of squares most, so that a wrong
+// Data snooping: of every track the observation with the largest w is removed,
+// if that is above the critical value, and the track is fitted anew; then sigma
+// and the critical value are measured anew, until nothing is above. The removal
+// of the largest w lowers the track's sum of squares most, so that a wrong
 // observation goes before the sound ones that it bends. Of a track of two both
-// go. Requires and throws as above.
+// go. Requires and throws what EstimateNoise does.
 NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
                          const Context& context);
 
@@ -68,16 +69,17 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
 // and which of their observations take part.
 class TrackNoise {
  public:
-  // Keeps references. Every observation takes part whose image has a pose.
+  // Keeps references. Every observation whose image has a pose takes part.
   TrackNoise(const Model& model, const std::vector<double>& relative_sigmas);
 
-  // Moves point k to the least squares of those of its observations that take
-  // part and see it, and fills in what that says of them. Different points may
-  // be fitted at the same time.
+  // Moves point k to the least squares of its observations that take part and
+  // see it, and fills in their noise. Different points may be fitted at the
+  // same time.
   void Fit(int64_t k);
 
-  // Of what takes part and sees its point all but w, which needs sigma. w is
-  // infinite for what does not see it, NaN for the rest.
+  // Complete but for w, which needs sigma, where an observation takes part and
+  // sees its point. w is infinite if it does not see the point, NaN for all
+  // others.
   const std::vector<ObservationNoise>& observations() const {
     return observations_;
   }
@@ -88,11 +90,11 @@ class TrackNoise {
   bool TakesPart(uint64_t e) const { return takes_part_[e]; }
   void Remove(uint64_t e);
 
-  // The error of any observation, pixels, where its point lies now; not finite
-  // where that is not seen.
+  // The error of any observation, pixels, at its point's present place; not
+  // finite if it does not see that.
   Eigen::Vector2d ErrorOf(uint64_t e) const;
-  // Where point k came to lie; the model's where that is at infinity, or the
-  // point was not fitted.
+  // The fitted place of point k; the model's place if that is at infinity, or
+  // if the point was not fitted.
   Eigen::Vector3d Point(int64_t k) const;
 
  private:
@@ -120,16 +122,16 @@ class TrackNoise {
   std::vector<Eigen::Vector4d> points_;  // homogeneous
 };
 
-// Of an image's observations, in the directions that others control. Points
-// that move along are eliminated: M is its diagonal block of the reduced camera
-// system, sigma^2 M^-1 its covariance while the other images stay, and -M^-1 g
-// the step that its errors ask for.
+// Sums over an image's observations, in the directions that other images
+// control. The points move along and are eliminated: M is its diagonal block of
+// the reduced camera system, sigma^2 M^-1 its covariance while the other images
+// stay, and -M^-1 g the step that its errors ask for.
 struct ImageSums {
   Eigen::Matrix<double, 6, 6> M =
       Eigen::Matrix<double, 6, 6>::Zero();  // F' R_ii F, R_ii as above
   Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Zero();  // F' e
   double square = 0;           // e' R_ii^+ e
-  int64_t num_directions = 0;  // of these
+  int64_t num_directions = 0;  // in these sums
   Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
 
   // The standard deviations of the centre, scene units, and of the rotation,
@@ -138,49 +140,50 @@ struct ImageSums {
   double CenterSpread() const;
   double TurnSpread() const;
 
-  // What the step takes away of `square`, to first order.
+  // By how much the step lowers `square`, to first order.
   double Gain() const { return -g.dot(step); }
   // In [0, 1).
   double GainShare() const {
     return square > 0 ? std::min(Gain() / square, 1 - 1e-12) : 0;
   }
-  // Of the bound exp(-exponent) on the probability that noise gains as much. Of
-  // noise of one size, `sigma_px` or the image's own, the gain is sigma^2 chi^2
+  // exp(-exponent) bounds the probability that noise gains as much, be it of
+  // `sigma_px` or of a size of the image's own. Such a gain is sigma^2 chi^2
   // with six degrees of freedom, and its share of all squared errors, in n
   // directions, has the distribution Beta(3, (n - 6) / 2).
   double GainExponent(double sigma_px) const;
-  // Beyond the share that six parameters take of noise.
+  // The share beyond that which six parameters take from noise.
   double UnexpectedGainShare() const {
     const double expected = 6 / static_cast<double>(num_directions);
     return expected < 1 ? (GainShare() - expected) / (1 - expected) : 0;
   }
 };
 
-// To which a model of these errors was filtered: their 99.9 % quantile; 0 of
-// none.
+// The limit to which a model with these errors was filtered: their 99.9 %
+// quantile; 0 without errors.
 double FilterLimit(std::vector<double> errors_px);
 
-// An image's squared errors up to a limit, as shares u of its square. Gaussian
-// noise of sigma gives u the density lambda exp(-lambda u) / (1 - exp(-lambda))
-// with lambda = limit^2 / (2 sigma^2), whatever is filtered beyond the limit;
-// errors by chance fill the disc evenly: lambda = 0.
+// An image's squared errors up to a limit, as shares u of the limit's square.
+// Gaussian noise of sigma gives u the density lambda exp(-lambda u) / (1 -
+// exp(-lambda)) with lambda = limit^2 / (2 sigma^2), whatever was filtered out
+// beyond the limit. Errors by chance fill the disc evenly: lambda = 0.
 struct ErrorsInDisc {
   ErrorsInDisc(const std::vector<double>& errors_px, double limit_px);
 
   int64_t num = 0;
   double mean = 0;    // of u, at most that of an even disc
-  double lambda = 0;  // the likeliest, not negative
-  // Of Chernoff's bound on the probability of such a mean or one farther from
-  // that of `other`, not negative: num KL(lambda, other).
+  double lambda = 0;  // the likeliest one, >= 0
+  // The exponent of Chernoff's bound on the probability of such a mean, or of
+  // one farther from that of `other`: num KL(lambda, other) >= 0.
   double Exponent(double other) const;
 };
 
-// Of Chernoff's bound exp(-exponent) on the probability that of so many trials,
-// each of probability p, so many or more succeed; 0 if that is to be expected.
+// The exponent of Chernoff's bound exp(-exponent) on the probability that so
+// many trials or more succeed, each with probability p; 0 if as many are to be
+// expected.
 double SuccessExponent(int64_t num_successes, int64_t num_trials, double p);
 
-// As Model::images; of the observations of which `noise` says that they are
-// tested. Requires a valid model. O(observations).
+// The sums of each image, over the observations that are tested according to
+// `noise`. Requires a valid model. O(observations).
 std::vector<ImageSums> AddUpImages(const Model& model, const ModelNoise& noise);
 
 }  // namespace krot::internal

@@ -62,8 +62,8 @@ class PairChecker {
     return matches;
   }
 
-  // The errors of each pair under the model's poses, ascending; none where
-  // there is no baseline.
+  // The errors of each pair under the model's poses, ascending; none for pairs
+  // with few matches or without a baseline.
   void Measure() {
     std::vector<int64_t> num_without_ray(database_.pairs.size(), 0);
     ForEachPair([&](int64_t p) {
@@ -148,8 +148,8 @@ class PairChecker {
     });
   }
 
-  // What contradicts the poses between right images: groups of them, or their
-  // matches.
+  // What is left of contradictions between right images: either groups of
+  // images contradict each other, or the matches are wrong.
   void FindGroups() {
     const auto num_images = static_cast<int32_t>(check_.images.size());
     DisjointSets joined(num_images);

@@ -27,9 +27,10 @@ struct CameraPose {
   Eigen::Vector3d translation;
 };
 
-// Normalised when read and when used, and applied to points as a quaternion:
-// operation by operation what COLMAP 3.8 does. Where a point all but coincides
-// with a camera centre, rounding decides its error, and shall decide alike.
+// Normalised when read and again when used, and applied to points as a
+// quaternion: these are the operations of COLMAP 3.8. Where a point nearly
+// coincides with a camera centre, rounding decides its error, and should decide
+// alike.
 Eigen::Quaterniond NormalizedTwice(const Pose& pose) {
   Eigen::Vector4d q(pose.quaternion_wxyz.data());
   q /= q.norm();

@@ -20,12 +20,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Positions scatter by this at least, relative to their size: those of a
-// synthetic scene may be exact.
+// The least scatter of positions, relative to their size: those of a synthetic
+// scene may be exact.
 constexpr double kLeastScatter = 1e-6;
 // Places this near to a line, relative to its length, are on it.
 constexpr double kOnLine = 3e-5;
-// The standard deviation of a turn about the line that is too large, radians.
+// A turn about the line is too loose from this standard deviation on, radians.
 constexpr double kLooseTurn = 1.0 / 3;
 
 // How far places lie from their best line and along it, root mean squares.
@@ -54,7 +54,7 @@ std::string NameOf(const Model& model, const KnownPosition& position) {
              : "3D point " + std::to_string(model.points3D[position.index].id);
 }
 
-// Of two significant digits.
+// With two significant digits.
 std::string LengthText(double length) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.2g", length);
@@ -147,7 +147,7 @@ class FrameFinder {
       if (!refined || !(refined->scale > 0)) break;
       own_from_model_ = *refined;
       misfits = MisfitsOf(pairs_, own_from_model_);
-      // Three equations of each position, seven unknowns.
+      // Three equations for each position, seven unknowns.
       const double equations = 3 * static_cast<double>(agreeing.size());
       tolerance_ = std::max(
           least, kFarByMedian * std::sqrt(equations / (equations - 7)) *
@@ -251,7 +251,8 @@ class FrameFinder {
   bool has_radii_ = false;
   Vector3d own_origin_ = Vector3d::Zero();
   Vector3d model_origin_ = Vector3d::Zero();
-  // Of the centred places.
+  // Takes places relative to model_origin_ to positions relative to
+  // own_origin_.
   Similarity own_from_model_;
   double tolerance_ = 1;
 };

@@ -12,13 +12,13 @@
 namespace krot::internal {
 
 // Positions in a frame of their own (metres of a survey, UTM, a receiver's):
-// how the model's frame is taken to it, and which positions are wrong.
+// the similarity from the model's frame to it, and which positions are wrong.
 
 // A position that does not agree with the others.
 struct WrongPosition {
   size_t index = 0;     // in the list of positions
   std::string name;     // "a.jpg" or "3D point 12"
-  double distance = 0;  // of what the model has there; units of the positions
+  double distance = 0;  // from the model's place; units of the positions
   double radius = 0;    // the position's, in that direction
 };
 
@@ -29,26 +29,27 @@ struct PositionFrame {
   std::vector<WrongPosition> wrong;  // farthest first
   int64_t num_compared = 0;          // whose camera or point the model places
   double median_distance = 0;        // of those that agree; their units
-  // What counts as wrong: this many radii. Above 1 where the model and the
+  // A position is wrong beyond so many radii. Above 1 where the model and the
   // positions differ by more than the radii say.
   double tolerance = 1;
-  // Of positions that came without one: from how far they are scattered.
+  // The radius of positions that came without one, from their scatter.
   std::optional<double> radius;
 };
 
-// The similarity that the largest part of the positions agrees with, to their
-// radii: of all those that take three of the model's places to their positions
-// [Umeyama 1991] (of 50,000 triples where there are more, always the same), the
-// one with the least sum of squares of distances by radii, none of which counts
-// for more than 1; refined on what agrees. Where no majority agrees to its
-// radii, or radii are unknown (zero), the one with the least median. A position
-// is wrong if it is farther off than its radius and 2.6 times the median (more,
-// of few positions).
+// Finds the similarity that the largest part of the positions agrees with,
+// within their radii. Candidates take three of the model's places to their
+// positions [Umeyama 1991]: all triples or, where there are more, 50,000 of
+// them, always the same. The best one has the least sum of squared distances in
+// radii, none of which counts for more than 1; it is refined on the positions
+// that agree. Where no majority agrees within its radii, or radii are unknown
+// (zero), the one with the least median is taken. A position is wrong if it is
+// farther off than its radius and than 2.6 times the median (more, of few
+// positions).
 //
 // Requires a valid model. Throws ModelError, which begins with `source`, for
-// fewer than three positions of what the model places, for those on a line, up
-// to their scatter, about which they could be turned, and for those that have
-// nothing to do with the model. The same at any number of threads.
+// fewer than three positions of what the model places, for positions on a line,
+// up to their scatter, about which the model could be turned, and for positions
+// that have nothing to do with the model. The same at any number of threads.
 // O(positions), with at most 50,000 triples on 300 of them.
 PositionFrame FindPositionFrame(const Model& model,
                                 const std::vector<KnownPosition>& positions,

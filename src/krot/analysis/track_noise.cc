@@ -21,7 +21,7 @@ using Eigen::Vector3d;
 using Eigen::Vector4d;
 
 constexpr int kMaxIterations = 50;
-// Of the sum of squares, that a step may still promise.
+// A fit ends when a step promises less than this share of the sum of squares.
 constexpr double kTolerance = 1e-8;
 
 ObservationNoise NotTested(double w) {
@@ -42,9 +42,9 @@ Eigen::Matrix<double, 4, 3> TangentBasis(const Vector4d& X) {
 
 }  // namespace
 
-// A fit in homogeneous coordinates, so that a point at infinity, or beyond by
-// the noise of its rays, is one like any other. The origin is the first camera,
-// the unit what separates it from the farthest.
+// Fits a point in homogeneous coordinates, so that one at infinity, or beyond
+// by the noise of its rays, is like any other. The origin is the first camera,
+// the unit its distance from the farthest one.
 class TrackNoise::Track {
  public:
   Track(TrackNoise* all, int64_t k) : all_(*all), k_(k) {
@@ -109,7 +109,7 @@ class TrackNoise::Track {
     X_ << (point.xyz - origin_) / unit_, 1;
     X_.normalize();
     const auto basis = TangentBasis(X_);
-    // Who does not see the point has no say.
+    // Observations that do not see the point have no part in the fit.
     size_t num = 0;
     for (const uint64_t e : elements_) {
       const auto row = RowAt(e, X_, basis);
@@ -168,7 +168,7 @@ class TrackNoise::Track {
     }
   }
 
-  // R_ii and what it makes of the errors.
+  // R_ii, and the standardised errors that it gives.
   void Describe() {
     Matrix3d H = Matrix3d::Zero();
     for (const Row& row : rows_) H.noalias() += row.J.transpose() * row.J;

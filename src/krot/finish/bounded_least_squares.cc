@@ -13,24 +13,23 @@
 namespace krot::internal {
 namespace {
 
-// The first mu, as a share of the cost by pair: the start is near the boundary,
-// and has to leave it first.
+// The first mu, relative to the cost by pair of slack and multiplier. It is
+// large, as the start is near the boundary and has to leave it first.
 constexpr double kStartWeight = 10;
-// The first multipliers are those of slacks of this share of the cap's at
-// least. Nearer to the boundary they would let the slack grow by no more than
-// itself in a step.
+// The first multipliers are those of slacks of at least this share of the
+// cap's. With smaller ones the slack could only double in a step.
 constexpr double kStartSlack = 0.01;
-// A step goes so far of the way to the boundary: one that all but reached it
-// would leave a slack that the next direction cannot predict.
+// Fraction to the boundary. After a longer step the next direction could not
+// predict the slacks.
 constexpr double kDamping = 0.95;
-// No pair's product is less than this share of mu: what the step leaves of a
-// multiplier may be too little to keep its error off the cap in the next one,
-// and a single pair holds back the step of all. Nor is it more than the second.
+// Products of slack and multiplier stay between these multiples of mu. With
+// less, a multiplier may be too small to keep its error off the cap in the next
+// step, and a single pair holds back the step of all.
 constexpr double kLeastProduct = 0.3;
 constexpr double kLargestProduct = 1e5;
-// With a gap this near to that asked for, in such gaps, so many steps in a row
-// that are shorter than kIdleStep and gain less of the cost end it: lenses near
-// their fold follow no linear row far.
+// It ends after so many steps in a row that are shorter than kIdleStep and gain
+// less than kLeastGain times the gap asked for, when the gap is at most
+// kNearGap times that: lenses near their fold follow no linear row far.
 constexpr double kIdleStep = 0.1;
 constexpr double kNearGap = 10;
 constexpr double kLeastGain = 0.01;
@@ -69,7 +68,7 @@ class BoundedPath {
   }
 
   BoundedSummary Run() {
-    if (!View(&now_)) {  // as only rows can make it that are not those of x
+    if (!View(&now_)) {  // only with rows that are not those of x
       summary_.termination = InteriorPointTermination::kNoProgress;
       return summary_;
     }
@@ -84,9 +83,10 @@ class BoundedPath {
 
   const Estimate& estimate() const { return now_.x; }
 
-  // FollowPath's.
+  // The steps of FollowPath.
   bool Factorize() { return system_.Factorize(now_.viewed, multipliers_); }
-  // Where the gap is small enough, Newton's step is looked at.
+  // Where the gap is small enough, tests whether Newton's step would gain
+  // enough.
   bool IsThere() {
     summary_.duality_gap = RelativeGap();
     if (*summary_.duality_gap > options_.gap_tolerance) return false;
@@ -96,8 +96,8 @@ class BoundedPath {
     return *summary_.stationarity <= options_.stationarity_tolerance;
   }
 
-  // All multipliers take one step in what a predictor is thought to leave of
-  // the gap: their full ones would promise too much.
+  // The predicted gap is that of one common step of all multipliers: their own
+  // full steps would promise too much.
   void FindDirection(double step) {
     target_mu_ = mu_;
     if (*summary_.duality_gap <= options_.gap_tolerance) return;  // Newton's
@@ -166,7 +166,8 @@ class BoundedPath {
   bool TakeRows(const Estimate& x) {
     return !options_.take_rows || AllRanks(context_, options_.take_rows(x));
   }
-  // Whether every error is below the cap.
+  // Fills in errors, cost and barrier. False unless every error is below the
+  // cap.
   bool View(State* state) {
     if (!TakeRows(state->x)) return false;
     struct Totals {
@@ -234,7 +235,7 @@ class BoundedPath {
     return true;
   }
 
-  // To those of trial_.
+  // Moves the multipliers to the slacks of trial_.
   void MoveMultipliers() {
     const double gap = system_.loop().Sum([&](int64_t i) {
       Vector& l = multipliers_[i];
@@ -264,7 +265,7 @@ class BoundedPath {
   double target_mu_ = 0;     // that the direction aims at
   double gain_ = 0;          // what the last step took off the barrier cost
   int num_idle_ = 0;         // steps in a row
-  bool is_centred_ = false;  // all pairs are, since no step was found
+  bool is_centred_ = false;  // the multipliers, after a failed step
   BoundedSummary summary_;
 };
 

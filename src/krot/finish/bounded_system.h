@@ -23,8 +23,7 @@ namespace krot::internal {
 //   kBend          -d^2 h_j / de^2 = kBend I
 //   MaxStep        the largest t <= limit with e + t d inside
 //   RelativeSlack  of slacks h_j, the product of all h_j / h_j(0)
-//   Share          of multipliers: what they weigh beside an error's own
-//                  weight, 1
+// Share          of multipliers: their weight, where an error's own is 1
 
 // p = 2: h = (cap^2 - |e|^2) / 2.
 struct DiscCap {
@@ -41,7 +40,7 @@ struct DiscCap {
   Eigen::Matrix<double, 2, kNum> Normals(const Eigen::Vector2d& e) const {
     return e;
   }
-  // Of |d|^2 t^2 + 2 e'd t = 2 h the positive root, without cancellation.
+  // The positive root of |d|^2 t^2 + 2 e'd t = 2 h, without cancellation.
   double MaxStep(const Eigen::Vector2d& e, const Eigen::Vector2d& d,
                  double limit) const {
     const double h2 = 2 * Slacks(e)[0];
@@ -112,10 +111,10 @@ struct ViewedError {
 //   [        U J         ]    U'U = (rho' + kBend sum_j l_j) I
 //   [ sqrt(h'l) E_w / w  ]          + sum_j l_j / h_j n_j n_j'
 //
-// the last of which holds back points whose depths the errors hardly tell, as
-// the barrier of the cone of (cap w; v) would; it vanishes with mu. The
-// right-hand side, -(rho' e + sum_j mu / h_j n_j), is minus the gradient of the
-// barrier problem: any l > 0 gives a descent direction.
+// The last row holds back points whose depths the errors hardly tell, as the
+// barrier of the cone of (cap w; v) would; it vanishes with mu. The right-hand
+// side, -(rho' e + sum_j mu / h_j n_j), is minus the gradient of the barrier
+// problem: any l > 0 gives a descent direction.
 //
 // The unknowns are points and frames' centres.
 template <typename Cap>
@@ -126,7 +125,7 @@ class BoundedSystem {
   using Vector3d = Eigen::Vector3d;
 
   // Keeps a reference to `problem`, whose rows Factorize reads. Observations of
-  // views behind the first `num_views` are bounds alone.
+  // views after the first `num_views` are bounds alone.
   BoundedSystem(const KnownRotationProblem& problem, const Cap& cap,
                 const ErrorLoss& loss, int32_t num_views,
                 const Context& context)
@@ -143,8 +142,8 @@ class BoundedSystem {
         correction_(problem.observations.size()),
         d_(problem.observations.size()) {}
 
-  // The system at an iterate; errors and multipliers must outlive the calls
-  // below. False if there is no factor.
+  // Builds the system at an iterate; errors and multipliers must outlive the
+  // calls below. False if there is no factor.
   bool Factorize(const std::vector<ViewedError>& viewed,
                  const std::vector<Vector>& multipliers) {
     viewed_ = &viewed;
@@ -172,8 +171,8 @@ class BoundedSystem {
     SolveForTarget();
   }
 
-  // The same with the second order of the products and slacks along that
-  // direction [Mehrotra 1992].
+  // Newton's direction with the second-order terms of products and slacks along
+  // the last one [Mehrotra 1992].
   void Correct(double mu) {
     loop_.ForEach([&](int64_t i) {
       const PairStep step = StepOf(i);
@@ -189,7 +188,7 @@ class BoundedSystem {
   void Move(const Estimate& from, double step, Estimate* to) const {
     MoveCentres(rig_from_world_, from, step, dx_, to);
   }
-  // Where the last direction leads the slacks and multipliers of observation i.
+  // The slacks and multipliers of observation i along the last direction.
   struct PairStep {
     Vector h, dh, dl;
   };
@@ -207,20 +206,21 @@ class BoundedSystem {
     return step;
   }
 
-  // The longest step <= 1 along dx that keeps all errors below the cap where
-  // rows stay, times `damping`, which is >= 1 / 2.
+  // The longest step <= 1 along dx that keeps all errors below the cap, if the
+  // rows stay as they are, times `damping`, which is >= 1 / 2.
   double MaxStep(double damping) const {
     return std::min(1.0, damping * reach_.primal);
   }
-  // sum h'l, to second order, after the longest steps <= 1 along dx and along
-  // all dl that keep all errors below the cap and all multipliers positive.
+  // The sum of h'l that the last direction promises, to second order: after the
+  // longest steps <= 1, of dx and of all dl, at which all errors are below the
+  // cap and all multipliers positive.
   double PredictedGap() const {
     const double primal = std::min(1.0, reach_.primal);
     const double dual = std::min(1.0, reach_.dual);
     return reach_.gap + primal * reach_.by_primal + dual * reach_.by_dual +
            primal * dual * reach_.by_both;
   }
-  // What a full step gains of the quadratic model, twice; squared pixels.
+  // Twice what a full step gains in the quadratic model; squared pixels.
   double Slope() const {
     return loop_.Sum(
         [&](int64_t i) { return -PullOf(i).dot(d_[i].template head<2>()); });
@@ -230,21 +230,22 @@ class BoundedSystem {
   const Cap& cap() const { return cap_; }
 
  private:
-  // Of a direction, in the energy norm: the next step corrects it anyway.
+  // The relative error of a direction in the energy norm. The next step corrects
+  // it.
   static constexpr double kTolerance = 1e-3;
-  // No step is followed farther.
+  // Longer steps are not looked at.
   static constexpr double kFurthest = 2;
 
   // What an observation's rows are made of: U = [a b; 0 c] and sqrt(h'l).
   struct Root {
     double a, b, c, depth;
   };
-  // Second order along Newton's direction: of h_j l_j, and of each h_j.
+  // Second-order terms along Newton's direction: of h_j l_j, and of each h_j.
   struct Correction {
     Vector product;
     double slack;
   };
-  // Along the last direction: the longest steps <= 2, and sum h'l, as a
+  // Along the last direction: the longest steps <= 2, and the sum of h'l as a
   // polynomial in the two step lengths.
   struct Reach {
     double primal, dual;
@@ -257,8 +258,8 @@ class BoundedSystem {
                ? loss_.Weight((*viewed_)[i].e.squaredNorm())
                : 0;
   }
-  // The determinant as a sum of what is not negative: near the cap the normals'
-  // part is many orders of magnitude above the rest.
+  // The determinant is a sum of terms that are not negative: near the cap the
+  // normals' part is many orders of magnitude above the rest.
   Root RootOf(int64_t i) const {
     const Vector2d& e = (*viewed_)[i].e;
     const Vector& l = (*multipliers_)[i];
@@ -366,7 +367,7 @@ class BoundedSystem {
   bool is_corrected_ = false;
   std::vector<Root> root_;
   std::vector<Correction> correction_;
-  // Of the rows: the right-hand side, then (de; dw / w).
+  // At first the right-hand side of the rows, then (de; dw / w).
   std::vector<Eigen::Vector3d> d_;
   BlockVector dx_;
   Reach reach_ = {};

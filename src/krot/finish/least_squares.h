@@ -12,16 +12,16 @@
 
 namespace krot::internal {
 
-// Of all estimates with every error below a cap, the least squares:
+// The least squares among all estimates with every error below a cap:
 //
 //   min 1/2 sum rho(|e_i|^2)   subject to   ||e_i||_p <= cap,  e_i = v_i / w_i,
 //
 // over all frames and points at once, by a primal-dual interior point method
-// (docs/method/joint_solver.md, "The finish"). Not convex, but for the
-// constraints: what is found is a local minimum.
+// (docs/method/joint_solver.md, "The finish"). The constraints are convex, the
+// sum is not: what is found is a local minimum.
 
-// rho of a squared error, squared pixels: rho(s) = s for small s, and less for
-// what is beyond the scale. As in Ceres.
+// rho of a squared error, squared pixels: rho(s) = s for small s, and grows
+// less beyond the scale. As in Ceres.
 struct ErrorLoss {
   enum class Kind { kTrivial, kHuber, kCauchy };
   Kind kind = Kind::kTrivial;
@@ -55,7 +55,7 @@ struct ErrorLoss {
   }
 };
 
-// As --Solver.finish_loss takes it: "trivial", "huber", "cauchy".
+// The names that --Solver.finish_loss takes: "trivial", "huber", "cauchy".
 inline const char* LossName(ErrorLoss::Kind kind) {
   switch (kind) {
     case ErrorLoss::Kind::kHuber:
@@ -79,16 +79,16 @@ struct BoundedIterate {
 struct BoundedOptions {
   Norm norm;       // of the cap: p = 1, 2 or infinity
   double cap = 0;  // pixels; > 0
-  // Only the observations of so many first views have errors that are squared;
-  // the others are bounds alone. None: all have.
+  // Only the errors of the first num_views views are squared; all other
+  // observations are bounds alone. None: all are squared.
   std::optional<int32_t> num_views;
   ErrorLoss loss;
   double gap_tolerance = 1e-3;           // > 0, relative to the cost
   double stationarity_tolerance = 1e-6;  // > 0
   int max_iterations = 200;              // >= 1
-  // Takes all rows of the problem itself anew where their points project at an
-  // estimate: false if one does not project. Empty where rows do not depend on
-  // where they are taken.
+  // Takes all rows of the problem itself anew, where their points project at an
+  // estimate; false if one does not project. Empty if rows do not depend on the
+  // estimate.
   std::function<bool(const Estimate&)> take_rows;
   std::function<void(const BoundedIterate&)> callback;  // may be empty
 };
@@ -134,8 +134,8 @@ BoundedSummary MinimizeBounded(const KnownRotationProblem& problem,
 // The problem may have several components and must have nothing fixed. Ends
 // where a step lowers the sum by less than 0.03 %, at the latest after 30. If
 // most observations do not see their points, nothing moves. The same bits at
-// any number of threads. O(observations) and a factorisation of the frames'
-// system a step.
+// any number of threads. A step takes O(observations) and a factorisation of
+// the reduced camera system.
 void MinimizeRobustly(const KnownRotationProblem& problem,
                       const Context& context, Estimate* estimate);
 

@@ -15,13 +15,13 @@ namespace {
 
 constexpr int kMaxSteps = 30;
 constexpr int kMaxTries = 8;  // of one step
-// c / median in the end.
+// The last c, relative to the median.
 constexpr double kFactor = 2;
 constexpr double kLeastFall = 3e-4;
 constexpr double kLeastDamping = 1e-3;
-// Of a step: it is a model's that does not hold far from here.
+// Of a step's linear solve: the linear model does not hold far from here.
 constexpr double kTolerance = 1e-2;
-// A smaller scale is that of rounding; pixels.
+// In pixels: a smaller scale would be that of rounding.
 constexpr double kLeastScale = 1e-6;
 
 class RobustLeastSquares {
@@ -126,7 +126,7 @@ bool RobustLeastSquares::FindStep() {
                      [](const Eigen::Vector3d& c) { return c.allFinite(); });
 }
 
-// Whether the sum fell by enough to go on.
+// Takes a step. Returns whether the sum fell by enough to go on.
 bool RobustLeastSquares::TakeStep() {
   const double before = Cost(squared_errors_);
   Estimate moved = estimate_;
@@ -154,7 +154,7 @@ void RobustLeastSquares::Run() {
   squared_errors_ = SquaredErrors(estimate_);
   if (squared_errors_.empty()) return;
   TakeScale();
-  // Where fewer than half of the points are seen, there is no scale.
+  // If fewer than half of the points are seen, there is no scale.
   for (int n = 0; n < kMaxSteps && std::isfinite(scale2_); ++n) {
     context_.Stage("improving the start, step", n + 1, kMaxSteps);
     if (context_.IsCancelled() || !TakeStep()) break;

@@ -16,20 +16,21 @@
 namespace krot::internal {
 namespace {
 
-// Of the rows, round by round, as long as nothing is decided: optima as near
-// to the bound as the last stay undecided.
+// Relative gaps of the solves, round by round, until something is decided. An
+// optimum nearer to the bound than the last gap stays undecided.
 constexpr double kDecisionGaps[] = {1e-2, 1e-3, 1e-5, 1e-6};
-// What a start from nothing has to be below, in bounds.
+// A start from nothing must have errors below this many times the bound.
 constexpr double kRoughStart = 1000;
-// Of a decision in all. Most take three, and where they are hardest (an
-// endoscope's lens, wrong rotations) one of a thousand takes 200.
+// Joint iterations of one decision. Most take three, and where they are hardest
+// (an endoscope's lens, wrong rotations) one of a thousand takes 200.
 constexpr int kMaxIterations = 400;
-// What true errors may be above those of the rows.
+// Relative margin for the difference between the rows' errors and true ones.
 constexpr double kRoomForLenses = 1e-6;
-// Of the rows of a refutation that is to be proved.
+// Relative gap of the solve whose multipliers are to prove a refutation.
 constexpr double kProofGap = 1e-6;
 constexpr double kJustAbove = 1e-9;
-// Rows whose bound is nearer to it have no room to be widened.
+// If the rows' bound exceeds the error bound by less than this share, there is
+// no room for the regions of lenses, and ProveInPixels is not tried.
 constexpr double kWorthWidening = 1e-2;
 
 void Add(const KnownRotationProblem& problem,
@@ -38,7 +39,8 @@ void Add(const KnownRotationProblem& problem,
       static_cast<int64_t>(iterations.size() * problem.observations.size());
 }
 
-// Whether all depths of `*start` are positive, or of one that is found instead.
+// Whether all depths of `*start` are positive; where not, looks for another
+// one.
 bool HaveStart(const KnownRotationProblem& problem, const ErrorBound& bound,
                const Context& context, Estimate* start, Work* work) {
   if (AllDepthsPositive(problem, *start, context.num_threads)) return true;
@@ -108,8 +110,8 @@ std::optional<PixelCertificate> ProveRefutation(
            CheckPixelCertificate(model, part, bound.norm, proof, context)
                .is_accepted;
   };
-  // No more than the bound need be proved: what the rows' bound is above it by
-  // is room for the lenses.
+  // Only the bound needs a proof: the margin of the rows' bound above it is
+  // room for lens distortion.
   JointOptions options;
   options.norm = bound.norm;
   options.relative_gap = kProofGap;
@@ -150,7 +152,7 @@ std::vector<std::vector<int64_t>> Parts(
                              PruneUnconstrained(built.problem, observations));
 }
 
-// Larger supports stay as they are: deletion would take as many solves.
+// Larger supports are not reduced, as deletion takes a solve per observation.
 constexpr size_t kMaxDeletions = 60;
 
 // Makes a refuted support irreducible, within its own small problem.
@@ -167,7 +169,8 @@ class Deletion {
     std::iota(kept_.begin(), kept_.end(), 0);
   }
 
-  // False if an observation is kept only because nothing was decided.
+  // False if the support is too large, or if an observation is kept only
+  // because nothing was decided.
   bool Run() {
     if (kept_.size() > kMaxDeletions) return false;
     bool is_irreducible = true;
@@ -273,7 +276,7 @@ std::vector<Conflict> PackConflicts(const Model& model,
   return conflicts;
 }
 
-// Both go along the tracks.
+// A built problem has its observations in the order of the model's tracks.
 std::vector<uint64_t> ElementsOf(const Model& model,
                                  const BuiltProblem& built) {
   const KnownRotationProblem& problem = built.problem;

@@ -15,9 +15,10 @@
 namespace krot::internal {
 namespace {
 
-// That noise alone exceeds the limit.
+// The probability that noise alone exceeds the limit.
 constexpr double kFalseAlarm = 0.05;
-// Few are enough where the last level's weights are at hand.
+// Slack programmes per level; a few are enough where the last level's weights
+// are at hand.
 constexpr int kFirstProgrammes = 4;
 constexpr int kNextProgrammes = 2;
 
@@ -73,7 +74,7 @@ void Profiler::Charge(ProfileLevel* level) {
   level->num_proved = static_cast<int64_t>(profile_.conflicts.size());
 }
 
-// In the place of those that removed no less.
+// Appends a level; earlier ones that removed no fewer observations are dropped.
 void Profiler::Append(ProfileLevel level) {
   std::vector<ProfileLevel>& levels = profile_.levels;
   while (levels.size() > 1 && levels.back().removal.observations.size() >=

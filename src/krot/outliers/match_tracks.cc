@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 
 // COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).
 constexpr int64_t kMinMatchesOfPair = 15;
-// Of a search for a baseline whose proof nobody asks for.
+// Cells of a search for a baseline; its optimality is not needed.
 constexpr int64_t kCellsOfPair = 1000;
 
 class MatchTriangulator {
@@ -35,7 +35,7 @@ class MatchTriangulator {
         model_(model),
         geometries_(ImageGeometries(model)) {}
 
-  // Where no positions are known.
+  // Makes tracks where no positions are known.
   Model RunOnRotations() {
     has_positions_ = false;
     TakeKeypoints();
@@ -70,7 +70,7 @@ class MatchTriangulator {
   }
 
  private:
-  // Moves the tracks out of the model.
+  // Moves the tracks out of the model, and finds the keypoints' rays.
   void TakeKeypoints() {
     points3D_ = std::move(model_.points3D);
     elements_ = std::move(model_.track_elements);
@@ -204,8 +204,8 @@ class MatchTriangulator {
     return numbers_.ModelWith(tracks, model_);
   }
 
-  // Takes out what belongs to one point and closes it, and what belongs to
-  // none. What is left is open.
+  // Accepts every track, or the part of it, that belongs to one point. Tracks
+  // without such a part are closed; what else is left stays open.
   void Divide(std::vector<MatchTrack> tracks) {
     Intersect(&tracks);
     const Model model = ModelWith(tracks);
@@ -242,7 +242,7 @@ class MatchTriangulator {
     accepted_.push_back(std::move(track));
   }
 
-  // Each track's l-infinity intersection.
+  // Moves each track's point to its l-infinity intersection.
   void Intersect(std::vector<MatchTrack>* tracks) const {
     for (MatchTrack& track : *tracks) {
       std::vector<Ray> rays;
@@ -281,8 +281,8 @@ class MatchTriangulator {
     }
   }
 
-  // Of each of `tracks` what is within the bound where `places` has its point,
-  // of every image the nearest.
+  // Of each of `tracks` the keypoints within the bound of the point in
+  // `places`, of every image only the nearest.
   std::vector<MatchTrack> NearestOf(
       std::vector<MatchTrack> tracks,
       const std::vector<MatchTrack>& places) const {
@@ -334,9 +334,9 @@ class MatchTriangulator {
   std::vector<TrackElement> elements_;
   KeypointNumbers numbers_;
   std::vector<PixelRay> rays_;  // world axes
-  // Of keypoints: has a ray and a pose and belongs to no point yet.
+  // Per keypoint: it has a ray and a pose and belongs to no point yet.
   std::vector<char> is_open_;
-  std::vector<int32_t> num_matches_;  // of keypoints, agreeing or not
+  std::vector<int32_t> num_matches_;  // per keypoint, agreeing or not
   std::vector<std::pair<int64_t, int64_t>> edges_;  // keypoints that match
   std::vector<MatchTrack> accepted_;
   bool has_positions_ = true;

@@ -19,7 +19,7 @@ namespace krot::internal {
 struct MatchTracksOptions {
   double max_error_px = 4;  // of an observation; > 0
   double min_angle_deg =
-      1.5;  // between two of a point's rays, the largest; >= 0
+      1.5;  // the largest between two of a point's rays; >= 0
   // Whether the model's own tracks count as matches; else they are ignored.
   bool keeps_tracks = false;
 };
@@ -29,9 +29,9 @@ struct MatchTracksSummary {
   int64_t num_contradictory_pairs = 0;  // fewer than a quarter of matches agree
   int64_t num_matches = 0;              // of the pairs used
   int64_t num_disagreeing = 0;  // of these, no point is within max_error_px
-  int64_t num_components = 0;   // of images and keypoints that matches join
+  int64_t num_components = 0;   // sets of keypoints that matches join
   int64_t num_image_twice = 0;  // of these, with two keypoints of an image
-  int64_t num_in_conflict = 0;  // of these, no point is within max_error_px
+  int64_t num_in_conflict = 0;  // tracks that no point fits; also joined anew
   int64_t num_two_views = 0;    // points left out, seen by one match alone
   int64_t num_narrow = 0;       // points left out, below min_angle_deg
 };
@@ -41,16 +41,17 @@ struct MatchTracksResult {
   MatchTracksSummary summary;
 };
 
-// As COLMAP's point_triangulator: images whose 2D points are not the database's
-// keypoints get these. Pairs of images need 15 matches. A match whose pixels
-// must move together by more than sqrt(2) max_error_px to lie on their epipolar
-// lines has no point within max_error_px of both, and goes. What the others
-// join is a track. Where its l-infinity intersection is within max_error_px of
-// all, it is kept as a whole: there is no conflict. Else the point that most of
-// it agrees with is found (PlacePointsRobustly); what is within max_error_px of
-// that, of every image the nearest, is a track, and the rest is joined anew.
-// Each point then moves to the least squares of its track; observations that
-// are above max_error_px there go. Two keypoints that have no match but each
+// Makes points from matches, as COLMAP's point_triangulator does. Images whose
+// 2D points are not the database's keypoints get these. Pairs of images need 15
+// matches, a quarter of which agree. A match is dropped if its pixels must move
+// together by more than sqrt(2) max_error_px to lie on their epipolar lines:
+// then no point is within max_error_px of both. The others join keypoints to
+// tracks. A track that sees no image twice is kept whole if its l-infinity
+// intersection is within max_error_px of all its keypoints. Otherwise the point
+// that most of it agrees with is found (PlacePointsRobustly); of every image
+// the nearest keypoint within max_error_px of that point is taken, and the rest
+// is joined anew. Each point then moves to the least squares of its track, and
+// observations above max_error_px there go. Two keypoints that match only each
 // other are left out, since nothing checks them.
 //
 // Throws std::invalid_argument for options out of range, ModelError for cameras
@@ -62,32 +63,33 @@ MatchTracksResult TriangulateMatches(const Model& model,
                                      const MatchTracksOptions& options,
                                      const Context& context);
 
-// Tracks of a model whose rotations and rigs alone are known; its positions
-// only have to be finite. A match counts if it agrees with the baseline that
-// most matches of its pair agree with (SearchBaseline). Keypoints of an image
-// that a track has twice are left out; points have no place. Otherwise as
-// TriangulateMatches.
+// Makes tracks for a model whose rotations and rigs alone are known; its
+// positions only have to be finite. A match counts if it agrees with the
+// baseline that most matches of its pair agree with (SearchBaseline). If a
+// track has several keypoints of an image, these are left out. Points stay at
+// the origin. Otherwise as TriangulateMatches.
 Model TracksFromRotations(const Model& model, const Database& database,
                           double max_error_px, const Context& context);
 
 struct PlacedMatches {
   Model model;  // without points where there is nothing to make them from
-  MatchTracksSummary summary;  // of its tracks
+  MatchTracksSummary summary;  // of the last triangulation
   int64_t num_unplaced = 0;    // images with rotations, but without a track
 };
 
-// Positions and points from rotations and matches, nothing else: the tracks of
-// the rotations alone, their robust start (FindRobustStart), then twice
-// TriangulateMatches and robust least squares of its tracks, since it divides
-// tracks and drops wrong matches better the better the positions are. Place and
-// scale are the model's where it has positions. Images without a track stay
-// where they are. Requires and throws what TriangulateMatches does, with
-// keeps_tracks false. The same bits at any number of threads.
+// Positions and points from rotations and matches alone. The tracks of the
+// rotations (TracksFromRotations) get a robust start (FindRobustStart). Its
+// positions serve TriangulateMatches, whose tracks move to their robust least
+// squares; with these positions TriangulateMatches runs again, because it
+// divides tracks and drops wrong matches better the better the positions are.
+// Place and scale are the model's where it has positions. Images without a
+// track stay where they are. Requires and throws what TriangulateMatches does,
+// with keeps_tracks false. The same bits at any number of threads.
 PlacedMatches PlaceMatches(const Model& model, const Database& database,
                            const MatchTracksOptions& options,
                            const Context& context);
 
-// What TriangulateMatches does with tracks that are given. Internal to it.
+// Steps of TriangulateMatches, internal to it.
 
 struct MatchTrack {
   std::vector<int64_t> keypoints;  // KeypointNumbers, ascending
@@ -100,50 +102,52 @@ class KeypointNumbers {
   KeypointNumbers() = default;
   explicit KeypointNumbers(const Model& model);
 
-  // Of the first keypoint of Model::images[image]; behind the last image the
-  // number of all.
+  // The number of the first keypoint of Model::images[image]; behind the last
+  // image the number of all keypoints.
   int64_t First(int64_t image) const { return begin_[image]; }
   int64_t size() const { return begin_.back(); }
   int32_t ImageOf(int64_t keypoint) const;
 
   bool HasImageTwice(const MatchTrack& track) const;
-  // Which of an image's keypoints is right cannot be told: none stays.
+  // Drops all keypoints of an image that has several, as the right one is
+  // unknown.
   void LeaveOutTwins(MatchTrack* track) const;
-  // A copy of a model without tracks that has these.
+  // A copy of `model`, which must have no tracks, with these.
   Model ModelWith(const std::vector<MatchTrack>& tracks, Model model) const;
 
  private:
   std::vector<int64_t> begin_ = {0};
 };
 
-// Takes the model's tracks and points from it, and gives its images the
-// database's keypoints as 2D points. Throws ModelError if tracks are to be kept
-// whose 2D points are others.
+// Removes the model's tracks and points, and gives its images the database's
+// keypoints as 2D points. Throws ModelError if tracks are to be kept, but an
+// image with tracks has other 2D points than the database.
 void TakeKeypointsOf(const Database& database, bool keeps_tracks, Model* model);
 
-// What matches (`edges`) join of the keypoints that are open, ascending, in the
-// order of their first ones; those that nothing joins are closed.
+// The sets of open keypoints that matches (`edges`) join: each ascending, in
+// the order of their first keypoints. Open keypoints that nothing joins are
+// closed.
 std::vector<std::vector<int64_t>> JoinMatches(
     const std::vector<std::pair<int64_t, int64_t>>& edges,
     std::vector<char>* is_open);
 
-// Of each point a place that most of its track agrees with, whatever the others
-// are (PlacePointsRobustly); where the point is if there is none.
+// For each point a place that most of its track agrees with, however far off
+// the others are (PlacePointsRobustly); the point's own place if there is none.
 std::vector<Eigen::Vector3d> RobustPlaces(const Model& model,
                                           double max_error_px,
                                           const Context& context);
 
 struct FittedTrack {
-  std::vector<uint64_t> elements;  // that are left, in Model::track_elements
+  std::vector<uint64_t> elements;  // what is left, in Model::track_elements
   Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
 };
 
-// Each point at the least squares of its track; observations that are then
-// above the bound go, the worst first.
+// Moves each point to the least squares of its track. As long as observations
+// are above the bound there, the worst one goes, and the point is fitted again.
 std::vector<FittedTrack> FitTracks(const Model& model, double max_error_px,
                                    const Context& context);
 
-// Removes points all of whose rays are within the angle. Returns the number.
+// Removes points whose rays are all within this angle. Returns how many.
 int64_t RemoveNarrow(double min_angle_deg, Model* model);
 
 }  // namespace krot::internal

@@ -14,10 +14,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Of the points that two frames see: so many with the most strained rays are
-// looked at.
+// For two frames, so many of the points that both see are looked at, the most
+// strained ones.
 constexpr int kStrainedPoints = 64;
-// Frames of a track that are looked at together; no more.
+// At most so many frames of a track are looked at together.
 constexpr size_t kMaxFramesTogether = 8;
 constexpr size_t kFramesInTriples = 4;
 
@@ -39,7 +39,7 @@ Neighbourhoods::Neighbourhoods(const KnownRotationProblem& problem,
   }
 }
 
-// Of the ray on which v = 0, in the world.
+// The direction in the world of the ray on which v = 0.
 Vector3d Neighbourhoods::Direction(int64_t i) const {
   const Observation& o = problem_.observations[i];
   const Vector3d u = o.E.row(1).cross(o.E.row(2)).transpose();
@@ -53,7 +53,7 @@ Vector3d Neighbourhoods::CentreOf(int64_t i) const {
   return -map.leftCols<3>().transpose() * map.col(3);
 }
 
-// By how much two rays miss each other, about, pixels: their epipolar error.
+// The strain of two rays, about: their epipolar error in pixels.
 double Neighbourhoods::Strain(int64_t i, int64_t j) const {
   const Vector3d baseline = CentreOf(j) - CentreOf(i);
   const Vector3d normal = baseline.cross(Direction(i));
@@ -63,7 +63,7 @@ double Neighbourhoods::Strain(int64_t i, int64_t j) const {
   return angle * problem_.observations[j].E.bottomRows<2>().norm();
 }
 
-// The points that both frames see freely, the most strained.
+// Appends the most strained points of which both frames have free observations.
 void Neighbourhoods::AddStrained(int32_t a, int32_t b,
                                  const std::vector<char>& is_free,
                                  std::vector<int32_t>* points) const {
@@ -91,7 +91,6 @@ void Neighbourhoods::AddStrained(int32_t a, int32_t b,
   for (size_t n = 0; n < count; ++n) points->push_back(strained[n].second);
 }
 
-// Observation i, and free ones of the frames.
 std::vector<int64_t> Neighbourhoods::Around(
     int64_t i, std::vector<int32_t> frames,
     const std::vector<char>& is_free) const {
@@ -117,8 +116,6 @@ std::vector<int64_t> Neighbourhoods::Around(
   return observations;
 }
 
-// Those of the track, beside its own, that observation i is tried with: the
-// most strained first.
 std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
     int64_t i, int num_others, const std::vector<char>& is_free) const {
   const int32_t k = problem_.observations[i].point;
@@ -148,8 +145,10 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
 
 namespace {
 
-// What an observation is worth that others of its track need.
+// The worth of an observation that others of its track need.
 constexpr float kWorthToItsTrack = 0.3F;
+// Free observations that a conflict in two views takes from the open one's
+// view.
 constexpr int64_t kCompanions = 2;
 
 }  // namespace

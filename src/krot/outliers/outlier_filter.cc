@@ -19,11 +19,11 @@
 namespace krot::internal {
 namespace {
 
-// What rounding may add to an error on its way into a model, relative.
+// Relative: rounding may raise an error by this much when a model is written.
 constexpr double kWithin = 1e-9;
 constexpr int kMaxThresholdSolves = 50;
 
-// Of the points that these observations are of; ascending.
+// The ids of these observations' points; ascending.
 std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
                                const std::vector<int64_t>& observations) {
   std::set<uint64_t> ids;
@@ -74,7 +74,7 @@ class OutlierFilter {
   std::vector<char> is_removed_;
   std::vector<int64_t> conflict_of_;
   RemovedObservations kept_;    // as of the last solve
-  bool is_given_back_ = false;  // the model, with nothing removed
+  bool is_given_back_ = false;  // nothing is removed, the model is the input
   OutlierFilterSummary summary_;
 };
 
@@ -100,8 +100,9 @@ void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
   *moved = ApplyEstimate(model_, built, placed);
 }
 
-// Conflicts that are at hand already go to `found`. None if noise explains all
-// errors where it is to choose the bound, which is set otherwise.
+// Chooses what to remove. Conflicts that this finds on the way go to `found`.
+// Where noise is to choose the bound, it is set here, or none is returned if
+// noise explains all errors.
 std::optional<Removal> OutlierFilter::RemoveFew(const BuiltProblem& built,
                                                 std::vector<Conflict>* found) {
   if (built.pixels.empty()) return Removal{{}, built.start, {}};
@@ -112,8 +113,9 @@ std::optional<Removal> OutlierFilter::RemoveFew(const BuiltProblem& built,
     bound_.max_error = summary_.noise->limit.max_error;
   }
   const Timer timer;
-  // Those of a robust start are few already: programmes take ten times as long
-  // to find a two-hundredth fewer, and hold no part's scale.
+  // A robust start leaves few above the bound already: programmes would take
+  // ten times as long to find a two-hundredth fewer, and do not hold parts'
+  // scales.
   const bool is_enough =
       summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
   Removal removal = FindRemoval(model_, built, bound_, context_,
@@ -198,7 +200,8 @@ void OutlierFilter::Solve(Model moved) {
   const Timer timer;
   kept_ = RemoveObservations(moved, is_removed_);
   if (!kept_.model.track_elements.empty()) {
-    // Where all that is left can be within the bound, the least squares there.
+    // If all that is left can be within the bound, its least squares below
+    // that.
     SolveModelOptions options = options_.solve;
     options.init = SolveInit::kModel;
     options.polish = Polish::kNone;
@@ -211,7 +214,7 @@ void OutlierFilter::Solve(Model moved) {
   summary_.seconds_solve += timer.Seconds();
 }
 
-// Removes what is above the bound in the solved model; whether anything was.
+// Removes what is above the bound in the solved model. Returns whether any was.
 bool OutlierFilter::RemoveAbove() {
   const std::vector<double> errors =
       PixelErrors(kept_.model, context_.num_threads);
@@ -224,7 +227,7 @@ bool OutlierFilter::RemoveAbove() {
   return is_any;
 }
 
-// Of the model that was solved, by all tracks of the input.
+// Looks for weakly tied parts in the solved model, by all tracks of the input.
 void OutlierFilter::FindWeakParts(const BuiltProblem& built) {
   Estimate estimate = built.start;
   for (size_t f = 0; f < built.frame_of.size(); ++f) {
@@ -287,7 +290,7 @@ void OutlierFilter::FilterByConflicts() {
   if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
     FindWeakParts(built);
   }
-  // What took no part in all that.
+  // Observations that had no part in the problem may still be above the bound.
   if (!RemoveAbove()) return;
   Model solved = std::move(kept_.model);
   std::vector<char> is_gone(solved.track_elements.size());

@@ -15,9 +15,10 @@
 namespace krot::internal {
 namespace {
 
-// Of the open observations so many, the worst, are tried in more frames.
+// Of the open observations, so many with the largest errors are tried in more
+// frames.
 constexpr size_t kMaxForMoreFrames = 400;
-// More tight observations than these are left alone.
+// If more observations are tight, no conflicts are looked for among them.
 constexpr size_t kMaxTight = 250;
 // Open observations that look for a conflict at the same time.
 constexpr size_t kBatch = 16;
@@ -59,7 +60,7 @@ class Packing {
     return ProveConflict(model_, built_, bound_, small_context_, conflict,
                          work);
   }
-  // Asked while there is more to do.
+  // Reports progress. False at the limit of work, or if cancelled.
   bool MayGoOn() {
     context_.Stage("conflicts of removed observations",
                    static_cast<int64_t>(conflicts_.size()),
@@ -93,9 +94,9 @@ class Packing {
   std::vector<Conflict> conflicts_;
 };
 
-// Whether observation i and the others of its point in the frames are within
-// the bound where the frames stand, as all that stay are: then they are part of
-// no conflict with these.
+// Whether a point brings observation i and its other observations in the frames
+// within the bound, the frames fixed. All observations that stay are within it,
+// too, so that there is no conflict with them in these frames.
 bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
   const int32_t k = problem_.observations[i].point;
   std::vector<int64_t> observations;
@@ -113,7 +114,7 @@ bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
              .IntersectPoints(&estimate) <= bound_.max_error;
 }
 
-// A conflict among observations (ascending) that hang together with i.
+// Looks for a conflict in the connected part of `near` (ascending) that has i.
 std::optional<Conflict> Packing::Refute(int64_t i,
                                         const std::vector<int64_t>& near,
                                         Work* work) const {
@@ -125,7 +126,7 @@ std::optional<Conflict> Packing::Refute(int64_t i,
   return std::nullopt;
 }
 
-// A conflict of observation i in its frame and others.
+// Looks for a conflict of observation i in its frame and others.
 std::optional<Conflict> Packing::Try(int64_t i,
                                      const std::vector<int32_t>& frames,
                                      Work* work) const {
@@ -163,8 +164,8 @@ std::optional<Conflict> Packing::InTwoViews(int64_t i,
   return std::nullopt;
 }
 
-// Those that are left open found none. What is found at the same time and needs
-// the same observations is looked for anew.
+// Observations left in `open` found no conflict. Those whose conflict shares
+// observations with one found at the same time search again.
 void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
   std::vector<int64_t> queue(open->rbegin(), open->rend());
   std::vector<int64_t> left;
@@ -202,7 +203,8 @@ void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
   *open = std::move(left);
 }
 
-// Looks in all the frames' sets at once and takes the smallest conflict.
+// Looks in all sets of frames at once and takes the smallest conflict that is
+// proved.
 bool Packing::Charge(int64_t i, int num_others) {
   const std::vector<std::vector<int32_t>> sets =
       neighbourhoods_.FrameSets(i, num_others, is_free_);
@@ -225,8 +227,8 @@ bool Packing::Charge(int64_t i, int num_others) {
   return false;
 }
 
-// Those that are left open found no conflict of their own. Those that barely
-// miss the bound hardly ever find one in more frames.
+// Observations left in `open` found no conflict. Only those with the largest
+// errors are tried: others hardly ever find a conflict in more frames.
 void Packing::ChargeInFrames(std::vector<int64_t>* open) {
   for (const int num_others : {2, 3}) {
     std::vector<int64_t> left;
@@ -242,8 +244,9 @@ void Packing::ChargeInFrames(std::vector<int64_t>* open) {
   }
 }
 
-// Conflicts of two views are the smallest, but have three observations in the
-// open one's view; others may have two.
+// Conflicts of two views are the smallest, but take three observations of the
+// open one's view; conflicts of more views may take two, so crowded views try
+// these first.
 void Packing::Charge(std::vector<int64_t>* open) {
   std::vector<int64_t> crowded = TakeCrowded(problem_, is_free_, open);
   ChargeInFrames(&crowded);

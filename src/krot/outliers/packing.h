@@ -15,19 +15,22 @@
 namespace krot::internal {
 
 // Where to look for a small conflict of an observation: in a few frames of its
-// track, among the points there whose rays miss each other by most.
+// track, among the points with the largest strain there. The strain of two rays
+// is by how much they miss each other, in pixels.
 class Neighbourhoods {
  public:
   // Keeps references. Cameras stand as in `estimate`.
   Neighbourhoods(const KnownRotationProblem& problem, const Estimate& estimate);
 
-  // Sets of frames of the track of observation i, beside its own: pairs of the
-  // most strained, for num_others = 2, or all. Only those of free observations.
+  // The sets of frames to look in, beside the frame of observation i. For
+  // num_others = 2 these are pairs of the most strained frames of its track,
+  // otherwise one set of up to eight. Only frames with free observations count.
   std::vector<std::vector<int32_t>> FrameSets(
       int64_t i, int num_others, const std::vector<char>& is_free) const;
 
-  // Observation i, and in its frame and the others the free ones of its own
-  // point and of the most strained that two of them see. Ascending.
+  // Observation i and the free observations, in its frame and the others, of
+  // its own point and of the most strained points that two of these frames see.
+  // Ascending.
   std::vector<int64_t> Around(int64_t i, std::vector<int32_t> frames,
                               const std::vector<char>& is_free) const;
 
@@ -46,47 +49,47 @@ class Neighbourhoods {
   std::vector<std::vector<int32_t>> points_of_frame_;  // ascending
 };
 
-// What is scarce where open observations look for conflicts: no two may share
-// an observation.
+// No two conflicts may share an observation. So each should use observations
+// that others need least.
 
-// How dispensable observations are, in [0, 1]: those that are not free not at
-// all, those of a track that an open one has little else of less than others.
+// How dispensable each observation is, in [0, 1]: 0 if it is not free, less
+// than 1 if the track of an open observation has little else, otherwise 1.
 std::vector<float> Worths(const KnownRotationProblem& problem,
                           const std::vector<char>& is_free,
                           const std::vector<int64_t>& open);
 
-// Takes those out of `open` whose view has not enough free observations for a
-// conflict in two views of each, which needs two. Both keep their order.
+// Takes out of `open` the observations in crowded views, and returns them:
+// views that have fewer than two free observations for each open one, as a
+// conflict in two views needs. Both keep their order.
 std::vector<int64_t> TakeCrowded(const KnownRotationProblem& problem,
                                  const std::vector<char>& is_free,
                                  std::vector<int64_t>* open);
 
-// Where to look for the smallest conflict of an observation: with two other
+// Where to look for the smallest conflict of an observation o: with two other
 // points in its image and one more, six observations in all.
 //
-// Of two views only the direction b of the baseline matters. Observations of a
-// point within a bound are two narrow cones of rays, and allow a band of
+// Of two views only the direction b of the baseline matters. Two observations
+// of a point within a bound are two narrow cones of rays, and allow a band of
 // directions: the hull of the one cone and the other reversed. Its edges are
 // great circles, two half-planes n'x <= c of the chart b = e + x around the
-// estimate's direction e. By Helly's theorem three bands without a common
-// direction are all that it takes, and where o excludes x = 0 and j, k do not,
+// estimate's direction e. By Helly's theorem, if some bands have no common
+// direction, three of them have none. Where o excludes x = 0 and j, k do not,
+// these are three with lambda > 0 and
 //
-//   n_o + lambda_j n_j + lambda_k n_k = 0,   c_o + lambda_j c_j + lambda_k c_k
-//   < 0
-//
-// with lambda > 0 is such a triple.
+//   n_o + lambda_j n_j + lambda_k n_k = 0,
+//   c_o + lambda_j c_j + lambda_k c_k < 0.
 class TwoViewConflicts {
  public:
   // Keeps references. Cameras stand as in `estimate`; the bound is in pixels.
   TwoViewConflicts(const KnownRotationProblem& problem,
                    const Estimate& estimate, double max_error);
 
-  // Sets of observations, ascending, that do not go together as far as this
-  // tells, each with i, which is above the bound at the estimate: the most
-  // dispensable first. worth[j] in [0, 1] says how dispensable another is, 0:
-  // not to be used. Those in the middle of their bands are more so, and tight
-  // ones are left to those that need them. O(observations of the views of i's
-  // track).
+  // Sets of observations, ascending, each with i, that conflict as far as this
+  // test tells; the most dispensable first. Observation i must be above the
+  // bound at the estimate. worth[j] in [0, 1] says how dispensable observation
+  // j is, 0: not to be used. Points in the middle of their bands count as more
+  // dispensable, so that those near an edge are left to observations that need
+  // them. O(observations of the views of i's track).
   std::vector<std::vector<int64_t>> Candidates(
       int64_t i, const std::vector<float>& worth) const;
 
@@ -106,19 +109,19 @@ class TwoViewConflicts {
   std::vector<std::vector<int64_t>> observations_of_view_;  // ascending
 };
 
-// What is found of the conflicts that removed observations take part in.
+// Conflicts that removed observations take part in.
 struct ConflictPacking {
   std::vector<Conflict> conflicts;
-  bool is_complete = true;  // false: it ended for want of work
+  bool is_complete = true;  // false: it ended at the limit of work
 };
 
-// An endoscope's model needs 1,300, and most fewer than 300.
+// Work per observation. An endoscope's model needs 1,300, most fewer than 300.
 inline constexpr int64_t kMostWork = 1500;
 
-// Disjoint conflicts, each of which charges one of the removed observations
-// with what others it does not go together with, so that as many as possible
-// have one of their own. For each, those that barely miss the bound first, as
-// they have the least choice, it looks
+// Packs disjoint conflicts so that as many removed observations as possible
+// have one of their own: each charges a removed observation with others that
+// cannot be satisfied together with it. The removed observations with the
+// smallest errors come first, as they have the least choice. For each it looks
 //
 //   in its image alone and one other of its track, with the companions that
 //     others need least,
@@ -126,15 +129,15 @@ inline constexpr int64_t kMostWork = 1500;
 //     each other by most,
 //   and at last among the removal's tight observations,
 //
-// first among those that are neither removed nor taken already, so that no
-// other has to share the charge, then with the removed ones that found none.
-// Small conflicts leave more to others.
+// first among observations that are neither removed nor in a conflict, so that
+// removed ones do not share a conflict, then also among the removed ones that
+// found none. Small conflicts are preferred, as they leave more to others.
 //
-// Those that are `found` already, without a common observation, stay, and come
+// Conflicts that are already `found`, which must be disjoint, stay and come
 // first.
 //
 // Where hardly anything can be decided, as with wrong rotations, it ends with
-// the conflicts so far once it has taken `work_per_observation` (Work) for each
+// the conflicts so far once it has done `work_per_observation` (Work) for each
 // observation of the problem.
 ConflictPacking PackAgainstRemoval(
     const Model& model, const BuiltProblem& built, const ErrorBound& bound,

@@ -162,8 +162,8 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
     }
     KeepStrongest(sizes.size(), &pairs);
     SortStrongestFirst(&pairs);
-    // Each becomes one with at most one other at a time, as it has other tracks
-    // in common afterwards.
+    // In each pass a group is united with at most one other, because the tracks
+    // that it shares change by that.
     std::vector<char> has_best(problem.num_frames, 0);
     std::vector<char> is_done(problem.num_frames, 0);
     goes_on = false;
@@ -194,12 +194,13 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// So many of the pairs of tracks are tried, about, for a place.
+// About so many pairs of tracks are tried for a place at a given scale, and
+// about so many pairs or triples for a place and a scale.
 constexpr int64_t kTriedPlaces = 60;
 constexpr int64_t kProposals = 300;
 constexpr int kNewtonSteps = 5;
 
-// M^-1, of a matrix that may lack a direction.
+// M^-1, where M may be singular.
 Matrix3d InverseOf(const Matrix3d& M) {
   return (M + 1e-9 * M.trace() * Matrix3d::Identity()).inverse();
 }
@@ -225,7 +226,8 @@ Normal NormalOf(const KnownRotationProblem& problem,
   return normal;
 }
 
-// Either group's, or what both agree on best.
+// The point of a track with the lowest cost: either group's, or the one that
+// both agree on best.
 std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
                                                    const Place& place) const {
   const Vector3d x_b = place.scale * (place.rotation * track.b.x) + place.shift;
@@ -241,7 +243,7 @@ std::pair<Vector3d, double> PlaceSearch::BestPoint(const SharedTrack& track,
   return best;
 }
 
-// A step of Gauss-Newton in the shift and the points, of the tracks that agree.
+// A step of Gauss-Newton in the shift and the points of the tracks that agree.
 Place PlaceSearch::Improve(const Place& place) const {
   Matrix3d S = Matrix3d::Zero();
   Vector3d rhs = Vector3d::Zero();
@@ -263,8 +265,8 @@ Place PlaceSearch::Improve(const Place& place) const {
   return moved;
 }
 
-// Every track says of the shift t that (t - x_a + scale x_b)' W (...) is small,
-// W^-1 = H_a^-1 + H_b^-1; two of them say where it is.
+// For every track (t - x_a + scale x_b)' W (...) is to be small, with t the
+// shift and W^-1 = H_a^-1 + H_b^-1; two tracks determine t.
 Place PlaceSearch::BestPlace(double scale) const {
   const auto count = static_cast<int64_t>(tracks_.size());
   std::vector<Normal> of_shift(tracks_.size());

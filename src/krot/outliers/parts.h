@@ -26,7 +26,7 @@ struct GroupPair {
   double strength = 0;  // how many tracks both see, or their share
 };
 
-// Groups of frames, and what they see of the tracks. O(observations).
+// Groups of frames, and which tracks they see. O(observations).
 class Groups {
  public:
   // Starts with the group of every frame.
@@ -36,16 +36,16 @@ class Groups {
   // All frames of group g go over to group new_group[g].
   void Merge(const std::vector<int32_t>& new_group);
 
-  // Every two groups a < b that share tracks, with how many. O(sum over tracks
-  // of their squared numbers of groups).
+  // All pairs of groups a < b that share tracks; their strength is the number of
+  // these. O(sum over tracks of their squared numbers of groups).
   std::vector<GroupPair> Pairs() const;
-  // Per group: the tracks that two of its frames see or, if it is one, this
-  // one, in all and of these those that others see, too: two others at least,
-  // if the scales are to be compared.
+  // Per group: the tracks that two of its frames see, or its only frame; and of
+  // these the tracks that frames of other groups see, too: at least two such
+  // frames if scales are to be compared, otherwise one.
   struct Count {
     int64_t num_tracks = 0;
     int64_t num_shared = 0;
-    // That two others see, whether two of its frames see them or one.
+    // Tracks of the group, even of one frame, that two others see.
     int64_t num_located = 0;
   };
   std::vector<Count> Counts(bool compares_scales) const;
@@ -64,42 +64,42 @@ class Groups {
   std::vector<Sight> sights_;   // by track, then by group
 };
 
-// Equal ones by their numbers.
+// Pairs of the same strength are ordered by their groups' numbers.
 void SortStrongestFirst(std::vector<GroupPair>* pairs);
 
-// When a group of frames is tied to others so well that it is no part of its
-// own.
+// How well a group of frames must be tied to others to be no part of its own.
 inline constexpr int64_t kStrongTracks = 50;
 struct PartOptions {
   int64_t min_tracks = kStrongTracks;  // that it shares with others
-  // Whether only tracks count that two frames of the group and two others see:
-  // these compare the scales.
+  // Whether only tracks count that two frames of the group and two others see,
+  // as only these compare the scales.
   bool compares_scales = true;
-  double min_share = 0;  // of its tracks
+  double min_share = 0;  // the share of its tracks that it shares
 };
 
-// The part of every frame, numbered from 0 in the order of their first frames;
-// the problem must be connected. A group that is tied to others becomes one
-// with that which it shares most of its tracks with, until none is left; first
-// the two that share most. A single frame, which has no scale, is always tied,
-// and so is a group of so few tracks of its own that others say more.
-// O(sum over tracks of their squared lengths), a dozen times.
+// The part of every frame, numbered from 0 in the order of their first frames.
+// The problem must be connected. All frames begin as groups of one. A group
+// that is well tied to others is united with the one that it shares most of its
+// tracks with, the strongest pair first, until no such group is left. A single
+// frame, which has no scale, always counts as tied, and so does a group with so
+// few tracks of its own that others say more about it. O(sum over tracks of
+// their squared lengths), a dozen times.
 std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
                                const PartOptions& options);
 
-// Chi-squared of three degrees of freedom: one right track in a thousand has
-// more.
+// The 99.9 % quantile of chi-squared of three degrees of freedom: one right
+// track in a thousand exceeds it.
 inline constexpr double kCutOff = 16.3;
-// Three standard deviations.
+// Three standard deviations, squared: costs that rise by less are no worse.
 inline constexpr double kNoWorse = 9;
 
-// What one group says of a track: its point there, and the observations that
-// agree with that.
+// What one group says about a track: its point there, and the observations that
+// agree with it.
 struct Side {
   Eigen::Vector3d x = Eigen::Vector3d::Zero();
   std::vector<int64_t> observations;
   double sum = 0;                               // of their squared errors there
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();  // of that, by the point
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();  // J'J of these, by the point
 };
 
 struct SharedTrack {
@@ -114,7 +114,8 @@ struct Place {
   double cost = std::numeric_limits<double>::infinity();  // squared pixels
 };
 
-// Squared errors and their derivatives by the point; both add up.
+// The sums J'J and J'r of the errors r of a side, J their derivatives by the
+// point.
 struct Normal {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -124,8 +125,8 @@ Normal NormalOf(const KnownRotationProblem& problem,
                 const std::vector<AffineMap>& cameras, const Side& side,
                 const Eigen::Vector3d& x);
 
-// The place and the scale of one group against another, as their tracks have
-// it.
+// Finds the place and the scale of one group relative to another by the tracks
+// that both see.
 class PlaceSearch {
  public:
   PlaceSearch(const KnownRotationProblem& problem, const Estimate& estimate,
@@ -135,10 +136,10 @@ class PlaceSearch {
         variance_(sigma * sigma),
         tracks_(std::move(tracks)) {}
 
-  // The best that two tracks with points on either side propose, for many such
-  // pairs; none where there are few such tracks.
+  // The best of the places that pairs of tracks with points on either side
+  // propose; none if there are too few such tracks.
   std::optional<Place> Propose() const;
-  // The same with a turn, which three tracks propose; for few tracks, too.
+  // The same with a rotation, which three tracks propose; for few tracks, too.
   std::optional<Place> ProposeTurned() const;
   double Cost(const Place& place) const {
     double sum = 0;
@@ -147,7 +148,7 @@ class PlaceSearch {
     }
     return sum;
   }
-  // The best of all scales first.
+  // The best place for each of the scales, lowest cost first.
   std::vector<Place> Profile(const std::vector<double>& scales,
                              const Context& context) const;
   int64_t NumAgreeing(const Place& place) const {
@@ -186,53 +187,53 @@ class PlaceSearch {
   const std::vector<SharedTrack> tracks_;
 };
 
-// Parts of a problem that few tracks join, and how well these hold the scale of
-// one part against that of the other.
+// Parts of a problem that few tracks join, and how well these tracks hold the
+// scale of one part relative to the other.
 
 // Two groups of frames that few tracks join.
 struct WeakLink {
   std::vector<int32_t> frames;  // of the smaller group, ascending
   int64_t num_tracks = 0;       // that frames of both groups see
-  // Of these: the tracks that say something about place and scale, and of these
-  // those that agree on the place and the scale that most agree on.
+  // Of these: the tracks that say something about place and scale, and those
+  // among them that agree with the best place and scale.
   int64_t num_telling = 0;
   int64_t num_agreeing = 0;
-  // The group may be larger or smaller by this factor, about, and the tracks
+  // The group could be larger or smaller by about this factor, and the tracks
   // would fit as well; infinite if any scale fits. >= 1.
   double scale_factor = 1;
-  // By how much the group's rotations, all alike, would have to turn against
-  // the others', degrees, for more tracks to agree, and how many then would;
-  // 0: no turn was found. Rotations are known, so that nothing turns.
+  // By how much the group's rotations would all have to turn relative to the
+  // others', degrees, for more tracks to agree, and how many would agree then;
+  // 0: no turn was found. Nothing is turned, as rotations are known.
   double turn_deg = 0;
   int64_t num_agreeing_turned = 0;
 
-  // Beyond this factor, and where the tracks that agree are no more than those
-  // that do not, nobody should rely on scale and place.
+  // Whether scale and place can be relied on: the scale is held to a tenth, and
+  // more tracks agree than disagree.
   bool IsHeld() const {
     return scale_factor <= 1.1 && 2 * num_agreeing > num_telling;
   }
 };
 
-// Makes one estimate of those of all parts, whose places and scales have
-// nothing to do with each other: the two groups that share most tracks are
-// joined first, and so on. For every scale on a fine logarithmic grid the place
-// is found at which the tracks of both fit best, whatever some of them say
-// (reprojection errors, squared, each track's cut off); of all scales the best
-// is taken. A scale that is no worse by more than three standard deviations of
-// the noise may be the right one, too: WeakLink::scale_factor.
+// Makes one estimate of those of all parts, each of which has its own place and
+// scale. The two groups that share most tracks are joined first, and so on. For
+// every scale on a fine logarithmic grid the place is found at which the tracks
+// of both fit best: the cost is the sum of squared reprojection errors, limited
+// for each track, so that some tracks may be wrong. Of all scales the one with
+// the lowest cost is taken. Scales whose cost is higher by at most three
+// standard deviations of the noise may be right, too: WeakLink::scale_factor.
 //
-// Translations of `*estimate` change; points that it has are those of their
-// part (point_part; -1: it has none) and change with it.
+// Changes the translations of `*estimate` and those of its points that belong
+// to a part (point_part; -1: none).
 std::vector<WeakLink> JoinParts(const KnownRotationProblem& problem,
                                 const std::vector<int32_t>& parts,
                                 const std::vector<int32_t>& point_part,
                                 double cap, const Context& context,
                                 Estimate* estimate);
 
-// The same links of an estimate that is one already, of which only the
-// translations count: by how much the scales could be other than they are.
-// Every component's; none where no part hangs on few tracks. Points are placed
-// anew, no error counted for more than `cap`, pixels.
+// The same links of an estimate that is complete already, of which only the
+// translations are used: how much could the scales differ from the estimate's?
+// For every connected component; none where no part hangs on few tracks. Points
+// are placed anew, and no error counts for more than `cap`, pixels.
 std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
                                     const Estimate& estimate, double cap,
                                     const Context& context);

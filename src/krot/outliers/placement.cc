@@ -20,10 +20,10 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int64_t kPlacesPerTask = 64;
-// So many of the pairs of rays are tried, about.
+// About so many pairs of rays are tried.
 constexpr int64_t kTriedPairs = 60;
 
-// Where v = 0 and w > 0, in the world; of unit length.
+// The direction in the world where v = 0 and w > 0; of unit length.
 Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i) {
   const Observation& o = problem.observations[i];
   Vector3d ray = o.E.row(1).cross(o.E.row(2)).transpose();
@@ -32,15 +32,15 @@ Vector3d DirectionOf(const KnownRotationProblem& problem, int64_t i) {
       .normalized();
 }
 
-// A place near most of its rays, in numbers of error(n, place) of the n-th,
-// none counted for more than the cap.
+// Finds a place near most rays. error(n, place) is the error of the n-th ray
+// there; none counts for more than the cap.
 template <typename Error>
 class RobustPlace {
  public:
   RobustPlace(const std::vector<Ray>& rays, double cap, const Error& error)
       : rays_(rays), cap_(cap), error_(error) {}
 
-  // From `depth` along the first ray. There must be one.
+  // Starts at `depth` along the first ray, which must exist.
   Vector3d Find(double depth) {
     best_ = rays_.front().centre + depth * rays_.front().direction;
     lowest_ = Score(best_);
@@ -85,7 +85,7 @@ class RobustPlace {
   double lowest_ = 0;
 };
 
-// Of the observations of all points but the given ones; 1 if there are none.
+// The median depth of all points but the given ones; 1 if there are none.
 double MedianDepthOfOthers(const KnownRotationProblem& problem,
                            const std::vector<int32_t>& points,
                            const Estimate& estimate) {

@@ -40,7 +40,7 @@ void NearSet::AddAbove(const std::vector<double>& errors, double level) {
   TieFrames();
 }
 
-// Those that are missing are taken evenly along the track.
+// Adds observations of a point, evenly along its track, up to kTiesPerPoint.
 void NearSet::TiePoint(int32_t point) {
   const int64_t begin = problem_->point_begin[point];
   const int64_t end = problem_->point_begin[point + 1];
@@ -86,24 +86,26 @@ std::vector<std::vector<int64_t>> NearSet::Parts() const {
 
 namespace {
 
-// Of the bound: what the interior point leaves open.
+// The programmes' bound is lower by this share, since the interior point ends
+// slightly above its optimum.
 constexpr double kInside = 1e-3;
-// So many programmes in a row that remove no fewer are the last but one.
+// After so many programmes in a row that remove no fewer, only one more is
+// solved.
 constexpr int kPatience = 3;
-// Of the bound: what comes nearer is looked at from then on.
+// Observations with errors above this share of the bound are looked at.
 constexpr double kNear = 0.5;
-// Of the bound: less excess is dear.
+// It is costly to exceed the bound by less than this share of it.
 constexpr double kDear = 0.03;
-// Where the programmes end, of the bound, and where the last one does.
+// Relative to the bound: the last mu of most programmes, and of the last one.
 constexpr double kRoughMu = 1e-3;
 constexpr double kFineMu = 1e-5;
-// In units of the bound: what an error at the start counts for at most.
+// In units of the bound: larger excesses get the weight of this one.
 constexpr double kLargestExcess = 100;
-// Observations with less of a multiplier have no say.
+// Observations with a lower price (SlackSolution) do not count as tight.
 constexpr double kSmallPrice = 1e-2;
 constexpr int64_t kErrorsPerTask = 4096;
 
-// The observations above a bound, by their errors.
+// The observations whose errors are above a bound.
 std::vector<int64_t> Above(const std::vector<double>& errors,
                            double max_error) {
   std::vector<int64_t> above;
@@ -146,8 +148,8 @@ std::vector<double> RemovalSearch::WeightsOfErrors() const {
   return WeightsAgainst(excess, max_error_, kDear);
 }
 
-// Solves what the part, which hangs together, exceeds the bound by, with rows
-// as they are, and sets the weights of the next programme.
+// Solves the slack programme of a connected part, with rows as they are, and
+// sets the weights of the next one.
 void RemovalSearch::Excess(const std::vector<int64_t>& part,
                            double smallest_mu) {
   const ProblemSubset subset(rows_, part);
@@ -168,8 +170,9 @@ void RemovalSearch::Excess(const std::vector<int64_t>& part,
   }
 }
 
-// Of what comes near the bound. Others may have come above it afterwards, and
-// take part in the next with weights for that.
+// Solves the programme of the observations that came near the bound. Others
+// that it lifts above the bound take part in the next one, weighted by their
+// errors.
 void RemovalSearch::SolveProgramme(double smallest_mu) {
   reprojection_.TakeRows(estimate_, context_.num_threads, &rows_);
   near_.AddAbove(errors_, kNear * max_error_);
@@ -191,8 +194,8 @@ void RemovalSearch::Offer(Removal* best) const {
   best->estimate = estimate_;
 }
 
-// Every point with observations removed tries to take back that which is
-// nearest to the bound. Whether one did.
+// Every point with removed observations tries to take back the one with the
+// smallest error. Returns whether any did.
 bool RemovalSearch::TakeBack(Removal* best) {
   std::vector<char> is_removed(rows_.observations.size(), 0);
   for (const int64_t i : best->observations) is_removed[i] = 1;

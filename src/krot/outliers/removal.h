@@ -16,19 +16,19 @@
 namespace krot::internal {
 
 // The observations that a slack programme looks at: those that come near the
-// bound, and enough others to tie their points and every frame. An optimum of
-// theirs is one of all as long as no other exceeds the bound there.
+// bound, and enough others to tie their points and every frame. Its optimum is
+// one of all observations as long as no other exceeds the bound there.
 class NearSet {
  public:
   // Empty. Keeps a reference to `problem`.
   explicit NearSet(const KnownRotationProblem& problem);
 
-  // Adds the observations whose error, one each, is above `level`, and ties.
+  // Adds the observations whose errors (one each) are above `level`, and ties.
   // O(observations).
   void AddAbove(const std::vector<double>& errors, double level);
 
   bool Contains(int64_t i) const { return contains_[i] != 0; }
-  // By connected component, each ascending.
+  // The connected components of its observations, each ascending.
   std::vector<std::vector<int64_t>> Parts() const;
 
  private:
@@ -42,31 +42,32 @@ class NearSet {
 // Observations without which all others are within a bound.
 struct Removal {
   std::vector<int64_t> observations;  // of the built problem, ascending
-  // At which the true errors of all others are within the bound.
+  // An estimate at which the true errors of all others are within the bound.
   Estimate estimate;
-  // The observations that had a say in it: conflicts are to be looked for among
-  // them. Ascending.
+  // The observations that influenced the slack programmes' solutions: conflicts
+  // are looked for among them. Ascending.
   std::vector<int64_t> tight;
 };
 
-// Few observations to remove, by the slack programme (conic/interior_point.h):
-// solved with weights that make those dear that exceed the bound by little at
-// the start, and again with those of the solution, as long as that makes them
-// fewer [Candes, Wakin, Boyd 2008]; rows are taken anew each time. It looks at
-// the observations that came near the bound so far; points then take back what
-// they can where the frames stand. Never more than are above the bound at
-// built.start.
+// Finds few observations to remove by the slack programme
+// (conic/interior_point.h). The weights of the first one make it costly to
+// exceed the bound by little at the start. Each next one has rows and weights
+// from the last solution, as long as this leaves fewer observations above the
+// bound [Candes, Wakin, Boyd 2008]. A programme looks at the observations that
+// came near the bound so far. Points then take back what fits after all, the
+// frames fixed. Never removes more than are above the bound at built.start.
 //
-// One bound after the other: each begins with the estimate and the weights that
-// the last one ended with.
+// A search may be asked for one bound after the other: each begins with the
+// estimate and the weights that the last one ended with.
 class RemovalSearch {
  public:
   // Keeps references.
   RemovalSearch(const Model& model, const BuiltProblem& built, Norm norm,
                 const Context& context);
 
-  // max_error in true pixels, > 0; solves at most so many programmes. Of 0 it
-  // is what is above the bound at built.start, but for what points take back.
+  // max_error in true pixels, > 0. Solves at most `max_programmes`; with 0 of
+  // them the result is what is above the bound at built.start or, if that is
+  // less, at the last search's estimate, but for what points take back.
   Removal Find(double max_error, int max_programmes);
 
  private:
@@ -93,7 +94,7 @@ class RemovalSearch {
   std::vector<char> is_tight_;
 };
 
-// With a bound alone.
+// A search for a single bound.
 inline constexpr int kMaxProgrammes = 16;
 Removal FindRemoval(const Model& model, const BuiltProblem& built,
                     const ErrorBound& bound, const Context& context,
@@ -101,17 +102,17 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
 
 // The lowest largest error of some observations, proved.
 struct OptimumWithout {
-  Estimate estimate;     // of the whole
+  Estimate estimate;     // of the whole problem
   double max_error = 0;  // there, true pixels
-  // That no translations and points bring them below; true pixels, 0 without a
-  // proof, which CheckPixelCertificate accepted otherwise.
+  // No translations and points bring them below this; true pixels. 0 without a
+  // proof; otherwise CheckPixelCertificate accepted it.
   double lower_bound = 0;
   std::optional<PixelCertificate> proof;  // of the built problem
 };
 
-// Of all observations but the `removed` (ascending), by SolveInRounds from
-// `start`, where the depths of the others must be positive. Those that alone
-// hold a point or a frame bound nothing and have no part.
+// The optimum of all observations but the `removed` (ascending), by
+// SolveInRounds from `start`, where their depths must be positive. Observations
+// that alone hold a point or a frame bound nothing and are left out.
 OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
                             const std::vector<int64_t>& removed,
                             const Estimate& start, Norm norm,

@@ -22,22 +22,23 @@
 namespace krot::internal {
 namespace {
 
-// So much redundancy that tracks check each frame by, doubled until they hang
-// together. A track of n observations has 2 n - 3, 2 - 3 / n for each of them.
+// The redundancy that tracks must give each frame, doubled until the tracks are
+// connected. A track of n observations has 2 n - 3, 2 - 3 / n for each of them.
 constexpr double kRedundancyPerFrame = 120;
-// Parts whose programmes are solved on their own.
+// A group that shares less of its tracks with others is a part with a programme
+// of its own.
 constexpr double kStrongShare = 0.2;
 // Programmes after the first, with weights.
 constexpr int kStartReweightings = 1;
-// A start needs no more; of the level.
+// A start needs no smaller mu; relative to the level.
 constexpr double kStartMu = 1e-3;
-// In levels.
+// The `dear` of WeightsAgainst.
 constexpr double kDearExcess = 0.1;
-// Whose dense factor costs next to nothing.
+// The size of a core. The dense factor of so many costs next to nothing.
 constexpr int32_t kCoreFrames = 500;
 
-// The longest tracks first, each that sees a frame which has too few so far.
-// Ascending.
+// The observations of some of the longest tracks, ascending: a track is taken
+// if it sees a frame that has too little redundancy so far.
 std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
                                     double redundancy_per_frame) {
   const auto length = [&](int32_t k) {
@@ -67,7 +68,7 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   return covering;
 }
 
-// The same with as much per frame as it takes for all to hang together.
+// The same with as much redundancy as it takes to connect all tracks.
 std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
   for (double per_frame = kRedundancyPerFrame;; per_frame *= 2) {
     std::vector<int64_t> tracks = CoveringTracks(problem, per_frame);
@@ -85,7 +86,7 @@ Estimate AllAtZero(const KnownRotationProblem& problem) {
   return estimate;
 }
 
-// By the slack programme of some tracks, then all other points.
+// Solves the slack programme of some tracks, then places all other points.
 Estimate StartByProgramme(const KnownRotationProblem& problem,
                           const std::vector<int64_t>& tracks, Norm norm,
                           double level, const Context& context) {
@@ -114,9 +115,9 @@ Estimate StartByProgramme(const KnownRotationProblem& problem,
   return estimate;
 }
 
-// Places a core of frames by a programme, and then those that see most of what
-// is placed, ring by ring, as incremental mapping does: where the programme of
-// all frames would have too full a matrix.
+// Places a core of frames by a programme, and then, ring by ring as in
+// incremental mapping, those that see most placed points. This is for problems
+// of which the programme of all frames would have too full a matrix.
 class GrownStart {
  public:
   GrownStart(const KnownRotationProblem& problem, Norm norm, double level,
@@ -143,7 +144,8 @@ class GrownStart {
     while (!context_.IsCancelled() && AddFrames()) {
       const ProblemSubset placed(problem_, SeenTwice());
       Estimate grown = placed.Restrict(estimate_);
-      // In the end those of the core and its rings, too: more see them now.
+      // After the last ring all points are placed again: more frames see them
+      // now.
       std::vector<int32_t> points;
       for (int32_t k = 0; k < problem_.num_points; ++k) {
         const std::optional<int32_t> own_k = placed.FindPoint(k);
@@ -165,7 +167,7 @@ class GrownStart {
   }
 
  private:
-  // Frame by frame, the one that sees most points of those before it.
+  // Adds one frame at a time: the one that sees most points of those before it.
   void ChooseCore() {
     std::vector<int64_t> num_shared(problem_.num_frames, 0);
     std::vector<char> is_seen(problem_.num_points, 0);
@@ -215,8 +217,8 @@ class GrownStart {
     }
   }
 
-  // Those that see half as many placed points as the one that sees most. False
-  // if all are placed.
+  // Places the frames that see at least half as many placed points as the frame
+  // that sees most. False if all are placed already.
   bool AddFrames() {
     if (num_left_ == 0) return false;
     std::vector<int64_t> num_seen(problem_.num_frames, -1);
@@ -253,7 +255,7 @@ class GrownStart {
   int32_t num_left_ = 0;                   // frames
 };
 
-// Of what hangs together well.
+// The start of a part whose frames are well tied.
 Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
                      double level, const Context& context) {
   const std::vector<int64_t> tracks = ConnectedTracks(problem);
@@ -269,7 +271,8 @@ Estimate StartOfPart(const KnownRotationProblem& problem, Norm norm,
   return estimate;
 }
 
-// The observations of every part that two or more see the points of.
+// For every part its observations of the points that it observes at least
+// twice.
 std::vector<std::vector<int64_t>> SplitIntoParts(
     const KnownRotationProblem& problem, const std::vector<int32_t>& part_of) {
   std::vector<std::vector<int64_t>> split(
@@ -289,7 +292,7 @@ std::vector<std::vector<int64_t>> SplitIntoParts(
   return split;
 }
 
-// Of parts that are placed apart, each with its own scale, and joined.
+// Parts are placed one by one, each with its own scale, and then joined.
 Estimate StartOfParts(const KnownRotationProblem& problem,
                       const std::vector<int32_t>& part_of, Norm norm,
                       double level, const Context& context) {

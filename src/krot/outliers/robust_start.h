@@ -10,8 +10,8 @@
 namespace krot::internal {
 
 // Weights for the next slack programme [Candes, Wakin, Boyd 2008]: an excess
-// much below the share `dear` of `bound` costs 1 / dear times as much as one of
-// the bound.
+// that is small against `dear` times `bound` costs 1 / dear times as much, per
+// pixel, as one of the size of the bound.
 inline std::vector<double> WeightsAgainst(const std::vector<double>& excess,
                                           double bound, double dear) {
   std::vector<double> weights;
@@ -22,28 +22,29 @@ inline std::vector<double> WeightsAgainst(const std::vector<double>& excess,
   return weights;
 }
 
-// From nothing, pixels: what is an error is known only afterwards.
+// The level of a start from nothing, pixels. Which observations are wrong is
+// known only afterwards.
 inline constexpr double kLevelOfStart = 2;
-// In levels: what is farther from a point disagrees with it.
+// In units of the level: observations with larger errors disagree with a point.
 inline constexpr double kCapOfPoints = 4;
 
-// Positions from rotations and raw tracks: an estimate of all frames and points
-// from nothing, whatever outliers there are. For each connected component,
+// Finds positions of all frames and points from rotations and raw tracks,
+// whatever outliers there are. For each connected component,
 //
-//   1. parts that share few of their tracks with others (parts.h), since
-//      one programme holds one mean scale, and what hangs on it by little
-//      shrinks for free; and of each part
-//   2. the longest tracks, so many that they check every frame many times over
-//      and all hang together;
-//   3. their slack programme from nothing (conic/interior_point.h), and again
-//      with weights that let large errors count less; of a core of frames only
-//      where its matrix would fill, and then the other frames, ring by ring;
-//   4. the other points where most of their rays agree;
-//   5. then the parts, each where a robust sum of squares is least
-//      (finish/least_squares.h), are joined.
+//   1. parts that share few of their tracks with others (parts.h) are placed
+//      apart, since a programme holds only the mean scale, and what is weakly
+//      tied would shrink at no cost; of each part
+//   2. the longest tracks are taken, enough to check every frame many times
+//      over and to connect them all;
+//   3. their slack programme is solved from nothing (conic/interior_point.h),
+//      and again with weights by which large errors count less; where its
+//      matrix would fill, of a core of frames, then the others ring by ring;
+//   4. the other points go where most of their rays agree;
+//   5. several parts move to minima of a robust sum of squares
+//      (finish/least_squares.h) and are joined.
 //
-// What exceeds `level`, pixels, counts as an error there. Depths are positive
-// but for those of outliers, and their median is one where the scale is free.
+// Errors above `level`, pixels, count as wrong there. Depths are positive but
+// for those of outliers, and their median is one where the scale is free.
 Estimate FindRobustStart(const KnownRotationProblem& problem, Norm norm,
                          double level, const Context& context);
 

@@ -30,7 +30,7 @@ constexpr int kTurnIterations = 50;
 constexpr double kSmallestTurn = 1e-12;  // rad
 constexpr double kTurnDamping = 1e-9;    // relative
 
-// An observation of the image, and its point where its camera stands now.
+// An observation of the image, and its point in the camera as that stands now.
 struct Sighting {
   Vector2d pixel;
   Vector3d x_cam;
@@ -48,7 +48,7 @@ class TurnFit {
           std::vector<Sighting> sightings)
       : source_(source), bound_(bound), sightings_(std::move(sightings)) {}
 
-  // With the position alone, or the rotation, too.
+  // Fits the translation and, if asked to, the rotation.
   Turn Fit(bool with_rotation) const;
   int64_t NumAbove(const Turn& turn) const;
 
@@ -60,7 +60,7 @@ class TurnFit {
   const std::vector<Sighting> sightings_;
 };
 
-// Gauss and Newton's, by rows at the projection: e = v / w.
+// A Gauss-Newton step, with rows taken at the projection: e = v / w.
 Vector6d TurnFit::Step(const Turn& turn, bool with_rotation) const {
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -121,7 +121,7 @@ int64_t TurnFit::NumAbove(const Turn& turn) const {
       });
 }
 
-// Per view, in how many conflicts it has an observation.
+// For each view the number of conflicts that it has observations in.
 std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,
                                       const std::vector<Conflict>& conflicts) {
   std::vector<int64_t> counts(problem.views.size(), 0);
@@ -137,8 +137,8 @@ std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,
   return counts;
 }
 
-// Of the views in most conflicts the one that most was removed of: conflicts of
-// two images accuse both alike.
+// Of the views in most conflicts the one with most observations removed. (A
+// conflict of two images accuses both alike.)
 std::optional<int32_t> SuspectedView(const KnownRotationProblem& problem,
                                      const std::vector<int64_t>& counts,
                                      size_t num_conflicts,
@@ -171,7 +171,7 @@ std::vector<int64_t> ObservationsOf(const KnownRotationProblem& problem,
   return observations;
 }
 
-// The observations of a view whose points two other views hold.
+// The view's observations of points that have two observations in other views.
 std::vector<Sighting> SightingsOf(const BuiltProblem& built,
                                   const Reprojection& reprojection,
                                   const std::vector<int64_t>& observations,

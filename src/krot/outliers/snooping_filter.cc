@@ -21,7 +21,8 @@
 namespace krot::internal {
 namespace {
 
-// Of an input, and what is still left of it.
+// Removes observations round by round; kept_ is what is still left of the
+// input.
 class SnoopingFilter {
  public:
   SnoopingFilter(const Model& model, const OutlierFilterOptions& options,
@@ -54,7 +55,8 @@ class SnoopingFilter {
   }
 
  private:
-  // What noise does not explain, cameras as they stand; whether anything was.
+  // Removes what noise does not explain, the cameras fixed. Whether anything
+  // was.
   bool Remove() {
     const Timer timer;
     SnoopingSummary& summary = *summary_.snooping;
@@ -106,7 +108,8 @@ class SnoopingFilter {
     summary_.seconds_solve += timer.Seconds();
   }
 
-  // A bound for each observation, and conflicts about what was removed.
+  // Sets a bound for each observation, and looks for conflicts of the removed
+  // ones.
   void Prove() {
     const Timer timer;
     SnoopingSummary& summary = *summary_.snooping;
@@ -143,7 +146,8 @@ class SnoopingFilter {
     summary_.seconds_conflicts = timer.Seconds();
   }
 
-  // The start of a problem of the input is where what is kept stands.
+  // Moves the start of a problem built from the input to the frames and points
+  // of what is kept.
   void PlaceAtKept(BuiltProblem* built) const {
     for (size_t f = 0; f < built->frame_of.size(); ++f) {
       built->start.translations[f] =
@@ -160,8 +164,8 @@ class SnoopingFilter {
     }
   }
 
-  // Per observation the square root of the larger eigenvalue of its R_ii among
-  // all of its point, where that and the cameras stand.
+  // Per observation the square root of the larger eigenvalue of its R_ii, from
+  // all observations of its point, with the point and the cameras at the start.
   static std::vector<double> Scales(const BuiltProblem& built) {
     const KnownRotationProblem& problem = built.problem;
     std::vector<double> scales;

@@ -17,7 +17,7 @@
 namespace krot::internal {
 namespace {
 
-// Counts per thing, by id.
+// Counts observations, removals and conflicts of tracks, images or cameras.
 class Counts {
  public:
   void Add(uint64_t id, bool is_removed, int64_t conflict) {
@@ -96,8 +96,8 @@ void ColorSuspects(const OutlierFilterSummary& summary, Model* model) {
 
 namespace {
 
-// The errors that the input's track elements have in the result; NaN where the
-// point went.
+// The errors of the input's track elements with the result's cameras and
+// points; NaN where the point was removed.
 std::vector<double> ErrorsAfter(const Model& input, const Model& kept,
                                 const Context& context) {
   Model model = input;

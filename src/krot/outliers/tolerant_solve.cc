@@ -14,8 +14,8 @@
 namespace krot::internal {
 namespace {
 
-// Errors of a start are larger than the lowest maximum: so many times as large
-// as what noise explains, they say nothing yet.
+// A start's errors are larger than the lowest maximum: up to so many times what
+// noise explains, they do not show that an observation has to go.
 constexpr double kNearlyFits = 3;
 
 std::string Pixels(double value) {
@@ -25,7 +25,7 @@ std::string Pixels(double value) {
   return words.str();
 }
 
-// From nothing; an error is what is above `level`.
+// Starts from nothing; errors above `level` count as wrong.
 void PlaceFromTracks(Norm norm, double level, const Context& context,
                      RemovalStart* start) {
   start->init = SolveInit::kFeasible;
@@ -97,7 +97,7 @@ RemovalStart FindRemovalStart(const Model& model,
 
 namespace {
 
-// Whether observations may go where no start has them all.
+// Whether observations may be removed if no start satisfies all.
 bool AllowsRemoval(const SolveModelOptions& options) {
   return !options.problem.fixed.Any() && options.problem.positions.empty() &&
          EffectiveMethod(options) == SolveMethod::kAuto && options.norm.p == 2;

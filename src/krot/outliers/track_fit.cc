@@ -30,8 +30,8 @@ using Eigen::Vector3d;
 
 constexpr int64_t kTracksPerTask = 64;
 
-// Whether there was one above the bound, or behind its camera, in a track of
-// more than one.
+// Removes the worst observation of a track of several, if it is above the bound
+// or behind its camera. Returns whether it did.
 bool RemoveWorst(const Point3D& point, double max_error_px, TrackNoise* fit) {
   std::optional<uint64_t> worst;
   double largest = max_error_px;
@@ -230,11 +230,11 @@ int64_t RemoveNarrow(double min_angle_deg, Model* model) {
 
 namespace {
 
-// The first of tracks that the robust start's positions divide, the second of
-// those that their own positions do.
+// The first one divides tracks by the robust start's positions, the second one
+// by positions that fit the first one's tracks.
 constexpr int kTriangulations = 2;
 
-// Without positions, points and tracks.
+// A copy without positions.
 Model RotationsOf(const Model& model) {
   Model rotations = model;
   for (Frame& frame : rotations.frames) {
@@ -244,8 +244,8 @@ Model RotationsOf(const Model& model) {
   return rotations;
 }
 
-// Moves the frames of the problem to the estimate, in the model's place and
-// scale, and leaves no tracks.
+// The model with the estimate's frames and points, moved to its own place and
+// scale.
 Model PosesAt(const Model& model, const BuiltProblem& built, Estimate estimate,
               const Context& context) {
   RestoreGaugeIfHarmless(built.problem, OwnEstimate(model, built), Norm::L2(),
@@ -262,7 +262,7 @@ PlacedMatches PlaceInFrame(const Model& poses, const Database& database,
   from_nothing.solve.init = SolveInit::kFeasible;
   context.Stage("baselines of " + std::to_string(database.pairs.size()) +
                 " pairs");
-  // Of what is left out on the way nothing is to be said.
+  // Notes about what these steps leave out are not for the user.
   Context quiet = context;
   quiet.on_note = {};
   const Model rotations = RotationsOf(poses);

@@ -17,12 +17,13 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Of the excess, what companions may use up: the chart is not all exact.
+// Shares of the excess that companions may use up; below 1, as the chart is
+// only approximate.
 constexpr double kUse[] = {0.97, 0.8};
 constexpr size_t kMaxCandidates = 4;
 
-// The cone of rays within a bound, in the world: { x = d + P y : ||y|| <= 1 },
-// at depth 1.
+// The cone of rays within a bound, in the world, at depth 1: { x = d + P y :
+// ||y|| <= 1 }.
 struct RayCone {
   RayCone(const KnownRotationProblem& problem, int64_t i, double max_error) {
     const Observation& o = problem.observations[i];
@@ -48,7 +49,7 @@ std::array<Vector3d, 2> AxesAcross(const Vector3d& e) {
 struct TwoViewConflicts::HalfPlane {
   Vector2d normal;   // unit
   double slack = 0;  // normal.x <= slack
-  double ease = 0;   // of both edges' the smaller slack, 1: in the middle
+  double ease = 0;   // 0: at an edge of its band, 1: in the middle
   std::array<int64_t, 2> observations;
 };
 
@@ -75,8 +76,8 @@ Vector3d TwoViewConflicts::CentreOf(int64_t i) const {
   return -map.leftCols<3>().transpose() * map.col(3);
 }
 
-// Both edges of the band of baselines from the view of i to that of j; false if
-// their cones meet, or e is not between them.
+// Appends both edges of the band of baselines from the view of i to that of j.
+// False if their cones meet, or if e is not between them.
 bool TwoViewConflicts::AppendBand(int64_t i, int64_t j, const Vector3d& e,
                                   std::vector<HalfPlane>* planes) const {
   const RayCone a(problem_, i, max_error_);
@@ -113,9 +114,9 @@ bool TwoViewConflicts::AppendBand(int64_t i, int64_t j, const Vector3d& e,
   return true;
 }
 
-// The two companions of the most ease. With A = n_o'n / |n_o x n| and
-// S = c / |n_o x n| on either side of n_o, and m = -c_o, a pair is a conflict
-// with o if (S_j + m A_j) + (S_k + m A_k) < 0.
+// Finds the two companions with the most ease. With A = n_o'n / |n_o x n| and S
+// = c / |n_o x n| of planes on either side of n_o, and m = -c_o, a pair j, k is
+// in conflict with o if (S_j + m A_j) + (S_k + m A_k) < 0.
 void TwoViewConflicts::AppendTriples(const HalfPlane& violated,
                                      const std::vector<HalfPlane>& planes,
                                      float worth,

@@ -21,13 +21,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The scales that are tried, against the ratio of the median depths, and the
-// steps of the grid.
+// The scales that are tried, up to this factor from the ratio of the median
+// depths, and the ratio of neighbours on the grid.
 constexpr double kLargestScale = 30;
 constexpr double kScaleStep = 1.05;
-constexpr int kFineSteps = 10;      // to each side, within a step of the grid
-constexpr size_t kMaxTracks = 200;  // that a place is found by, about
-// Errors of two observations of a point, in standard deviations.
+constexpr int kFineSteps = 10;      // to each side, within a grid step
+constexpr size_t kMaxTracks = 200;  // about; more are thinned out
+// Observations agree with a point up to so many standard deviations.
 constexpr double kAgreeing = 4;
 
 std::vector<double> ScalesAround(double scale, double step, int num_steps) {
@@ -38,8 +38,8 @@ std::vector<double> ScalesAround(double scale, double step, int num_steps) {
   return scales;
 }
 
-// The noise per axis of what is at one place, from the median error; pixels.
-// Observations of points elsewhere do not count.
+// The noise per axis, pixels, from the median error of the observations whose
+// points belong to the same group as their frames.
 double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
                const std::vector<int32_t>& group_of,
                const std::vector<int32_t>& point_group) {
@@ -63,7 +63,7 @@ double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
   return std::max(kLeastNoisePx, *middle / std::sqrt(2 * std::log(2.0)));
 }
 
-// Groups of parts, which joins make fewer.
+// Joins groups of frames until none share tracks.
 class Joiner {
  public:
   Joiner(const KnownRotationProblem& problem, std::vector<int32_t> parts,
@@ -135,7 +135,7 @@ std::vector<Side> Joiner::SidesOf(const std::vector<int32_t>& points,
       side.observations.push_back(part.InWhole(i));
       side.sum += error * error;
     }
-    // Which of two is right is not known.
+    // If only one of several is left, it is not known which one is right.
     if (side.observations.size() == 1 &&
         own.point_begin[k + 1] - own.point_begin[k] > 1) {
       side.observations.clear();
@@ -145,7 +145,8 @@ std::vector<Side> Joiner::SidesOf(const std::vector<int32_t>& points,
   return sides;
 }
 
-// Those that say something about the scale, and how many there are in all.
+// The tracks that both groups see and that say something about the scale;
+// *num_shared is how many both see in all.
 std::vector<SharedTrack> Joiner::TracksOf(const GroupPair& pair,
                                           int64_t* num_shared) {
   std::vector<int32_t> points;
@@ -174,7 +175,8 @@ std::vector<SharedTrack> Joiner::TracksOf(const GroupPair& pair,
   return tracks;
 }
 
-// x -> scale x + shift: s (R x + R_sr t) = R (s x + shift) + R_sr t'.
+// Moves a group by x -> scale x + shift:
+// s (R x + R_sr t) = R (s x + shift) + R_sr t'.
 void Joiner::Move(int32_t group, const Place& place) {
   std::vector<char> has_moved(problem_.num_frames, 0);
   for (const View& view : problem_.views) {
@@ -190,7 +192,7 @@ void Joiner::Move(int32_t group, const Place& place) {
   }
 }
 
-// Three tracks agree at some turn, whatever they are: twice as many must.
+// Any three tracks agree at some turn. So twice as many must agree.
 void Joiner::FindTurn(const PlaceSearch& tracks, WeakLink* link) {
   constexpr int64_t kTelling = 6;
   const std::optional<Place> turned = tracks.ProposeTurned();
@@ -233,7 +235,7 @@ WeakLink Joiner::Join(GroupPair pair) {
         ScalesAround(places[0].scale, step, kFineSteps), context_);
     places.insert(places.begin(), fine.begin(), fine.end());
   }
-  if (!may_move_) {  // the result's own, which no search may hit as well
+  if (!may_move_) {  // the estimate's own, which a search may miss
     Place own;
     own.cost = tracks.Cost(own);
     places.push_back(own);
@@ -267,7 +269,7 @@ WeakLink Joiner::Join(GroupPair pair) {
   return link;
 }
 
-// The second becomes part of the first.
+// The second group becomes part of the first.
 void Joiner::Unite(const GroupPair& pair, const Place& place) {
   if (may_move_) Move(pair.b, place);
   for (std::vector<int32_t>* groups : {&group_of_, &point_group_}) {

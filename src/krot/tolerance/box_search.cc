@@ -20,7 +20,7 @@ constexpr int kMaxRounds = 12;
 // Bisection along the segment from the centre ends with this share of it.
 constexpr double kSegmentStep = 1.0 / 1024;
 
-// The same pulls in a part of the problem; none unless it holds all.
+// The same pulls in a part of the problem; none if it lacks one of them.
 std::optional<Pulls> AllInPart(const ProblemSubset& part, const Pulls& pulls) {
   Pulls in_part;
   for (const Pull& pull : pulls) {
@@ -160,8 +160,8 @@ class EndSearch {
     }
   }
 
-  // The whole estimate that has the set's, and all other points where they fit
-  // in best.
+  // The whole estimate: that of the set, and all other points where they fit
+  // best.
   Estimate Complete(const ProblemSubset& part, const Estimate& estimate,
                     Estimate* of_usable) const {
     Estimate whole = shared_.centre();
@@ -313,7 +313,7 @@ LengthRange FindLength(const ToleranceProblem& problem, const Pair& targets,
   const Eigen::Vector3d u =
       at_centre > 0 ? difference.normalized() : Eigen::Vector3d::UnitX();
   const Eigen::Vector3d v = u.unitOrthogonal();
-  // Of the differences along u, v and w the one that is farthest from zero.
+  // The largest absolute value of the difference along u, v and w.
   Eigen::Vector3d farthest = Eigen::Vector3d::Constant(at_centre);
   std::optional<double> least = at_centre;
   bool is_proved = true;

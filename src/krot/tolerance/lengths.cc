@@ -15,8 +15,8 @@
 namespace krot::internal {
 namespace {
 
-// The least and the greatest of distances, by a problem of their own: its gauge
-// is the scale bar, if there is one and the scale is free.
+// Finds the least and the greatest length of distances, by a problem of their
+// own: its gauge is the scale bar, if there is one and the scale is free.
 class LengthFinder {
  public:
   LengthFinder(const ToleranceOptions& options, const ToleranceGauge& gauge,
@@ -57,7 +57,7 @@ class LengthFinder {
   }
 
  private:
-  // What a length is divided by for metres.
+  // What lengths are divided by to get metres.
   struct BarUnit {
     double in_model = 0;
     LengthRange range;
@@ -105,7 +105,7 @@ class LengthFinder {
     for (const int64_t count : num_programmes) summary->num_programmes += count;
   }
 
-  // By the bar: of each end what the least favourable length of the bar makes.
+  // Converts a range to metres, each end by the bar's least favourable length.
   void InMetres(const LengthRange& range, ToleranceLength* length) const {
     length->low = range.low;
     length->high = range.high;

@@ -26,8 +26,8 @@ std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count) {
 
 namespace {
 
-// A model whose largest error is at most this share of the bound is not solved
-// first.
+// The model is solved first unless its largest error is at most this share of
+// the bound.
 constexpr double kFitShare = 0.95;
 
 double TrueCostOf(const Model& model, const BuiltProblem& built, Norm norm,
@@ -211,8 +211,8 @@ ToleranceResult AnalyzeInFrame(const Model& model,
   return result;
 }
 
-// Moves a box by a vector, rounding the proved ends outwards, except those of
-// what cannot move.
+// Moves a box by a vector. Proved ends are rounded outwards, except those of
+// what is fixed.
 void Shift(const Eigen::Vector3d& by, ToleranceBox* box) {
   for (int axis = 0; axis < 3; ++axis) {
     const double at = box->position[axis];

@@ -25,10 +25,11 @@
 
 namespace krot::internal {
 
-// A linear function of positions, the sum of p'x over pulls: of one, a
-// coordinate; of two that are opposite, that of a difference.
+// A linear function of positions: the sum of p'x over pulls. A single pull
+// gives a coordinate, two opposite ones a coordinate of a difference.
 using Pulls = std::vector<Pull>;
 
+// The value of the sum at an estimate.
 double Along(const KnownRotationProblem& problem, const Estimate& estimate,
              const Pulls& pulls);
 
@@ -36,8 +37,8 @@ double Along(const KnownRotationProblem& problem, const Estimate& estimate,
 inline constexpr double kProofRounding =
     8 * std::numeric_limits<double>::epsilon();
 
-// A row that keeps the scale where nothing else does: direction'x of a view's
-// centre or a point stays what it is at the start.
+// A row that keeps the scale where nothing else does: for a view's centre or a
+// point, direction'x stays what it is at the start.
 using ScaleRow = Pull;
 
 struct ExtentOptions {
@@ -50,14 +51,14 @@ struct ExtentOptions {
 // How far estimates reach whose residuals are all below the bound.
 struct Extent {
   Estimate estimate;             // that reaches the farthest
-  std::optional<double> proved;  // the sum is no more: CheckExtent; scene units
+  std::optional<double> proved;  // bounds the sum (CheckExtent); scene units
   int iterations = 0;
 };
 
 // Maximises the sum of p'x over `pulls` from `start`, which must be below the
 // bound. Nothing is proved where there is no end, or where double precision
-// does not suffice. The problem must be connected and something in it fixed,
-// though none of what pulls.
+// does not suffice. The problem must be connected, and something in it fixed,
+// but nothing that a pull acts on.
 Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
                   const std::optional<ScaleRow>& scale,
                   const ExtentOptions& options, const Context& context,
@@ -68,18 +69,19 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
 BlockVector CoefficientsOf(const KnownRotationProblem& problem,
                            const Pulls& pulls);
 
-// Marks the points whose residuals are all below `bound`, pixels, if the point
-// is infinitely far away in some direction. Wherever the frames are, such a
-// point fits in if it is far enough away, and so it says nothing about the
-// frames. O(observations).
+// Marks the points whose residuals are all below `bound`, pixels, when the
+// point is infinitely far away in some direction. Such a point fits in wherever
+// the frames are, if it is far enough away, and so it says nothing about them.
+// O(observations).
 std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
                                 double bound, const Context& context);
 
 // What holds place and scale of the estimates.
 struct ToleranceGauge {
-  // Of a view or a point each: the first is fixed (of a view the frame) and, if
-  // that leaves the scale free, the second keeps its distance from it along the
-  // line between the two. Without a first, what the problem fixes does both.
+  // Each is a view or a point. The first is fixed (of a view the frame). If
+  // that leaves the scale free, the second keeps its distance from the first
+  // along the line between the two. Without a first, what the problem fixes
+  // holds both.
   std::optional<Pull> first;
   std::optional<Pull> second;
 };
@@ -94,8 +96,8 @@ ToleranceGauge ChooseGauge(const KnownRotationProblem& problem,
 // problem that all boxes are about.
 class ToleranceProblem {
  public:
-  // `centre` is an estimate whose errors are all below the bound; the gauge
-  // holds what it holds at its place there. Keeps references to all arguments
+  // `centre` is an estimate whose errors are all below the bound; what the
+  // gauge holds is held where it is there. Keeps references to all arguments
   // but the gauge. Takes the rows of `built` anew (TakeOuterRows).
   ToleranceProblem(const Model& model, BuiltProblem* built,
                    const Estimate& centre, const ToleranceGauge& gauge,
@@ -132,8 +134,8 @@ class ToleranceProblem {
   int64_t num_far_points_ = 0;
 };
 
-// Those of some observations that are in components in which something is
-// fixed; ascending.
+// The given observations whose connected component has something fixed;
+// ascending.
 std::vector<int64_t> HeldObservations(const KnownRotationProblem& problem,
                                       std::vector<int64_t> observations);
 
@@ -153,12 +155,12 @@ struct LengthRange {
 };
 
 // The same for |x_2 - x_1|, in the gauge's unit. With u the difference's
-// direction at the centre and v, w across, proved are the ends of the
-// differences along u and the largest ones along v and w; so |x_2 - x_1| is at
-// least the least along u, and at most the diagonal of the box
+// direction at the centre and v, w across, both ends of the difference along u
+// are proved, and its largest values along v and w. So |x_2 - x_1| is at least
+// the least along u, and at most the diagonal of the box
 // (docs/method/outliers.md, "Lengths"). Both ends are proved together, or
-// neither. What is reached is measured in units of the length of `unit`, if
-// given, whose length at the centre counts.
+// neither. If `unit` is given, what is reached is scaled so that `unit` has the
+// length that it has at the centre.
 LengthRange FindLength(const ToleranceProblem& problem,
                        const std::array<Pull, 2>& targets,
                        const std::optional<std::array<Pull, 2>>& unit,
@@ -186,9 +188,9 @@ struct ToleranceOptions {
   // Options of the problem, and of the solve that finds an estimate within the
   // bound if the model is none.
   SolveModelOptions solve;
-  // Called once there is an estimate within the bound, then after every box,
-  // and length, with the number of them so far. May be empty; must be safe to
-  // call from several threads.
+  // Called once there is an estimate within the bound, and then after every box
+  // and every length, with the number of them so far. May be empty; must be
+  // safe to call from several threads.
   std::function<void(int64_t num_boxes)> on_box;
 };
 
@@ -208,13 +210,13 @@ struct ToleranceLength {
   double tolerance = 0;          // of that
   bool is_bar = false;
   double length = 0;  // in the resulting model
-  // It has no ends: an end of it takes no part, or is not connected to what
-  // holds the scale.
+  // It has no ends, because one of its positions takes no part, or is not
+  // connected to what holds the scale.
   bool is_free = false;
   BoxEnd low;
   BoxEnd high;
 
-  // Whether it is proved that it is not as long as known.
+  // Whether it is proved that its length is not the known one.
   bool IsContradicted() const {
     return metres && low.proved && high.proved &&
            (*metres + tolerance < *low.proved ||
@@ -242,8 +244,8 @@ struct ToleranceSummary {
   std::vector<std::string> gauge_images;  // empty if the options fix something
   std::vector<ToleranceBox> boxes;        // images, then points, as asked for
   std::vector<ToleranceLength> lengths;   // as ToleranceOptions::distances
-  // In the frame in which they are found: far from the origin the last digits
-  // of coordinates are as large as a narrow box.
+  // Compared in the local frame, where the ends are found: far from the origin
+  // rounding of coordinates may be as large as a narrow box.
   EndAgreement agreement;
   double seconds = 0;
 };
@@ -252,9 +254,9 @@ struct ToleranceSummary {
 // elements the index in the list, or -1.
 std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count);
 
-// Fills in summary->lengths, around the estimate that `built` starts from: by a
-// problem of their own, whose gauge is the scale bar where there is one and the
-// scale is free, and else `gauge`.
+// Fills in summary->lengths, around the estimate that `built` starts from.
+// Lengths have a problem of their own: its gauge is the scale bar, if there is
+// one and the scale is free, and otherwise `gauge`.
 void FillLengths(const ToleranceOptions& options, const Model& model,
                  const ToleranceGauge& gauge, const BuiltProblem& built,
                  const Context& context, ToleranceSummary* summary);

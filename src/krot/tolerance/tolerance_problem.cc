@@ -18,8 +18,8 @@ namespace {
 // If p'x grows by more than so many times the size of the scene, there is no
 // end to find.
 constexpr double kFarAway = 1e4;
-// A proof is tried once the gap is below so many times the tolerance, because a
-// later one, with a smaller gap, may fail.
+// A proof is tried once the gap is below so many times the tolerance: later
+// ones, with a smaller gap, may fail.
 constexpr double kFirstProof = 20;
 
 // The upper bound of the sum that the multipliers prove, if any.
