@@ -24,8 +24,9 @@ struct CertificateVerdict {
   std::string refusal;  // one sentence; empty if accepted
   // The rest is meaningful only if accepted.
   double lower_bound = 0;  // proved, pixels
-  // The largest true error of the model as it is, pixels; none if an
-  // observation is behind its camera.
+  // The largest true error of the usable observations, pixels, with the model's
+  // own translations and points; points behind a camera are re-triangulated.
+  // None if one of them still does not project.
   std::optional<double> cost;
   std::optional<double> relative_gap;  // (cost - lower_bound) / cost
   // Images and points in the support whose positions the certificate takes as

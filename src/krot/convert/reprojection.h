@@ -18,8 +18,8 @@ namespace krot::internal {
 
 // The condition that a camera's centre C is in an ellipsoid |U (C - g)| <= 1,
 // written as observations of the known rotation problem: views of C's frame
-// that are shifted by p, |U p| > 1, see a fixed point at g. With a = U p / |U
-// p| and a, m, n orthonormal,
+// that are shifted by p, |U p| > 1, see a fixed point at g. With the unit
+// vector a = U p / |U p| and a, m, n orthonormal,
 //
 //   w = a'U (g + p - C),  v = (level / tan) (m n)'U (g + p - C),
 //   sin = 1 / |U p|,
