@@ -153,10 +153,10 @@ void SqliteDatabase::Require(int status) const {
   }
   std::string reason =
       database_ ? sqlite3_errmsg(database_.get()) : sqlite3_errstr(status);
-  if ((status & 0xff) ==
-      SQLITE_NOMEM) {  // SQLite reports some damage like this
-    // Bytes; if they are free, memory is not short.
-    constexpr int kMuch = 1 << 20;
+  // SQLite reports some damage as a lack of memory, too. If there is memory
+  // for far more than a row, it is damage.
+  if ((status & 0xff) == SQLITE_NOMEM) {
+    constexpr int kMuch = 1 << 20;  // bytes
     void* const memory = sqlite3_malloc(kMuch);
     if (memory == nullptr) throw std::bad_alloc();
     sqlite3_free(memory);
