@@ -104,7 +104,7 @@ struct BundleAdjustmentSummary {
   int64_t num_no_pose = 0;
   int64_t num_behind = 0;
   int64_t num_short_track = 0;
-  int64_t num_parameters = 0;  // of all blocks that moved, gauge included
+  int64_t num_parameters = 0;  // that moved, gauge included
 
   // Half the sum of the robust squared errors, pixels^2.
   double cost_initial = 0;

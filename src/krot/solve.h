@@ -117,10 +117,11 @@ struct SolveState {
 struct SolveOptions {
   SolveMethod method = SolveMethod::kAuto;
   SolveInit init = SolveInit::kModel;
-  // With kFeasible, the start must be below it; pixels; > 0.
+  // A start from nothing must be below it; pixels; > 0. If the model's own
+  // estimate stays above it, kAuto looks for such a start, too.
   double init_max_error = 100;
-  // Of the errors. Only p = 1, 2 and infinity have proofs; any other needs
-  // kResInt.
+  // The norm of the errors. Only p = 1, 2 and infinity have proofs; any other
+  // needs kResInt.
   Norm norm;
   double relative_gap = 1e-4;  // of the maximum to the proved bound; > 0
   int max_iterations = 2000;   // of the joint solver, per component; >= 1

@@ -53,8 +53,8 @@ struct ToleranceBox {
 
 struct TolerancesOptions {
   double max_error = 0;  // the bound, pixels; > 0
-  // Of reached from proved, relative to the way from the position to the proved
-  // end; > 0.
+  // How far the reached end may be from the proved one, relative to the proved
+  // end's distance from the position; > 0.
   double tolerance = 0.01;
   // Indices in Model::images and Model::points3D: the boxes to find.
   std::vector<int32_t> images;

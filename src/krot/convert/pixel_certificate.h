@@ -41,7 +41,7 @@ namespace krot::internal {
 // rows have the `level` delta (reprojection.h); their cones contain the whole
 // region.
 struct PixelCertificate {
-  // Of the problem whose row i is RowAtProjection at bearings[i].
+  // For the problem whose row i is RowAtProjection at bearings[i].
   Certificate rows;
   // One per observation of the support: the ray at which its row is taken, in
   // the camera's frame; for the row of a known position its p, in the world's

@@ -59,10 +59,10 @@ Model RemoveImages(const Model& model, const std::vector<char>& is_removed);
 class LocalFrame {
  public:
   // O is near the median of the fixed and known positions; without any, of all
-  // finite camera centres; without these, of the points. O is zero, and
-  // everything below only copies, unless that median is more than 10 times as
-  // far from the origin as the median of these positions is from it. Requires a
-  // valid model. O(images + points).
+  // finite camera centres; without these, of the points. If that median is not
+  // farther from the origin than 10 times the positions' median distance from
+  // it, O is zero, and everything below only copies. Requires a valid model.
+  // O(images + points).
   explicit LocalFrame(const Model& model, const FixedParts& fixed = {},
                       const std::vector<KnownPosition>& known = {});
 

@@ -68,8 +68,8 @@ struct Option {
   // May be given several times; parse is called for each.
   bool repeatable = false;
   std::vector<std::string> choices = {};  // all values, if they are few
-  // One of COLMAP's options that changes nothing in KROT: `parse` refuses any
-  // value that would have to. Help lists its name only.
+  // One of COLMAP's options that changes nothing in KROT: `parse` refuses
+  // values that ask for what KROT cannot do. Help lists its name only.
   bool is_without_effect = false;
 };
 

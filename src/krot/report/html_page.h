@@ -26,7 +26,7 @@ std::string Base64(const std::vector<Number>& numbers) {
 // number of observations. Only finite errors count.
 
 struct ErrorHistogram {
-  // Of the first bin's lower end, pixels.
+  // The first bin begins at this power of ten, pixels.
   static constexpr int kMinExponent = -3;
   static constexpr int kBinsPerDecade = 10;
   // Bin k ends at 10^(kMinExponent + (k + 1) / kBinsPerDecade) pixels. The

@@ -54,7 +54,7 @@ struct PrecisionFigures {
   std::map<int, int64_t> num_with_rays;
   double mean_angle_deg = 0;
   int64_t num_tested = 0;
-  // Of which one direction or both are not controlled.
+  // Observations of which one direction or both are not controlled.
   int64_t num_uncontrolled = 0;
   double critical_w = kNaN;
   int64_t num_above = 0;

@@ -352,7 +352,7 @@ struct ToleranceReport {
   RunRecord run;
   ToleranceSummary summary;
   PixelErrorStatistics pixel_error_before;  // of the input
-  // Of the model that the boxes are around.
+  // The errors of the model that the boxes are around.
   PixelErrorStatistics pixel_error_after;
 };
 
