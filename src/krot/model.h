@@ -165,8 +165,8 @@ enum class ModelFormat { kBinary, kText };
 
 // Finds the format of the model in this folder: binary if all of cameras.bin,
 // images.bin and points3D.bin exist, otherwise text if all three .txt files
-// exist. Throws ModelError, naming what is missing; if a subfolder "0" holds a
-// model, the message says so.
+// exist. Throws ModelError, naming what is missing; if a subfolder "0",
+// "sparse/0" or "sparse" holds a model, the message says so.
 ModelFormat DetectModelFormat(const std::filesystem::path& folder);
 
 // Reads cameras, rigs, frames (both optional, but only together), images and

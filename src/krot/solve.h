@@ -83,7 +83,9 @@ struct SupportPosition {
   ImageId image_id = 0;
   std::string image_name;
   Point3DId point3D_id = 0;
-  double share = 0;  // of the forces of all known positions; all add up to 1
+  // How much it holds back: the length of the sum of its rows' gradients
+  // (docs/method/proof.md), relative to the sum of these lengths.
+  double share = 0;
   // Of the camera or point from the known position, scene units.
   double distance = 0;
   double radius = 0;  // the allowed distance in that direction

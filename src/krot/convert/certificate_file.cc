@@ -157,7 +157,7 @@ SupportPosition Describe(const Model& model, const BuiltProblem& built,
 std::vector<SupportPosition> ListSupportPositions(
     const Model& model, const BuiltProblem& built, const Estimate& estimate,
     const PixelCertificate& certificate) {
-  // By index of the position: the force of all its rows on the camera or point.
+  // By index of the position: the sum of its rows' gradients.
   std::map<int64_t, Eigen::Vector3d> pulls;
   const Certificate& rows = certificate.rows;
   KnownRotationProblem problem = built.problem;
