@@ -11,9 +11,9 @@
 
 namespace krot {
 
-// Least squares over everything in a COLMAP model: poses, points and
-// intrinsics, plain (by Ceres) or with every error below a cap. Names and
-// defaults are those of COLMAP 4.1 unless a comment says otherwise.
+// Bundle adjustment of a COLMAP model: least squares over poses, points and
+// intrinsics, either plain (by Ceres) or with every error kept below a cap.
+// Names and defaults are those of COLMAP 4.1 unless a comment says otherwise.
 
 enum class RobustLoss { kTrivial, kSoftL1, kCauchy, kHuber };
 
@@ -24,8 +24,8 @@ struct BundleAdjustmentIteration {
   double cost = 0;
   double radius = 0;  // of the trust region
   bool is_successful = false;
-  std::optional<double> barrier;  // pixels^2; with a cap
-  std::optional<double> cap;      // pixels; with one
+  std::optional<double> barrier;  // pixels^2; only with a cap
+  std::optional<double> cap;      // pixels; only with a cap
   double seconds = 0;             // wall clock, since the start
 };
 
@@ -39,42 +39,44 @@ struct BundleAdjustmentOptions {
   bool refine_points3D = true;
   bool constant_rig_from_world_rotation = false;
 
-  // Parts that must not move. Fixed frames keep their rotations, too, and the
-  // sensors through which they see their places in the rig.
+  // Parts that must not move. A fixed frame keeps its rotation, too, and the
+  // sensors through which it sees keep their poses in the rig.
   FixedParts fixed;
 
   // Points with fewer usable observations take no part unless they are fixed;
-  // at least 1. COLMAP's default is 0, with which points of one ray move along
-  // it.
+  // at least 1. COLMAP's default is 0, which lets a point with a single ray
+  // move along that ray.
   int min_track_length = 2;
 
   RobustLoss loss = RobustLoss::kTrivial;
   double loss_scale = 1;  // > 0; pixels
 
   int max_num_iterations = 100;  // >= 0
-  // Without a cap; with one the solve ends as kCapConverged says.
+  // The limits below hold without a cap only; kCapConverged tells when a solve
+  // with a cap ends.
   int max_linear_solver_iterations = 200;  // >= 1; iterative solver only
   double function_tolerance = 1e-6;        // relative; >= 0; COLMAP's is 0
   double gradient_tolerance = 1e-4;        // >= 0
   double parameter_tolerance = 0;          // relative; >= 0
 
-  // Without a cap: up to so many images the reduced camera system is solved
-  // densely, up to so many sparsely, and with more by conjugate gradients.
+  // Without a cap: the reduced camera system is solved by a dense factorisation
+  // up to the first number of images, by a sparse one up to the second, and by
+  // conjugate gradients above.
   int max_num_images_direct_dense = 50;     // >= 0
   int max_num_images_direct_sparse = 1000;  // >= 0
 
-  // No error may reach this: pixels; > 0; kTrivial only. The start must be
-  // strictly below it.
+  // The cap: every error stays below this; pixels; > 0; kTrivial only. All
+  // errors of the start must be strictly below it.
   std::optional<double> max_error;
 
-  // Instead of max_error: first moves nearly to a local minimum of the largest
-  // error, which is at most that of the start; the cap is (1 + 5e-4) times
-  // that. kTrivial only.
+  // Instead of max_error: the solver first lowers the largest error nearly to a
+  // local minimum, which is at most that of the start, and then takes (1 +
+  // 5e-4) times that as the cap. kTrivial only.
   bool lower_max_error = false;
 
   bool IsBounded() const { return max_error || lower_max_error; }
 
-  // After every iteration; may be empty.
+  // Called after every iteration; may be empty.
   std::function<void(const BundleAdjustmentIteration&)> callback;
 };
 
@@ -87,7 +89,7 @@ enum class BundleAdjustmentTermination {
   kStalled,          // no step lowers the cost, and the tolerances of
                      // kCapConverged are not met
   kInfeasibleStart,  // the start is not strictly below max_error
-  kInterrupted,      // the model is the best so far
+  kInterrupted,      // the model is the best one so far
 };
 
 struct BundleAdjustmentSummary {
@@ -111,54 +113,56 @@ struct BundleAdjustmentSummary {
   std::vector<BundleAdjustmentIteration> iterations;  // without the start
   std::string linear_solver;                          // "dense_schur", ...
 
-  std::optional<double> max_error;  // the cap of the end, pixels
-  // With lower_max_error: the local minimum of the largest error, nearly.
+  std::optional<double> max_error;  // the cap at the end, pixels
+  // With lower_max_error: nearly the local minimum of the largest error.
   std::optional<double> lowest_max_error;  // pixels
 
-  // At the end, g'D^-1 g / (2 cost) with g the gradient and D the diagonal of
-  // J'J: to first order, the sum of the shares of the cost that moving each
-  // unknown alone would remove. With a cap, g and D are those of the barrier
-  // problem, whose gradient is that of the Lagrangian. 0 at a stationary point.
+  // Distance from a stationary point (0 there) at the end: g'D^-1 g / (2 cost),
+  // with g the gradient and D the diagonal of J'J. To first order this is the
+  // share of the cost that could be removed by moving each unknown alone,
+  // summed over the unknowns. With a cap, g and D are those of the barrier
+  // problem, whose gradient is that of the Lagrangian.
   std::optional<double> stationarity;
   // With a cap: the sum of multiplier times slack, relative to the cost. If the
-  // problem were convex, no feasible point could be lower by more.
+  // problem were convex, no feasible point could have a cost lower by more than
+  // this.
   std::optional<double> duality_gap;
-  // Observations whose multiplier is above 1e-3: those that the cap holds.
+  // Observations whose multiplier is above 1e-3: the cap holds them back.
   int64_t num_active = 0;
 
   double seconds = 0;  // wall clock
 };
 
 struct AdjustOptions {
-  // With adjustment.max_error, a model whose errors are not all below that is
-  // first brought there with its rotations (krot/solve.h); with lower_max_error
-  // it always is brought to its lowest maximum first.
+  // With adjustment.max_error, a model with errors above it is first brought
+  // below it by krot/solve.h, with its rotations as they are; with
+  // lower_max_error every model is first brought to its lowest maximum.
   BundleAdjustmentOptions adjustment;
-  // Instead of adjustment.max_error: the cap is so many times the lowest
-  // maximum of the model's rotations; > 1.
+  // Instead of adjustment.max_error: the cap is this many times the lowest
+  // maximum that the model's rotations allow; > 1.
   std::optional<double> max_error_factor;
 };
 
 struct AdjustResult {
-  Model model;  // a copy of the input where nothing was adjusted
+  Model model;  // a copy of the input if nothing was adjusted
   // termination kInfeasibleStart: no estimate below the cap was found.
   BundleAdjustmentSummary summary;
-  std::optional<double> max_error;  // the cap of the end, pixels
-  // Over all observations of the model.
+  std::optional<double> max_error;  // the cap at the end, pixels
+  // Over all observations of the model, at three stages.
   PixelErrorStatistics errors_before;
   PixelErrorStatistics errors_start;  // where the adjustment began
   PixelErrorStatistics errors_after;
 };
 
-// Minimises the sum of (robust) squared errors from the model's own estimate,
-// below the cap if there is one. Everything that must not move or takes no part
-// keeps its bits; every connected component without anything fixed keeps its
-// place, scale and mean rotation. Stored point errors are updated.
+// Minimises the sum of (robust) squared errors, starting from the model as it
+// is, and stays below the cap if there is one. Everything that must not move or
+// takes no part keeps its bits. Every connected component without a fixed part
+// keeps its place, scale and mean rotation. Stored point errors are updated.
 //
 // Requires a valid model (ValidateModel). Throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range. Without a
-// cap and on several threads the last digits differ from run to run, as Ceres
-// adds up in no fixed order.
+// cap and on several threads the last digits differ from run to run, because
+// Ceres adds up in no fixed order.
 AdjustResult Adjust(const Model& model, const AdjustOptions& options = {},
                     const Context& context = {});
 

@@ -11,11 +11,12 @@
 
 namespace krot {
 
-// Proofs as JSON (docs/formats.md): that no translations and points bring the
-// largest error of a model below a bound (SolveResult::certificate), and that
-// so many observations at least must go for a bound (OutlierResult::conflicts).
-// They are judged by the model alone, by code that has nothing in common with
-// the solvers and accounts for every rounding.
+// Proofs as JSON (docs/formats.md). A certificate (SolveResult::certificate)
+// proves that no translations and points bring the largest error of a model
+// below a bound. A file of conflicts (OutlierResult::conflicts) proves how many
+// observations must go at least before all others are within a bound. The
+// checker needs nothing but the model and the file. It shares no code with the
+// solvers and accounts for every rounding.
 
 // What a certificate says about a model, judged from the two alone.
 struct CertificateVerdict {
@@ -23,16 +24,19 @@ struct CertificateVerdict {
   std::string refusal;  // one sentence; empty if accepted
   // The rest is meaningful only if accepted.
   double lower_bound = 0;  // proved, pixels
-  // Of the model as it is, true pixels; none where that puts an observation
-  // behind its camera.
+  // The largest true error of the usable observations, pixels, with the model's
+  // own translations and points; points behind a camera are re-triangulated.
+  // None if one of them still does not project.
   std::optional<double> cost;
   std::optional<double> relative_gap;  // (cost - lower_bound) / cost
-  // Of those whose positions it takes as fixed.
+  // Images and points in the support whose positions the certificate takes as
+  // fixed.
   int64_t num_fixed_images = 0;
   int64_t num_fixed_points = 0;
-  // Those that it takes as known to a radius, where this model has the cameras.
+  // The positions that the certificate takes as known within a radius, and
+  // where this model has these cameras and points.
   std::vector<SupportPosition> positions;
-  double defect = 0;  // what rounding takes from the stated bound
+  double defect = 0;  // what rounding takes from the stated bound, relative
   std::vector<SupportObservation> support;  // worst first
 };
 
@@ -40,32 +44,32 @@ struct CertificateVerdict {
 struct ConflictVerdict {
   bool is_accepted = false;
   std::string refusal;  // one sentence; empty if accepted
-  // At least so many of the observations must go for all others to be within
+  // At least this many observations must go for all others to be within
   // max_error; meaningful only if accepted.
   int64_t num_conflicts = 0;
-  int64_t num_observations = 0;  // of all conflicts
+  int64_t num_observations = 0;  // in all conflicts together
   double max_error = 0;          // true pixels
-  // Whether the file has a bound for each observation: max_error is the
-  // largest.
+  // Whether the file gives each observation a bound of its own; then max_error
+  // is the largest of them.
   bool has_own_bounds = false;
 };
 
-// Accepts if the file's digest of the model agrees and its multipliers prove
-// the bound for the observations that it lists. Translations and points of the
-// model do not enter into that, but for what the certificate takes as fixed.
-// Requires a valid model. Throws ModelError, with the place, for what is no
-// certificate. O(observations), and the check: far less than a solve.
+// Accepts if the file's digest is that of the model and its multipliers prove
+// the bound for the observations that it lists. The model's translations and
+// points do not matter, except those that the certificate takes as fixed.
+// Requires a valid model. Throws ModelError, with the place in the text, if it
+// is not a certificate. O(observations), and the check: far less than a solve.
 CertificateVerdict VerifyCertificate(const Model& model,
                                      const std::string& json);
 
-// Likewise, if no observation is in two conflicts and each of them proves an
-// error above the bound.
+// Likewise for conflicts: accepts if no observation is in two of them and each
+// of them proves an error above the bound.
 ConflictVerdict VerifyConflicts(const Model& model, const std::string& json);
 
-// The text of a file of either kind. Throws ModelError if it cannot be read.
+// Reads a file of either kind. Throws ModelError if it cannot be read.
 std::string ReadCertificate(const std::filesystem::path& path);
 
-// Writes it as a whole or not at all. Throws WriteError.
+// Writes a file of either kind, as a whole or not at all. Throws WriteError.
 void WriteCertificate(const std::string& json,
                       const std::filesystem::path& path);
 

@@ -10,28 +10,28 @@
 
 namespace krot {
 
-// How two models of the same images differ. Lengths are in the scene units of
-// the first, into whose coordinates the second has been brought.
+// How two models of the same images differ. The second is brought into the
+// coordinates of the first; lengths are in the scene units of the first.
 
-// How the coordinates of a second model are taken to those of a first.
+// How the second model is brought into the coordinates of the first.
 enum class AlignmentKind {
   kNone,       // as stored
-  kFrame,      // the frame that KROT keeps: mean rotation, centroid and
-               // RMS distance from it of the camera centres
+  kFrame,      // what KROT preserves is made equal: the mean rotation, and the
+               // centroid of the camera centres and their RMS distance from it
   kSimilarity  // least squares on the camera centres [Umeyama 1991]
 };
 
-// What one model holds.
+// The size of a model.
 struct ModelCounts {
   int64_t num_images = 0;
   int64_t num_points = 0;
   int64_t num_observations = 0;
 };
 
-// Zero if there are none.
+// All zero if there is nothing to compare.
 struct DifferenceStatistics {
   double max = 0;
-  double median = 0;  // the lower one of two
+  double median = 0;  // the lower one of the middle two
   double mean = 0;
   double rms = 0;
   int64_t count = 0;
@@ -66,8 +66,9 @@ struct ComparisonSummary {
 
   AlignmentKind alignment = AlignmentKind::kNone;
   Similarity world1_from_world2;
-  // Of the centroid of the second model's cameras, by the alignment: unlike its
-  // translation it does not grow with the distance from the origin.
+  // How far the alignment moves the centroid of the second model's cameras;
+  // unlike its translation, this does not grow with the distance from the
+  // origin.
   double moved = 0;
   double scene_radius = 0;  // RMS distance of the shared cameras from their
                             // centroid
@@ -76,14 +77,14 @@ struct ComparisonSummary {
   DifferenceStatistics center;
   DifferenceStatistics point;
 
-  PixelErrorStatistics errors1;         // of all its observations
-  PixelErrorStatistics errors2;         // of all its observations
-  PixelErrorStatistics shared_errors1;  // of the shared ones
+  PixelErrorStatistics errors1;  // of all observations of the first model
+  PixelErrorStatistics errors2;  // of all observations of the second model
+  PixelErrorStatistics shared_errors1;  // of the shared observations
   PixelErrorStatistics shared_errors2;
 
   std::vector<ImageDifference> images;  // the shared ones
-  // The num_worst points that moved farthest, descending; equal ones in the
-  // order of the first model.
+  // The num_worst points that moved farthest, descending; equal distances in
+  // the order of the first model.
   std::vector<PointDifference> worst_points;
 };
 
@@ -94,9 +95,9 @@ struct CompareModelsOptions {
 };
 
 // Finds what the models have in common (images by name, observations by image
-// and index, points by the observations they share), brings the second into
-// the coordinates of the first, and measures what is left. None if they share
-// no poses that `options.alignment` could be found from: kFrame needs one,
+// and index, points by the observations they share), brings the second into the
+// coordinates of the first, and measures the differences that remain. None if
+// they share too few poses for `options.alignment`: kFrame needs one,
 // kSimilarity three that are not on a line. Requires valid models
 // (ValidateModel). The same at any number of threads. O(observations log
 // observations).
@@ -104,9 +105,10 @@ std::optional<ComparisonSummary> CompareModels(
     const Model& model1, const Model& model2,
     const CompareModelsOptions& options = {});
 
-// The model in the coordinates world1_from_world2 leads to: poses of frames and
-// images, baselines of rigs, points. Pixels stay where they are. What is not
-// finite stays so; the identity leaves all bits. O(size of the model).
+// The model in the coordinates that world1_from_world2 maps to: it transforms
+// poses of frames and images, baselines of rigs, and points. Pixels do not
+// change. What is not finite stays so; the identity keeps all bits. O(size of
+// the model).
 Model TransformModel(const Model& model, const Similarity& world1_from_world2);
 
 }  // namespace krot

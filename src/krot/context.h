@@ -10,12 +10,13 @@ namespace krot {
 
 // What all functions of the library share: how they work, and how they fail.
 //
-//   misuse                     std::invalid_argument: "name = value, must be
-//   ..." a bad file or model        ModelError an output WriteError a numerical
-//   outcome        an enum in the result, by default "not run"
+// - misuse: std::invalid_argument, "name = value, must be ..."
+// - a bad file or model: ModelError
+// - an output that cannot be written: WriteError
+// - a numerical outcome: an enum in the result, by default "not run"
 
-// Set from another thread or a signal handler; solvers look at it between
-// steps and return what they have with the termination "interrupted".
+// Set from another thread or a signal handler. Solvers look at it between steps
+// and return what they have, with the termination "interrupted".
 using CancelFlag = std::atomic<bool>;
 
 inline bool IsCancelled(const CancelFlag* cancel) {
@@ -26,19 +27,20 @@ namespace internal {
 class Ranks;
 }
 
-// How work is done, as opposed to what is done. No result depends on it, unless
-// the work is cancelled: results have the same bits at any number of threads.
+// How work is done, as opposed to what is done. Unless the work is cancelled,
+// no result depends on it: results have the same bits at any number of threads.
 struct Context {
-  int num_threads = -1;                // -1: all
+  int num_threads = -1;                // -1: all processors
   const CancelFlag* cancel = nullptr;  // may be null
-  // Receives a sentence about a choice that was made, and why; may be empty.
+  // Receives a sentence about a choice that was made and why; may be empty.
   std::function<void(const std::string&)> on_note = {};
-  // Takes what a stage that may last does, as "looking for conflicts", and how
-  // much of it is done; of 0: not known. From any thread; may be empty.
+  // Receives what a long stage is doing, such as "looking for conflicts", and
+  // how much of it is done; `of` is 0 if the total is not known. Called from
+  // any thread; may be empty.
   std::function<void(const std::string& what, int64_t done, int64_t of)>
       on_stage = {};
-  // The processes that share the points, of krot_mpi alone; null if this one
-  // has them all.
+  // The processes that share the points; used by krot_mpi alone. Null if this
+  // process has them all.
   internal::Ranks* ranks = nullptr;
 
   bool IsCancelled() const { return krot::IsCancelled(cancel); }
@@ -49,7 +51,8 @@ struct Context {
     if (on_stage) on_stage(what, done, of);
   }
 
-  // The same for a part of `whole`: stages begin with that.
+  // A copy for a part of the work `whole`, whose name precedes those of the
+  // stages.
   Context Within(const std::string& whole) const {
     Context part = *this;
     if (!on_stage) return part;
@@ -69,8 +72,8 @@ class ModelError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// A file or folder that cannot be written; what() is one sentence. What was
-// there before is still there.
+// A file or folder that cannot be written; what() is one sentence. What stood
+// there before has not changed.
 class WriteError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

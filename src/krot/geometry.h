@@ -24,15 +24,15 @@ struct RigidTransform {
   }
 };
 
-// a_from_c = a_from_b * b_from_c.
+// The composition: a_from_c = a_from_b * b_from_c.
 RigidTransform operator*(const RigidTransform& a_from_b,
                          const RigidTransform& b_from_c);
 
-// a_from_b of b_from_a: x -> R' x - R' t.
+// The inverse, a_from_b: x -> R' x - R' t.
 RigidTransform Inverse(const RigidTransform& b_from_a);
 
-// Where a camera of this cam_from_world stands in the world: the point that is
-// mapped to the origin, -R' t.
+// The centre of a camera in the world: the point that is mapped to the origin,
+// -R' t.
 Eigen::Vector3d Center(const RigidTransform& cam_from_world);
 
 // x -> scale * rotation * x + translation; the default is the identity.
@@ -47,22 +47,22 @@ struct Similarity {
 // A quaternion's coefficients in COLMAP's order.
 using QuaternionWxyz = std::array<double, 4>;
 
-// Of unit norm, whatever norm the coefficients have; they must not all be zero.
-// Normalising what has been normalised changes no bit.
+// The quaternion, normalised; the coefficients must not all be zero.
+// Normalising a second time changes no bit.
 Eigen::Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz);
 
-// The coefficients, as they are.
+// The coefficients, not normalised.
 QuaternionWxyz ToWxyz(const Eigen::Quaterniond& q);
 
-// Whether it can be normalised: it is finite and not zero. Images that are not
-// registered are written with such as cannot.
+// Whether the quaternion can be normalised: it is finite and not zero. For
+// images that are not registered files may hold one that is neither.
 bool HasRotation(const QuaternionWxyz& wxyz);
 
 // The rotation of the normalised quaternion; NaN if it has none.
 Eigen::Matrix3d RotationOf(const QuaternionWxyz& wxyz);
 
 // The rotation nearest to M in the Frobenius norm: U diag(1, 1, det U V') V'
-// for M = U S V'. None if there are several, up to 1e-9 of M's norm.
+// for M = U S V'. None if it is not unique, up to 1e-9 of M's norm.
 std::optional<Eigen::Matrix3d> NearestRotation(const Eigen::Matrix3d& M);
 
 // The points x with |UnitFromWorld() (x - centre)| <= 1.

@@ -36,14 +36,14 @@ struct Residual {
 double ResidualValue(const Residual& residual, const Eigen::Vector3d& x,
                      Norm norm);
 
-// That of point x, seen by a camera of this pose along `ray`, the point of the
-// ray on the plane z = 1 of the camera. In pixels for a focal length in pixels;
-// with 1 in units of that plane.
+// The residual of point x, seen by a camera of this pose along `ray`, which is
+// given by its point on the camera's plane z = 1. In pixels if the focal length
+// is in pixels; with a focal length of 1 in units of that plane.
 Residual PointResidual(const RigidTransform& cam_from_world,
                        const Eigen::Vector2d& ray, double focal_length);
 
-// That of the translation x of a camera with this rotation, which sees `point`
-// along `ray`, likewise.
+// The residual of the translation x of a camera with this rotation that sees
+// `point` along `ray`; units as above.
 Residual CameraResidual(const Eigen::Matrix3d& cam_from_world_rotation,
                         const Eigen::Vector3d& point,
                         const Eigen::Vector2d& ray, double focal_length);
@@ -61,7 +61,7 @@ struct Ball {
 // their convex hull, since max_i |g_i - m|^2 = 1 + |m|^2 - 2 min_i g_i.m.
 Ball MinEnclosingBall(const Eigen::Vector3d* points, int count);
 
-// Which means the Fast Descent Method uses; the optimum sought is the same.
+// How the Fast Descent Method finds its steps; the optimum is the same.
 enum class FastDescentSettings {
   kPaper,  // Algorithms 2-4 to the letter
   kFast,   // Newton steps on the active residuals, sequential quadratic
@@ -71,7 +71,7 @@ enum class FastDescentSettings {
 struct FastDescentOptions {
   FastDescentSettings settings = FastDescentSettings::kFast;
   int max_iterations = 100;  // >= 1
-  // The paper's thresholds; without effect on kFast.
+  // The paper's thresholds; kFast ignores them.
   double stationarity_tolerance = 1e-8;  // eps_0 >= 0, norm of the MEB centre
   double step_tolerance = 1e-6;          // eps_1 > 0, units of x
   double slope_probe = 1e-8;             // eps_2 > 0, units of x
@@ -84,9 +84,9 @@ enum class DescentTermination {
   kBehind,      // the start is not feasible: a depth there is not positive
   kStationary,  // no direction lowers the maximum, up to the tolerance
   kZeroCost,    // all residuals vanish
-  kLowEnough,   // the start is at the goal's level, or a step sufficed
-  kFarAway,     // a depth reached its limit: the infimum lies at infinity
-  kNoDecrease,  // the best step does not lower the cost: rounding
+  kLowEnough,   // a level was asked for, and the start or a step has reached it
+  kFarAway,     // a depth has reached its limit: the infimum lies at infinity
+  kNoDecrease,  // rounding: the best step does not lower the cost
   kMaxIterations,
 };
 
@@ -94,13 +94,13 @@ struct DescentSummary {
   DescentTermination termination = DescentTermination::kNotRun;
   double cost_initial = 0;
   double cost = 0;     // <= cost_initial
-  int iterations = 0;  // steps tried
+  int iterations = 0;  // the number of steps tried
 };
 
-// Lowers max_i r_i(x) from *x to its minimum [Zhang18, Alg. 2]; never raises
-// it. All depths at *x must be positive: otherwise nothing is done, and the
-// termination is kBehind. Throws std::invalid_argument for options or a p out
-// of range. An iteration passes over the residuals once with kFast, some 70
+// Lowers max_i r_i(x) from *x to its minimum [Zhang18, Alg. 2], and never
+// raises it. All depths at *x must be positive: otherwise nothing is done, and
+// the termination is kBehind. Throws std::invalid_argument for options or a p
+// out of range. An iteration passes over the residuals once with kFast, some 70
 // times with kPaper.
 DescentSummary MinimizeLargestResidual(const std::vector<Residual>& residuals,
                                        const FastDescentOptions& options,

@@ -20,9 +20,9 @@ namespace krot {
 // order of its file and every number with the bits it was stored with.
 //
 // Identifiers are COLMAP's. Every image belongs to a frame, and every frame to
-// a rig, also in a model whose files hold neither ("legacy", COLMAP 3.8
-// to 3.11): there each image has a frame and each camera a rig of its own, and
-// only writing tells.
+// a rig. This also holds for "legacy" models, whose files have neither (COLMAP
+// 3.8 to 3.11): after reading, each of their images has a frame of its own and
+// each camera a rig of its own, and they are not written.
 
 using CameraId = uint32_t;
 using RigId = uint32_t;
@@ -30,7 +30,7 @@ using FrameId = uint32_t;
 using ImageId = uint32_t;
 using Point3DId = uint64_t;
 
-// The id that a 2D point without a 3D point bears (-1 in text files).
+// The point3D_id of a 2D point without a 3D point (-1 in text files).
 inline constexpr Point3DId kInvalidPoint3DId =
     std::numeric_limits<Point3DId>::max();
 
@@ -40,7 +40,7 @@ struct Pose {
   QuaternionWxyz quaternion_wxyz = {1, 0, 0, 0};
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  // Of the normalised quaternion.
+  // The rotation of the normalised quaternion.
   Eigen::Matrix3d Rotation() const { return RotationOf(quaternion_wxyz); }
   RigidTransform Transform() const { return {Rotation(), translation}; }
 };
@@ -134,10 +134,10 @@ struct Model {
   std::vector<TrackElement> track_elements;
 };
 
-// ---- Parts of a model that options speak of ----
+// ---- Parts of a model that options refer to ----
 
-// What of a model must not move, one mark per frame and per 3D point in the
-// order of its records; empty: nothing of the kind.
+// The parts of a model that must not move: one mark per frame and one per 3D
+// point, in the order of their records; empty: none is fixed.
 struct FixedParts {
   std::vector<char> frames;
   std::vector<char> points3D;
@@ -149,9 +149,9 @@ struct FixedParts {
   }
 };
 
-// What is known of where an image was taken, or of where a 3D point is: the
-// projection centre, or the point, is in `region`, in the model's frame and
-// unit.
+// Prior knowledge of where an image was taken or where a 3D point is: the
+// projection centre, or the point, lies in `region`, which is in the model's
+// frame and unit.
 struct KnownPosition {
   enum class Of { kImage, kPoint3D };
   Of of = Of::kImage;
@@ -163,22 +163,22 @@ struct KnownPosition {
 
 enum class ModelFormat { kBinary, kText };
 
-// The format that ReadModel takes in this folder: binary if all of
-// cameras.bin, images.bin and points3D.bin exist, otherwise text if all three
-// .txt files exist. Throws ModelError, naming what is missing; if a
-// subfolder "0" holds a model, the message says so.
+// Finds the format of the model in this folder: binary if all of cameras.bin,
+// images.bin and points3D.bin exist, otherwise text if all three .txt files
+// exist. Throws ModelError, naming what is missing; if a subfolder "0",
+// "sparse/0" or "sparse" holds a model, the message says so.
 ModelFormat DetectModelFormat(const std::filesystem::path& folder);
 
 // Reads cameras, rigs, frames (both optional, but only together), images and
 // points3D, each file in one read. Every count is checked against the file's
 // size before memory is reserved. Throws ModelError. The result is
-// syntactically complete; ValidateModel says whether it is consistent.
-// Rigs and frames that are both empty or missing mean a legacy model, as for
-// COLMAP; it gets trivial ones.
+// syntactically complete; ValidateModel says whether it is consistent. If rigs
+// and frames are both empty or missing, the model is a legacy one, as for
+// COLMAP, and gets trivial ones.
 Model ReadModel(const std::filesystem::path& folder, ModelFormat format);
 
-// DetectModelFormat, ReadModel and ValidateModel in one: what nearly every
-// program wants. Throws ModelError.
+// DetectModelFormat, ReadModel and ValidateModel in one; most programs need no
+// other. Throws ModelError.
 Model ReadModel(const std::filesystem::path& folder);
 
 struct WriteModelOptions {
@@ -188,29 +188,30 @@ struct WriteModelOptions {
   bool overwrite = false;
   // project.ini is copied from this folder, if there is one.
   std::filesystem::path copy_project_from;  // empty: nothing is copied
-  // Told what is left behind in the folder, and why; may be empty.
+  // Receives a sentence about what is left behind in the folder, and why; may
+  // be empty.
   std::function<void(const std::string&)> on_note = {};
 };
 
 // Throws WriteError if WriteModel would refuse this folder: it holds a model
-// and options.overwrite is false, it is a file, a mount point or the working
-// directory, or it cannot be created or is not writable. Changes nothing.
+// and options.overwrite is false; it is a file, a mount point or the working
+// directory; or it cannot be created or written to. Changes nothing.
 void CheckWritable(const std::filesystem::path& folder,
                    const WriteModelOptions& options);
 
 // Writes the model into a new sibling folder and swaps that in, so that an
-// interruption leaves the old model or the new one and never a mix; foreign
-// files already in `folder` are carried over, model files of the other format
-// are not. Rigs and frames are written if model.stores_rigs. Throws WriteError;
-// nothing has changed then. Requires a valid model (ValidateModel).
+// interruption leaves either the old model or the new one. Foreign files in
+// `folder` are kept, model files of the other format are not. Rigs and frames
+// are written if model.stores_rigs. Throws WriteError; nothing has changed
+// then. Requires a valid model (ValidateModel).
 void WriteModel(const Model& model, const std::filesystem::path& folder,
                 const WriteModelOptions& options = {});
 
 // Checks everything that the rest of KROT relies on:
 //  1. ids are unique, and none is the largest of its type, which in COLMAP
-//     stands for none;
-//  2. camera model ids are known and have as many parameters as they need; of
-//     cameras with images no focal length is zero;
+//     means "no id";
+//  2. camera model ids are known, and cameras have the right number of
+//     parameters; no camera with images has a focal length of zero;
 //  3. references resolve: image -> camera, rig -> camera, frame -> rig,
 //     frame -> image, track -> image and 2D point;
 //  4. tracks follow one another in Model::track_elements without gaps;
@@ -220,11 +221,12 @@ void WriteModel(const Model& model, const std::filesystem::path& folder,
 //  7. numbers are finite and quaternions are not zero, with three exceptions:
 //     the pose of an image or a frame may be NaN, infinite or have a quaternion
 //     of zeros and counts as absent; 2D points in no track, whose coordinates
-//     COLMAP's undistorter may write as NaN; and stored point errors, which are
-//     recomputed by KROT.
-// An image's own pose may contradict its frame's: the frame's counts, as in
-// COLMAP 4. A 3D point may have any track length, none included. What 2D
-// points say of their 3D points may contradict the tracks: those count.
+//     COLMAP's undistorter may write as NaN; and stored point errors, which
+//     KROT recomputes.
+// Some contradictions are allowed, and it is defined what counts. An image's
+// pose may differ from its frame's: the frame's counts, as in COLMAP 4. The 3D
+// points that 2D points name may differ from the tracks: the tracks count. A
+// track may have any length, 0 included.
 //
 // Throws ModelError naming the first offender. O(size of the model), a few ns
 // per 2D point.
@@ -232,18 +234,19 @@ void ValidateModel(const Model& model);
 
 // ---- Errors ----
 
-// True reprojection errors of a model: through the full camera, in pixels of
-// the norm, in the order of Model::track_elements. NaN where a point is not in
-// front of its camera, has no pose, or projects to no finite pixel (no camera
-// without an image plane gives one). In a model with rigs the poses are the
-// frames'. Requires a valid model (ValidateModel). O(observations).
+// The true reprojection errors of a model, through the full camera, in pixels
+// of the norm, in the order of Model::track_elements. NaN if a point is not in
+// front of its camera, if the image has no pose, or if the point projects to no
+// finite pixel (always so for cameras without an image plane). In a model with
+// rigs the poses are the frames'. Requires a valid model (ValidateModel).
+// O(observations).
 std::vector<double> PixelErrors(const Model& model, int num_threads = -1,
                                 Norm norm = Norm::L2());
 
 // Over the finite errors.
 struct PixelErrorStatistics {
   double max = 0;
-  double p99 = 0;  // nearest rank: the least that 99 % do not exceed
+  double p99 = 0;  // nearest rank: the smallest error that 99 % do not exceed
   double mean = 0;
   double rms = 0;
   int64_t count = 0;       // finite errors
@@ -253,9 +256,9 @@ struct PixelErrorStatistics {
 PixelErrorStatistics Summarize(const std::vector<double>& errors_px);
 
 // Sets every point's stored error to the mean of its finite errors (-1 if it
-// has none): what COLMAP's model_analyzer averages and its GUI colours by.
-// `errors_px` as PixelErrors gives them; throws std::invalid_argument if
-// their number is not that of the track elements.
+// has none). COLMAP's model_analyzer averages these, and its GUI colours points
+// by them. `errors_px` must come from PixelErrors; throws std::invalid_argument
+// if there are not as many as track elements.
 void UpdatePointErrors(const std::vector<double>& errors_px, Model* model);
 
 }  // namespace krot

@@ -14,14 +14,13 @@
 
 namespace krot {
 
-// What the data allow: all positions that a camera or a point may have in an
-// estimate whose errors are within a bound, with rotations and intrinsics as
-// given.
+// What the data allow: all positions that a camera or a point can have without
+// any error above a bound, with rotations and intrinsics as given.
 
 // One end of the interval in which a coordinate may be.
 struct BoxEnd {
-  double reached = 0;            // by an estimate that was found
-  std::optional<double> proved;  // no estimate is beyond it; none: no bound
+  double reached = 0;            // the value in an estimate that was found
+  std::optional<double> proved;  // no estimate is beyond this; none: unbounded
 };
 
 // Smallest and largest value of each coordinate of a position, over all
@@ -29,13 +28,13 @@ struct BoxEnd {
 struct PositionBox {
   std::array<BoxEnd, 3> low;
   std::array<BoxEnd, 3> high;
-  int64_t num_programmes = 0;  // that were solved
+  int64_t num_programmes = 0;  // cone programmes solved for it
 };
 
 enum class ToleranceTermination {
   kNotRun,
   kNothingToSolve,  // every observation was left out
-  kNoEstimate,      // none was found whose errors are within the bound
+  kNoEstimate,      // no estimate within the bound was found
   kDone,
   kInterrupted,
 };
@@ -46,40 +45,45 @@ struct ToleranceBox {
   uint64_t id = 0;
   std::string name;                                    // of an image
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // in the resulting model
-  // It has no box: it takes no part in the optimisation, or is not connected to
-  // what holds place and scale.
+  // True if it has no box: it takes no part in the optimisation, or is not
+  // connected to what holds place and scale.
   bool is_free = false;
   PositionBox box;
 };
 
 struct TolerancesOptions {
-  double max_error = 0;     // the bound, pixels; > 0
-  double tolerance = 0.01;  // of an end, relative to how far it is; > 0
-  // Indices in Model::images and Model::points3D whose boxes are wanted.
+  double max_error = 0;  // the bound, pixels; > 0
+  // How far the reached end may be from the proved one, relative to the proved
+  // end's distance from the position; > 0.
+  double tolerance = 0.01;
+  // Indices in Model::images and Model::points3D: the boxes to find.
   std::vector<int32_t> images;
   std::vector<int32_t> points;
-  // The indices of two images that hold place and scale. Empty: what
-  // solve.fixed marks does or, if that is nothing, two images are chosen.
+  // The indices of two images that hold place and scale. Empty: the parts
+  // marked in solve.fixed hold them or, if there are none, two images are
+  // chosen.
   std::vector<int32_t> gauge_images;
-  // Of the solve that finds an estimate within the bound if the model is none.
+  // For the solve that finds an estimate within the bound, if the model itself
+  // is not within it.
   SolveOptions solve;
 };
 
 struct TolerancesResult {
-  Model model;  // the input, or the solved one; the boxes are around it
+  // The input, or the solved model if the input is not within the bound.
+  Model model;
   ToleranceTermination termination = ToleranceTermination::kNotRun;
-  double max_error = 0;  // of the model, pixels
-  // kNoEstimate: no estimate is below this, proved; pixels.
+  double max_error = 0;  // the largest of the model, pixels
+  // kNoEstimate: proved that no estimate is below this; pixels.
   std::optional<double> lower_bound;
   std::vector<std::string> gauge_images;  // empty if the options fix something
   std::vector<ToleranceBox> boxes;        // images, then points, as asked for
 };
 
-// Each end of a box is reached by an estimate and proved, and the two agree to
-// `tolerance` unless lenses prevent it. Requires a valid model (ValidateModel).
-// Throws std::invalid_argument for options out of range, and for gauge images
-// that are not connected. A box takes about as long as a solve with the
-// observations near to it.
+// Finds the box of each position asked for. Each end is reached by an estimate
+// and proved, and the two agree to `tolerance` unless lenses prevent it.
+// Requires a valid model (ValidateModel). Throws std::invalid_argument for
+// options out of range, and for gauge images that are not connected. A box
+// takes about as long as a solve with the observations near it.
 TolerancesResult FindTolerances(const Model& model,
                                 const TolerancesOptions& options,
                                 const Context& context = {});

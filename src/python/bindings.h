@@ -4,7 +4,7 @@
 
 namespace krot::internal {
 
-// The parts of pykrot._core, one source each.
+// Each adds a part of pykrot._core, and has a source file of its own.
 void BindModel(pybind11::module_* module);
 void BindCommands(pybind11::module_* module);
 

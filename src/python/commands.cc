@@ -1,5 +1,5 @@
-// The commands: each takes a Model and keywords under the command line's names,
-// and gives the new Model with the command's report as JSON.
+// The commands. Each takes a Model and keywords, which have the names of the
+// command line, and returns the new Model and the command's report as JSON.
 
 #include <functional>
 #include <memory>
@@ -33,11 +33,11 @@ namespace py = pybind11;
 using ModelPointer = std::shared_ptr<Model>;
 using ConstModelPointer = std::shared_ptr<const Model>;
 
-// stage, largest error or None, lower bound or None.
+// Receives the stage, the largest error or None, and the lower bound or None.
 using Progress = std::function<void(const std::string&, std::optional<double>,
                                     std::optional<double>)>;
 
-// What a command gives back; Python makes objects of the JSON texts.
+// What a command returns; Python makes objects from the JSON texts.
 struct Outcome {
   ModelPointer model;
   std::string report;
@@ -48,7 +48,8 @@ OptionTable TableOf(const std::string& function) {
   return {function, "", "docs/cli.md"};
 }
 
-// The callbacks take the GIL, which the call itself has released.
+// Reports progress to Python. The callbacks take the GIL, which the call itself
+// has released.
 void Follow(const Progress& progress, SolveModelOptions* options) {
   if (!progress) return;
   options->res_int.callback = [progress](int, const Sweep& state) {
@@ -152,7 +153,7 @@ Outcome FilterCommand(const ModelPointer& model, const Progress& progress,
   return outcome;
 }
 
-// The cured model.
+// Returns the cured model.
 Outcome CheckModelCommand(const ModelPointer& model, const Progress&,
                           const py::dict& keywords) {
   const Timer timer;
@@ -236,7 +237,7 @@ Outcome ToleranceCommand(const ModelPointer& model, const Progress& progress,
           ToleranceJson(report), std::nullopt};
 }
 
-// None where the models share too little to be aligned.
+// The report as JSON; none if the models share too little to be aligned.
 std::optional<std::string> CompareCommand(const ModelPointer& model1,
                                           const ModelPointer& model2,
                                           const std::string& alignment,
@@ -264,7 +265,8 @@ std::optional<std::string> CompareCommand(const ModelPointer& model1,
   return ComparisonJson(report);
 }
 
-// (is accepted, refusal, proved pixels or None, proved removals or None).
+// Returns (is accepted, refusal, proved pixels or None, proved removals or
+// None).
 py::tuple CheckProof(const ModelPointer& model, const std::string& json) {
   if (HoldsConflicts(json)) {
     ConflictVerdict verdict;

@@ -13,8 +13,8 @@ std::string TextOf(const py::handle& value) {
   return py::str(value);
 }
 
-// The option that the keyword means, or the keyword itself: the table then says
-// what is wrong with it.
+// The option that the keyword means. If there is none, the keyword itself, so
+// that the table reports what is wrong with it.
 std::string FullName(const std::string& keyword, const OptionTable& table) {
   std::string found;
   for (const Option& option : table.options()) {

@@ -6,10 +6,10 @@
 
 namespace krot::internal {
 
-// Sets options from Python's keywords: `relative_gap` stands for the one option
-// whose name ends so behind its group; {"Solver.relative_gap": ...} spells it
-// out. Numbers, bools and strings. Throws OptionError with the sentences of the
-// command line.
+// Sets options from Python's keywords. `relative_gap` means the one option
+// whose name behind its group is this; {"Solver.relative_gap": ...} gives the
+// whole name. Values may be numbers, bools and strings. Throws OptionError with
+// the same sentences as the command line.
 void AssignKeywords(const pybind11::dict& keywords, OptionTable* table);
 
 }  // namespace krot::internal

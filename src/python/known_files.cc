@@ -8,7 +8,8 @@
 namespace krot::internal {
 namespace {
 
-// What a list holds that the model does not have, as a Python warning.
+// Raises a Python warning, for example about lines whose names the model does
+// not have.
 void Warn(const std::string& sentence) {
   if (PyErr_WarnEx(PyExc_UserWarning, sentence.c_str(), 1) != 0) {
     throw pybind11::error_already_set();

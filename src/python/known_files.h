@@ -13,8 +13,8 @@
 
 namespace krot::internal {
 
-// The command line's files of what else is known than the model says, as
-// keywords.
+// The command line's files with knowledge beyond the model, as keywords of
+// Python.
 class KnownFiles {
  public:
   void AddRotationsTo(OptionTable* table);
@@ -22,13 +22,13 @@ class KnownFiles {
   void AddPositionsTo(OptionTable* table);
   void AddDatabaseTo(OptionTable* table);
 
-  // The model, or a copy with the file's rotations; records what they did, and
-  // what is odd about the poses.
+  // The model, or a copy with the rotations of the file. Records what the file
+  // changed, and suspicious properties of the poses.
   std::shared_ptr<const Model> WithRotations(
       const std::shared_ptr<Model>& model, RunRecord* run) const;
   FixedParts Fixed(const Model& model) const;
   std::vector<KnownPosition> Positions(const Model& model) const;
-  // None without one.
+  // None if no database is given.
   std::optional<Database> Matches(const Model& model) const;
 
  private:

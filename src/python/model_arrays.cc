@@ -13,7 +13,7 @@ namespace {
 
 namespace py = pybind11;
 
-// An array of `shape`, of which -1 stands for any length.
+// Checks that an array has `shape`, in which -1 stands for any length.
 template <typename T>
 void CheckShape(const CArray<T>& array, const std::vector<int64_t>& shape,
                 const char* name) {
@@ -58,7 +58,8 @@ std::vector<Camera> MakeCameras(const std::vector<CameraTuple>& tuples) {
   return cameras;
 }
 
-// The tracks, one point after another, each in the order of the observations.
+// Makes the tracks, one point after another, each in the order of the
+// observations.
 void MakeTracks(const CArray<int64_t>& image_indices,
                 const CArray<int64_t>& point_indices, Model* model) {
   const int64_t* points = point_indices.data();

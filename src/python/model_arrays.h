@@ -19,11 +19,12 @@ using CArray =
 using CameraTuple =
     std::tuple<std::string, uint64_t, uint64_t, std::vector<double>>;
 
-// A model of observations as numpy arrays have them: one frame per image; ids
-// are indices plus one. `rotations` (images, 3, 3) and `translations` (images,
-// 3), NaN where unknown, are camera from world. O(observations), which are
-// copied once. Throws ModelError and std::invalid_argument for arrays that do
-// not fit together.
+// Makes a model from observations in numpy arrays, with one frame per image;
+// ids are indices plus one. `rotations` (images, 3, 3) and `translations`
+// (images, 3) are camera from world; translations are NaN where they are
+// unknown, rotations must be known. O(observations), which are copied once.
+// Throws ModelError, and std::invalid_argument for arrays that do not fit
+// together.
 std::shared_ptr<Model> ModelFromArrays(const CArray<double>& observations,
                                        const CArray<int64_t>& image_indices,
                                        const CArray<int64_t>& point_indices,

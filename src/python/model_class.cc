@@ -59,8 +59,8 @@ void Write(const Model& model, const std::filesystem::path& path,
   WriteModel(model, path, options);
 }
 
-// A view of one member of all records: no copy; writing into it changes the
-// model, which lives as long as the view does.
+// A view of one member of all records, without a copy. Writing to it changes
+// the model; the view keeps the model alive.
 template <typename Record, typename T>
 py::array_t<T> View(std::vector<Record>& records, T* first, int64_t columns,
                     const py::object& owner) {
@@ -86,7 +86,7 @@ py::array_t<uint8_t> Colors(const py::object& self) {
               self);
 }
 
-// Copies of what is small or composed.
+// Copies one value of each record, if values are small or have to be computed.
 template <typename Records, typename Of>
 auto Collect(const Records& records, const Of& of) {
   using T = decltype(of(records.front()));
@@ -140,8 +140,8 @@ std::vector<std::string> Names(const Model& model) {
   return names;
 }
 
-// Columns of what a track element stands for: indices of its point and image,
-// and its pixel.
+// Three columns with a row for each track element: its pixel, and the indices
+// of its image and point.
 py::tuple Observations(const Model& model) {
   const int64_t count = static_cast<int64_t>(model.track_elements.size());
   py::array_t<double> pixels({count, int64_t{2}});
@@ -164,7 +164,8 @@ py::tuple Observations(const Model& model) {
   return py::make_tuple(pixels, images, points);
 }
 
-// EstimateNoise; what is of observations in the order of observations().
+// Calls EstimateNoise; arrays about observations are in the order of
+// observations().
 py::dict Noise(const Model& model, double false_alarm,
                std::vector<double> relative_sigmas) {
   const ModelNoise noise =

@@ -1,4 +1,5 @@
-// pykrot._core: KROT's commands for Python, without files in between.
+// pykrot._core: KROT's commands for Python, which exchange models without
+// files.
 
 #include <pybind11/pybind11.h>
 

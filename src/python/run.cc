@@ -10,7 +10,7 @@ namespace {
 
 namespace py = pybind11;
 
-// How often Python's signal handlers get their turn.
+// How often Python's signal handlers are called.
 constexpr std::chrono::milliseconds kBetweenLooks(50);
 
 }  // namespace
@@ -28,7 +28,8 @@ void RunInterruptibly(const std::function<void(const CancelFlag&)>& work) {
     if (!is_interrupted && PyErr_CheckSignals() != 0) {
       is_interrupted = true;
       cancel = true;
-      // Kept until the work has ended: its callbacks may need Python.
+      // The error is kept until the work has ended, because its callbacks may
+      // need Python.
       const py::error_already_set error;
       {
         const py::gil_scoped_release release;

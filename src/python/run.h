@@ -6,9 +6,10 @@
 
 namespace krot::internal {
 
-// Runs `work` on a thread of its own with the GIL released, and meanwhile looks
-// for Ctrl-C: then cancels it, waits until it ends, and throws what the signal
-// raises. Exceptions of `work` come out. Needs the GIL, and has it in the end.
+// Runs `work` on a thread of its own with the GIL released, and watches for
+// Ctrl-C. On Ctrl-C it cancels the work, waits until it ends, and throws what
+// the signal raises. Rethrows exceptions of `work`. The caller must hold the
+// GIL, and holds it again at the end.
 void RunInterruptibly(const std::function<void(const CancelFlag&)>& work);
 
 }  // namespace krot::internal

@@ -28,7 +28,7 @@ void CheckPositive(const Value& value, std::string_view name) {
 
 template <typename Value>
 void CheckAtLeast(int least, const Value& value, std::string_view name) {
-  if (value >= least) return;  // without a string
+  if (value >= least) return;  // saves making the text
   CheckArgument(false, name, value, ">= " + std::to_string(least));
 }
 

@@ -72,8 +72,8 @@ class StepValues {
     describe(&**value);
   }
 
-  // A value per point, of which every rank has its share. The record does not
-  // depend on the number of ranks.
+  // A value per point, of which every rank has its share. The record is the
+  // same at any number of ranks.
   template <typename T>
   void Shared(std::vector<T>* values) {
     if (ranks_ == nullptr) return OnFirst(values);
@@ -111,7 +111,7 @@ class StepValues {
 
   const std::string& record() const { return record_; }
 
-  // Throws CheckpointError if more was written than is read.
+  // Throws CheckpointError if the record holds more than was read.
   void RequireEnd() const { Require(offset_ == record_.size()); }
 
  private:

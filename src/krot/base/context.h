@@ -28,11 +28,11 @@ class Timer {
 };
 
 // Processes that solve one problem together. Each has all frames and a share of
-// the points, with their observations; the shares of rank 0, 1, ... one after
-// another are the whole problem in its order. All ranks take the same steps,
-// and exchange numbers where a number of the whole problem is needed. Numbers
-// are combined in the order in which one process combines them, so that the
-// result has the same bits at any number of ranks.
+// the points, with their observations; the shares of rank 0, 1, ..., one after
+// another, are the whole problem in its order. All ranks take the same steps,
+// and exchange numbers where one of the whole problem is needed. Numbers are
+// combined in the order in which a single process combines them, so the result
+// has the same bits at any number of ranks.
 class Ranks {
  public:
   virtual ~Ranks() = default;
@@ -148,14 +148,15 @@ class Ranks {
   }
 };
 
-// Something that several processes cannot do together; what() is one sentence.
+// Thrown for what several processes cannot do together; what() is one sentence.
 class RanksError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// A number of the whole problem, where the processes of a context share its
-// points; in one process it is the number itself.
+// The following reduce numbers of one process's share to numbers of the whole
+// problem, if the processes of a context share its points; with one process
+// they change nothing.
 
 template <typename T, typename Combine>
 void ReduceRanks(const Context& context, const Combine& combine,
@@ -163,7 +164,7 @@ void ReduceRanks(const Context& context, const Combine& combine,
   if (context.ranks != nullptr) context.ranks->Reduce(combine, values);
 }
 
-// The largest value and the sum over all processes' shares.
+// The largest value, or the sum, over all processes' shares.
 inline double MaxOfRanks(const Context& context, double own) {
   if (context.ranks == nullptr) return own;
   std::vector<double> value = {own};
@@ -185,7 +186,7 @@ inline bool AnyRank(const Context& context, bool own) {
   return SumOfRanks(context, own ? 1 : 0) > 0;
 }
 
-// change(value), on every process in turn, in the order of their points.
+// Calls change(value) on every process in turn, in the order of their points.
 template <typename T, typename Change>
 void InTurnOfRanks(const Context& context, const Change& change,
                    std::vector<T>* value) {
@@ -193,13 +194,13 @@ void InTurnOfRanks(const Context& context, const Change& change,
   context.ranks->InTurn(change, value);
 }
 
-// Throws RanksError where several processes share the points.
+// Throws RanksError if several processes share the points.
 inline void RequireOneRank(const Context& context, const std::string& what) {
   if (context.ranks == nullptr) return;
   throw RanksError(what + " is for one process: use krot solver");
 }
 
-// For work on this process's own share.
+// The context for work on this process's own share alone.
 inline Context WithoutRanks(const Context& context) {
   Context alone = context;
   alone.ranks = nullptr;

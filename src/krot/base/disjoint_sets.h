@@ -7,8 +7,8 @@
 
 namespace krot::internal {
 
-// Union-find with path halving over 0, 1, ..., count - 1. At first each is a
-// set of its own. The root of a set is its smallest member.
+// Union-find with path halving over 0, 1, ..., count - 1. At first each member
+// is a set of its own. The root of a set is its smallest member.
 class DisjointSets {
  public:
   explicit DisjointSets(int64_t count) : parent_(count) {

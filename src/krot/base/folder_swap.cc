@@ -44,7 +44,7 @@ void CheckFolderIsWritable(const fs::path& folder) {
   }
 }
 
-// A new folder beside `target`, with the permissions that mkdir gives.
+// Creates a folder beside `target`, with the permissions that mkdir gives.
 fs::path CreateSibling(const fs::path& target) {
   for (int i = 0;; ++i) {
     const std::string name = "." + target.filename().string() + ".krot-" +
@@ -171,7 +171,7 @@ FolderSwap::~FolderSwap() {
   }
 }
 
-// The new folder is in place, so a failure here is only worth a note.
+// The new folder is in place already, so a failure here is only worth a note.
 void FolderSwap::SyncPlace() const {
   try {
     SyncFolder(target_.parent_path());

@@ -12,6 +12,7 @@
 namespace krot::internal {
 namespace {
 
+// As snprintf with one precision and one number.
 std::string Print(const char* format, int decimals, double value) {
   std::string text(512, '\0');
   const int size =
@@ -22,8 +23,9 @@ std::string Print(const char* format, int decimals, double value) {
 
 }  // namespace
 
-// strtod accepts more than from_chars at the beginning of a text, accepts
-// hexadecimal digits, and returns infinity or zero for numbers out of range.
+// strtod differs from from_chars: it accepts more at the beginning of a text,
+// accepts hexadecimal digits, and returns infinity or zero for numbers out of
+// range. These cases are refused here.
 std::optional<double> ParseRealByC(std::string_view text) {
   const std::string copy(text);
   const bool is_negative = !copy.empty() && copy[0] == '-';
@@ -60,8 +62,9 @@ std::string ShortestTextByC(double value) {
 
 namespace {
 
-// The bits of doubles that are not negative have the order of their values, so
-// the median's bits are found eight at a time: by how many values have which.
+// The bits of doubles that are not negative, read as integers, have the order
+// of their values. So the bits of the median are found from the highest on,
+// eight at a time, by counting how many values have each continuation.
 constexpr int kBits = 8;
 constexpr int kNumDigits = 1 << kBits;
 
@@ -82,14 +85,15 @@ double FromBits(uint64_t bits) {
 std::vector<double> GroupMedians(const std::vector<double>& values,
                                  const std::vector<int32_t>& group_of,
                                  int32_t num_groups, const Context& context) {
-  std::vector<uint64_t> found(num_groups, 0);       // the leading bits
-  std::vector<int64_t> num_before(num_groups, -1);  // of those with these bits
+  std::vector<uint64_t> found(num_groups, 0);  // the bits found so far
+  // Values below the median among those with these bits.
+  std::vector<int64_t> num_before(num_groups, -1);
   for (int shift = 64 - kBits; shift >= 0; shift -= kBits) {
     std::vector<int64_t> counts(static_cast<size_t>(num_groups) * kNumDigits);
     for (size_t n = 0; n < values.size(); ++n) {
       const int32_t group = group_of[n];
       if (group < 0 || !std::isfinite(values[n]) || values[n] < 0) continue;
-      // -0 has the bits of 0 here.
+      // This gives -0 the bits of 0.
       const uint64_t digits = BitsOf(std::abs(values[n])) >> shift;
       if (digits >> kBits != found[group]) continue;
       ++counts[group * kNumDigits + (digits & (kNumDigits - 1))];

@@ -31,7 +31,7 @@ inline double Median(std::vector<double> values) {
   return *middle;
 }
 
-// The same, but of an even number of values the smaller of the middle two.
+// The median, and of an even number of values the smaller of the middle two.
 inline double LowerMedian(std::vector<double> values) {
   const auto middle =
       values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
@@ -39,8 +39,8 @@ inline double LowerMedian(std::vector<double> values) {
   return *middle;
 }
 
-// std::from_chars and std::to_chars for doubles, by the C library, for standard
-// libraries that have them for integers alone.
+// Replace std::from_chars and std::to_chars for doubles, by functions of the C
+// library, in standard libraries that have the two for integers alone.
 std::optional<double> ParseRealByC(std::string_view text);
 std::string ShortestTextByC(double value);
 
@@ -50,9 +50,9 @@ inline constexpr bool kCharconvHasReals = true;
 inline constexpr bool kCharconvHasReals = false;
 #endif
 
-// The number that `text` as a whole stands for, read as std::from_chars does:
-// no blank, no plus sign, independent of the locale. None if it is not a
-// number, or one that `Number` cannot hold.
+// The number that the whole `text` stands for, read as by std::from_chars: no
+// blank, no plus sign, independent of the locale. None if it is not a number,
+// or if `Number` cannot hold it.
 template <typename Number>
 std::optional<Number> ParseNumber(std::string_view text) {
   if constexpr (std::is_floating_point_v<Number> && !kCharconvHasReals) {
@@ -80,14 +80,14 @@ void AppendNumber(Number value, std::string* text) {
 }
 
 // The lower median of each group's values. Values that are negative or not
-// finite, or whose group is -1, do not count; a group without values has NaN.
-// Where ranks share the values it is that of all of them, to the bit.
+// finite, or whose group is -1, do not count; a group without values gets NaN.
+// If ranks share the values, it is the median of all ranks' values, to the bit.
 // O(values + 256 groups), eight times.
 std::vector<double> GroupMedians(const std::vector<double>& values,
                                  const std::vector<int32_t>& group_of,
                                  int32_t num_groups, const Context& context);
 
-// The same of a single group.
+// The lower median of all values, likewise.
 double MedianOf(const std::vector<double>& values, const Context& context);
 
 }  // namespace krot::internal

@@ -10,21 +10,21 @@
 #include "krot/base/system.h"
 
 namespace krot::internal {
-// One call of Run. It lives on the caller's stack until no call of its work
-// runs or may begin.
+// One call of Run. It lives on the caller's stack until no call of its work is
+// running or may begin.
 struct ThreadPool::Task {
   const std::function<void(int)>& work;
   std::fenv_t environment;
-  int num_begun = 1;    // the caller's own
-  int num_workers;      // at most
-  int num_running = 0;  // in the pool
+  int num_begun = 1;    // calls that have begun, with the caller's own
+  int num_workers;      // largest number of calls
+  int num_running = 0;  // calls on threads of the pool
   std::condition_variable is_done;
 };
 
 ThreadPool& ThreadPool::Get() {
   static ThreadPool* pool = nullptr;
-  // A child process has none of the threads, and its locks are in the state in
-  // which the fork found them.
+  // After a fork the child has none of the threads, and the locks are in
+  // whatever state they were at the fork: it gets a new pool.
   const auto make_pool = [] { pool = new ThreadPool; };
   [[maybe_unused]] static const bool made = [&] {
     make_pool();
@@ -51,7 +51,7 @@ void ThreadPool::Run(int num_workers, const std::function<void(int)>& work) {
   task.is_done.wait(lock, [&] { return task.num_running == 0; });
 }
 
-// Creates as many threads as there are calls that have not begun.
+// Creates threads until there is one for each call that has not begun.
 void ThreadPool::AddThreads() {
   for (; num_idle_ < num_to_begin_; ++num_idle_) {
     try {
@@ -62,7 +62,7 @@ void ThreadPool::AddThreads() {
   }
 }
 
-// The endless loop of a thread of the pool.
+// What a thread of the pool does, for ever.
 void ThreadPool::Serve() {
   std::unique_lock<std::mutex> lock(mutex_);
   for (;;) {
@@ -82,7 +82,7 @@ void ThreadPool::Serve() {
   }
 }
 
-// No further call of `task` begins.
+// No further call of `task` will begin.
 void ThreadPool::Close(const Task* task) {
   const auto found = std::find(open_.begin(), open_.end(), task);
   if (found == open_.end()) return;
@@ -92,7 +92,8 @@ void ThreadPool::Close(const Task* task) {
 
 int ResolveNumThreads(int requested) {
   if (requested > 0) return requested;
-  // Asking the system opens a file, which takes longer than a small loop runs.
+  // Cached, because asking the system opens a file, which takes longer than a
+  // small loop.
   static const int num_hardware_threads =
       std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   return num_hardware_threads;
@@ -106,7 +107,8 @@ void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
   const int num_workers = static_cast<int>(
       std::min<int64_t>(ResolveNumThreads(num_threads), num_chunks));
 
-  // Which thread takes which chunk is left to chance, and must not matter.
+  // Threads take chunks as they come; the result must not depend on which takes
+  // which.
   std::atomic<int64_t> next_chunk{0};
   std::mutex mutex;
   int64_t failed_chunk = num_chunks;

@@ -8,8 +8,8 @@
 
 namespace krot::internal {
 
-// Threads that wait for work, so that none has to be created for it. Their
-// number grows with the number that is asked for at the same time.
+// Threads that wait for work, because creating them takes time. There are as
+// many as calls of Run have needed at the same time.
 //
 // There is one pool. It is never destroyed and its threads are detached: at the
 // end of the process they sleep, and nothing waits for them. A child process
@@ -35,11 +35,11 @@ class ThreadPool {
   void Serve();
   void Close(const Task* task);
 
-  std::mutex mutex_;  // of all that follows
+  std::mutex mutex_;  // guards all that follows
   std::condition_variable is_open_;
   std::vector<Task*>
-      open_;              // have calls that have not begun; served last first
-  int num_to_begin_ = 0;  // calls of all of them that have not begun
+      open_;  // have calls that have not begun; the last task is served first
+  int num_to_begin_ = 0;  // calls of all tasks that have not begun
   int num_idle_ = 0;      // threads without work
 };
 
@@ -47,8 +47,8 @@ class ThreadPool {
 // otherwise the number of hardware threads. At least 1.
 int ResolveNumThreads(int requested);
 
-// Any callable as body(begin, end, worker), which it refers to: a std::function
-// would be compiled anew for each of them, in more time than most bodies take.
+// A reference to any callable body(begin, end, worker). A std::function for
+// each of them would take more time to compile than most bodies themselves.
 class ChunkBody {
  public:
   template <typename Body>
@@ -67,26 +67,26 @@ class ChunkBody {
   void (*call_)(const void*, int64_t, int64_t, int);
 };
 
-// Calls body(begin, end, worker) for the fixed chunks [0, chunk_size),
-// [chunk_size, 2 chunk_size), ... of [0, count), each exactly once, on up to
-// `num_threads` threads (resolved as above); `worker` in [0, num_threads)
-// names the thread, for scratch memory. The threads are those of the pool.
-// Calls may be nested.
+// Calls body(begin, end, worker) exactly once for each of the fixed chunks [0,
+// chunk_size), [chunk_size, 2 chunk_size), ... of [0, count), on up to
+// `num_threads` threads of the pool (as ResolveNumThreads says). `worker` in
+// [0, num_threads) is the number of the thread; bodies use it to choose scratch
+// memory. Calls may be nested.
 //
 // The chunks depend on `count` and `chunk_size` alone, never on the number of
-// threads or the clock: a body that writes only what belongs to its chunk
-// gives the same bits at any thread count. A reduction goes through one slot
-// per chunk, summed in order afterwards.
+// threads or the clock. So a body that writes only what belongs to its chunk
+// gives the same bits at any number of threads. A reduction should write to one
+// slot per chunk and sum these up in order afterwards.
 //
 // If bodies throw, all chunks are visited nevertheless, and the exception of
 // the first chunk that threw is rethrown afterwards.
 void ParallelFor(int64_t count, int64_t chunk_size, int num_threads,
                  const ChunkBody& body);
 
-// A chunk of cheap work.
+// The chunk size for cheap work.
 inline constexpr int64_t kItemsPerChunk = 256;
 
-// body(i) for every i of [0, count); it writes only what belongs to i.
+// Calls body(i) for every i in [0, count); it may write only what belongs to i.
 template <typename Body>
 void ParallelForEach(int64_t count, int num_threads, const Body& body) {
   ParallelFor(count, kItemsPerChunk, num_threads,

@@ -10,19 +10,19 @@
 
 namespace krot::internal {
 
-// What is asked of the operating system in a way of its own: system_posix.cc
-// and system_windows.cc. Texts are UTF-8 on both.
+// Everything that operating systems do differently; implemented in
+// system_posix.cc and system_windows.cc. Texts are UTF-8 on both.
 
-// An open file that is closed when it goes out of scope, and that no child
-// process inherits. What fails leaves the reason in errno.
+// An open file. It is closed when it goes out of scope, and child processes do
+// not inherit it. Functions that fail leave the reason in errno.
 class FileDescriptor {
  public:
   enum class Use {
     kRead,
-    kReplace,  // write; what the file held is gone
+    kReplace,  // write; the file's old content is lost
     kUpdate,   // read and write
   };
-  // kReplace and kUpdate create a file that is not there.
+  // kReplace and kUpdate create the file if it does not exist.
   FileDescriptor(const std::filesystem::path& file, Use use);
   ~FileDescriptor() {
     if (is_open()) Close();
@@ -31,81 +31,83 @@ class FileDescriptor {
   FileDescriptor& operator=(const FileDescriptor&) = delete;
 
   bool is_open() const { return value_ >= 0; }
-  // In bytes; none if it is a folder, a pipe or a device, or on failure.
+  // Size in bytes; none if it is a folder, a pipe or a device, or on failure.
   std::optional<int64_t> RegularSize() const;
-  // Reads on from `offset`: `size` bytes, or as many as there are.
+  // Reads `size` bytes from `offset` on, or as many as there are.
   bool ReadAt(int64_t offset, size_t size, std::string* bytes) const;
-  // All of them, from where Truncate or the last Write ended.
+  // Writes all bytes, from where Truncate or the last Write ended.
   bool Write(std::string_view bytes) const;
-  // Leaves `size` bytes, and writes on behind them.
+  // Cuts the file to `size` bytes; later writes continue there.
   bool Truncate(int64_t size) const;
-  // Forces what was written to the disk, where there is one.
+  // Forces what was written to the disk.
   bool Sync() const;
-  // Keeps other processes from locking it; false if one has.
+  // Locks the file against other processes' Lock; false if one of them has it.
   bool Lock() const;
-  // Fails if earlier writes did not reach the file.
+  // Closes the file; false if earlier writes did not reach it.
   bool Close();
 
  private:
   int value_;
 };
 
-// Folders.
+// ---- Folders ----
 
-// Why nothing can be created in `folder`; no error if something can. It is
-// tried, since permissions tell root nothing of /proc or of a read-only disk;
-// nothing stays.
+// Why nothing can be created in `folder`; no error if something can. This is
+// tried, because root's permissions say nothing about /proc or a read-only
+// disk; nothing remains.
 std::error_code TryToCreateIn(const std::filesystem::path& folder);
-// Appends the names that a folder holds, in no order.
+// Appends the names in a folder, in no particular order.
 std::error_code ListEntries(const std::filesystem::path& folder,
                             std::vector<std::filesystem::path>* names);
 // Removes a file, a link or an empty folder.
 std::error_code RemoveEntry(const std::filesystem::path& path);
-// Forces the names that a folder holds to the disk, where that is for programs
-// to do and the folder may be read.
+// Forces the names in a folder to the disk, if that is left to programs and the
+// folder may be read.
 std::error_code SyncEntries(const std::filesystem::path& folder);
-// Why the entries of `folder` may be neither listed nor changed, as far as its
-// permissions tell.
+// Why the entries of `folder` may not be listed or changed, as far as its
+// permissions say.
 std::error_code CheckPermissions(const std::filesystem::path& folder);
-// False where the system cannot tell.
+// Always false if the system does not say.
 bool IsMountPoint(const std::filesystem::path& folder);
-// Exchanges two names in one step. errc::function_not_supported where the
-// system or the file system has no such step.
+// Exchanges two names in one step; errc::function_not_supported if the system
+// or the file system cannot.
 std::error_code ExchangeNames(const std::filesystem::path& a,
                               const std::filesystem::path& b);
 
-// The process.
+// ---- The process ----
 
-// The arguments behind the program's name. To be called once, first of all: on
-// Windows the console is told that texts are UTF-8, and stdout that lines end
-// as they are written.
+// The arguments after the program's name. Must be the first call, and be called
+// once: on Windows it also sets the console to UTF-8, and stdout and stderr not
+// to change line ends.
 std::vector<std::string> ProgramArguments(int argc, char** argv);
 int ProcessId();
-// What happens on Ctrl-C or when the process is asked to end (SIGINT, SIGTERM):
-// `handler` is called in a signal handler, or on Windows on a thread of its
-// own, and may do what is allowed in the former. With `once`, the next request
-// ends the process.
+// Calls `handler` on Ctrl-C or when the process is asked to end (SIGINT,
+// SIGTERM): in a signal handler, or on Windows on a thread of its own, so it
+// may do only what signal handlers may. With `once`, the next request ends the
+// process.
 void OnEndRequest(void (*handler)(), bool once);
-// Calls `function` in every child process that is forked off.
+// Calls `function` in every child process after a fork.
 void OnFork(void (*function)());
-// Writes to stderr as it is, also in a signal handler; false if that fails.
+// Writes the text to stderr unchanged; may be called in a signal handler. False
+// if it fails.
 bool WriteToStderr(std::string_view text);
 
-// Bytes that this process can still take: what is left of the machine's memory
-// and swap, of its control group's and of its own address space, the least of
-// them. What the system does not say sets no limit.
+// Memory that this process can still take, bytes: the smallest of the free
+// memory and swap of the machine, the limit of the control group (its cache may
+// be dropped, so what it uses does not count), and the rest of the address
+// space. Where the system does not say, there is no limit.
 int64_t FreeMemoryBytes();
-int64_t ResidentBytes();  // now
+int64_t ResidentBytes();  // at present
 int64_t PeakMemoryBytes();
 
-// The terminal.
+// ---- The terminal ----
 
 bool IsStderrTerminal();
-// Whether it lets lines be rewritten by control sequences.
+// Whether control sequences can rewrite its lines.
 bool CanRewriteLines();
 std::optional<int> TerminalColumns();
 
-// The machine; "unknown" and 0 where the system does not say.
+// ---- The machine; "unknown" and 0 if the system does not say ----
 
 std::string CpuName();
 std::string SystemName();

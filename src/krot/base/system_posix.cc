@@ -40,7 +40,7 @@ int Open(const fs::path& file, FileDescriptor::Use use) {
   return -1;
 }
 
-// File systems without fsync answer EINVAL.
+// A file system without fsync answers EINVAL; that is no failure.
 bool SyncDescriptor(int descriptor) {
   return ::fsync(descriptor) == 0 || errno == EINVAL;
 }
@@ -108,7 +108,7 @@ bool FileDescriptor::Close() {
 
 std::error_code TryToCreateIn(const fs::path& folder) {
 #ifdef O_TMPFILE
-  // A file without a name, where the file system has such.
+  // First try a file without a name; not all file systems have these.
   const int unnamed =
       ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, mode_t{0600});
   if (unnamed >= 0) {
@@ -212,7 +212,8 @@ namespace {
 
 constexpr int64_t kUnlimited = std::numeric_limits<int64_t>::max();
 
-// "MemAvailable:  12345 kB" of /proc/meminfo, in bytes.
+// The sum of "MemAvailable:  12345 kB" and "SwapFree:" in /proc/meminfo, in
+// bytes.
 int64_t FreeOfMachine() {
   std::ifstream stream("/proc/meminfo");
   int64_t bytes = 0;
@@ -227,7 +228,8 @@ int64_t FreeOfMachine() {
   return is_said ? bytes : kUnlimited;
 }
 
-// The whole of it: what else the group holds may be cache.
+// The limit of the control group, whatever it uses at present: that may be
+// cache.
 int64_t OfControlGroup() {
   for (const char* name : {"/sys/fs/cgroup/memory.max",
                            "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
@@ -294,7 +296,7 @@ std::optional<int> TerminalColumns() {
   return size.ws_col;
 }
 
-// "model name : AMD EPYC" of /proc/cpuinfo.
+// The name after "model name : " in /proc/cpuinfo.
 std::string CpuName() {
   std::ifstream stream("/proc/cpuinfo");
   for (std::string line; std::getline(stream, line);) {

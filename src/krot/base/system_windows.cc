@@ -1,5 +1,5 @@
 #include <windows.h>
-// Behind it, as they need its types.
+// These must follow windows.h, as they need its types.
 #include <fcntl.h>
 #include <io.h>
 #include <process.h>
@@ -16,9 +16,10 @@
 
 #include "krot/base/system.h"
 
-// libstdc++ makes a path of a narrow text by this facet, whose own functions
-// take every byte for a letter in the locale "C", and msvcrt.dll has no locale
-// of UTF-8. These take the place of all of them.
+// Makes std::filesystem read narrow texts as UTF-8. libstdc++ converts paths by
+// this facet; in the locale "C" its own functions take every byte for a letter,
+// and msvcrt.dll has no UTF-8 locale. The functions below replace all of the
+// facet's.
 namespace std {
 
 using ByUtf8 = codecvt_utf8_utf16<wchar_t>;
@@ -30,7 +31,7 @@ codecvt_base::result OfLocale::do_out(state_type& state, const wchar_t* from,
                                       char* to_end, char*& to_next) const {
   return ByUtf8().out(state, from, from_end, from_next, to, to_end, to_next);
 }
-// What is not UTF-8 becomes U+FFFD, and so the name of no file.
+// Bytes that are not UTF-8 become U+FFFD, so they name no existing file.
 codecvt_base::result OfLocale::do_in(state_type& state, const char* from,
                                      const char* from_end,
                                      const char*& from_next, wchar_t* to,
@@ -79,7 +80,7 @@ int Open(const fs::path& file, FileDescriptor::Use use) {
   return -1;
 }
 
-// One call of the system takes no more.
+// One system call cannot take more bytes than this.
 unsigned int OneCall(size_t size) {
   return static_cast<unsigned int>(std::min<size_t>(size, 1 << 30));
 }
@@ -138,7 +139,8 @@ bool FileDescriptor::Truncate(int64_t size) const {
 
 bool FileDescriptor::Sync() const { return ::_commit(value_) == 0; }
 
-// One byte far behind the end: what is locked nobody else could read.
+// Locks one byte far behind the end, because nobody else could read locked
+// bytes.
 bool FileDescriptor::Lock() const {
   OVERLAPPED place = {};
   place.OffsetHigh = 0x7FFFFFFF;
@@ -184,10 +186,10 @@ std::error_code RemoveEntry(const fs::path& path) {
   return is_removed != 0 ? std::error_code() : LastSystemError();
 }
 
-// NTFS keeps a log of names.
+// Nothing to do: NTFS keeps a log of names.
 std::error_code SyncEntries(const fs::path&) { return {}; }
 
-// The attribute "read-only" of a folder says nothing about its entries.
+// A folder's attribute "read-only" says nothing about its entries.
 std::error_code CheckPermissions(const fs::path&) { return {}; }
 
 bool IsMountPoint(const fs::path&) { return false; }
@@ -210,7 +212,7 @@ std::vector<std::string> ProgramArguments(int, char**) {
       ::CommandLineToArgvW(::GetCommandLineW(), &count), &::LocalFree);
   std::vector<std::string> arguments;
   for (int n = 1; n < count; ++n) {
-    // fs::path keeps what it is given, and knows UTF-8.
+    // fs::path keeps the characters, and converts them to UTF-8.
     arguments.push_back(fs::path(words.get()[n]).string());
   }
   return arguments;
@@ -224,7 +226,8 @@ void (*on_end_request)() = nullptr;
 bool is_once = false;
 
 BOOL WINAPI HandleConsole(DWORD) {
-  if (on_end_request == nullptr) return FALSE;  // what ends the process
+  // The default handler then ends the process.
+  if (on_end_request == nullptr) return FALSE;
   void (*const handler)() = on_end_request;
   if (is_once) on_end_request = nullptr;
   handler();
@@ -250,7 +253,7 @@ int64_t FreeMemoryBytes() {
   if (::GlobalMemoryStatusEx(&status) == 0) {
     return std::numeric_limits<int64_t>::max();
   }
-  // The page file counts as memory in the former.
+  // ullAvailPageFile includes physical memory.
   return static_cast<int64_t>(
       std::min(status.ullAvailPageFile, status.ullAvailVirtual));
 }

@@ -5,9 +5,9 @@
 
 namespace krot::internal {
 
-// The vector units that kernels are compiled for, in a build for any machine:
-// krot_native_kernel of cmake/KrotTargets.cmake. In a namespace each,
-// KROT_UNITS.
+// The vector units that kernels are compiled for in a build for any machine
+// (krot_native_kernel of cmake/KrotTargets.cmake). The kernels for each are in
+// a namespace of their own, KROT_UNITS.
 enum class VectorUnits {
   kOwn,  // those that the whole program is compiled for
 #ifdef KROT_CHOOSES_UNITS
@@ -16,9 +16,9 @@ enum class VectorUnits {
 #endif
 };
 
-// The best ones that this processor has. The environment variable KROT_KERNELS
-// names lesser ones, "own" or "avx2", for results that have the same bits on
-// another machine. Reads the environment at its first call.
+// The best units that this processor has. The environment variable KROT_KERNELS
+// can limit them to "own" or "avx2", to get the same bits on different
+// machines. It is read at the first call.
 inline VectorUnits BestVectorUnits() {
 #ifdef KROT_CHOOSES_UNITS
   static const VectorUnits best = [] {
@@ -40,8 +40,8 @@ inline VectorUnits BestVectorUnits() {
 #endif
 }
 
-// What is the same in all namespaces but for its units; of those of TABLE, the
-// best one.
+// KROT_DECLARE_KERNELS declares a table of kernels in the namespace of each
+// unit; KROT_BEST_KERNELS chooses that of the best units.
 #ifdef KROT_CHOOSES_UNITS
 #define KROT_DECLARE_KERNELS(Type, table) \
   namespace own {                         \

@@ -14,12 +14,13 @@ fs::path ParentFolder(const fs::path& file) {
   return parent.empty() ? fs::path(".") : parent;
 }
 
-// "out/" and "out" are the same folder.
+// An absolute path with a trailing slash, so that "out/" and "out" compare
+// equal.
 fs::path Normal(const fs::path& folder) {
   return (fs::absolute(folder) / "").lexically_normal();
 }
 
-// The action that failed on a file, and why.
+// The action that failed on a file, and the reason.
 struct Failure {
   const char* action;
   std::string reason;
@@ -34,7 +35,7 @@ std::optional<Failure> TryToWrite(const fs::path& file,
   FileDescriptor descriptor(file, FileDescriptor::Use::kReplace);
   if (!descriptor.is_open()) return FailureOf("created");
   if (!descriptor.Write(contents)) return FailureOf("written");
-  // Some file systems report only now that there is no space left.
+  // Some file systems report only at this point that there is no space left.
   if (!descriptor.Sync()) return FailureOf("written");
   if (!descriptor.Close()) return FailureOf("written");
   return std::nullopt;

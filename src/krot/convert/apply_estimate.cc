@@ -16,8 +16,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Stored poses that agree to this with those of frames and rigs differ by
-// rounding alone: quaternions and translations relative to their size.
+// Stored poses that differ from those of frames and rigs by less than this
+// differ by rounding alone; quaternions, and translations relative to their
+// size.
 constexpr double kSamePose = 1e-9;
 
 bool IsSamePoint(const Vector3d& a, const Vector3d& b) {
@@ -54,7 +55,8 @@ Estimate OwnEstimate(const Model& model, const BuiltProblem& built) {
   for (const int32_t point : built.point_of) {
     estimate.points.push_back(model.points3D[point].xyz);
   }
-  // What stands behind the model's does not move.
+  // Known positions add frames and points behind the model's; these do not
+  // move.
   const Estimate& start = built.start;
   estimate.translations.insert(
       estimate.translations.end(),
@@ -97,8 +99,8 @@ Model ApplyEstimate(const Model& model, const BuiltProblem& built,
 
 namespace {
 
-// The largest error of a point's observations whose error was finite before;
-// infinite where one of those no longer projects.
+// The largest error of a point's observations, only over those whose error was
+// finite before; infinite if one of these no longer projects.
 class TrackError {
  public:
   TrackError(const Model& model, const std::vector<double>& errors_before_px,

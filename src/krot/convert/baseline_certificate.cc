@@ -22,10 +22,11 @@ namespace {
 using Json = CertificateFileJson;
 using Eigen::Vector3d;
 
-// Halves of halves: squares are exact numbers up to here.
+// Cells are halved at most this often; until then their corners are exact
+// numbers.
 constexpr int kDeepestCell = 50;
 
-// An enclosure of a vector.
+// An interval for each coordinate of a vector.
 using Box = std::array<Interval, 3>;
 
 Box Cross(const Vector3d& a, const Vector3d& b) {
@@ -46,13 +47,14 @@ Interval Square(const Interval& a) {
   return Interval{least, most} * Interval{least, most};
 }
 
-// A match: a baseline b explains it if, with the rays d1 and d2 of its pixels
-// and their derivatives, |b . (d1 x d2)| <= tolerance |gradient b|.
+// The condition of a match. A baseline b explains the match if |b . (d1 x d2)|
+// <= tolerance |gradient b|, where d1 and d2 are the rays of its pixels and the
+// gradient is that of the left side by the four pixel coordinates.
 struct Condition {
   Box normal;
   std::array<Box, 4> gradient;
 
-  // Both sides, squared.
+  // The squares of both sides.
   std::pair<Interval, Interval> Sides(const Box& b, double tolerance) const {
     Interval sum{0, 0};
     for (const Box& row : gradient) sum = sum + Square(Dot(row, b));
@@ -109,14 +111,14 @@ std::vector<Condition> ConditionsOf(
   return conditions;
 }
 
-// Walks through the cells of one pair.
+// Reads the cells of one pair and checks each of them.
 class CellChecker {
  public:
   CellChecker(const std::vector<Condition>& conditions, double tolerance,
               const BaselineCertificate::Pair& pair)
       : conditions_(conditions), tolerance_(tolerance), pair_(pair) {}
 
-  // Why the cells prove nothing; empty if they do.
+  // Why the cells prove nothing; empty if they prove most_explained.
   std::string Run() {
     std::vector<int32_t> all(conditions_.size());
     for (size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int32_t>(k);

@@ -21,29 +21,29 @@ namespace {
 using Eigen::Vector3d;
 using LeftOutCounts = std::array<int64_t, kNumLeftOutReasons>;
 
-// Depths below this, relative to the coordinates that they are the difference
-// of, may be rounding.
+// A depth below this, relative to the coordinates that it is the difference of,
+// may be rounding alone.
 constexpr double kDepthRounding = 1e-14;
 
-// What is looked up for every observation.
+// The model, and tables that are looked up for every observation.
 struct Sources {
   const Model& model;
   std::vector<ImageGeometry> geometries;
   std::unordered_map<ImageId, int32_t> image_indices;
 };
 
-// What becomes of one point of the model.
+// What became of one point of the model.
 struct PointOutcome {
   int32_t index = 0;   // in the model
-  uint64_t slots = 0;  // where its own begin
+  uint64_t slots = 0;  // where its slots begin
   RepairedPoint point;
   int num_kept = 0;
   bool has_image_twice = false;
 };
 
-// Where a point's usable observations are written, in the track's order. As
-// many places as the track has elements; `view` is the index of the image and
-// `point` that of the point in the model until Compact renumbers them.
+// Where a point's usable observations are written, in the track's order; there
+// is a slot for every element of the track. Until Compact renumbers them,
+// `view` is the index of the image in the model and `point` that of the point.
 struct Slots {
   Observation* observations;
   int32_t* point2D;
@@ -56,7 +56,7 @@ struct Slots {
   }
 };
 
-// The row where the point projects, at a depth that is not rounding alone.
+// The row where the point projects; none if its depth may be rounding alone.
 std::optional<Eigen::Matrix3d> RowAtPoint(const Sources& sources,
                                           const ImageGeometry& geometry,
                                           const Eigen::Vector2d& pixel,
@@ -83,9 +83,11 @@ std::optional<Eigen::Matrix3d> RowAtPixel(const Sources& sources,
   return RowAtProjection(camera.model_id, params, pixel, *bearing);
 }
 
-// Fills the slots with the observations that have a pose and a row: where the
-// point projects or, if it does not or must not count, at the pixel's ray. All
-// that have a ray are taken there if one does not see the point.
+// Fills the slots with the observations that have a pose and a row. The row is
+// taken where the point projects or, if it does not or translations are
+// ignored, at the pixel's ray. If one observation does not see the point, the
+// rows of all others that have a ray are taken at their rays, too, for the
+// re-triangulation.
 int CollectRows(const Sources& sources, int32_t point,
                 const BuildProblemOptions& options, Slots slots,
                 LeftOutCounts* left_out) {
@@ -132,8 +134,8 @@ int CollectRows(const Sources& sources, int32_t point,
   return num_kept;
 }
 
-// Removes the observations that the point does not project in; the others' rows
-// are taken there.
+// Removes the observations in which the point does not project, and takes the
+// rows of the others where it does.
 int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
                  Slots slots) {
   int num_kept = 0;
@@ -148,7 +150,7 @@ int RemoveBehind(const Sources& sources, const Vector3d& xyz, int count,
   return num_kept;
 }
 
-// Of several observations of an image only the one closest to the point stays.
+// Keeps only the observation closest to the point among those of each image.
 void KeepClosest(const Sources& sources, const Vector3d& xyz, Slots slots,
                  int* count, LeftOutCounts* left_out) {
   const std::vector<char> is_closest =
@@ -235,7 +237,7 @@ std::vector<PointOutcome> ProcessPoints(const Sources& sources,
   return outcomes;
 }
 
-// Moves the kept observations together and numbers the points that have any.
+// Moves the kept observations together, and numbers the points that have any.
 void Compact(const std::vector<PointOutcome>& outcomes, BuiltProblem* built) {
   std::vector<Observation>& observations = built->problem.observations;
   size_t num_kept = 0;
@@ -261,7 +263,8 @@ void Compact(const std::vector<PointOutcome>& outcomes, BuiltProblem* built) {
   built->problem.num_points = static_cast<int32_t>(built->point_of.size());
 }
 
-// An image has a pose if its rotation and its place in the rig are known.
+// With translations ignored, an image has a pose if its rotation and its pose
+// in the rig are known.
 void PlaceByRotations(std::vector<ImageGeometry>* geometries) {
   for (ImageGeometry& image : *geometries) {
     image.has_pose = image.frame >= 0 &&

@@ -14,73 +14,78 @@
 
 namespace krot::internal {
 
-// Between a COLMAP model and the known rotation problem.
+// Converts a COLMAP model to the known rotation problem, and an estimate of
+// that back to a model.
 
-// What becomes of several observations of one image in the same track, of
-// which one at most is right.
+// What to do with several observations of one image in the same track, of which
+// at most one is right.
 enum class SameImage {
   kKeep,
-  kClosest,  // the one with the smallest error at the model's own point stays
+  kClosest,  // only the one with the smallest error at the model's own point is
+             // kept
 };
 
 struct BuildProblemOptions {
-  // Usable observations that a point needs to be optimised; >= 1. Two of one
-  // image are two.
+  // Points with fewer usable observations take no part; >= 1. Two observations
+  // of one image count as two.
   int min_track_length = 2;
   int num_threads = -1;  // -1: all; the result does not depend on it
-  // Takes nothing from the model but rotations, rigs and rays: no observation
-  // is left out as `behind`, and as `no_pose` only where rotation or rig are
-  // unknown. No start then: `start` is what the model says, whatever that is.
+  // Uses only rotations, rigs and rays of the model. Then no observation is
+  // left out as `behind`, and as `no_pose` only if its rotation or rig is
+  // unknown. `start` is whatever the model says and is no valid start.
   bool ignore_translations = false;
-  SameImage same_image = SameImage::kKeep;  // kKeep if translations are ignored
-  FixedParts fixed = {};                    // what must not move, of that model
-  // Of that model; what is fixed, or has no observation, needs none.
+  // Must be kKeep if translations are ignored.
+  SameImage same_image = SameImage::kKeep;
+  FixedParts fixed = {};  // the parts of the model that must not move
+  // Known positions in the model; those of parts that are fixed or have no
+  // observation are ignored.
   std::vector<KnownPosition> positions = {};
-  // The model is one rank's share of the points, with all of the rest: frames
-  // and views are those of the whole. Null: it is the whole.
+  // Not null: the model is one rank's share of the points, with everything else
+  // of the whole model; frames and views are then numbered as in the whole.
   Ranks* ranks = nullptr;
 };
 
-// Where a view's camera or a point is known to be, as rows of the problem
+// Where a camera or a point is known to be; the problem has rows for it
 // (reprojection.h).
 struct BuiltPosition {
   KnownPosition::Of of = KnownPosition::Of::kImage;
-  int32_t index = 0;  // of the view or the point in the problem
+  int32_t index = 0;  // of the view or the point, in the problem
   Ellipsoid region;
   Eigen::Matrix3d unit_from_world;  // region.UnitFromWorld()
 };
 
-// The problem, its start, and where each unknown lives in the model. All stand
-// in the order of their ids, observations in that of their tracks: the same
-// whatever order the records of the model have.
+// The problem, its start, and the place of each unknown in the model.
+// Everything is in the order of the ids, and observations in the order of their
+// tracks: the problem does not depend on the order of the model's records.
 struct BuiltProblem {
   KnownRotationProblem problem;
-  // The model's own translations and points, with the points re-triangulated
-  // that were behind a camera. All depths are positive (unless translations
-  // are ignored).
+  // The model's own translations and points; points that were behind a camera
+  // are re-triangulated. All depths are positive, unless translations are
+  // ignored.
   Estimate start;
   std::vector<int32_t> frame_of;    // problem frame -> index in model.frames
   std::vector<int32_t> image_of;    // problem view -> index in model.images
   std::vector<int32_t> point_of;    // problem point -> index in model.points3D
   std::vector<int32_t> point2D_of;  // observation -> index in image.points2D
   std::vector<Eigen::Vector2d> pixels;  // of the observations
-  // Of the observations, > 0: their rows and errors are divided by it, so that
-  // a bound of epsilon is one of epsilon * scale pixels for each. Empty: 1.
+  // For each observation, > 0: its row and error are divided by this, so a
+  // bound of epsilon means epsilon * scale pixels for it. Empty: all are 1.
   std::vector<double> scales;
-  // Behind what the model has, the problem holds kRowsPerPosition views for
-  // each of these, each with an observation that has no pixel: of a fixed point
-  // behind the model's, one for each camera, or from a fixed frame behind the
-  // model's, of a point. Where a region ends the residual of its rows is
-  // `position_level`, pixels.
+  // For each known position the problem has kRowsPerPosition further views,
+  // behind those of the model, with one observation each that has no pixel. A
+  // camera gets a fixed point, behind the model's points, which these views
+  // see. A point is seen from a fixed frame, behind the model's frames. On the
+  // boundary of the region, to first order, the residual of these rows is
+  // `position_level` pixels.
   std::vector<BuiltPosition> positions;
   double position_level = 1;
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
-  // Tracks with several usable observations of one image, whatever becomes of
-  // them.
+  // Tracks with several usable observations of one image, whether or not they
+  // are kept.
   int64_t num_same_image_tracks = 0;
 
-  // Whether an observation is one of the model, and not a position's row.
+  // Whether an observation is one of the model, not a row of a known position.
   bool HasPixel(int64_t observation) const {
     return problem.observations[observation].view <
            static_cast<int32_t>(image_of.size());
@@ -94,58 +99,59 @@ struct BuiltProblem {
   }
 };
 
-// The problem of all observations that can be used: the unknowns are the
-// frames and points that have any. Every image of such a frame is a view,
-// whether or not it sees a point, so that the gauge knows all cameras.
+// Builds the problem of all observations that can be used. Unknowns are the
+// frames and points that have any. Every image of such a frame is a view, even
+// if it sees no point, because the gauge needs all cameras.
 //
-// What options.fixed marks stands still in the problem, and a fixed point is
-// part of it for one usable observation. options.positions add rows.
+// What options.fixed marks is a constant of the problem; a fixed point takes
+// part if it has one usable observation. options.positions add rows.
 //
-// An observation is left out for the first of these reasons: its image has no
-// pose; neither that nor its point may move; its point does not project and its
-// pixel has no trustworthy ray (PixelBearing); it does not see its point, and
-// re-triangulating that from all its rays does not bring it into sight of all
-// (then the fewest are left out); options.same_image prefers another of its
-// image and track; its point has too few usable observations. Rows are taken
-// where the points project (RowAtProjection).
+// An observation is left out for the first of these reasons that applies: its
+// image has no pose; neither its frame nor its point may move; its point does
+// not project and its pixel has no trustworthy ray (PixelBearing); it does not
+// see its point, even if that is re-triangulated from all its rays (of the two
+// positions of the point the one that fewer observations fail to see counts);
+// options.same_image prefers another observation of its image and track; its
+// point has too few usable observations. Rows are taken where the points
+// project (RowAtProjection).
 //
 // Requires a valid model (ValidateModel). Throws std::invalid_argument for bad
-// options. A problem without observations is no error. O(observations
-// + points log points); 100 bytes each.
+// options. A problem without observations is not an error. O(observations +
+// points log points); 100 bytes each.
 BuiltProblem BuildProblem(const Model& model,
                           const BuildProblemOptions& options);
 
-// Gives the observations scales, one each. Requires a problem without any, and
-// without positions.
+// Sets the scale of each observation. Requires a problem without scales and
+// positions.
 void ScaleObservations(std::vector<double> scales, BuiltProblem* built);
 
 // The model's own translations and points as an estimate of a problem that was
-// built from it, wherever they are: nothing is re-triangulated, and depths may
-// be of any sign.
+// built from it. Nothing is re-triangulated, so depths may have any sign.
 Estimate OwnEstimate(const Model& model, const BuiltProblem& built);
 
 // A copy of `model` with the estimate's translations and points; rotations and
-// everything else are unchanged. An image's pose becomes that of its sensor in
-// its frame, as COLMAP reads it: translations are composed anew, and the
-// quaternion of an image is replaced only if it is another rotation than its
-// frame and rig imply. What the estimate leaves where it is keeps its bits.
-// Throws std::invalid_argument where the estimate does not have the size of the
-// problem.
+// everything else do not change. The pose of an image becomes that of its
+// sensor in its frame, as COLMAP reads it: its translation is computed from the
+// frame's, and its quaternion is replaced only if it differs as a rotation from
+// what frame and rig imply. Whatever the estimate does not move keeps its bits.
+// Throws std::invalid_argument if the estimate has not the size of the problem.
 Model ApplyEstimate(const Model& model, const BuiltProblem& built,
                     const Estimate& estimate);
 
-// The subset of built.problem as a built problem of its own, from `start`, an
-// estimate of the whole; what was left out is not counted. O(subset).
+// A subset of built.problem as a built problem of its own, which starts from
+// `start`, an estimate of the whole. Its counts of what was left out are zero.
+// O(subset).
 BuiltProblem BuiltPart(const BuiltProblem& built, const ProblemSubset& subset,
                        const Estimate& start);
 
-// Points that took no part in the optimisation, in a model whose frames have
-// moved: where the largest error of such a point, finite before, has risen
-// above both its own old one and `level`, pixels, the point moves along with
-// the image, of those of its track, that serves it best, and stays where it is
-// if none does. What is fixed stays. A point of one observation keeps its error
-// exactly to rounding. `errors_px` are PixelErrors of `before` in the norm.
-// O(observations of such points).
+// Moves points that took no part in the optimisation along with frames that
+// have moved, so that they do not get worse. A point is moved if its largest
+// error has risen above both its old value and `level`, pixels; errors that
+// were not finite before do not count. It gets the shift of that image of its
+// track which gives it the smallest error, and stays where it is if none helps.
+// Fixed points stay. A point with one observation keeps its error up to
+// rounding. `errors_px` are PixelErrors of `before` in the norm. O(observations
+// of such points).
 void CarryLeftOutPoints(const Model& before,
                         const std::vector<double>& errors_px, Norm norm,
                         const BuiltProblem& built, const FixedParts& fixed,

@@ -90,7 +90,8 @@ std::vector<char> ClosestOfImages(const std::vector<ImageGeometry>& images,
   return is_closest;
 }
 
-// Observations stand in the order of their tracks, in front of positions' rows.
+// Relies on the order: observations are in the order of their tracks, in front
+// of the rows of positions.
 std::vector<Role> RolesOf(const Model& model, const BuiltProblem& built,
                           SameImage same_image) {
   const KnownRotationProblem& problem = built.problem;
@@ -128,16 +129,16 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The least eigenvalue of mean(I - d d') is half the mean squared sine
-// between the rays and their mean direction, or so. Below this (angles of
-// 1e-6) it is the rounding of rotations.
+// The smallest eigenvalue of mean(I - d d') is about half the mean squared sine
+// between the rays and their mean direction. Below this (angles of 1e-6) it is
+// within the rounding of rotations.
 constexpr double kParallel = 1e-12;
 
 }  // namespace
 
 std::optional<Vector3d> RetriangulateMidpoint(const std::vector<Ray>& rays) {
   if (rays.empty()) return std::nullopt;
-  // Relative to the mean centre, where rounding is least.
+  // Computed relative to the mean centre, where rounding is smallest.
   Vector3d mean_centre = Vector3d::Zero();
   for (const Ray& ray : rays) mean_centre += ray.centre;
   mean_centre /= static_cast<double>(rays.size());
@@ -162,7 +163,8 @@ std::optional<Vector3d> RetriangulateMidpoint(const std::vector<Ray>& rays) {
 
 namespace {
 
-// C = -R' t; its direction is where v = 0 and w > 0.
+// The ray of an observation: from C = -R' t in the direction where v = 0 and w
+// > 0.
 Ray RayOf(const ImageGeometry& image, const Observation& observation) {
   const RigidTransform world_from_cam = Inverse(image.cam_from_world);
   Vector3d ray = observation.E.row(1).cross(observation.E.row(2));

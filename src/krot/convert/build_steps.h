@@ -16,8 +16,9 @@
 
 namespace krot::internal {
 
-// Indices of the records by their ids, which differ: the order in which a file
-// happens to hold them makes no difference to a result.
+// Indices of the records in the order of their ids, which must be unique.
+// Results that are computed in this order do not depend on the order in the
+// file.
 template <typename Record>
 std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
   std::vector<int32_t> order(records.size());
@@ -28,38 +29,41 @@ std::vector<int32_t> OrderOfIds(const std::vector<Record>& records) {
   return order;
 }
 
-// Numbers the frames that have observations, and their images as views, of a
-// problem whose observations name their image as `view`; they name the view
-// from now on.
+// Numbers the frames that have observations, and their images as views. Before,
+// the `view` of an observation is the index of its image in the model;
+// afterwards it is that of the view.
 void AddFramesAndViews(const Model& model,
                        const std::vector<ImageGeometry>& geometries,
                        Ranks* ranks, BuiltProblem* built);
 
-// Fixes what is marked of the model where the problem starts.
+// Fixes the marked parts of the model at their positions in the problem's
+// start.
 void FixPositions(const FixedParts& fixed, BuiltProblem* built);
 
-// Observations of one image in the same track: of a point that was matched to
-// two places of an image one is wrong, or both are.
+// ---- Observations of one image in the same track ---- A point that was
+// matched to two places of one image has at least one wrong observation.
 
-// Whether two of a point's observations are of one image. O(count^2).
+// Whether two of a point's observations are from one image. O(count^2).
 bool HasImageTwice(const Observation* observations, int count);
 
-// For each of a point's observations, whether no other of its image has a
-// smaller error at `xyz`, or the same and comes first. Rows are taken there;
-// `view` is the index of the image in `images`. O(count^2).
+// For each of a point's observations, whether it has the smallest error at
+// `xyz` among those of its image; the first one counts if several have the
+// same. Requires rows that were taken there; `view` is the index of the image
+// in `images`. O(count^2).
 std::vector<char> ClosestOfImages(const std::vector<ImageGeometry>& images,
                                   const Observation* observations, int count,
                                   const Eigen::Vector3d& xyz);
 
-// The part that a track element has in a built problem.
+// How a track element takes part in a built problem.
 enum class Role : char {
-  kOut,   // none
+  kOut,   // it takes no part
   kIn,    // it is an observation of the problem
-  kTwin,  // none, but another of its image and track is, which kClosest prefers
+  kTwin,  // it takes no part, because kClosest prefers another observation of
+          // its image and track
 };
 
-// One for each of the model's track elements, of a problem that was built with
-// `same_image`. O(observations).
+// The role of each of the model's track elements in a problem that was built
+// with `same_image`. O(observations).
 std::vector<Role> RolesOf(const Model& model, const BuiltProblem& built,
                           SameImage same_image);
 
@@ -69,24 +73,24 @@ struct Ray {
   Eigen::Vector3d direction;  // of unit length
 };
 
-// The point whose squared distances to the rays' lines sum to the least: the
-// x of sum_i (I - d_i d_i') (x - C_i) = 0. None if the lines are parallel up
-// to rounding. O(rays).
+// The point with the smallest sum of squared distances to the lines of the
+// rays: the x of sum_i (I - d_i d_i') (x - C_i) = 0. None if the lines are
+// parallel up to rounding. O(rays).
 std::optional<Eigen::Vector3d> RetriangulateMidpoint(
     const std::vector<Ray>& rays);
 
-// Points that their images see, or brought there.
+// ---- Points behind their cameras ----
 
 struct RepairedPoint {
   Eigen::Vector3d xyz = Eigen::Vector3d::Zero();
   bool is_retriangulated = false;
 };
 
-// Leaves the point where it is if all its images see it, or if re-triangulation
-// from all its rays (where v = 0) does not lower the number of those that do
-// not; `is_seen` tells for the i-th observation and a position. Requires that
-// the observations have poses and that their `view` is the image's index in
-// `images`. O(count); allocates only if an image does not see it.
+// Keeps the point where it is if all its images see it, or if re-triangulation
+// from all its rays (where v = 0) does not lower the number of images that do
+// not. `is_seen` says whether the i-th observation sees a position. Requires
+// observations with poses, whose `view` is the image's index in `images`.
+// O(count); allocates only if some image does not see the point.
 RepairedPoint RepairPoint(
     const std::vector<ImageGeometry>& images, const Observation* observations,
     int count, const Eigen::Vector3d& xyz,

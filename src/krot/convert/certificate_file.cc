@@ -18,13 +18,13 @@
 namespace krot::internal {
 namespace {
 
-// What is not in a problem of an observation.
+// What an observation has beside the problem's own data.
 struct Sighting {
   Eigen::Vector2d pixel;
   int32_t point2D;
 };
 
-// Cameras and poses.
+// The model's cameras, rigs, frames and images only.
 Model WithoutPoints(const Model& model) {
   Model result;
   result.stores_rigs = model.stores_rigs;
@@ -132,7 +132,7 @@ bool HasImageTwice(const KnownRotationProblem& problem, int32_t point) {
       static_cast<int>(problem.point_begin[point + 1] - begin));
 }
 
-// All but its share.
+// Everything but the share.
 SupportPosition Describe(const Model& model, const BuiltProblem& built,
                          const Estimate& estimate,
                          const BuiltPosition& position) {
@@ -157,7 +157,7 @@ SupportPosition Describe(const Model& model, const BuiltProblem& built,
 std::vector<SupportPosition> ListSupportPositions(
     const Model& model, const BuiltProblem& built, const Estimate& estimate,
     const PixelCertificate& certificate) {
-  // By index, the force of all its rows on the camera.
+  // By index of the position: the sum of its rows' gradients.
   std::map<int64_t, Eigen::Vector3d> pulls;
   const Certificate& rows = certificate.rows;
   KnownRotationProblem problem = built.problem;
@@ -268,7 +268,7 @@ std::vector<CertificateFile::SupportObservation> DescribeSupport(
 
 namespace {
 
-// What of the support does not move.
+// Lists the fixed images and points in the support.
 void DescribeFixed(const Model& model, const BuiltProblem& built,
                    const PixelCertificate& certificate, CertificateFile* file) {
   const KnownRotationProblem& problem = built.problem;
@@ -293,8 +293,8 @@ void DescribeFixed(const Model& model, const BuiltProblem& built,
   }
 }
 
-// The positions in the support; rows ascend, so that a position's stand
-// together.
+// Lists the positions in the support. Rows are in ascending order, so the rows
+// of one position are next to each other.
 void DescribePositions(const Model& model, const BuiltProblem& built,
                        const PixelCertificate& certificate,
                        CertificateFile* file) {
@@ -355,7 +355,7 @@ CertificateFile ParseCertificate(const std::string& json,
 std::string ReadCertificateText(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;
-  // Fails on an empty file, too, and on a folder.
+  // This also fails for an empty file and for a folder.
   if (!stream.is_open() || !(text << stream.rdbuf())) {
     throw ModelError(path.string() + ": cannot be read, or is empty");
   }

@@ -20,36 +20,41 @@
 
 namespace krot::internal {
 
-// Where ranks share a model's points: those that some observations see, with
-// all that proofs need of them, on the first rank. Numbers "in the whole" count
-// through the ranks' observations, one rank's after another's.
+// For ranks that share a model's points: the points that certain observations
+// see, gathered on the first rank with everything that proofs need. Numbers "in
+// the whole" count the observations of all ranks, one rank after another.
 struct GatheredSupport {
   Model model;         // without 2D points and tracks
   BuiltProblem built;  // all frames and views
   Estimate estimate;
-  std::vector<int64_t> in_whole;      // per observation, ascending
-  std::vector<int64_t> observations;  // those that were asked for, likewise
+  // Number of each observation in the whole, ascending.
+  std::vector<int64_t> in_whole;
+  // Indices here of those that were asked for, ascending.
+  std::vector<int64_t> observations;
 
-  int64_t Find(int64_t number) const;  // of one in the whole
-  // A certificate's observations by what they are called here, and back.
+  // Index here of an observation of the whole.
+  int64_t Find(int64_t number) const;
+  // Renumber a certificate's observations from the whole to here, and back.
   Certificate FromWhole(Certificate certificate) const;
   Certificate ToWhole(Certificate certificate) const;
 };
 
-// Of `observations`, this rank's own, ascending. All ranks call it; on others
-// than the first the result has no points.
+// Gathers `observations`, this rank's own, ascending, with those of all other
+// ranks. All ranks must call it; on others than the first one the result has no
+// points.
 GatheredSupport GatherSupport(const Model& model, const BuiltProblem& built,
                               const Estimate& estimate,
                               const std::vector<int64_t>& observations,
                               Ranks* ranks);
 
-// Which of its `num_observations` the first rank's certificate names in the
-// whole, on every rank; ascending.
+// The first rank has a certificate whose observations are numbered in the
+// whole. Returns on every rank which of its own `num_observations` observations
+// the certificate names; ascending.
 std::vector<int64_t> OwnSupport(const Certificate& certificate,
                                 int64_t num_observations, Ranks* ranks);
 
-// Those of a certificate, whose rows those of built.problem are, with the
-// largest share first.
+// The known positions in the support of a certificate of built.problem, largest
+// share first.
 std::vector<SupportPosition> ListSupportPositions(
     const Model& model, const BuiltProblem& built, const Estimate& estimate,
     const PixelCertificate& certificate);
@@ -63,21 +68,21 @@ std::vector<SupportObservation> ListSupport(const Model& model,
 
 inline constexpr int kCertificateVersion = 2;
 
-// A certificate of a bound in true pixels (pixel_certificate.h), in terms of
-// the model's ids: what is written to a file, and can be checked by anyone who
-// has the model (docs/formats.md).
+// A certificate of a bound in true pixels (pixel_certificate.h) in terms of the
+// model's ids. This is what is written to a file; anyone who has the model can
+// check it (docs/formats.md).
 struct CertificateFile {
   struct SupportObservation {
     ImageId image_id = 0;
     uint32_t point2D_idx = 0;
     Point3DId point3D_id = 0;
-    // Where the row is taken, in the camera's frame.
+    // The ray at which the row is taken, in the camera's frame.
     Eigen::Vector3d bearing = Eigen::Vector3d::Zero();
     double lambda = 0;
     Eigen::Vector2d y = Eigen::Vector2d::Zero();
   };
 
-  // What must not move, and where it stands: its position is part of the proof.
+  // Parts that must not move, and their positions, which the proof depends on.
   struct FixedImage {
     ImageId image_id = 0;
     Eigen::Vector3d translation;  // rig_from_world, of its frame
@@ -87,8 +92,8 @@ struct CertificateFile {
     Eigen::Vector3d xyz;
   };
 
-  // Where a camera or a point is known to be, and the rows of that in the
-  // support.
+  // The known position of a camera or a point, and those of its rows that are
+  // in the support.
   struct Position {
     struct Row {
       Eigen::Vector3d apex;  // p of reprojection.h
@@ -103,58 +108,61 @@ struct CertificateFile {
 
   Norm norm;
   double lower_bound = 0;  // true pixels
-  double rows_bound = 0;   // delta of the rows, pixels
-  double defect = 0;       // of the rows' identities, relative
+  double rows_bound = 0;   // delta of the rows, in pixels
+  double defect = 0;  // by how much the rows' multipliers miss (1), relative
   std::string model_sha256;
   std::vector<SupportObservation> observations;
-  // Of the support; the first image of a frame.
+  // The fixed parts in the support; of a frame its first image there.
   std::vector<FixedImage> fixed_images;
   std::vector<FixedPoint> fixed_points;
   std::vector<Position> positions;
 };
 
-// The observations in its support in terms of the model's ids; `certificate`
-// must be one of built.problem.
+// The observations in the support of a certificate of built.problem, in terms
+// of the model's ids.
 std::vector<CertificateFile::SupportObservation> DescribeSupport(
     const Model& model, const BuiltProblem& built,
     const PixelCertificate& certificate);
 
-// The same of all of it.
+// The whole certificate in terms of the model's ids.
 CertificateFile DescribeCertificate(const Model& model,
                                     const BuiltProblem& built, Norm norm,
                                     const PixelCertificate& certificate);
 
-// JSON. Doubles come back with the same bits.
+// JSON. Doubles are restored with the same bits.
 std::string CertificateJson(const CertificateFile& file);
 
-// The inverse. Throws ModelError, naming the file and the place in it, where a
-// key is missing or a value is not of its type; says nothing about what the
-// certificate proves.
+// The inverse of CertificateJson. Throws ModelError, naming the file and the
+// place in it, if a key is missing or a value has the wrong type. Does not
+// check what the certificate proves.
 CertificateFile ParseCertificate(const std::string& json,
                                  const std::string& file_name);
-// The text of such a file; throws ModelError if it cannot be read or is empty.
+// Reads the text of such a file; throws ModelError if it cannot be read or is
+// empty.
 std::string ReadCertificateText(const std::filesystem::path& path);
 CertificateFile ReadCertificateFile(const std::filesystem::path& path);
 
-// Positions within a radius as the file of a certificate has them.
+// ---- Known positions in the file of a certificate ----
 
-// Why they are none; empty if they are.
+// Why the file's positions cannot be used; empty if they can.
 std::string RefusalOfPositions(const Model& model, const CertificateFile& file);
 
-// The same in terms of the model; requires that there is no refusal.
+// The file's positions in terms of the model; requires that they are not
+// refused.
 std::vector<KnownPosition> KnownPositionsOf(const Model& model,
                                             const CertificateFile& file);
 
-// Their rows, by what the problem calls them that was built with these. One
-// that it does not have, of an image or point without observations in the
-// problem, is missed by the proof's balance.
+// Finds the file's rows of known positions for the observations of a problem
+// that was built with these positions. The problem has no rows for an image or
+// point without observations; if the proof needs them, (1) does not hold and
+// the checker refuses it.
 class CertificatePositions {
  public:
   // Keeps references.
   CertificatePositions(const Model& model, const CertificateFile& file,
                        const BuiltProblem& built);
 
-  // That of a position's observation; none if the file has less rows.
+  // The row of a position's observation; null if the file has fewer rows.
   const CertificateFile::Position::Row* RowOf(int64_t observation) const;
 
  private:
@@ -162,13 +170,13 @@ class CertificatePositions {
   std::vector<const CertificateFile::Position*> positions_;
 };
 
-// Accepts if the digest of the model agrees, every observation is one of the
-// problem that BuildProblem makes of the model, and CheckPixelCertificate
-// accepts the multipliers and bearings. Translations and points do not enter
-// into that: where they keep BuildProblem from using an observation of the
-// certificate, it ignores them. But what the file takes as fixed has to stand
-// where it says, to the bit; and of positions within a radius it speaks as the
-// file has them. Requires a valid model; throws what BuildProblem does.
+// Accepts if the model's digest agrees, every observation is one of the problem
+// that BuildProblem makes of the model, and CheckPixelCertificate accepts the
+// multipliers and bearings. The model's translations and points do not matter:
+// if they prevent BuildProblem from using an observation of the certificate, it
+// is called without them. However, what the file takes as fixed must have the
+// same position in the model, to the bit; positions within a radius are taken
+// from the file. Requires a valid model; throws what BuildProblem does.
 // O(observations), and the check.
 CertificateVerdict VerifyCertificateFile(const Model& model,
                                          const CertificateFile& file);
@@ -176,48 +184,50 @@ CertificateVerdict VerifyCertificateFile(const Model& model,
 // Version 2: observations have bounds of their own.
 inline constexpr int kConflictFileVersion = 2;
 
-// Conflicts without a common observation, in terms of the model's ids: a proof
-// that as many observations at least must go for all others to be within a
-// bound, or each within its own (docs/formats.md). Each is a certificate
-// whose lower bound is above it.
+// Conflicts without common observations, in terms of the model's ids. They
+// prove that at least one observation per conflict must be removed before all
+// others can be within a bound, or each within its own (docs/formats.md). Each
+// conflict is a certificate whose lower bound is above that bound.
 struct ConflictFile {
   struct Conflict {
     double lower_bound = 0;  // true pixels; > max_error
     double rows_bound = 0;   // delta of the rows, pixels
-    double defect = 0;       // of the rows' identities, relative
+    double defect = 0;  // by how much the rows' multipliers miss (1), relative
     std::vector<CertificateFile::SupportObservation> observations;
-    // Version 2: the bounds of the observations, true pixels; > 0. Those above,
-    // and lambda and y, are of errors times the file's max_error over these.
+    // Version 2: the bound of each observation, true pixels; > 0. The bounds
+    // above, lambda and y then refer to errors that are multiplied by the
+    // file's max_error and divided by the observation's bound.
     std::vector<double> max_errors;
   };
 
   int version = 1;
   Norm norm;
-  double max_error = 0;  // the bound, true pixels; version 2: the largest
+  double max_error = 0;  // the bound, true pixels; version 2: the largest one
   std::string model_sha256;
   std::vector<Conflict> conflicts;
 };
 
-// `certificates` must be of built.problem. Version 2 if that has scales.
+// `certificates` must be of built.problem. The result has version 2 if built
+// has scales.
 ConflictFile DescribeConflicts(
     const Model& model, const BuiltProblem& built, Norm norm, double max_error,
     const std::vector<PixelCertificate>& certificates);
 
-// JSON. Doubles come back with the same bits.
+// JSON. Doubles are restored with the same bits.
 std::string ConflictJson(const ConflictFile& file);
 
-// Whether a file is one of conflicts, rather than one of a certificate.
+// Whether a file holds conflicts, rather than a certificate.
 bool HoldsConflicts(const std::string& json);
 
-// The inverse of ConflictJson. Throws ModelError as ParseCertificate does, and
-// says nothing about what is proved.
+// The inverse of ConflictJson. Throws ModelError as ParseCertificate does. Does
+// not check what is proved.
 ConflictFile ParseConflicts(const std::string& json,
                             const std::string& file_name);
 
-// Accepts if the digest of the model agrees, no observation is in two
-// conflicts, and CheckPixelCertificate accepts every one of them with a bound
-// above max_error. Translations and points do not enter, as with
-// VerifyCertificateFile. Requires a valid model; throws what BuildProblem does.
+// Accepts if the model's digest agrees, no observation is in two conflicts, and
+// CheckPixelCertificate accepts every conflict with a bound above max_error.
+// Translations and points do not matter, as for VerifyCertificateFile. Requires
+// a valid model; throws what BuildProblem does.
 ConflictVerdict VerifyConflictFile(const Model& model,
                                    const ConflictFile& file);
 

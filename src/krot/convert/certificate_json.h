@@ -11,11 +11,11 @@
 
 namespace krot::internal {
 
-// What the files of certificates and of conflicts have in common.
+// What the files of certificates, conflicts and baselines have in common.
 
 using CertificateFileJson = nlohmann::ordered_json;
 
-// Reads values out of a parsed file; every error is a ModelError that names the
+// Reads values from a parsed file; every error is a ModelError that names the
 // file and the place.
 class JsonReader {
  public:
@@ -41,9 +41,9 @@ class JsonReader {
   // The support of a certificate.
   std::vector<CertificateFile::SupportObservation> ReadSupport(
       const Json& observations, const std::string& place) const;
-  // Fills in what does not move.
+  // Sets the file's fixed images and points.
   void ReadFixed(const Json& fixed, CertificateFile* file) const;
-  // Fills in where cameras and points are known to be.
+  // Sets the file's known positions.
   void ReadPositions(const Json& positions, CertificateFile* file) const;
 
  private:

@@ -95,7 +95,7 @@ std::string NameOf(const CertificateFile::SupportObservation& o) {
          std::to_string(o.image_id);
 }
 
-// Why an entry of the file found no observation of the problem for itself.
+// Says why no observation of the problem is left for an entry of the file.
 // Several tracks may hold the same 2D point, and a track may hold it twice.
 std::string RefusalOfUnused(const CertificateFile::SupportObservation& o,
                             const Model& model, const BuiltProblem& built) {
@@ -118,8 +118,8 @@ std::string RefusalOfUnused(const CertificateFile::SupportObservation& o,
              : NameOf(o) + " is not among those that can be used";
 }
 
-// The parts of the model that the certificate says do not move; refuses if they
-// are elsewhere in the model.
+// The parts of the model that the certificate takes as fixed; refused if they
+// have another position in the model.
 struct FixedClaim {
   FixedParts parts;
   std::string refusal;
@@ -159,10 +159,10 @@ FixedClaim FindFixed(const Model& model, const CertificateFile& file) {
   return claim;
 }
 
-// The certificate in terms of the problem.
+// The certificate, with the observations of the problem.
 struct Translation {
   std::string refusal;
-  bool is_unseen = false;  // the problem has not all of its observations
+  bool is_unseen = false;  // the problem lacks some of its observations
   PixelCertificate certificate;
 };
 

@@ -124,15 +124,16 @@ namespace {
 
 using Support = CertificateFile::SupportObservation;
 
-// An entry of the file and the conflict that it is of.
+// An observation in the file.
 struct Entry {
-  size_t conflict = 0;
-  size_t place = 0;  // in the conflict
+  size_t conflict = 0;  // the conflict that it is in
+  size_t place = 0;     // its index in the conflict
   const Support* observation = nullptr;
-  int64_t index = -1;  // in the problem; -1: not found
+  int64_t index = -1;  // its index in the problem; -1: not found
 };
 
-// Every observation of the problem serves one entry.
+// Finds the observation of each entry; each observation of the problem is used
+// once.
 std::vector<Entry> FindEntries(const Model& model, const BuiltProblem& built,
                                const ConflictFile& file) {
   using Key = std::tuple<ImageId, uint32_t, Point3DId>;
@@ -179,7 +180,7 @@ bool AreBounds(const ConflictFile::Conflict& conflict, double largest) {
                      });
 }
 
-// Why one conflict is refused, or nothing.
+// Says why one conflict is refused; none if it is accepted.
 std::optional<std::string> RefuseConflict(const Model& model,
                                           const BuiltProblem& built,
                                           const ConflictFile& file, size_t n,

@@ -23,7 +23,7 @@ constexpr bool IsPrime(int n) {
   return true;
 }
 
-// The first 32 bits behind the point of the root of that degree.
+// The first 32 bits of the fraction of n's root of that degree.
 constexpr uint32_t RootBits(int n, int degree) {
   const Wide target = Wide(n) << (32 * degree);
   Wide root = 0;
@@ -35,7 +35,7 @@ constexpr uint32_t RootBits(int n, int degree) {
   return static_cast<uint32_t>(root);
 }
 
-// Of the first primes.
+// The RootBits of the first primes.
 template <size_t size>
 constexpr std::array<uint32_t, size> PrimeRoots(int degree) {
   std::array<uint32_t, size> roots = {};
@@ -65,7 +65,8 @@ void Sha256Stream::Append(const unsigned char* bytes, size_t size) {
   }
 }
 
-// Named as in the standard: the schedule w, the working variables a to h.
+// Names are those of the standard: the schedule w, the working variables a to
+// h.
 void Sha256Stream::DigestBlock() {
   std::array<uint32_t, 64> w;
   for (size_t t = 0; t < 16; ++t) {
@@ -168,7 +169,7 @@ void AddCamera(const Camera& camera, Digest* digest) {
   for (const double param : camera.params) digest->Number(param);
 }
 
-// By image id: which 2D points, and of which 3D points, the tracks name.
+// For each image id: the 2D points that tracks contain, with their 3D points.
 using Observations =
     std::unordered_map<ImageId, std::vector<std::pair<uint32_t, Point3DId>>>;
 
@@ -187,7 +188,8 @@ Observations SortedObservations(const Model& model) {
   return observations;
 }
 
-// How the image's camera sits: in which frame, how that is turned, where in it.
+// The pose of the image's camera: its frame, the frame's rotation, and its pose
+// in the rig.
 void AddPlace(const Model& model, const ImageGeometry& image, Digest* digest) {
   digest->Integer(image.frame >= 0);
   if (image.frame < 0) return;

@@ -17,7 +17,7 @@ class Sha256Stream {
 
   void Append(const unsigned char* bytes, size_t size);
 
-  // Of all that was appended; nothing may be appended after it.
+  // The digest of everything that was appended; must be the last call.
   std::array<unsigned char, 32> Finish();
 
  private:
@@ -29,14 +29,14 @@ class Sha256Stream {
   uint64_t num_bytes_ = 0;
 };
 
-// SHA-256, in 64 lower-case hexadecimal digits, of what a certificate speaks
-// about: cameras, rotations, places in rigs and observations. Translations of
-// frames and points, which a solver changes, do not enter, nor does the format
-// or the order of the files. The bytes are defined in docs/formats.md.
-// Requires a valid model. O(2D points); keeps no copy of the bytes.
+// SHA-256, as 64 lower-case hexadecimal digits, of everything that a
+// certificate depends on: cameras, rotations, poses in rigs, and observations.
+// It does not depend on translations of frames and points, which a solver
+// changes, nor on the format or order of the files. docs/formats.md defines the
+// bytes. Requires a valid model. O(2D points); keeps no copy of the bytes.
 std::string ModelSha256(const Model& model);
 
-// Of any bytes, written likewise.
+// SHA-256 of any bytes, in the same digits.
 std::string Sha256(std::string_view bytes);
 
 }  // namespace krot::internal

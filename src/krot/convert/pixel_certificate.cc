@@ -15,16 +15,18 @@
 namespace krot::internal {
 namespace {
 
-// Corrections of gamma that MakePixelCertificate takes; two mostly do.
+// The largest number of corrections of gamma in MakePixelCertificate; mostly
+// two are enough.
 constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
 constexpr double kMargin = 1e-9;
-// By how much a certificate that is refused is lowered, relative.
+// Shares by which a refused certificate is lowered, one after another.
 constexpr double kLower[] = {1e-8, 1e-7, 1e-6};
-// Support lines that are found at the same time; the next profit from them.
+// Support lines that are found in parallel; those after them can use the
+// highest one so far.
 constexpr int64_t kLinesAtOnce = 32;
-// A remainder below it need not be known: what it stretches is an allowance for
-// roundings.
+// A remainder need not be known more exactly than this: it only scales an
+// allowance for rounding.
 constexpr double kSmallRemainder = 0.1;
 
 std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
@@ -35,7 +37,7 @@ std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
                  .id);
 }
 
-// (3) of observation n of the support, at its bearing.
+// Evaluates (3) for observation n of the support, at its bearing.
 double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
               Norm norm, const Certificate& rows,
               const std::vector<Eigen::Vector3d>& bearings, int64_t n,
@@ -53,8 +55,8 @@ double LineAt(const Reprojection& reprojection, const BuiltProblem& built,
   return largest ? *largest / unit : kInfinity;
 }
 
-// The highest of them, or one that is at most `sufficient`: those that are
-// lower than others need not be known.
+// The highest support line, or `sufficient` if all are below it. Lines that are
+// lower than others are not computed exactly.
 double HighestLine(const Reprojection& reprojection, const BuiltProblem& built,
                    Norm norm, const Certificate& rows,
                    const std::vector<Eigen::Vector3d>& bearings, double gamma,
@@ -74,8 +76,8 @@ double HighestLine(const Reprojection& reprojection, const BuiltProblem& built,
   return highest;
 }
 
-// Whether (3) holds for observation n of the support, whatever the change of
-// its multipliers.
+// Whether (3) holds for observation n of the support for all changes of its
+// multipliers that rounding may require.
 bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
                     Norm norm, const PixelCertificate& certificate,
                     const MultiplierChange& change, size_t n) {
@@ -91,7 +93,8 @@ bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
       certificate.bearings[n], built.ScaleOf(o.observation) * gamma, norm.p,
       kSmallRemainder);
   if (!kappa) return false;
-  // |L| <= sqrt(2) |L|_p over S_i; over the scale, of which gamma is a bound.
+  // |L| <= sqrt(2) |L|_p over S_i; both sides are divided by the scale, of
+  // which gamma is a bound.
   const double reach =
       1.5 * gamma * (1 + *kappa) / (certificate.rows.lower_bound * o.lambda);
   const double allowance = change.y * reach + change.depth;

@@ -17,32 +17,35 @@ namespace krot::internal {
 // A proof in true pixels: no translations and points bring every reprojection
 // error of the support below `lower_bound`.
 //
-// Let S_i be the rays of observation i whose true error is at most gamma, of
-// the region that krot/camera/remainder_bound.h speaks of. The multipliers of
-// `rows`, with x_cam at depth w_i and v_i = w_i L_i(u) linear in it, satisfy
+// Let S_i be the rays of observation i whose true error is at most gamma,
+// within the region of krot/camera/remainder_bound.h. Let w_i be the depth of
+// x_cam, and v_i = w_i L_i(u) the linear error on the ray u. The multipliers of
+// `rows` satisfy
 //
 //   sum_i (delta lambda_i w_i + y_i'v_i) <= 0      for all translations, points
 //
-// (certificate_check.h, (1) and (2)). If every support line keeps to its side,
+// (certificate_check.h, (1) and (2)). If for every observation
 //
 //   (3)  -y_i'L_i(u) <= delta lambda_i             for all u in S_i,
 //
-// then no estimate has all its rays in the interior of the S_i. So whatever a
-// lens does, it enters by the support function of S_i in the one direction
-// -y_i; at an optimum that direction is the error's own, its supporting line
-// touches S_i where the point projects, and gamma = delta.
+// then no estimate has all its rays in the interior of the S_i, so none has all
+// errors below gamma. The lens matters only through (3): the line -y_i'L =
+// delta lambda_i must leave S_i on one side. At an optimum, -y_i is the
+// direction of the error itself, this line touches S_i where the point
+// projects, and gamma = delta.
 //
-// Where observations have scales, the true error and L_i are those over them:
-// S_i are the rays within gamma times the scale.
+// If observations have scales, the true error and L_i are divided by them: S_i
+// are the rays whose error is at most gamma times the scale.
 //
-// Where positions are known, z is of estimates that keep them alone: their rows
-// are those of `level` delta (reprojection.h), within which every camera in
-// its ball is seen.
+// If positions are known, the proof is about estimates within them only. Their
+// rows have the `level` delta (reprojection.h); their cones contain the whole
+// region.
 struct PixelCertificate {
-  // Of the problem whose row i is RowAtProjection at bearings[i].
+  // For the problem whose row i is RowAtProjection at bearings[i].
   Certificate rows;
-  // In the cameras' frames, one per observation of the support; of a
-  // position's row its p, in the world's.
+  // One per observation of the support: the ray at which its row is taken, in
+  // the camera's frame; for the row of a known position its p, in the world's
+  // axes.
   std::vector<Eigen::Vector3d> bearings;
   double lower_bound = 0;  // gamma, true pixels; <= rows.lower_bound
 };
@@ -54,25 +57,25 @@ struct PixelCertificateCheck {
   std::string refusal;     // one sentence; empty if accepted
 };
 
-// Judges a certificate from the model alone: rows, forces and support lines are
-// computed anew, with bounds on every rounding. `built` only names the
-// observations. Whatever is wrong is a refusal and never an exception.
+// Judges a certificate from the model alone: it computes rows, gradients and
+// support lines itself, with bounds on every rounding. `built` only says which
+// observations are meant. Whatever is wrong is a refusal, never an exception.
 PixelCertificateCheck CheckPixelCertificate(const Model& model,
                                             const BuiltProblem& built,
                                             Norm norm,
                                             const PixelCertificate& certificate,
                                             const Context& context);
 
-// The same of a certificate as it is or, if it is refused, up to 1e-6 lower:
-// its making leaves room for roundings by a guess, which a multiplier that is
-// tiny beside the others may exceed.
+// Checks the certificate as it is and, if it is refused, with a bound that is
+// lower by up to 1e-6. MakePixelCertificate only guesses how much room
+// roundings need; a multiplier that is tiny beside the others may need more.
 PixelCertificateCheck LowerUntilAccepted(const Model& model,
                                          const BuiltProblem& built, Norm norm,
                                          const Context& context,
                                          PixelCertificate* certificate);
 
-// Where the rows of a certificate's observations were taken: at the points of
-// an estimate, or, for a start from nothing, at the pixels' own rays.
+// The rays at which the rows of a certificate's observations were taken: at the
+// points of an estimate or, for a start from nothing, at the pixels' own rays.
 std::vector<Eigen::Vector3d> BearingsOfPoints(const Model& model,
                                               const BuiltProblem& built,
                                               const Estimate& x_hat,
@@ -82,17 +85,17 @@ std::vector<Eigen::Vector3d> BearingsOfPixels(const Model& model,
                                               const Certificate& rows);
 
 // The certificate with the largest gamma for these rows, which were taken at
-// `bearings`; none without observations, or if one has no region. Verifies
-// nothing.
+// `bearings`; none without observations, or if one of them has no region.
+// Checks nothing.
 std::optional<PixelCertificate> MakePixelCertificate(
     const Model& model, const BuiltProblem& built, Norm norm,
     const Certificate& rows, std::vector<Eigen::Vector3d> bearings,
     const Context& context);
 
-// Per observation of `rows`, taken at `bearings`, its (3): the largest -y_i'L_i
-// over S_i at `gamma` pixels, relative to delta lambda_i: at most 1 where it
-// holds. What is at most `sufficient` is not found any better. Infinity without
-// a region.
+// Evaluates (3) for each observation of `rows`, taken at `bearings`: the
+// largest -y_i'L_i over S_i at `gamma` pixels, divided by delta lambda_i; (3)
+// holds if it is at most 1. Values of at most `sufficient` are not made more
+// exact. Infinity without a region.
 std::vector<double> SupportLines(const Model& model, const BuiltProblem& built,
                                  Norm norm, const Certificate& rows,
                                  const std::vector<Eigen::Vector3d>& bearings,

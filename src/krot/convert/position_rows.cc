@@ -18,13 +18,14 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Of = KnownPosition::Of;
 
-// |U p|: far enough for a cone that is almost a tube about the region, and
-// beyond a camera that is far off; near enough to keep the digits.
+// The range of |U p|. A distant apex makes the cone almost a tube about the
+// region, and lies beyond a camera that is far off; a near one keeps more
+// digits.
 constexpr double kApexDistance = 10;
 constexpr double kApexPerOffset = 4;
 constexpr double kNearestApex = 1.5;
 constexpr double kFarthestApex = 1e6;
-// Offsets below this, |U x|, have no direction.
+// Offsets shorter than this, |U x|, have no direction.
 constexpr double kNoOffset = 1e-9;
 
 const BuiltPosition& PositionOfRow(const BuiltProblem& built,
@@ -32,9 +33,10 @@ const BuiltPosition& PositionOfRow(const BuiltProblem& built,
   return built.positions[PositionOf(built, observation)];
 }
 
-// U p of a row whose region has its camera at U (C - g) = offset: two cones
-// that touch the unit ball in the offset's direction n, a'n = 1 / |U p|, across
-// each other, and one from the far side.
+// U p of a row for a camera at the offset U (C - g) from the region's centre.
+// Rows 0 and 1 are two perpendicular cones that touch the unit ball in the
+// direction n of the offset, a'n = 1 / |U p|. Row 2 is a cone from the far
+// side.
 Vector3d ApexAround(const Vector3d& offset, int64_t row) {
   const double length = offset.norm();
   const Vector3d n =
@@ -57,7 +59,7 @@ Vector3d ApexOf(const BuiltProblem& built, int64_t observation,
                     RowIndex(built, observation) % kRowsPerPosition);
 }
 
-// Calls visit(i) for every row of a position, in their order.
+// Calls visit(i) for every row of a known position, in order.
 template <typename Visit>
 void ForPositionRows(const BuiltProblem& built, const Visit& visit) {
   if (built.positions.empty()) return;
@@ -67,14 +69,14 @@ void ForPositionRows(const BuiltProblem& built, const Visit& visit) {
   }
 }
 
-// Builds the views and observations of positions; rows are put into them
+// Adds the views and observations of known positions; their rows are set
 // afterwards.
 class PositionAdder {
  public:
   explicit PositionAdder(BuiltProblem* built)
       : built_(*built), problem_(built->problem) {}
 
-  // Of a view: it sees a fixed point.
+  // The position of a view's camera: views of its frame see a fixed point.
   void AddCamera(int32_t view, const Ellipsoid& region) {
     Add({Of::kImage, view, region, region.UnitFromWorld()},
         View(problem_.views[view]), problem_.num_points);
@@ -84,7 +86,7 @@ class PositionAdder {
     ++problem_.num_points;
   }
 
-  // Of a point: the fixed frame sees it, which stands at the world's origin.
+  // The position of a point: a fixed frame at the world's origin sees it.
   void AddPoint(int32_t point, const Ellipsoid& region) {
     if (frame_ < 0) {
       frame_ = problem_.num_frames++;

@@ -18,7 +18,7 @@
 namespace krot::internal {
 namespace {
 
-// Of a coordinate that is computed in a few operations, relative.
+// Relative rounding of a coordinate that is computed in a few operations.
 constexpr double kDigits = 4 * std::numeric_limits<double>::epsilon();
 
 }  // namespace
@@ -54,8 +54,8 @@ double Reprojection::Error(const Estimate& estimate, Norm norm,
   return std::isfinite(error) ? error : kInfinity;
 }
 
-// What a change of the coordinates' last digits does to the error, pixels:
-// next to nothing, but where a point all but coincides with its camera.
+// What a change in the coordinates' last digits does to the error, pixels. It
+// is negligible unless a point all but coincides with its camera.
 double Reprojection::Resolution(const Estimate& estimate, int64_t i,
                                 const Eigen::Vector3d& x_cam) const {
   const Observation& o = built_.problem.observations[i];
@@ -115,7 +115,7 @@ bool Reprojection::TakeRows(const Estimate& estimate, int num_threads,
 
 namespace {
 
-// Above the relative error of the operations that make a row.
+// An upper bound on the relative rounding of the operations that make a row.
 constexpr double kRowRounding = 1e-13;
 
 std::optional<Eigen::Matrix3d> OuterRow(const Reprojection::Source& source,

@@ -7,7 +7,7 @@
 namespace krot::internal {
 namespace {
 
-// The lists that lie in memory as they lie in the file.
+// These records have the same layout in memory as in the file.
 static_assert(sizeof(Point2D) == 24 && std::is_trivially_copyable_v<Point2D>);
 static_assert(sizeof(TrackElement) == 8 &&
               std::has_unique_object_representations_v<TrackElement>);
@@ -16,7 +16,7 @@ static_assert(sizeof(FrameData) == 16 &&
 static_assert(sizeof(SensorId) == 8 &&
               std::has_unique_object_representations_v<SensorId>);
 
-// The least bytes that one record takes, its lists being empty.
+// The smallest size of one record in bytes, with empty lists.
 constexpr size_t kPoseBytes = 7 * sizeof(double);
 constexpr size_t kCameraBytes = 4 + 4 + 8 + 8;
 constexpr size_t kRigBytes = 4 + 4;
@@ -171,7 +171,7 @@ void ParsePoints3DBinary(const FileBytes& file, Model* model) {
   BinaryReader reader(file);
   model->points3D.resize(
       reader.ReadCount<uint64_t>(kPoint3DBytes, "number of 3D points"));
-  // What the records themselves leave is all tracks.
+  // Everything in the file beyond the fixed part of each record is tracks.
   const size_t track_bytes =
       reader.BytesLeft() - model->points3D.size() * kPoint3DBytes;
   model->track_elements.clear();

@@ -12,14 +12,13 @@
 
 namespace krot::internal {
 
-// COLMAP's binary files (docs/formats.md): little endian, packed, without
-// magic or version. Bytes that COLMAP 3.8 to 4.x wrote are reproduced
-// exactly.
+// COLMAP's binary files (docs/formats.md): little endian, packed, without magic
+// number or version. Bytes that COLMAP 3.8 to 4.x wrote are reproduced exactly.
 //
-// Parse... replaces its part of the model; throws ModelError with the byte
-// offset if the file is truncated, holds a count larger than itself, a camera
-// model that is unknown, or bytes after its last record. Format... returns
-// the file's content. O(bytes), a few GB/s.
+// Parse... replaces its part of the model. Throws ModelError with the byte
+// offset if the file is truncated, or holds a count larger than itself, an
+// unknown camera model, or bytes after its last record. Format... returns the
+// file's content. O(bytes), a few GB/s.
 
 void ParseCamerasBinary(const FileBytes& file, Model* model);
 void ParseRigsBinary(const FileBytes& file, Model* model);
@@ -37,9 +36,9 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
               "COLMAP's binary files are read and written as they lie in "
               "memory, which must be little endian");
 
-// Walks over the packed little-endian values of a file in memory. Every
-// access is checked against the file's end and throws ModelError beyond it;
-// `what` says in the message what was expected there ("the camera's width").
+// Reads the packed little-endian values of a file in memory one after another.
+// Every read is checked against the file's end and throws ModelError beyond it;
+// `what` names in the message what was expected there ("the camera's width").
 class BinaryReader {
  public:
   // Keeps a reference to `file`.
@@ -52,8 +51,7 @@ class BinaryReader {
     return value;
   }
 
-  // Fills values[0, count). The bytes are copied, so that T must have no
-  // padding.
+  // Fills values[0, count). The bytes are copied, so T must have no padding.
   template <typename T>
   void ReadArray(T* values, size_t count, const char* what) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -64,9 +62,9 @@ class BinaryReader {
     offset_ += num_bytes;
   }
 
-  // A count of records of which each takes `min_record_bytes` or more: no
-  // larger than what the rest of the file can hold, so that memory may be
-  // reserved for it.
+  // Reads the number of records that follow, each of which takes
+  // `min_record_bytes` or more. Fails if the rest of the file cannot hold so
+  // many, so that memory may be reserved for them.
   template <typename Count>
   size_t ReadCount(size_t min_record_bytes, const char* what) {
     const size_t start = offset_;
@@ -80,7 +78,7 @@ class BinaryReader {
     return static_cast<size_t>(count);
   }
 
-  // The characters up to the next '\0', which is skipped.
+  // The characters up to the next '\0', which is skipped as well.
   std::string_view ReadString(const char* what) {
     const char* begin = file_.bytes.data() + offset_;
     const void* end = std::memchr(begin, '\0', BytesLeft());
@@ -101,7 +99,7 @@ class BinaryReader {
          "the end of the file");
   }
 
-  // The offset of the next value, for Fail.
+  // The offset of the next value; Fail takes it.
   size_t offset() const { return offset_; }
 
   // "cameras.bin, byte 12: found ..., expected ...".

@@ -10,9 +10,11 @@
 namespace krot::internal {
 namespace {
 
+// What the named 2D point says to a track element: it names the same 3D point;
+// another one or none; that element has come before; or it does not exist.
 enum class Claim { kConfirmed, kUnconfirmed, kRepeated, kNonexistent };
 
-// Takes the track elements one by one and remembers the confirmed 2D points.
+// Judges the track elements one by one and remembers the confirmed 2D points.
 class Claims {
  public:
   explicit Claims(const Model& model)
@@ -36,8 +38,8 @@ class Claims {
     return Claim::kConfirmed;
   }
 
-  // Calls `act(image, point2D_idx)`, both indices, for all 2D points that name
-  // a 3D point and that no element has claimed.
+  // Calls `act(image, point2D_idx)`, with the index of each, for every 2D point
+  // that names a 3D point but that no element has claimed.
   template <typename Act>
   void ForEachUnclaimed(const Act& act) const {
     for (size_t n = 0; n < claimed_.size(); ++n) {
@@ -89,7 +91,7 @@ std::string DescribeUnclaimed(const Image& image, uint32_t point2D_idx,
                        ", expected one that exists in points3D");
 }
 
-// What no track confirms.
+// 2D points name no 3D point if no track confirms it.
 void DropUnconfirmedNames(Model* model) {
   Claims claims(*model);
   for (const Point3D& point : model->points3D) {
@@ -102,7 +104,7 @@ void DropUnconfirmedNames(Model* model) {
   });
 }
 
-// 2D points that name none: after the first track that names them.
+// 2D points that name no 3D point get the first one whose track contains them.
 void NameByTracks(Model* model) {
   const IdIndex<ImageId> images(model->images);
   for (const Point3D& point : model->points3D) {
@@ -118,8 +120,8 @@ void NameByTracks(Model* model) {
   }
 }
 
-// Of every track the elements that are kept and, behind them, those of
-// `missing`, by point; or none, if that is empty.
+// Rebuilds every track from the elements that are kept and, behind them, those
+// of `missing`, by point; `missing` may be empty.
 void RebuildTracks(const std::vector<char>& is_kept,
                    const std::vector<std::vector<TrackElement>>& missing,
                    Model* model) {

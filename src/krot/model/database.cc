@@ -24,7 +24,7 @@ constexpr int64_t kMaxNumImages = 2147483647;
 constexpr int kConfigWatermark = 7;
 constexpr int kMaxConfig = 9;
 
-// The database's images that the model has, by the database's ids.
+// Index in Model::images by the database's image id, for images that both have.
 using ImageOfId = std::unordered_map<int64_t, int32_t>;
 
 ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
@@ -39,7 +39,7 @@ ImageOfId JoinImages(const Model& model, SqliteDatabase* database) {
   ImageOfId join;
   std::vector<bool> is_taken(model.images.size());
   SqliteRows rows(database, "images", "image_id, name");
-  std::string other;  // a name that the model does not have
+  std::string other;  // one that the model does not have
   while (rows.Next()) {
     const int64_t id = rows.Integer(0);
     const std::string name = rows.Text(1);
@@ -89,9 +89,9 @@ double Correlation(const std::vector<Eigen::Vector2d>& keypoints,
   return ab / std::sqrt(aa * bb);
 }
 
-// Whether an image's 2D points are these keypoints, one by one, maybe of a
-// photo that was undistorted or resized since; of other features they would
-// lie anywhere.
+// Whether an image's 2D points are these keypoints one by one, although the
+// photo may have been undistorted or resized since. The coordinates of other
+// features would not correlate.
 bool AreSameFeatures(const std::vector<Eigen::Vector2d>& keypoints,
                      const std::vector<Point2D>& points2D) {
   if (keypoints.size() != points2D.size()) return false;
@@ -105,8 +105,8 @@ bool AreSameFeatures(const std::vector<Eigen::Vector2d>& keypoints,
          Correlation(keypoints, points2D, 1) > kSameOrder;
 }
 
-// Whether at least half of the 2D points that see something are among the
-// keypoints, where some of them were dropped.
+// Whether at least half of the 2D points that see a 3D point are among the
+// keypoints; the model may have dropped some keypoints.
 bool AreAmong(const std::vector<Eigen::Vector2d>& keypoints,
               const std::vector<Point2D>& points2D) {
   const auto key = [](double x, double y) {
@@ -123,8 +123,9 @@ bool AreAmong(const std::vector<Eigen::Vector2d>& keypoints,
   return 2 * found >= of;
 }
 
-// Of a keypoint of 4 columns (x, y, scale, orientation) or 6 (x, y and an
-// affine shape), as COLMAP takes it: the mean of the shape's two scales.
+// The scale of a keypoint, as COLMAP defines it. A keypoint has 4 columns (x,
+// y, scale, orientation) or 6 (x, y and an affine shape); for the latter it is
+// the mean of the shape's two scales.
 float ScaleOf(const float* keypoint, int64_t columns) {
   if (columns == 4) return keypoint[2];
   return (std::hypot(keypoint[2], keypoint[4]) +
@@ -185,7 +186,8 @@ void RequireKeypoint(const Database& read, const Model& model, int32_t image,
                 std::to_string(read.keypoints[image].size()) + " keypoints");
 }
 
-// The matches of a pair that is there under both orders of its ids.
+// Merges the matches of a pair that the table lists under both orders of its
+// ids.
 void AddMatches(VerifiedPair from, VerifiedPair* to) {
   if (from.image1 != to->image1) {
     for (auto& match : from.matches) std::swap(match[0], match[1]);
@@ -207,7 +209,8 @@ void ReadPairs(const Model& model, const ImageOfId& join,
     const int64_t pair_id = rows.Integer(0);
     const int64_t config = rows.Integer(4);
     const int64_t id1 = pair_id / kMaxNumImages, id2 = pair_id % kMaxNumImages;
-    // COLMAP reads the larger id first, too, as other programs write it.
+    // Like COLMAP, accepts pairs with the larger id first; other programs write
+    // them.
     if (pair_id < 0 || id1 == id2) {
       database->Fail("found pair id " + std::to_string(pair_id) +
                      ", expected 2147483647 times an image id plus another "

@@ -1,4 +1,4 @@
-// Where there is no SQLite: no database can be read.
+// For builds without SQLite: databases can be neither read nor written.
 
 #include "krot/base/write_file.h"
 #include "krot/database.h"

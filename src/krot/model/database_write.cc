@@ -18,7 +18,7 @@ namespace {
 
 constexpr int64_t kIdsOfImages = 2147483647;
 
-// As COLMAP 3.8 creates them; later versions add what they need.
+// The tables as COLMAP 3.8 creates them; later versions add what they need.
 constexpr char kTables[] =
     "PRAGMA journal_mode = OFF;"
     "PRAGMA synchronous = OFF;"
@@ -48,7 +48,7 @@ constexpr char kTables[] =
 
 class DatabaseFile {
  public:
-  // `name` is what errors call it.
+  // Errors call the file `name`.
   DatabaseFile(const std::string& path, const std::string& name)
       : name_(name), database_(nullptr, &sqlite3_close_v2) {
     sqlite3* database = nullptr;
@@ -62,8 +62,8 @@ class DatabaseFile {
             SQLITE_OK);
   }
 
-  // One row: integers, then a text or a blob, if there is one, in the order of
-  // the question marks.
+  // Inserts one row: the integers, then a text or a blob, if there is one, in
+  // the order of the question marks in `sql`.
   void Insert(const std::string& sql, const std::vector<int64_t>& integers,
               const std::string* text, const void* blob, size_t bytes) {
     sqlite3_stmt* raw = nullptr;

@@ -23,7 +23,7 @@ std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count) {
   });
   std::vector<std::vector<int32_t>> cut(count);
   const auto total = static_cast<int64_t>(whole.track_elements.size());
-  // The observations of all shares up to this one.
+  // The number of observations in all shares up to and including this one.
   const auto end_of = [&](int share) { return total * (share + 1) / count; };
   int64_t sum = 0;
   int share = 0;
@@ -98,7 +98,7 @@ RemovedObservations RemoveObservations(const Model& model,
       ++result.num_points;
       result.num_left_alone += num_kept;
     }
-    // A track may hold a 2D point twice.
+    // A track may hold a 2D point twice, and one of the two may stay.
     std::vector<Point2D*> named;
     std::vector<Point2D*> stay;
     for (uint64_t e = point.track_begin; e < point.track_end; ++e) {
@@ -163,11 +163,12 @@ namespace {
 using Eigen::Vector3d;
 using Real = long double;
 
-// From here on coordinates cost digits, and adjustments steps: to turn a camera
-// about the origin, a hundred extents away, takes four times as many.
+// A model is far out if its distance from the origin exceeds this many extents.
+// Then coordinates lose digits, and adjustments need more steps: four times as
+// many at a hundred extents, where turning a camera moves it about the origin.
 constexpr double kFarOut = 10;
 
-// By coordinate; none without positions.
+// The median of each coordinate; none without positions.
 std::optional<Vector3d> MedianPosition(const std::vector<Vector3d>& positions) {
   if (positions.empty()) return std::nullopt;
   Vector3d median;
@@ -186,7 +187,7 @@ double MedianDistance(const std::vector<Vector3d>& positions,
   return distances.empty() ? 0 : Median(std::move(distances));
 }
 
-// Of the frames' rigs.
+// Centres of the frames' rigs, for all frames or those that are wanted.
 std::vector<Vector3d> Centres(const Model& model,
                               const std::vector<char>& is_wanted) {
   std::vector<Vector3d> centres;
@@ -230,7 +231,7 @@ std::vector<Vector3d> Positions(const Model& model, const FixedParts& fixed,
   return positions;
 }
 
-// t + R `shift`, rounded once; without a rotation there is nothing to shift.
+// t + R `shift`, rounded once; a pose without a rotation does not change.
 void Shift(const Vector3d& shift, Pose* pose) {
   if (!HasRotation(pose->quaternion_wxyz)) return;
   pose->translation = (pose->translation.cast<Real>() +
@@ -243,7 +244,8 @@ bool IsSame(const Pose& a, const Pose& b) {
          (a.translation == b.translation || !b.translation.allFinite());
 }
 
-// `pose` is what became of `was`.Shift(origin).
+// Undoes Shift(origin): `pose` began as `was` after that shift, and becomes
+// `was` again to the bit if it has not changed.
 void ShiftBack(const Vector3d& origin, const Pose& was, Pose* pose) {
   Pose local = was;
   Shift(origin, &local);
@@ -264,7 +266,7 @@ LocalFrame::LocalFrame(const Model& model, const FixedParts& fixed,
   double extent = MedianDistance(positions, *middle);
   if (extent == 0) extent = MedianDistance(Points(model, {}), *middle);
   if (!(extent > 0) || !(middle->norm() > kFarOut * extent)) return;
-  // To a power of two beyond the extent: differences to it are exact.
+  // Rounds to a power of two beyond the extent, so that differences are exact.
   const double unit = std::exp2(std::ceil(std::log2(extent)));
   origin_ = (*middle / unit).array().round() * unit;
 }

@@ -10,75 +10,80 @@
 
 namespace krot::internal {
 
-// The points that each of `count` processes takes of a model, as indices of its
-// points3D, ascending: consecutive ones in the order of their ids, with about
-// as many observations. O(points log points).
+// Divides a model's points among `count` processes, with about as many
+// observations each. Every process gets consecutive points in the order of
+// their ids; they are returned as indices of points3D, ascending. O(points log
+// points).
 std::vector<std::vector<int32_t>> CutPoints(const Model& whole, int count);
 
-// All of a model but for the other points, their tracks, and the 2D points that
-// no track here names.
+// A model with some of the points: with their tracks and the 2D points that
+// these name, and with everything else of the whole model.
 struct ModelShare {
   Model model;
-  // Per image: what its 2D points are called in the whole.
+  // For each image: the index that each of its 2D points has in the whole
+  // model.
   std::vector<std::vector<uint32_t>> point2D_of;
 };
 
-// `points` as CutPoints gives them. Requires a valid model (ValidateModel).
+// Makes the part of one process; `points` as CutPoints gives them. Requires a
+// valid model (ValidateModel).
 ModelShare TakeShare(const Model& whole, const std::vector<int32_t>& points);
 
 struct RemovedObservations {
   Model model;
-  std::vector<uint64_t> element_of;  // what each track element was
-  // Elements that went because fewer than two of their track were left.
+  std::vector<uint64_t> element_of;  // index of each track element in the input
+  // Elements that were removed because fewer than two of their track were left.
   int64_t num_left_alone = 0;
-  int64_t num_points = 0;  // whose tracks went with them
+  int64_t num_points = 0;  // points that were removed for that reason
 };
 
 // A copy of `model` without the track elements that `is_removed` marks, and
-// without the points that keep fewer than two. 2D points that belong to no
-// track any more name no 3D point; images and 2D points all stay, and so does
-// every order. Requires a valid model; throws std::invalid_argument unless
+// without the points that keep fewer than two elements. 2D points that no
+// longer belong to a track name no 3D point. All images and 2D points stay, in
+// the same order. Requires a valid model; throws std::invalid_argument unless
 // there is one mark per element.
 RemovedObservations RemoveObservations(const Model& model,
                                        const std::vector<char>& is_removed);
 
 // A copy without the images that `is_removed` marks, in the order of
-// Model::images, as if they had not been registered: frames go with their last
-// image, cameras and rigs stay. Tracks must not hold them any more; throws
-// std::invalid_argument unless there is one mark per image.
+// Model::images, as if they had never been registered. A frame is removed with
+// its last image; cameras and rigs stay. No track may hold a removed image.
+// Throws std::invalid_argument unless there is one mark per image.
 Model RemoveImages(const Model& model, const std::vector<char>& is_removed);
 
-// Coordinates of 10^6 to 10^7 m, as in UTM or ECEF, leave few digits for the
-// scene in differences of R s and t, and cameras that turn about a distant
-// origin are badly conditioned unknowns. A local frame has its origin O amid
-// the model, at a round number: x_local = x - O is exact for points, t_local =
-// t + R O is rounded once.
+// A frame whose origin O is amid the model, at a round number. It helps with
+// coordinates of 10^6 to 10^7 m, as in UTM or ECEF: these leave few digits for
+// the scene in differences of R s and t, and rotations about a distant origin
+// are badly conditioned unknowns. x_local = x - O is exact for points; t_local
+// = t + R O is rounded once.
 class LocalFrame {
  public:
-  // O is near the median of what is fixed or known, or else of all finite
-  // camera centres, or else of the points; zero, and all below are copies,
-  // unless that is more than 10 times as far from the origin as half of these
-  // are from it. Requires a valid model. O(images + points).
+  // O is near the median of the fixed and known positions; without any, of all
+  // finite camera centres; without these, of the points. If that median is not
+  // farther from the origin than 10 times the positions' median distance from
+  // it, O is zero, and everything below only copies. Requires a valid model.
+  // O(images + points).
   explicit LocalFrame(const Model& model, const FixedParts& fixed = {},
                       const std::vector<KnownPosition>& known = {});
 
   const Eigen::Vector3d& origin() const { return origin_; }
+  // Whether the local frame is the model's own.
   bool IsModels() const { return origin_.isZero(0); }
 
   // The model in the local frame.
   Model ToLocal(const Model& model) const;
   std::vector<KnownPosition> ToLocal(std::vector<KnownPosition> known) const;
 
-  // What became of ToLocal(before) in the frame of `before`. What is there as
-  // it was keeps the bits that it has in `before`. Requires the same images and
-  // frames; points may be missing.
+  // Brings a model back that began as ToLocal(before). What has not changed
+  // gets the bits that it has in `before`. Requires the same images and frames;
+  // points may be missing.
   Model FromLocal(const Model& before, const Model& local) const;
 
  private:
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
 };
 
-// solve(model), whose result has the new `model`, by way of the local frame.
+// Calls solve() in the local frame, and brings the `model` in its result back.
 template <typename Solve>
 auto InLocalFrame(const LocalFrame& frame, const Model& model,
                   const Solve& solve) {

@@ -124,7 +124,8 @@ std::optional<DistanceScale> FindScale(
   };
   std::optional<DistanceScale> best;
   double best_sum = 0;
-  // The set of intervals that share a point is largest where one begins.
+  // The largest set of intervals that share a point is found at the beginning
+  // of one of them.
   for (size_t first = 0; first < count; ++first) {
     if (!is_usable(first)) continue;
     const double at = end(first, -1);

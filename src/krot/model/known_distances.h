@@ -14,8 +14,8 @@
 
 namespace krot::internal {
 
-// A distance between two cameras, or two points, or one of each, and what is
-// known of it.
+// The distance between two cameras, two points, or one of each, and its true
+// length if that is known.
 struct KnownDistance {
   struct End {
     bool is_image = false;
@@ -23,65 +23,66 @@ struct KnownDistance {
   };
   std::array<End, 2> ends;
   std::optional<double> metres;  // > 0
-  double tolerance = 0;          // metres; > 0 where these are known
+  double tolerance = 0;          // metres; > 0 if `metres` is known
 
   // "a.jpg to b.jpg", "3D point 12 to 3D point 7".
   std::string Name(const Model& model) const;
 };
 
-// The distances that a text file lists (scale bars: docs/formats.md). A line
-// holds two images' names, or two ids of 3D points, and METRES and TOLERANCE
-// behind them; `may_lack_metres` allows lines without these, for distances that
-// are asked for. Names may have blanks in them; a number is a 3D point's id
-// where no image has it for a name. Lines with what the model does not have are
-// skipped, and `note` told. Throws ModelError, with the line, for what is no
-// such line, and for a file that holds nothing of the model.
+// Reads the distances that a text file lists (scale bars: docs/formats.md). A
+// line holds two image names or ids of 3D points, and behind them METRES and
+// TOLERANCE; `may_lack_metres` allows lines without these two, for distances
+// that are to be measured. Names may contain blanks. A number is the id of a 3D
+// point unless an image has it for a name. Lines that name something the model
+// does not have are skipped, and `note` is told. Throws ModelError, with the
+// line, for any other line, and if nothing in the file belongs to the model.
 std::vector<KnownDistance> ReadDistances(const FileBytes& file,
                                          const Model& model,
                                          bool may_lack_metres,
                                          const FileNote& note = {});
 
-// The same distances in another model, by images' names and points' ids; an
-// index is -1 where it has none.
+// The same distances for another model, in which images are found by name and
+// points by id; an index is -1 if the other model has none.
 std::vector<KnownDistance> InOtherModel(std::vector<KnownDistance> distances,
                                         const Model& model, const Model& other);
 
-// The length of each in the model, scene units; NaN where an end is not there,
-// or stands nowhere.
+// The length of each distance in the model, scene units; NaN if an end is
+// missing or has no position.
 std::vector<double> LengthsOf(const Model& model,
                               const std::vector<KnownDistance>& distances);
 
-// What known distances say of a model's scale.
+// The scale of a model that follows from known distances.
 struct DistanceScale {
-  // Metres for a scene unit; in the interval that all agreeing ones allow.
+  // Metres per scene unit, and the interval that all agreeing distances allow.
   double scale = 0;
   double lowest = 0;
   double highest = 0;
-  // By distance: whether it agrees. Not so without a length or metres.
+  // For each distance, whether it agrees. False without a length or metres.
   std::vector<char> agrees;
   int64_t num_agreeing = 0;
-  // Whether no other set of as many agrees with itself.
+  // Whether no other set of agreeing distances is as large.
   bool is_unique = true;
 };
 
-// The scale that the most distances agree with. Each allows the scales in
-// [(d - t) / length, (d + t) / length]; the largest number of these intervals
-// that share a point is found exactly, and within what they share the least sum
-// of squares of (scale length - d) / t. Among sets of as many the one with the
-// lowest sum. None if no distance has metres and a length above zero.
-// O(square of the number of distances).
+// Finds the scale that the most distances agree with. Each distance d with
+// tolerance t allows the scales in [(d - t) / length, (d + t) / length]. The
+// largest set of intervals that share a point is found exactly; within what
+// they share, the scale minimises the sum of ((scale length - d) / t)^2. Among
+// sets of equal size the one with the lowest sum counts. None if no distance
+// has metres and a length above zero. O(square of the number of distances).
 std::optional<DistanceScale> FindScale(
     const std::vector<double>& lengths,
     const std::vector<KnownDistance>& distances);
 
-// Known distances in one model.
+// The known distances as one model has them.
 struct MeasuredDistances {
-  std::vector<double> lengths;         // scene units
-  std::optional<DistanceScale> scale;  // none: no distance has both ends there
+  std::vector<double> lengths;  // scene units
+  // None: no distance has both ends in the model.
+  std::optional<DistanceScale> scale;
 };
 
-// By FindScale or, where the scale is known, by that: then what agrees is what
-// has it in its interval.
+// Measures the distances and finds the scale by FindScale, or takes `scale` if
+// it is given: then a distance agrees if it is within its tolerance.
 MeasuredDistances MeasureDistances(const Model& model,
                                    const std::vector<KnownDistance>& distances,
                                    std::optional<double> scale = {});
@@ -90,9 +91,9 @@ MeasuredDistances MeasureDistances(const Model& model,
 struct DistanceReport {
   std::vector<std::string> names;
   std::vector<KnownDistance> distances;
-  std::vector<MeasuredDistances> models;  // before and after, or the first's
-                                          // and the second's
-  bool is_scale_taken = false;  // the written model is in metres by it
+  // Before and after, or the first and the second one.
+  std::vector<MeasuredDistances> models;
+  bool is_scale_taken = false;  // the written model was scaled to metres by it
 };
 
 }  // namespace krot::internal

@@ -49,12 +49,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Numbers of a line: an ellipsoid's that is turned, one's along the axes, a
-// ball's, and a ball's without its radius.
+// How many numbers a line may have behind the name: position, semi-axes and
+// quaternion; position and semi-axes; position and radius; or a position alone.
 const std::vector<size_t> kCounts = {10, 6, 4, 3};
 constexpr char kExpected[] =
     "X Y Z RADIUS, or X Y Z and three semi-axes, or these and QW QX QY QZ";
-// Of two semi-axes.
+// The largest ratio of two semi-axes.
 constexpr double kLargestRatio = 1e4;
 
 [[noreturn]] void FailWithoutRadius(const TextReader& reader) {
@@ -84,7 +84,8 @@ Ellipsoid RegionOf(const std::vector<double>& v,
   return region;
 }
 
-// Between the quartiles of a coordinate, which few strays do not move.
+// The distance between the quartiles of a coordinate, which a few outliers do
+// not change.
 double Spread(std::vector<Vector3d> positions, int axis) {
   if (positions.empty()) return 0;
   std::sort(positions.begin(), positions.end(),
@@ -93,10 +94,11 @@ double Spread(std::vector<Vector3d> positions, int axis) {
   return positions[3 * count / 4][axis] - positions[count / 4][axis];
 }
 
-// Whether x and y are degrees on the earth: in their range, nowhere near zero
-// for how near they are to each other, and that next to nothing beside the
-// spread that the model gives the same things or, if it gives none, beside
-// their heights'. A degree is 111 km: metres would be 10^5 times as far apart.
+// Whether x and y are latitude and longitude in degrees rather than lengths.
+// They are if they are in the range of degrees and their spread is tiny: beside
+// their distance from zero, and beside the spread of the same cameras or points
+// in the model (or, if the model has no positions, that of the heights). A
+// degree is 111 km, so in metres the spread would be 10^5 times as large.
 bool AreDegrees(const std::vector<Vector3d>& positions,
                 const std::vector<Vector3d>& in_model) {
   constexpr double kNextToNothing = 0.01;
@@ -123,8 +125,7 @@ bool NamesDegrees(std::string header) {
           header.find("lng") != std::string::npos);
 }
 
-// Reads the list; `in_model` are the positions that the model has itself, NaN
-// for none.
+// Reads the list; `in_model` are the model's own positions, NaN for none.
 std::vector<KnownPosition> ReadList(const FileBytes& file, const Model& model,
                                     KnownPosition::Of of,
                                     const std::vector<Vector3d>& in_model,

@@ -12,26 +12,29 @@
 
 namespace krot::internal {
 
-// A COLMAP model says twice which 2D points see a 3D point: in the tracks and
-// in the images. Scripts write models where the two differ. COLMAP reads them:
-// its bundle adjustment takes the images' side, its filters take the tracks'.
+// A COLMAP model states twice which 2D points see a 3D point: in the tracks and
+// in the images. Some scripts write models in which the two differ. COLMAP
+// reads these: its bundle adjustment uses the images' statements, its filters
+// the tracks'.
 
 struct Contradictions {
-  // Whose 2D point names another 3D point or none, does not exist, or is in
-  // this track already.
+  // Track elements whose 2D point names another 3D point or none, does not
+  // exist, or is in the same track twice.
   int64_t num_track_elements = 0;
-  // That name a 3D point whose track does not name them, or that there is not.
+  // 2D points that name a 3D point which does not exist, or whose track does
+  // not contain them.
   int64_t num_points2D = 0;
-  std::string first;  // the first of them, as one sentence; "" if none
+  std::string first;  // describes the first of them in one sentence; "" if none
 
-  // How a side fits the model's own positions: errors of its observations whose
-  // images have a pose, pixels; infinite where the point does not project.
+  // How well one of the two statements fits the model's own positions: the
+  // errors of its observations in images with a pose, pixels; infinite where
+  // the point does not project.
   struct Fit {
     double median = 0;
     double max = 0;
   };
-  // Set by SettleContradictions, as is `followed`: "tracks", "images", "both"
-  // or "neither", "" if not settled. No fit: nothing can be measured.
+  // Set by SettleContradictions, with `followed`: "tracks", "images", "both" or
+  // "neither"; "" if not settled. None if nothing can be measured.
   std::optional<Fit> of_tracks;
   std::optional<Fit> of_images;
   std::string followed;
@@ -39,57 +42,61 @@ struct Contradictions {
   bool Any() const { return num_track_elements > 0 || num_points2D > 0; }
 };
 
-// Requires consecutive tracks, as ReadModel leaves them.
-// O(size of the model), a few ns per 2D point.
+// Counts the contradictions of a model. Requires consecutive tracks, as
+// ReadModel leaves them. O(size of the model), a few ns per 2D point.
 Contradictions FindContradictions(const Model& model);
 
-// Whether a track has two elements. Where none has there is nothing to solve,
-// and no side to choose.
+// Whether any track has two elements. If none has, there is nothing to solve
+// and no need to choose a statement.
 bool HasTrack(const Model& model);
 
-// Which of the two says what a 2D point sees.
+// How Follow decides which 3D point a 2D point sees.
 enum class Reading {
-  kTracks,  // the track that names it; of several, the one that it names
-            // itself, or else the first
+  kTracks,  // the point whose track contains it; of several, the one that it
+            // names itself, or else the first
   kImages,  // the 3D point that it names
-  kBoth,    // the 3D point that it names or, if it names none, the first whose
-            // track names it
+  kBoth,    // the 3D point that it names or, if it names none, the first one
+            // whose track contains it
 };
 
 // Makes a model that does not contradict itself: every 2D point sees at most
-// one 3D point, and names it; tracks hold what names them and nothing else. Of
-// a track, the elements that stay keep their order; those that it lacked are
-// appended in the order of the images. A model without contradictions stays as
-// it is. Requires consecutive tracks. O(size of the model).
+// one 3D point and names it, and the tracks contain exactly the 2D points that
+// name their point. In each track the elements that stay keep their order;
+// missing ones are appended in the order of the images. A model without
+// contradictions does not change. Requires consecutive tracks. O(size of the
+// model).
 void Follow(Reading reading, Model* model);
 
-// 2D points name none where their 3D point does not exist.
+// 2D points that name a 3D point which does not exist name none afterwards.
 void DropUnknownPoints3D(Model* model);
 
-// Track elements of images or 2D points that do not exist go; returns their
-// number. Requires consecutive tracks.
+// Removes track elements of images or 2D points that do not exist, and returns
+// their number. Requires consecutive tracks.
 int64_t DropUnknownPoints2D(Model* model);
 
 // The angle between two rotations, in [0, 180] degrees.
 double AngleDeg(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
-// What is odd about the poses of a model that can be read all the same.
+// Suspicious properties of a model's poses that do not prevent reading it.
 struct PoseChecks {
   int64_t num_images = 0;  // with a pose
 
-  // Whose frame's, or sensor's, quaternion is far from unit length. It is
-  // normalised, as COLMAP does, which hides numbers in a wrong order.
+  // Images of which a quaternion, the frame's or the sensor's, is far from unit
+  // length. It is normalised, as in COLMAP, which hides numbers in a wrong
+  // order.
   int64_t num_far_quaternions = 0;
+  // The extreme lengths of these quaternions.
   double shortest = 1;
   double longest = 1;
-  std::string first_far;  // image
-  // All poses read TX TY TZ QW QX QY QZ, by the length of the last four.
+  std::string first_far;  // name of the first such image
+  // Whether all poses seem to be written as TX TY TZ QW QX QY QZ: their last
+  // four numbers have unit length.
   bool is_exchanged = false;
 
-  // Whose pose in the images file is not the one that rigs and frames give,
-  // which counts, as in COLMAP.
+  // Images whose pose in the images file differs from the one by rigs and
+  // frames. The latter counts, as in COLMAP.
   int64_t num_stale = 0;
-  double median_turn_deg = 0;  // between the two, of the stale ones
+  double median_turn_deg = 0;  // between the two poses, of these images
   double largest_turn_deg = 0;
   std::string largest_turn_image;
 
@@ -99,20 +106,22 @@ struct PoseChecks {
 // Requires a valid model. O(images).
 PoseChecks CheckPoses(const Model& model);
 
-// How rotations from elsewhere stand to a model's own of the same images.
+// How listed rotations compare with the model's own rotations of the same
+// images.
 struct RotationAgreement {
-  // Where they agree much better after a rotation of the world:
-  // listed = own * own_world_from_list, nearly.
+  // Set if they agree much better after a rotation of the world: listed = own *
+  // own_world_from_list, nearly.
   std::optional<Eigen::Quaterniond> own_world_from_list;
-  // Where they agree much better in another convention, whatever the world
-  // frame: a sentence with the cure.
+  // Set if they agree much better in another convention, whatever the world
+  // frame: a sentence that says how to correct the list.
   std::string mistake;
 };
 
-// Camera-from-world rotations, image by image; the listed ones as their four
-// numbers stand in the file. What is compared are median angles: half of the
-// images may be anywhere. The conventions are those of tools that write the
-// inverse rotation, QW last, or cameras that look along -z. O(images).
+// Compares camera-from-world rotations, image by image; the listed ones are
+// given as the four numbers in the file. Median angles are compared, so half of
+// the images may have any rotation. The conventions tried are those of tools
+// that write the inverse rotation, QW last, or cameras that look along -z.
+// O(images).
 RotationAgreement CompareRotations(const std::vector<Eigen::Quaterniond>& own,
                                    const std::vector<QuaternionWxyz>& listed);
 

@@ -71,7 +71,7 @@ struct ModelPart {
   }
 };
 
-// In the order in which COLMAP reads them.
+// The files in the order in which COLMAP reads them.
 const ModelPart kParts[] = {
     {"cameras", false, ParseCamerasBinary, ParseCamerasText,
      FormatCamerasBinary, FormatCamerasText},
@@ -85,12 +85,12 @@ const ModelPart kParts[] = {
      FormatPoints3DBinary, FormatPoints3DText},
 };
 constexpr const char* kProjectFile = "project.ini";
-// What splatting programs make of points3D.bin and read in its place.
+// Splatting programs convert points3D.bin to this file and read it instead.
 constexpr const char* kPointsOfOthers = "points3D.ply";
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
-// Runs `action`; what the file system refuses becomes an Error.
+// Runs `action`, and turns a refusal of the file system into an Error.
 template <typename Error, typename Action>
 auto Translating(const fs::path& folder, const char* verb,
                  const Action& action) {
@@ -111,7 +111,8 @@ bool IsModelFile(const fs::path& file_name) {
   return false;
 }
 
-// Names of the core files of this format that the folder lacks, or holds.
+// Names of the core files of this format that the folder holds (`present`) or
+// lacks.
 std::vector<std::string> CoreFiles(const fs::path& folder, ModelFormat format,
                                    bool present) {
   std::vector<std::string> names;
@@ -227,8 +228,7 @@ Model ReadModel(const fs::path& folder, ModelFormat format) {
         format == ModelFormat::kBinary ? part.parse_binary : part.parse_text;
     parse_part(ReadFileBytes(folder / part.FileName(format)), &model);
   }
-  // COLMAP takes a model whose rigs and frames are both empty for a legacy
-  // one.
+  // Like COLMAP, treats a model with empty rigs and frames as a legacy one.
   model.stores_rigs = !model.rigs.empty() || !model.frames.empty();
   if (!model.stores_rigs) UseTrivialRigs(&model);
   return model;

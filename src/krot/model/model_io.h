@@ -17,102 +17,103 @@ struct FileBytes {
   std::string bytes;
 };
 
-// Takes a sentence on how a file was understood, on what was skipped, for one;
-// may be empty.
+// Receives a sentence on how a file was understood, for example on what was
+// skipped; may be empty.
 using FileNote = std::function<void(const std::string& sentence)>;
 
-// The whole file in one read. Throws ModelError if it is missing, not a
+// Reads the whole file at once. Throws ModelError if it is missing, not a
 // regular file or not readable, or if it is a Git LFS pointer instead of the
-// file that it stands for.
+// file itself.
 FileBytes ReadFileBytes(const std::filesystem::path& path);
 
 // The image names that COLMAP's text reader would cut at their first white
-// space, in the order of the images. KROT reads them whole; warn before
-// writing them as text.
+// space, in the order of the images. KROT reads them whole, so the user should
+// be warned before they are written as text.
 std::vector<std::string> ImageNamesWithWhiteSpace(const Model& model);
 
-// The frames of the images that a text file lists, by name or, where no image
-// has such a name, by id; one per line, comments with #. An image may be listed
-// twice; what the model does not have is skipped, and `note` told. Requires a
-// valid model. Throws ModelError, with the line, for a name of two images and
-// for an image without a pose to keep; and for a file that names nothing that
-// the model has.
+// Reads which images must not move, and marks their frames. The text file names
+// one image per line or, if no image has such a name, its id; comments begin
+// with #. An image may be listed twice. What the model does not have is
+// skipped, and `note` is told. Requires a valid model. Throws ModelError, with
+// the line, for a name that two images have and for an image without a pose;
+// and if the file names nothing that the model has.
 std::vector<char> FixedFrames(const FileBytes& file, const Model& model,
                               const FileNote& note = {});
 
-// The 3D points of which a text file lists the ids, likewise.
+// Likewise for 3D points, which the file lists by their ids.
 std::vector<char> FixedPoints3D(const FileBytes& file, const Model& model,
                                 const FileNote& note = {});
 
-// Whether all is finite and the semi-axes are above zero and not too different
-// for the digits of what is computed with them.
+// Whether the region can be computed with: everything is finite, the quaternion
+// is not zero, and the semi-axes are above zero and differ at most by a factor
+// of 10^4.
 bool IsFit(const Ellipsoid& region);
 
 struct PositionsOptions {
-  // Of lines without one; > 0, scene units. None: such lines are refused.
+  // For lines without a radius; > 0, scene units. None: such lines are refused.
   std::optional<double> radius;
-  FileNote on_note = {};  // what was skipped
-  // The file has a frame and a unit of its own. Then all lines may be without a
-  // radius, which is 0 in what is returned.
+  FileNote on_note = {};  // told what was skipped
+  // The file has a frame and a unit of its own. Then any line may lack a
+  // radius; it is returned as 0.
   bool has_own_frame = false;
 };
 
-// The positions of images that a text file lists (GPS, surveys:
-// docs/formats.md): a line holds an image's name, which may have blanks in it,
-// X Y Z, and a RADIUS or three semi-axes, the latter along the model's axes or,
-// with QW QX QY QZ, those that this turns into the model's. Images that the
-// model does not have are skipped. Requires a valid model. Throws ModelError,
-// with the line, for what is no such line and for a name that two images bear
-// or that the file has twice; for a file that names no image of the model; and
-// for latitudes and longitudes.
+// Reads the positions of images that a text file lists (GPS, surveys:
+// docs/formats.md). A line holds an image's name, which may contain blanks, X Y
+// Z, and either a RADIUS or three semi-axes. These are along the model's axes
+// or, with QW QX QY QZ behind them, along axes that this rotation takes to the
+// model's. Images that the model does not have are skipped. Requires a valid
+// model. Throws ModelError, with the line, for any other line and for a name
+// that two images have or that the file lists twice; if the file names no image
+// of the model; and for latitudes and longitudes.
 std::vector<KnownPosition> ReadPositions(const FileBytes& file,
                                          const Model& model,
                                          const PositionsOptions& options = {});
 
-// The same of 3D points, by their ids.
+// Likewise for 3D points, by their ids.
 std::vector<KnownPosition> ReadPointPositions(
     const FileBytes& file, const Model& model,
     const PositionsOptions& options = {});
 
-// What a file of rotations did to a model.
+// What ReplaceRotations did to a model.
 struct ReplacedRotations {
-  int64_t num_frames = 0;       // that it names
-  int64_t num_kept_images = 0;  // of frames that it does not name
-  // Whether the model's frames have rotations of their own, not all the same.
+  int64_t num_frames = 0;       // frames that the file names
+  int64_t num_kept_images = 0;  // images of the other frames
+  // Whether the model's frames had rotations of their own, not all the same.
   bool is_comparable = false;
-  // By how much the images that it names turn, degrees.
+  // By how much the images that the file names turn, degrees.
   double median_turn_deg = 0;
   double largest_turn_deg = 0;
   std::string largest_turn_image;
-  // The file's world frame is turned against the model's by so much, which was
-  // taken off.
+  // The angle between the world frames of the file and the model, which was
+  // corrected; 0 if they are the same.
   double frame_turn_deg = 0;
-  // Why the file is probably written in another convention, with the cure; ""
-  // if it is not.
+  // Why the file probably uses another convention, and how to correct it; "" if
+  // it does not.
   std::string mistake;
 };
 
-// Replaces the rotations of the frames that a text file names (gyroscopes,
+// Replaces the rotations of the frames that a text file names (from gyroscopes,
 // gimbals, other pipelines: docs/formats.md). A line holds an image's name,
-// which may have blanks in it, and the last four of its words, QW QX QY QZ,
-// that image's rotation, camera from world; of any length but zero. It gives
-// the frame its rotation, through the sensor's place in the rig; where several
-// images of a frame are named, they have to agree to 1e-5 rad, and the first
-// decides. Frames keep their place, -R' t; those without a line, or with the
-// rotation that they have, keep their bits.
+// which may contain blanks, and as its last four words QW QX QY QZ, the
+// rotation of that image, camera from world, of any length but zero. The frame
+// gets its rotation from that, through the sensor's pose in the rig. If several
+// images of a frame are named, they must agree to 1e-5 rad, and the first one
+// counts. Frames keep their place, -R' t; those without a line, or whose
+// rotation does not change, keep their bits.
 //
-// A file that names all frames, and whose rotations agree with the model's own
-// much better after a rotation of the world, is of another world frame: its
-// rotations are turned into the model's. One that agrees much better still
-// with its numbers in another order, or inverted, is a mistake, probably: they
-// are taken as they stand, and `mistake` says so.
-// A frame that had no rotation gets one, and has no translation. Images that
-// the model does not have are skipped, and `note` told.
+// If a file names all frames, and its rotations agree with the model's own much
+// better after a rotation of the world, it uses another world frame: its
+// rotations are turned into the model's. If they agree much better still with
+// their numbers in another order, or inverted, the file is probably wrong: its
+// rotations are used as they stand, and `mistake` says so. A frame that had no
+// rotation gets one, but no translation. Images that the model does not have
+// are skipped, and `note` is told.
 //
 // Requires a valid model, and leaves one. Throws ModelError, with the line, for
-// what is no such line, for a name that two images bear or that the file has
-// twice, and for a file that names no image of the model; the model is to be
-// thrown away then. O(file + images).
+// any other line and for a name that two images have or that the file lists
+// twice, and if the file names no image of the model; the model must not be
+// used after that. O(file + images).
 ReplacedRotations ReplaceRotations(const FileBytes& file, Model* model,
                                    const FileNote& note = {});
 

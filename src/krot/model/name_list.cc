@@ -9,7 +9,7 @@
 namespace krot::internal {
 namespace {
 
-constexpr int32_t kAmbiguous = -1;  // several images bear the name
+constexpr int32_t kAmbiguous = -1;  // several images have the name
 constexpr std::string_view kBlanksAndQuotes = " \t\r;\"";
 constexpr std::string_view kSeparators = " \t\r;\",";
 
@@ -41,8 +41,9 @@ bool HasNumber(std::string_view line) {
   return false;
 }
 
-// Whether one of the numbers at the end is like 4,99: where commas stand
-// between numbers, a word has several, or one at an end.
+// Whether one of the numbers at the end has a decimal comma, like 4,99. A comma
+// that separates numbers differs: then a word has several commas, or one at its
+// end.
 bool HasDecimalComma(std::string_view line) {
   for (;;) {
     const std::string_view word = TakeLast(kBlanksAndQuotes, &line);
@@ -126,7 +127,8 @@ std::optional<ListReader::Line> ListReader::Take(
   }
   ++num_lines_;
   if (HasDecimalComma(line)) reader_.FailAtNumber<double>(line, expected);
-  // The numbers at the end, from the last on, and what stands in front of them.
+  // The numbers at the end of the line, last one first, and for each count of
+  // numbers what stands in front of them.
   std::vector<double> numbers;
   std::string_view front = line;
   std::vector<std::string_view> names = {Trimmed(front)};
@@ -163,7 +165,8 @@ std::optional<ListReader::Line> ListReader::Take(
   return std::nullopt;
 }
 
-// The names may hold blanks: wherever both halves are known.
+// Names may contain blanks, so every place where they may be split is tried
+// until both halves are known.
 std::optional<std::array<KnownDistance::End, 2>> ListReader::FindPair(
     std::string_view names) const {
   const auto find =

@@ -15,14 +15,13 @@
 
 namespace krot::internal {
 
-// Text files beside a model that list names, or ids, and numbers: positions,
-// rotations, what must not move. docs/formats.md says what a line may look
-// like.
+// Text files beside a model that list names or ids with numbers: positions,
+// rotations, parts that must not move. docs/formats.md describes their lines.
 
-// Walks over the lines of a list. An image goes by its name, or by a path that
-// ends with it behind a slash or backslash: the longest such name counts. A 3D
-// point goes by its id. Whatever is indexed here is so as in Model::images or
-// Model::points3D.
+// Reads the lines of such a list one after another. An image is given by its
+// name, or by a path that ends with the name behind a slash or backslash: the
+// longest such name counts. A 3D point is given by its id. All indices are
+// those of Model::images or Model::points3D.
 class ListReader {
  public:
   enum class Of {
@@ -37,19 +36,21 @@ class ListReader {
 
   bool Next() { return reader_.NextRecord(); }
 
-  // What this line, all of it a name, stands for; none, and counted, if the
-  // model does not have it.
+  // The image or point whose name is this whole line. If the model does not
+  // have it, the line is counted as skipped, and none is returned.
   std::optional<int32_t> TakeName();
 
   struct Line {
     int32_t index;
     std::vector<double> numbers;  // finite
   };
-  // This line, a name and as many numbers as one of `counts` says, which
-  // descend: the most that leave a name of the model. None, and counted, if
-  // there is no such name; none, too, if it is the list's first line and a
-  // header: no word of it is a number. Fails for a line with other numbers,
-  // which are not what was `expected`, and for a name that another line has.
+  // Splits this line into a name and numbers. `counts` says, in descending
+  // order, how many numbers are allowed; the largest count that leaves a name
+  // of the model is taken. If there is no such name, the line is counted as
+  // skipped, and none is returned; likewise none for a header, that is, if the
+  // list's first line has no word that is a number. Fails, with what was
+  // `expected`, for a wrong count of numbers, and for a name that another line
+  // has, too.
   std::optional<Line> Take(const std::vector<size_t>& counts,
                            const std::string& expected);
 
@@ -57,20 +58,21 @@ class ListReader {
     std::array<KnownDistance::End, 2> ends;
     std::vector<double> numbers;  // finite
   };
-  // This line, two names, of images or, where no image has such a name, of 3D
-  // points, and `count` numbers, or maybe none. Otherwise as Take.
+  // Splits this line into two names and `count` numbers, or none if
+  // `may_lack_numbers`. The names are those of images or, if no image has such
+  // a name, ids of 3D points. Otherwise as Take.
   std::optional<PairLine> TakePair(size_t count, bool may_lack_numbers,
                                    const std::string& expected);
 
   // Throws ModelError if there was no line, or none whose name the model has;
-  // tells `note` of those that were skipped.
+  // tells `note` which lines were skipped.
   void Finish(const FileNote& note) const;
 
   const TextReader& reader() const { return reader_; }
   const std::string& header() const { return header_; }  // "" without one
 
  private:
-  // Counts a line, with the first of its kind.
+  // Counts lines of one kind and keeps the first one.
   struct Tally {
     void Add(const std::string& line) {
       if (++count == 1) first = line;
@@ -79,8 +81,8 @@ class ListReader {
     std::string first;
   };
 
-  // Of what bears the name; none if the model does not have it. Fails if
-  // several images bear it.
+  // The index of what has this name; none if the model does not have it. Fails
+  // if several images have it.
   std::optional<int32_t> Find(std::string_view name) const;
   std::optional<int32_t> FindPoint(std::string_view name) const;
   std::optional<std::array<KnownDistance::End, 2>> FindPair(
@@ -102,7 +104,7 @@ class ListReader {
   IdIndex<Point3DId> point_ids_;
   std::string header_;
   int64_t num_lines_ = 0;        // without the header
-  std::vector<size_t> line_of_;  // by index; 0: none so far
+  std::vector<size_t> line_of_;  // of each index; 0: none so far
   Tally skipped_;
   Tally paths_;
 };

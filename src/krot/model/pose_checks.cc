@@ -14,15 +14,16 @@
 namespace krot::internal {
 namespace {
 
-// What rounding to six digits leaves far behind: radians, or relative to a
-// length.
+// Two poses are the same up to this: radians, or relative to a length. Rounding
+// to six digits causes much smaller differences.
 constexpr double kSamePose = 1e-3;
+// How far a quaternion's length may be from 1.
 constexpr double kFarFromUnit = 0.01;
 
 using Rotations = std::vector<Eigen::Quaterniond>;
 
-// How other tools write a rotation of four numbers a b c d: which of them are
-// QW QX QY QZ, camera from world; 1 is a, -2 is -b.
+// How other tools write a rotation as four numbers a b c d. `numbers` says
+// which of them are QW QX QY QZ, camera from world: 1 is a, -2 is -b.
 struct Convention {
   std::array<int, 4> numbers;
   const char* meaning;
@@ -41,8 +42,8 @@ constexpr std::array<Convention, 8> kConventions = {{
      "along -z"},
 }};
 
-// One explanation is much better than another if it leaves a fifth of the
-// median angle, and the other one degrees.
+// One explanation is much better than another if its median angle is less than
+// a fifth of the other's, and the other's is above a degree.
 constexpr double kMuchBetter = 5;
 constexpr double kNoticeableDeg = 1;
 bool IsMuchBetter(double median_deg, double than_deg) {
@@ -64,7 +65,7 @@ Rotations ReadAs(const Convention& convention,
   return rotations;
 }
 
-// "-b a -d c".
+// For example "-b a -d c".
 std::string WrittenAs(const Convention& convention) {
   std::string text;
   for (const int number : convention.numbers) {
@@ -75,7 +76,7 @@ std::string WrittenAs(const Convention& convention) {
   return text;
 }
 
-// listed = own * own_world_from_list, nearly.
+// The angles by which listed = own * own_world_from_list is missed.
 std::vector<double> AnglesDeg(const Rotations& own, const Rotations& listed,
                               const Eigen::Quaterniond& own_world_from_list) {
   std::vector<double> angles(own.size());
@@ -85,8 +86,9 @@ std::vector<double> AnglesDeg(const Rotations& own, const Rotations& listed,
   return angles;
 }
 
-// The rotation of the world with the least median angle among those of some
-// of the images, then the mean over the better half of all. O(images).
+// The rotation of the world with the smallest median angle. Candidates are the
+// rotations that single images suggest (at most 32 images); the best one is
+// refined by the mean over the half of the images that fit it best. O(images).
 struct WorldTurn {
   Eigen::Quaterniond own_world_from_list = Eigen::Quaterniond::Identity();
   double median_deg = std::numeric_limits<double>::infinity();
@@ -124,7 +126,7 @@ double Length(const QuaternionWxyz& q) {
   return std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
 }
 
-// An image without a pose may have a quaternion of zeros.
+// An image without a pose may have a quaternion of zeros, which does not count.
 bool IsFar(const Pose& pose) {
   const double length = Length(pose.quaternion_wxyz);
   return length > 0 && std::abs(length - 1) > kFarFromUnit;

@@ -23,7 +23,7 @@ using Eigen::Vector3d;
 
 constexpr int64_t kWgs84 = 0;
 constexpr int64_t kCartesian = 1;
-constexpr int64_t kCamera = 0;  // of the sensor types
+constexpr int64_t kCamera = 0;  // COLMAP's sensor type of cameras
 constexpr double kSigmas = 3;
 
 struct PosePrior {
@@ -33,7 +33,8 @@ struct PosePrior {
   int64_t coordinate_system = kCartesian;
 };
 
-// None unless it holds so many finite doubles.
+// The matrix in the blob; none unless it holds exactly that many finite
+// doubles.
 template <typename Matrix>
 std::optional<Matrix> MatrixOf(std::string_view blob) {
   Matrix matrix;
@@ -55,9 +56,9 @@ std::vector<PosePrior> ReadRows(SqliteDatabase* database, const Model& model) {
     if (found == image_of_name.end()) continue;
     image_of_id.emplace(images.Integer(0), found->second);
   }
-  // COLMAP 4 names the sensor, too, older ones the image alone, 3.10 without a
-  // covariance. Before, EXIF's latitude, longitude and height were the image's
-  // prior_t.
+  // The table differs between versions. COLMAP 4 stores the sensor, too;
+  // earlier versions only the image; 3.10 has no covariance. Before that, the
+  // latitude, longitude and height of EXIF were in the prior_t of the images.
   constexpr int kOldest = 3;
   std::optional<SqliteRows> rows;
   int form = 0;
@@ -101,7 +102,7 @@ std::vector<PosePrior> ReadRows(SqliteDatabase* database, const Model& model) {
 
 double Radians(double degrees) { return degrees / kDegreesPerRadian; }
 
-// Earth-centred, earth-fixed, of latitude, longitude, height.
+// Earth-centred, earth-fixed coordinates of latitude, longitude and height.
 Vector3d EarthCentred(const Vector3d& geodetic) {
   constexpr double kSemiMajorAxis = 6378137;  // metres, WGS84
   constexpr double kFlattening = 1 / 298.257223563;
@@ -116,7 +117,7 @@ Vector3d EarthCentred(const Vector3d& geodetic) {
           (normal * (1 - kSquaredEccentricity) + geodetic[2]) * sine};
 }
 
-// The rows are east, north and up.
+// A rotation whose rows are east, north and up.
 Matrix3d LocalFromEarthCentred(const Vector3d& geodetic) {
   const double latitude = Radians(geodetic[0]);
   const double longitude = Radians(geodetic[1]);
@@ -164,7 +165,8 @@ void TakeIntoLocalFrame(const Model& model, SqliteDatabase* database,
        at + ", where " + model.images[(*priors)[nearest].image].name + " is");
 }
 
-// None unless the covariance has an inverse.
+// The ellipsoid of three standard deviations; none unless the covariance has an
+// inverse.
 std::optional<Ellipsoid> RegionOfPrior(const PosePrior& prior) {
   if (!prior.covariance) return std::nullopt;
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(*prior.covariance);

@@ -16,7 +16,8 @@ std::unordered_map<Id, int32_t> IndicesById(
   return indices;
 }
 
-// The pose of `image` from those of its frame and, in that, its sensor.
+// Composes the pose of `image` from its frame's pose and its sensor's pose in
+// the rig.
 void Place(const Pose& rig_from_world, const Pose& cam_from_rig,
            ImageGeometry* image) {
   image->rig_from_world = rig_from_world.Transform();

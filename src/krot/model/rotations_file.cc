@@ -18,7 +18,8 @@
 namespace krot::internal {
 namespace {
 
-// What rounding to six digits makes of one rotation, twice, radians.
+// Rounding one rotation twice to six digits changes it by less than this;
+// radians.
 constexpr double kSameRotation = 1e-5;
 
 // A line of the file.
@@ -29,13 +30,13 @@ struct ListedRotation {
   bool is_new = false;  // the model has no rotation of this image
 };
 
-// What the lines so far say of a frame.
+// What the lines read so far say about a frame.
 struct NamedFrame {
-  size_t line = 0;  // the first that does; 0: none
+  size_t line = 0;  // the first line that names the frame; 0: none
   QuaternionWxyz rig_from_world;
 };
 
-// The model's rotations as the lines replace them.
+// Replaces the model's rotations by those of the lines.
 class Replacement {
  public:
   explicit Replacement(Model* model)
@@ -49,25 +50,28 @@ class Replacement {
  private:
   void Add(int32_t image, const QuaternionWxyz& cam_from_world,
            const TextReader& reader);
-  // The model's own, of the listed images that have one.
+  // The model's own rotations of the listed images that have one.
   std::vector<Eigen::Quaterniond> OwnRotations() const;
-  // False where all frames have the same: a model without rotations, probably.
+  // False if all listed frames have the same rotation: then the model probably
+  // has none.
   bool HasRotations() const;
-  // Which convention the lines are in, and which world frame, by comparison
+  // Finds the convention and the world frame of the lines by comparing them
   // with the model's own rotations.
   void Judge(ReplacedRotations* replaced);
   void NameFrames(const ReplacedRotations& replaced, const std::string& path);
   void CountTurns(const std::vector<Eigen::Quaterniond>& before,
                   ReplacedRotations* replaced) const;
-  // The listed rotation of the rig, bit by bit where nothing turns it.
+  // The rotation of the rig that a line asks for, to the bit where nothing is
+  // multiplied to it.
   QuaternionWxyz RigFromWorld(const ListedRotation& listed) const;
-  // False if the frame has this rotation already.
+  // Gives the frame its rotation; false if it has it already.
   bool Turn(const QuaternionWxyz& rig_from_world, Pose* frame) const;
 
   Model& model_;
   const std::vector<ImageGeometry> geometries_;
   std::vector<ListedRotation> listed_;
-  std::optional<Eigen::Quaterniond> list_from_own_world_;  // none: the same
+  // None: the worlds agree.
+  std::optional<Eigen::Quaterniond> list_from_own_world_;
   std::vector<NamedFrame> named_;
 };
 

@@ -14,7 +14,7 @@
 namespace krot::internal {
 namespace {
 
-// The beginning of the file, as far as it tells what the file is.
+// The first bytes of the file, which tell its kind.
 std::string HeadOf(const std::filesystem::path& path) {
   const FileDescriptor file(path, FileDescriptor::Use::kRead);
   std::string head;
@@ -46,7 +46,7 @@ void RequireSqlite(const std::filesystem::path& path) {
   }
 }
 
-// A path in which no character has a meaning of its own.
+// The path as a URI, in which no character has a special meaning.
 std::string UriOf(const std::string& path) {
   std::string uri = "file:";
   for (const char c : path) {
@@ -67,7 +67,8 @@ std::string UriOf(const std::string& path) {
   return uri;
 }
 
-// SQLite's ways to files that take no locks, on Unix and on Windows.
+// A virtual file system of SQLite, for Unix or Windows, that takes no locks; ""
+// if this SQLite has none.
 std::string VfsWithoutLocks() {
   for (const char* name : {"unix-none", "win32-none"}) {
     if (sqlite3_vfs_find(name) != nullptr) return name;
@@ -80,15 +81,16 @@ std::string VfsWithoutLocks() {
 SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
     : name_(path.string()), database_(nullptr, &sqlite3_close_v2) {
   RequireSqlite(path);
-  // SQLite looks for the log beside the file that a link stands for.
+  // Follows symbolic links, because SQLite looks for the log beside the real
+  // file.
   std::error_code error;
   path_ = std::filesystem::canonical(path, error).generic_string();
   if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   if (error) Fail("cannot be opened: " + error.message());
   before_ = States();
-  // Without a journal, and without a log or the log's index, nobody is writing:
-  // no locks are needed, and SQLite need not create files of its own beside the
-  // database. A log alone is what a program left that did not end well.
+  // Nobody is writing if there is no journal, and no log or no index of the
+  // log. Then no locks are needed, and SQLite need not create files beside the
+  // database. A log without an index was left by a program that crashed.
   const bool has_log = before_[1].size > 0;
   const std::string without_locks = VfsWithoutLocks();
   is_unlocked_ =
@@ -105,11 +107,11 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
   sqlite3_busy_timeout(database, 5000);  // milliseconds
   sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
-  if (is_unlocked_) {  // keeps the log's index in memory
+  if (is_unlocked_) {  // keeps the index of the log in memory
     Require(sqlite3_exec(database, "PRAGMA locking_mode = EXCLUSIVE", nullptr,
                          nullptr, nullptr));
   }
-  // All that follows is of one state of the database.
+  // Everything that follows reads the same state of the database.
   Require(sqlite3_exec(database, "BEGIN", nullptr, nullptr, nullptr));
   for (const FileState& file : before_) bytes_left_ += file.size;
 }
@@ -151,14 +153,17 @@ void SqliteDatabase::Require(int status) const {
   }
   std::string reason =
       database_ ? sqlite3_errmsg(database_.get()) : sqlite3_errstr(status);
-  if ((status & 0xff) == SQLITE_NOMEM) {  // so it calls some damage, too
-    constexpr int kMuch = 1 << 20;        // beside a row
+  // SQLite reports some damage as a lack of memory, too. If there is memory
+  // for far more than a row, it is damage.
+  if ((status & 0xff) == SQLITE_NOMEM) {
+    constexpr int kMuch = 1 << 20;  // bytes
     void* const memory = sqlite3_malloc(kMuch);
     if (memory == nullptr) throw std::bad_alloc();
     sqlite3_free(memory);
     reason = "its tables make no sense";
   }
-  // What is read without locks may be half of one state and half of the next.
+  // Without locks, half of what was read may be of one state and half of the
+  // next.
   RequireUnchanged();
   if (status == SQLITE_BUSY || status == SQLITE_LOCKED) {
     Fail("is locked by another program; wait until COLMAP has ended");
@@ -207,7 +212,7 @@ void SqliteRows::Prepare(const std::string& sql) {
 
 bool SqliteRows::Next() {
   int status = sqlite3_step(statement_.get());
-  if (status == SQLITE_NOMEM) {  // once more, from the first row
+  if (status == SQLITE_NOMEM) {  // try once more, from the first row
     sqlite3_reset(statement_.get());
     int64_t row = 0;
     do {

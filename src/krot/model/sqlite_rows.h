@@ -14,13 +14,14 @@ struct sqlite3_stmt;
 
 namespace krot::internal {
 
-// An SQLite database that is read in one state and never written to. All that
-// is wrong with it throws ModelError: a sentence that begins with its path.
+// An SQLite database that is read in one consistent state and never written to.
+// Everything that is wrong with it throws ModelError with a sentence that
+// begins with its path.
 class SqliteDatabase {
  public:
   explicit SqliteDatabase(const std::filesystem::path& path);
 
-  // Throws if the file was written to since, while it was read without locks.
+  // Throws if the file was read without locks and has been written to since.
   void RequireUnchanged() const;
 
   [[noreturn]] void Fail(const std::string& what) const;
@@ -28,7 +29,7 @@ class SqliteDatabase {
  private:
   friend class SqliteRows;
 
-  // What tells whether a file was written to meanwhile.
+  // Changes if the file is written to.
   struct FileState {
     bool exists = false;
     int64_t size = 0;
@@ -39,15 +40,17 @@ class SqliteDatabase {
     }
   };
   static FileState StateOf(const std::string& path);
-  // Of the file, its write-ahead log and its journal.
+  // The states of the file, its write-ahead log and its journal.
   std::array<FileState, 3> States() const;
 
-  // Counts what was read against the size of the file, which may claim to hold
-  // more where it is damaged.
+  // Subtracts what was read from the size of the file, and throws if it is
+  // exceeded: a damaged file may claim to hold more than it can.
   void Account(int64_t bytes);
 
-  // Throws unless SQLite's status is one of success; std::bad_alloc where memory
-  // is short. What SQLite calls so a second time while there is some is damage.
+  // Throws ModelError unless SQLite's status is one of success, and
+  // std::bad_alloc if memory is short. SQLite also reports some damage as a
+  // lack of memory: if it does so a second time while memory is available, that
+  // counts as damage.
   void Require(int status) const;
 
   const std::string name_;
@@ -58,11 +61,11 @@ class SqliteDatabase {
   int64_t bytes_left_ = 0;
 };
 
-// The rows of a table, one after the other. Values of another type than asked
-// for throw ModelError.
+// The rows of a table, one after another. Throws ModelError for values of
+// another type than asked for.
 class SqliteRows {
  public:
-  // Of the table's columns, separated by commas. Throws ModelError if there is
+  // `columns` of the table, separated by commas. Throws ModelError if there is
   // no such table or column. Keeps a reference to the database.
   SqliteRows(SqliteDatabase* database, const std::string& table,
              const std::string& columns);
@@ -70,13 +73,14 @@ class SqliteRows {
   bool Next();
 
   int64_t Integer(int column) const;
-  double Real(int column) const;  // or an integer; NaN for NULL
+  double Real(int column) const;  // integers are converted; NaN for NULL
   std::string Text(int column) const;
-  std::string_view Blob(int column) const;  // until Next; empty for NULL
+  std::string_view Blob(int column) const;  // valid until Next; empty for NULL
 
-  // The elements of COLMAP's matrix blobs, row by row: `rows_column` and the
-  // two columns behind it are its rows, its columns and its data. Returns the
-  // number of rows. Throws ModelError, about `where`, if these do not agree.
+  // Reads one of COLMAP's matrix blobs, row by row: `rows_column` and the two
+  // columns behind it hold its number of rows, its number of columns and its
+  // data. Returns the number of rows. Throws ModelError, about `where`, if the
+  // three do not agree.
   template <typename T>
   int64_t Matrix(int rows_column, const std::string& where, int64_t min_columns,
                  int64_t max_columns, std::vector<T>* elements,

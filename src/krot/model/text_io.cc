@@ -108,7 +108,7 @@ Point2D ReadPoint2D(TextReader* reader) {
   return point;
 }
 
-// Whether the line is one of an image's own: IMAGE_ID POSE CAMERA_ID NAME.
+// Whether the line is the first line of an image: IMAGE_ID POSE CAMERA_ID NAME.
 bool IsImage(TextReader reader) {
   try {
     reader.Number<uint32_t>("");
@@ -135,9 +135,9 @@ void ReadPoints2D(const Image& image, TextReader* reader,
   }
 }
 
-// The image's own line, then the line of its 2D points, which may be empty, a
-// comment, which counts as empty, or, at the end of the file, absent, all as in
-// COLMAP. `points2D` is scratch memory.
+// Reads the image's own line and then the line of its 2D points. As in COLMAP,
+// the second line may be empty, a comment (which counts as empty) or, at the
+// end of the file, absent. `points2D` is scratch memory.
 Image ReadImage(TextReader* reader, std::vector<Point2D>* points2D) {
   Image image;
   image.id = reader->Number<uint32_t>("an image id");
@@ -215,7 +215,7 @@ void ParsePoints3DText(const FileBytes& file, Model* model) {
 
 namespace {
 
-// Each of the following begins with the blank that separates it.
+// Each of the following writes a blank and then its words.
 
 template <typename T>
 void AppendWord(T value, std::string* text) {
@@ -239,7 +239,8 @@ void AppendSensorId(const SensorId& sensor_id, std::string* text) {
   AppendWord(sensor_id.id, text);
 }
 
-// Names that a line cannot hold or that would come back shorter.
+// Fails for names that a line cannot hold, or that would lose blanks at their
+// ends.
 void CheckNameFitsText(const Image& image) {
   constexpr std::string_view kBlanks = " \t\r";
   const std::string& name = image.name;

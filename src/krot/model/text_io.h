@@ -18,14 +18,14 @@
 namespace krot::internal {
 
 // COLMAP's text files (docs/formats.md). Numbers are written with the fewest
-// digits that give the same bits back; a NaN keeps its sign but not its
-// payload. Image names are the rest of their line and may hold blanks.
+// digits that restore the same bits; a NaN keeps its sign but not its payload.
+// An image's name is the rest of its line and may contain blanks.
 //
-// Parse... replaces its part of the model; throws ModelError with the line,
-// the word found and what was expected. Text holds no counts of records:
-// duplicates and gaps are for ValidateModel. Format... returns the file's
-// content; throws WriteError for what text cannot hold (an unknown camera
-// model or sensor type, a name with line breaks or blanks at its ends).
+// Parse... replaces its part of the model. Throws ModelError with the line, the
+// word found and what was expected. Text has no counts of records:
+// ValidateModel finds duplicates and gaps. Format... returns the file's
+// content. Throws WriteError for what text cannot hold: an unknown camera model
+// or sensor type, and a name with line breaks or with blanks at its ends.
 // O(bytes), some 100 MB/s.
 
 void ParseCamerasText(const FileBytes& file, Model* model);
@@ -40,7 +40,7 @@ std::string FormatFramesText(const Model& model);
 std::string FormatImagesText(const Model& model);
 std::string FormatPoints3DText(const Model& model);
 
-// The text without the byte order mark that editors of Windows put in front.
+// The text without the byte order mark that Windows editors put in front.
 // Throws ModelError for UTF-16, which PowerShell writes.
 inline std::string_view WithoutByteOrderMark(const FileBytes& file) {
   std::string_view text = file.bytes;
@@ -53,11 +53,10 @@ inline std::string_view WithoutByteOrderMark(const FileBytes& file) {
   return text;
 }
 
-// Walks over the lines of a text file in memory and over the words of the
-// current line. Words are separated by spaces and tabs; a line may end with
-// CR LF; a byte order mark is skipped. Errors are ModelErrors that name the
-// file, the line, the word found and, from `what`, what was expected ("the x of
-// a 2D point").
+// Reads a text file in memory line by line, and the current line word by word.
+// Words are separated by spaces and tabs; a line may end with CR LF; a byte
+// order mark is skipped. Errors are ModelErrors that name the file, the line,
+// the word found and, from `what`, what was expected ("the x of a 2D point").
 class TextReader {
  public:
   // Keeps a reference to `file`.
@@ -100,8 +99,8 @@ class TextReader {
     return word;
   }
 
-  // The next word as a number; exact for what std::to_chars or 17 digits
-  // wrote. Throws if it is none or out of range of T.
+  // The next word as a number; exact for what std::to_chars wrote, or 17
+  // digits. Throws if it is not a number or out of T's range.
   template <typename T>
   T Number(const char* what) {
     const std::string_view word = Word(what);
@@ -110,7 +109,7 @@ class TextReader {
     return *value;
   }
 
-  // As Number does for a word that is none.
+  // Throws what Number throws for a word that is not a number.
   template <typename T>
   [[noreturn]] void FailAtNumber(std::string_view word,
                                  const std::string& what) const {
@@ -129,7 +128,7 @@ class TextReader {
                         : ""));
   }
 
-  // The rest of the line without the blanks at its ends.
+  // The rest of the line, without blanks at its ends.
   std::string_view Rest() {
     while (!line_.empty() && IsBlank(line_.back())) line_.remove_suffix(1);
     return std::exchange(line_, {});
@@ -141,7 +140,7 @@ class TextReader {
          std::string("the end of the line after ") + after);
   }
 
-  // Of the current line, from 1.
+  // The number of the current line, from 1.
   size_t line_number() const { return line_number_; }
 
   // "images.txt:12: found ..., expected ...".
@@ -153,7 +152,7 @@ class TextReader {
 
   template <typename T>
   static std::optional<T> ParseNumber(std::string_view word) {
-    // Streams take a plus sign.
+    // Like a C++ stream, accepts a plus sign in front.
     if (word.size() > 1 && word[0] == '+' && word[1] != '-') {
       word.remove_prefix(1);
     }
@@ -165,8 +164,8 @@ class TextReader {
   }
 
  private:
-  // The integer that stands there as a real number, "1000.0", if a double holds
-  // it exactly.
+  // An integer that is written as a real number, like "1000.0", if a double
+  // holds it exactly.
   template <typename T>
   static std::optional<T> ParseWhole(std::string_view word) {
     constexpr double kExact = 9007199254740992.0;  // 2^53

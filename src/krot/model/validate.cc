@@ -13,7 +13,7 @@
 namespace krot::internal {
 namespace {
 
-// Ends a sentence about rigs and frames that are not worth a repair.
+// Advice at the end of messages about inconsistent rigs and frames.
 constexpr const char* kUsePosesOfImages =
     "remove both rigs and frames: then the poses in images count";
 
@@ -76,7 +76,7 @@ void CheckRig(const Rig& rig, const IdIndex<CameraId>& cameras) {
   CheckSensorsDiffer(rig, sensor_ids);
 }
 
-// The position of the image that this data of the frame stands for.
+// The index of the image that this data of the frame refers to.
 int32_t ResolveImage(const IndexedModel& model, const Frame& frame,
                      const FrameData& data) {
   if (data.sensor_id.type != kSensorTypeCamera) {
@@ -114,7 +114,7 @@ void CheckCameraHasPose(const Rig& rig, const Image& image) {
   }
 }
 
-// Sets the frame of each of this frame's images.
+// Checks a frame, and enters it as the frame of each of its images.
 void CheckFrame(const IndexedModel& model, const Frame& frame,
                 std::vector<const Frame*>* frame_of_image) {
   const std::optional<int32_t> rig = model.rigs.Find(frame.rig_id);
@@ -154,7 +154,8 @@ void ValidateRigsAndFrames(const IndexedModel& model) {
 
 namespace {
 
-// Ends a sentence about a track element of a 2D point that does not exist.
+// Advice at the end of messages about track elements whose 2D point does not
+// exist.
 constexpr const char* kHowToReadTheRest =
     "; --Model.on_contradiction follow_images reads the rest";
 
@@ -228,8 +229,8 @@ void CheckCamera(const Camera& camera) {
   }
 }
 
-// With a focal length of zero, or a panorama without a side, all rays have one
-// pixel.
+// With a focal length of zero, or a panorama of no width or height, all rays
+// project to one pixel.
 void CheckFocalLength(const Camera& camera) {
   const CameraModelInfo& info = *FindCameraModel(camera.model_id);
   const bool has_two = info.param_names.substr(0, 2) == "fx" ||

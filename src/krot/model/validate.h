@@ -14,13 +14,13 @@
 
 namespace krot::internal {
 
-// Where each id stands in a list of records (cameras, images, points3D, ...).
+// Finds records (cameras, images, points3D, ...) by their id.
 //
 //   const IdIndex<ImageId> image_index(model.images);
 //   const std::optional<int32_t> i = image_index.Find(image_id);
 //
-// COLMAP's ids are nearly consecutive: Find is one look-up in a table then,
-// and a binary search otherwise. Of records with the same id, the first
+// COLMAP's ids are nearly consecutive: then Find is one look-up in a table,
+// otherwise a binary search. If several records have the same id, the first one
 // counts. Building costs O(n), O(n log n) for sparse ids.
 template <typename Id>
 class IdIndex {
@@ -38,7 +38,7 @@ class IdIndex {
     }
   }
 
-  // The position of the record with this id, none if there is no such record.
+  // The index of the record with this id; none if there is no such record.
   std::optional<int32_t> Find(Id id) const {
     if (!table_.empty()) {
       if (id >= table_.size() || table_[id] < 0) return std::nullopt;
@@ -50,7 +50,7 @@ class IdIndex {
     return entry->second;
   }
 
-  // An id that two records share, none if all differ.
+  // An id that several records share; none if all differ.
   std::optional<Id> duplicate() const { return duplicate_; }
 
  private:
@@ -86,9 +86,9 @@ class IdIndex {
   std::optional<Id> duplicate_;
 };
 
-// What the parts of ValidateModel share.
+// ---- What the parts of ValidateModel share ----
 
-// A model and where its ids are.
+// A model and indices of its ids.
 struct IndexedModel {
   explicit IndexedModel(const Model& model)
       : records(model),
@@ -106,12 +106,13 @@ struct IndexedModel {
   IdIndex<Point3DId> points3D;
 };
 
-// What ValidateModel says of rigs and frames, their own unique ids excepted.
+// Checks rigs and frames as ValidateModel promises, but not that their ids are
+// unique.
 void ValidateRigsAndFrames(const IndexedModel& model);
-// References of tracks to 2D points. Requires valid track ranges.
+// Checks that tracks refer to existing 2D points. Requires valid track ranges.
 void ValidateObservations(const IndexedModel& model);
 
-// Throws the parts, one after another, as a ModelError.
+// Joins the parts into a message and throws it as a ModelError.
 template <typename... Parts>
 [[noreturn]] void Fail(const Parts&... parts) {
   std::ostringstream message;
@@ -125,7 +126,8 @@ inline std::string Describe(const Image& image) {
   return "image " + std::to_string(image.id) + " (\"" + image.name + "\")";
 }
 
-// `owner()` names the record that the value belongs to.
+// Fails unless the value is finite; `owner()` names the record that it belongs
+// to.
 template <typename Owner>
 void CheckFinite(double value, const Owner& owner, const char* quantity) {
   if (std::isfinite(value)) return;

@@ -10,7 +10,7 @@ namespace {
 constexpr char kCeres[] = "BundleAdjustmentCeres.";
 constexpr char kPlain[] = "BundleAdjustment.";
 
-// Of what COLMAP 4 and COLMAP 3 both know, in two groups.
+// Options that COLMAP 4 and COLMAP 3 have in different groups.
 const std::vector<std::string> kMoved = {
     "max_num_iterations",
     "max_linear_solver_iterations",
@@ -135,7 +135,8 @@ void AdjustmentOptions::AddCeres(OptionTable* table) {
                     "more than one");
 }
 
-// Of where COLMAP computes, which is here on the CPU, and by Ceres.
+// Accepts options that say where COLMAP computes; KROT always computes on the
+// CPU, and adjusts with Ceres.
 void AdjustmentOptions::AddWithoutEffect(OptionTable* table) {
   const auto add = [&](const std::string& name, const std::string& range,
                        const std::function<bool(const std::string&)>& parse) {

@@ -16,25 +16,25 @@ namespace krot::internal {
 void AddSolveOptions(SolveModelOptions* options, Context* context,
                      OptionTable* table);
 
-// Problem.same_image, which `outlier_filter` has as well.
+// Problem.same_image, which `outlier_filter` has, too.
 void AddSameImage(BuildProblemOptions* options, OptionTable* table);
 
-// Throws OptionError for pairs of options that contradict each other. To be
-// called once they are set.
+// Throws OptionError for options that would have no effect. Must be called
+// after they are set.
 void CheckSolveOptions(const SolveModelOptions& options,
                        const OptionTable& table);
 
-// What follows the lowest maximum, of `solver` alone: Solver.finish and its
-// like, Solver.polish.
+// The options of `solver` for what follows the lowest maximum: Solver.finish
+// with its parameters, and Solver.polish.
 void AddFinishOptions(SolveModelOptions* options, OptionTable* table);
 
-// Solver.finish_loss and its scale alone.
+// Solver.finish_loss and its scale.
 void AddFinishLoss(SolveModelOptions* options, OptionTable* table);
 void CheckFinishLoss(const SolveModelOptions& options,
                      const OptionTable& table);
 
-// Throws OptionError for those that would have no effect. To be called after
-// they are set.
+// Throws OptionError for finish options that would have no effect. Must be
+// called after they are set.
 void CheckFinishOptions(const SolveModelOptions& options,
                         const OptionTable& table);
 
@@ -42,24 +42,27 @@ void CheckFinishOptions(const SolveModelOptions& options,
 void AddSolverOptions(TolerantSolveOptions* options, Context* context,
                       OptionTable* table);
 
-// Defaults that depend on others. Throws OptionError for pairs of options that
-// contradict each other, or have no effect. To be called once they are set.
+// Sets the defaults that depend on other options. Throws OptionError for pairs
+// of options that contradict each other, and for options without effect. Must
+// be called after they are set.
 void ResolveSolverOptions(const OptionTable& table, SolveModelOptions* options);
 
 // The options of `outlier_filter`, without its paths.
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table);
 
-// To be called after they are set: the method where none is given, which is
-// conflicts with a bound or if something is asked for that needs them. Throws
-// OptionError for options that would have no effect, or lack another.
+// Must be called after the options are set. Chooses the method if none is
+// given: conflicts if there is a bound or a profile is asked for, otherwise
+// snooping. Throws OptionError for options that would have no effect, or need
+// another one.
 void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
                                  OutlierFilterOptions* options);
 
-// What the options of `tolerance_analyzer` say before there is a model.
+// The options of `tolerance_analyzer` as they are known before a model is read.
 struct ToleranceArguments {
-  ToleranceOptions options;  // without what the lists name
-  // Separated by commas; "" if not given.
+  // Without the images and points that the lists name.
+  ToleranceOptions options;
+  // Lists separated by commas; "" if not given.
   std::string images;
   std::string points;
   std::string gauge_images;
@@ -69,9 +72,9 @@ struct ToleranceArguments {
 void AddToleranceOptions(ToleranceArguments* arguments, Context* context,
                          OptionTable* table);
 
-// With what the lists name of the model: images by name or, where none has such
-// a name, by id; all images if neither images nor points are named. Throws
-// OptionError for what the model does not have.
+// Finds the images and points that the lists name: images by name or, if none
+// has this name, by id. All images if neither images nor points are named.
+// Throws OptionError for what the model does not have.
 ToleranceOptions ResolveToleranceOptions(const ToleranceArguments& arguments,
                                          const Model& model);
 
@@ -80,8 +83,8 @@ class AdjustmentOptions {
  public:
   void AddTo(OptionTable* table);
 
-  // What they say. Throws OptionError for pairs that contradict each other. To
-  // be called once they are set.
+  // The values of the options. Throws OptionError for pairs that contradict
+  // each other. Must be called after they are set.
   AdjustModelOptions Resolve(const OptionTable& table) const;
   int num_threads() const { return num_threads_; }
 

@@ -46,7 +46,8 @@ std::string LowerCase(std::string text) {
   return text;
 }
 
-// Insertions, deletions and replacements that turn a into b (Levenshtein).
+// The number of insertions, deletions and replacements that turn a into b
+// (Levenshtein).
 size_t EditDistance(const std::string& a, const std::string& b) {
   std::vector<size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), size_t{0});
@@ -151,7 +152,8 @@ std::string NearestName(const std::string& name,
 
 namespace {
 
-// `text` broken at spaces into lines of at most 80 columns, each indented.
+// Breaks `text` at spaces into lines of at most 80 columns, each of them
+// indented.
 std::string Wrap(const std::string& text, const std::string& indent) {
   std::istringstream words(text);
   std::string wrapped;
@@ -243,7 +245,8 @@ void OptionTable::Assign(const std::vector<OptionAssignment>& assignments) {
     if (!names.insert(option.name).second && !option.repeatable) {
       throw OptionError(assignment.source + " is given twice");
     }
-    if (IsGiven(option.name)) continue;  // an explicit flag wins
+    // Earlier assignments win, as those of flags over files.
+    if (IsGiven(option.name)) continue;
     if (!option.parse(assignment.text)) {
       throw OptionError(assignment.source + " = " +
                         (assignment.text.empty() ? "''" : assignment.text) +
@@ -251,7 +254,8 @@ void OptionTable::Assign(const std::vector<OptionAssignment>& assignments) {
     }
   }
   for (const OptionAssignment& assignment : assignments) {
-    given_.emplace(assignment.name, assignment.text);  // the first stays
+    // `emplace` keeps an earlier text.
+    given_.emplace(assignment.name, assignment.text);
   }
 }
 
@@ -281,7 +285,7 @@ const Option& OptionTable::Find(const OptionAssignment& assignment) const {
     names.push_back(option.name);
   }
   std::string wanted = assignment.name;
-  if (wanted == "import_path") wanted = "input_path";  // in COLMAP's old names
+  if (wanted == "import_path") wanted = "input_path";  // COLMAP's old names
   if (wanted == "export_path") wanted = "output_path";
   const std::string nearest = NearestName(wanted, names);
   throw OptionError(assignment.source + " is no option of " + command_ +

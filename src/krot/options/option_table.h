@@ -10,22 +10,21 @@
 
 namespace krot::internal {
 
-// An option that cannot be obeyed; what() is one sentence for the user.
+// An option that cannot be accepted; what() is one sentence for the user.
 class OptionError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// From the text of a command line value to what it stands for. Each Parse
-// function takes the whole text or returns false; the result is untouched
-// then.
+// Convert the text of a command line value. Each Parse function reads the whole
+// text, or returns false and leaves the result unchanged.
 
 bool ParseInteger(const std::string& text, int* value);
 bool ParseInteger(const std::string& text, uint64_t* value);
 bool ParseReal(const std::string& text, double* value);  // finite
 bool ParseBool(const std::string& text, bool* value);    // 0, 1, false, true
 
-// Where a number may lie. `text` completes "must be ..."; help, messages and
+// The range of a number. `text` completes "must be ..."; help, messages and
 // docs/cli.md all use it.
 template <typename Number>
 struct Range {
@@ -42,22 +41,23 @@ Range<double> Between(double min, double max, const std::string& unit = "");
 // [min, max)
 Range<double> InHalfOpen(double min, double max, const std::string& unit = "");
 
-// But for upper and lower case.
+// Whether the words are the same up to upper and lower case.
 bool IsSameWord(const std::string& a, const std::string& b);
 
-// As help and messages print numbers: "1e-06".
+// A number as help and messages print it: "1e-06".
 std::string NumberText(double value);
 
-// "{a, b, c}"
+// The choices as help and messages print them: "{a, b, c}".
 std::string ChoiceText(const std::vector<std::string>& choices);
 
-// The candidate that looks most like `name`, whole or behind its group, or ""
-// if none looks like it at all: at most one edit per three characters, upper
-// and lower case being alike.
+// The candidate that is most similar to `name`, compared as a whole and without
+// its group. "" if none is similar: at most one edit per three characters is
+// allowed, and upper and lower case count as equal.
 std::string NearestName(const std::string& name,
                         const std::vector<std::string>& candidates);
 
-// One option. `range` completes "must be ..." and `parse` decides it.
+// One option. `range` completes "must be ..."; `parse` decides whether a text
+// is in it, and sets the value.
 struct Option {
   std::string name;          // "Solver.norm"
   std::string description;   // a phrase, without full stop
@@ -65,27 +65,29 @@ struct Option {
   std::string default_text;  // "" if there is none
   bool required = false;
   std::function<bool(const std::string& text)> parse;
-  bool repeatable = false;                // parse is called for every one
-  std::vector<std::string> choices = {};  // all that it takes, if they are few
-  // One of COLMAP's that changes nothing here: parse refuses what would. Help
-  // has no more than its name.
+  // May be given several times; parse is called for each.
+  bool repeatable = false;
+  std::vector<std::string> choices = {};  // all values, if they are few
+  // One of COLMAP's options that changes nothing in KROT: `parse` refuses
+  // values that ask for what KROT cannot do. Help lists its name only.
   bool is_without_effect = false;
 };
 
-// What one argument, one line of a project file or one keyword says.
+// An option's value, as one argument, one line of a project file or one keyword
+// gives it.
 struct OptionAssignment {
   std::string name;
   std::string text;
   std::string source;  // "--name", or "name in file.ini"
 };
 
-// The options of one command under COLMAP's kind of names, each bound to where
-// its value goes: for the command line, for Python, for whoever has names and
-// texts.
+// The options of one command. They have COLMAP's kind of names, and each is
+// bound to the variable that it sets. The command line, Python and anybody else
+// who has names and texts can use them.
 class OptionTable {
  public:
-  // `command`, "krot solver", as messages and help call it; "krot solver -h",
-  // or wherever else its options are listed.
+  // `command` is its name in messages and help, for example "krot solver";
+  // `list` says where its options are listed, for example "krot solver -h".
   OptionTable(std::string command, std::string summary, std::string list);
 
   void Add(Option option);
@@ -95,35 +97,36 @@ class OptionTable {
                   const std::string& description);
   void AddReal(const std::string& name, double* value,
                const Range<double>& range, const std::string& description);
-  // In upper or lower case, as COLMAP has it.
+  // The value may be given in upper or lower case, as in COLMAP; it is set to
+  // one of `choices`.
   void AddChoice(const std::string& name, std::string* value,
                  const std::vector<std::string>& choices,
                  const std::string& description);
-  // A choice of what the names stand for, in any case; the value's own is the
-  // default.
+  // A choice among values that have names, in upper or lower case; the present
+  // value is the default.
   template <typename T>
   void AddNamed(const std::string& name, T* value,
                 const std::vector<std::pair<std::string, T>>& choices,
                 const std::string& description);
-  // -1 stands for all; `remark` says what their number changes.
+  // -1 stands for all threads; `remark` says what their number changes.
   void AddThreads(const std::string& name, int* value,
                   const std::string& remark);
 
-  // Sets the values, but for those that earlier calls set. Throws OptionError
-  // for the first thing wrong; an unknown name comes with the nearest known
-  // one.
+  // Sets the values, except those that earlier calls have set. Throws
+  // OptionError for the first mistake; for an unknown name it suggests the
+  // nearest known one.
   void Assign(const std::vector<OptionAssignment>& assignments);
 
   // Throws OptionError for the first required option that is not set.
   void RequireAll() const;
 
-  // Whether it was set.
+  // Whether the option was set.
   bool IsGiven(const std::string& name) const;
 
-  // The value as it was given, the default if it was not.
+  // The value's text as it was given, or else the default's.
   std::string Text(const std::string& name) const;
 
-  // Throws OptionError if it is given: it "has no effect `why`".
+  // Throws OptionError if the option was given: it "has no effect `why`".
   void Refuse(const std::string& name, const std::string& why) const;
 
   // Every option with its range and default; 80 columns.
@@ -134,7 +137,7 @@ class OptionTable {
   const std::vector<Option>& options() const { return options_; }
 
  protected:
-  // Throws OptionError, naming the nearest option, if there is none.
+  // Throws OptionError, which suggests the nearest option, if there is none.
   const Option& Find(const OptionAssignment& assignment) const;
 
  private:

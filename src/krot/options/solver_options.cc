@@ -7,7 +7,7 @@
 namespace krot::internal {
 namespace {
 
-// Those that FastDescentSettings::kFast does not look at.
+// Options that FastDescentSettings::kFast does not use.
 const std::vector<std::string> kPaperOnlyNames = {
     "FastDescent.stationarity_tolerance", "FastDescent.step_tolerance",
     "FastDescent.slope_probe", "FastDescent.active_tolerance",
@@ -157,7 +157,7 @@ void CheckFinishOptions(const SolveModelOptions& options,
 
 namespace {
 
-// The paper's own rule, where its settings are asked for [Zhang18, Sec. 5].
+// The paper's stopping rule, which comes with its settings [Zhang18, Sec. 5].
 constexpr double kPaperSweepTolerance = 1e-3;
 
 void AddPixels(const std::string& name, const std::string& help,
@@ -227,7 +227,8 @@ void AddResIntOptions(const SolveModelOptions& defaults, ResIntOptions* options,
               }});
 }
 
-// What a method does not look at is refused.
+// Refuses options that the chosen method does not use, and pairs that
+// contradict each other.
 void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   const SolveMethod method = EffectiveMethod(options);
   if (method != SolveMethod::kAuto || options.norm.p != 2) {
@@ -295,7 +296,7 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   }
 }
 
-// Defaults of the sweeps that depend on what they are for.
+// Sets defaults of the sweeps that depend on their purpose.
 void ChooseSweeps(const OptionTable& table, SolveModelOptions* options) {
   ResIntOptions& res_int = options->res_int;
   if (table.IsGiven("ResInt.max_sweeps")) {

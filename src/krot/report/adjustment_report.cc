@@ -75,12 +75,12 @@ std::string AdjustmentEndSentence(const BundleAdjustmentSummary& summary) {
   return "Not run.";
 }
 
-// Of the solve for a model below the cap.
+// The time of the solve for a model below the cap.
 double StartSeconds(const SolveSummary& start) {
   return start.seconds_build + start.seconds_solve;
 }
 
-// What the cap did, and how good the end is.
+// Says what the cap did, and how good the result is.
 std::string CapSentence(const AdjustModelSummary& summary) {
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
   std::ostringstream text;
@@ -180,8 +180,9 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
 std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
   const AdjustModelSummary& summary = report.summary;
   const BundleAdjustmentSummary& adjustment = summary.adjustment;
-  Json start_bound, start_seconds;  // null unless there was such a solve
-  Json precision;                   // null unless it was asked for
+  // Null unless there was a solve below the cap.
+  Json start_bound, start_seconds;
+  Json precision;  // null unless it was asked for
   if (summary.precision) precision = PrecisionJson(*summary.precision, model);
   if (summary.start) {
     start_bound = NumberOrNull(summary.start->lower_bound);

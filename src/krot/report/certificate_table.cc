@@ -10,7 +10,7 @@
 namespace krot::internal {
 namespace {
 
-// What the bound presupposes beside rotations.
+// Says what is fixed; the bound presupposes that.
 std::string FixedSentence(const CertificateVerdict& verdict) {
   if (verdict.num_fixed_images + verdict.num_fixed_points == 0) return "";
   return "It takes " + Counted(verdict.num_fixed_images, "frame") + " and " +
@@ -69,7 +69,7 @@ std::string SupportTable(const std::vector<SupportObservation>& support,
 std::string CertificateTable(const CertificateVerdict& verdict,
                              int max_observations) {
   TextTable bounds;
-  // Downwards: more than this is not claimed.
+  // Rounded downwards, because more is not proved.
   bounds.AddRow({"lower bound",
                  FormatNumber(std::floor(verdict.lower_bound * 1e6) / 1e6, 6)});
   bounds.AddRow({"this model", verdict.cost ? FormatNumber(*verdict.cost, 6)

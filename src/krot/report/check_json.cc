@@ -10,7 +10,7 @@ const char* VerdictName(ImageVerdict verdict) {
   return kNames[static_cast<size_t>(verdict)];
 }
 
-// What an image is called wrong for.
+// The name in report.json of the reason why an image is wrong.
 const char* FaultName(ImageFault fault) {
   switch (fault) {
     case ImageFault::kMatches:

@@ -20,8 +20,8 @@ std::string NoiseWords(const ModelCheck& check) {
 
 std::string Are(int64_t count) { return count == 1 ? " is " : " are "; }
 
-// Of that verdict: wrong ones by what speaks against them, weakly held ones by
-// how weakly.
+// The images with this verdict: wrong ones by the number of their wrong
+// observations, weakly held ones by how weakly they are held.
 std::vector<const ImageCheck*> ImagesOf(const ModelCheck& check,
                                         ImageVerdict verdict) {
   std::vector<const ImageCheck*> images;
@@ -38,7 +38,7 @@ std::vector<const ImageCheck*> ImagesOf(const ModelCheck& check,
   return images;
 }
 
-// "0.0123", or that nothing holds it.
+// For example "0.0123"; "anywhere" if nothing holds the image.
 std::string SigmaText(double sigma) {
   if (!std::isfinite(sigma)) return "anywhere";
   return sigma < 1e-3 ? Scientific(sigma) : FormatNumber(sigma, 3);
@@ -135,7 +135,7 @@ std::string RobustAdjustment(const std::string& model, double scale_px) {
          FormatLength(scale_px) + "\n";
 }
 
-// In COLMAP's own commands.
+// Suggests what to do next, in commands of COLMAP and KROT.
 std::string NextSteps(const CheckReport& report) {
   const ModelCheck& check = report.check;
   const int64_t num_wrong = check.NumImages(ImageVerdict::kWrong);

@@ -15,7 +15,7 @@ namespace {
 
 std::string FormatAngle(double degrees) { return FormatNumber(degrees, 6); }
 
-// Per cent of the scene's radius; "-" if it has none.
+// Per cent of the scene's radius; "-" if that is zero.
 std::string FormatShare(double length, double scene_radius) {
   return scene_radius > 0 ? FormatNumber(100 * length / scene_radius, 4) : "-";
 }

@@ -91,7 +91,8 @@ std::vector<std::pair<int64_t, double>> ErrorTail(
 
 namespace {
 
-// Of all points, in the order of Model::points3D; NaN if none is finite.
+// The errors of each point, in the order of Model::points3D; NaN if none is
+// finite.
 struct PointErrors {
   std::vector<float> max_px;
   std::vector<float> mean_px;
@@ -149,7 +150,7 @@ Json PointsJson(const Model& model, const std::vector<int64_t>& selection,
 }
 
 // Half the width and height of the image on the plane z = 1, to first order
-// around the axis. Bounded, so that wide cameras can be drawn, too.
+// around the axis. Bounded, so that wide cameras can be drawn as well.
 Eigen::Vector2d HalfExtent(const Camera& camera) {
   constexpr double kMin = 0.05;
   constexpr double kMax = 1.5;
@@ -272,8 +273,8 @@ std::string ModelViewJson(const Model& model, const Eigen::Vector3d& origin,
 
 namespace {
 
-// JSON holds '<' in strings only. Written as an escape there, no text in it
-// can end the element that holds it, or begin a comment.
+// JSON contains '<' only in strings. There it is written as an escape, so that
+// no text can end the HTML element that holds it, or begin a comment.
 std::string EscapeForScript(const std::string& json) {
   std::string escaped;
   escaped.reserve(json.size());
@@ -287,8 +288,8 @@ std::string EscapeForScript(const std::string& json) {
   return escaped;
 }
 
-// `text` with every {{name}} replaced by its value. What a value holds is not
-// looked at.
+// `text` with every {{name}} replaced by its value. Values themselves are not
+// searched for names.
 std::string FillTemplate(
     std::string_view text,
     const std::map<std::string_view, std::string>& values) {

@@ -12,21 +12,22 @@
 
 namespace krot::internal {
 
-// RFC 4648, with padding. O(size).
+// Base64 by RFC 4648, with padding. O(size).
 std::string Base64(const unsigned char* bytes, size_t size);
 
-// Of the numbers' bytes as they lie in memory.
+// Base64 of the numbers' bytes as they are in memory.
 template <typename Number>
 std::string Base64(const std::vector<Number>& numbers) {
   return Base64(reinterpret_cast<const unsigned char*>(numbers.data()),
                 numbers.size() * sizeof(Number));
 }
 
-// The distribution of a model's errors, small enough for a page at any number
-// of observations. Errors that are not finite do not count.
+// The distribution of a model's errors, small enough for a page whatever the
+// number of observations. Only finite errors count.
 
 struct ErrorHistogram {
-  static constexpr int kMinExponent = -3;  // of the first bin's lower end
+  // The first bin begins at this power of ten, pixels.
+  static constexpr int kMinExponent = -3;
   static constexpr int kBinsPerDecade = 10;
   // Bin k ends at 10^(kMinExponent + (k + 1) / kBinsPerDecade) pixels. The
   // first also holds smaller errors; the last is not empty.
@@ -35,17 +36,17 @@ struct ErrorHistogram {
 // Requires errors >= 0 where finite. O(count).
 ErrorHistogram ComputeErrorHistogram(const std::vector<double>& errors_px);
 
-// (rank, error), the largest error being of rank 1, the smallest last; ranks
-// follow each other by at most 5 %, or by 1. O(count log count).
+// Pairs (rank, error): the largest error has rank 1, the smallest the last one.
+// Ranks increase by at most 5 %, or by 1. O(count log count).
 std::vector<std::pair<int64_t, double>> ErrorTail(
     std::vector<double> errors_px);
 
-// What the report page draws of a model.
+// ---- What the report page draws of a model ----
 
-// So many that they take less than 10 MB of a page that holds two models.
+// This many points take less than 10 MB of a page that holds two models.
 inline constexpr int64_t kMaxShownPoints = 100'000;
 
-// As JSON:
+// The view of a model as JSON:
 //
 //   num_points, num_observations   of the model
 //   origin     as given
@@ -63,35 +64,35 @@ inline constexpr int64_t kMaxShownPoints = 100'000;
 //   tail       [rank, error] at ranks spaced by at most 5 %, the largest error
 //              being of rank 1
 //
-// Beyond `max_points` (>= 1) points are left out of `points` by SelectPoints.
-// Requires a valid model. O(observations log observations).
+// If the model has more than `max_points` (>= 1) points, SelectPoints chooses
+// those in `points`. Requires a valid model. O(observations log observations).
 std::string ModelViewJson(const Model& model, const Eigen::Vector3d& origin,
                           int64_t max_points = kMaxShownPoints,
                           int num_threads = -1);
 
-// Indices, ascending, of at most `max_count` of the points: all if they are
-// no more; else the max_count / 100 with the largest errors (NaN being least)
-// and others at equal steps. Requires max_count >= 1.
-// O(points log points).
+// Indices, ascending, of at most `max_count` of the points: of all, if they are
+// no more; otherwise of the max_count / 100 points with the largest errors (NaN
+// counts as the smallest) and of others at equal steps. Requires max_count >=
+// 1. O(points log points).
 std::vector<int64_t> SelectPoints(const std::vector<float>& max_errors,
                                   int64_t max_count);
 
-// The mean of the finite points, so that float32 can hold what is relative to
-// it; zero if there are none. O(points).
+// The mean of the finite points; coordinates relative to it are small enough
+// for float32. Zero if there are none. O(points).
 Eigen::Vector3d SceneOrigin(const Model& model);
 
-// The report of a command that made `after` from `before`, or that compared
-// the two, as one HTML page without references to anything outside of it.
+// The report of a command that made `after` from `before`, or compared the two,
+// as one HTML page that refers to nothing outside of it.
 //
-// `report_json` is what --report_path writes; the page shows its numbers, and
-// holds it as it is in the element #krot-report. Keys that it lacks are not
-// shown. The models go into #krot-models: all images, at
-// most kMaxShownPoints points each, and the distribution of all true pixel
-// errors. Byte sequences that are not UTF-8 are replaced.
+// `report_json` is what --report_path writes. The page shows its numbers and
+// contains it unchanged in the element #krot-report; keys that it lacks are not
+// shown. The models are in #krot-models: all images, at most kMaxShownPoints
+// points each, and the distribution of all true pixel errors. Byte sequences
+// that are not UTF-8 are replaced.
 //
-// `crops_json` goes into #krot-crops: photos of suspects (SuspectCropsJson), []
-// without. `pairs_json` goes into #krot-pairs: PairViewJson's text, with photos
-// where there are some, null without.
+// `crops_json` is put into #krot-crops: photos of suspects (SuspectCropsJson),
+// or []. `pairs_json` is put into #krot-pairs: the text of PairViewJson, with
+// photos if there are any, or null.
 //
 // Requires valid models (ValidateModel). O(observations log observations); the
 // same text at any number of threads.

@@ -60,7 +60,7 @@ Json PositionFrameJson(const SolveReport& report) {
 
 namespace {
 
-// In metres, or in scene units where no scale is known.
+// The length in metres, or in scene units if no scale is known.
 double LengthIn(const MeasuredDistances& measured, size_t n) {
   return measured.lengths[n] * (measured.scale ? measured.scale->scale : 1);
 }

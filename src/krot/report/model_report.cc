@@ -106,7 +106,8 @@ std::string OverallErrors(const ModelReport& report) {
   return text;
 }
 
-// "By image, pixels; the 10 of 96 with the largest errors"; keeps those alone.
+// Keeps the `max_rows` with the largest errors, and returns the head of their
+// table: "By image, pixels; the 10 of 96 with the largest errors".
 template <typename Errors>
 std::string KeepWorst(const std::string& name, size_t max_rows,
                       std::vector<Errors>* all) {
@@ -202,7 +203,7 @@ std::string NoiseTable(const NoiseFigures& noise) {
          std::to_string(noise.num_uncontrolled) + ".\n";
 }
 
-// The lengths up to kLongest one by one, the rest together.
+// Track lengths up to kLongest have a row each; the longer ones share one.
 std::string TrackTable(const ModelReport& report) {
   constexpr int64_t kLongest = 10;
   TextTable table;

@@ -28,7 +28,7 @@ Json RemovedJson(const std::vector<RemovedObservation>& removed) {
   return json;
 }
 
-// The share of the conflicts that would vanish without it.
+// The share of conflicts that would vanish without this suspect.
 Json ConflictShare(int64_t num_conflicts, const OutlierFilterSummary& summary) {
   if (summary.num_proved == 0) return {};
   return static_cast<double>(num_conflicts) /

@@ -13,9 +13,9 @@
 namespace krot::internal {
 namespace {
 
-// "44 images (P1180141.JPG to P1180184.JPG) hang on the rest by 14 tracks, of
-// which 9 agree; their scale against the rest is held to a factor of 1.80
-// only", of a part that is not held.
+// About a part that is not held: "44 images (P1180141.JPG to P1180184.JPG) hang
+// on the rest by 14 tracks, of which 9 agree; their scale against the rest is
+// held to a factor of 1.80 only".
 std::string WeakPartWords(const WeakPart& part) {
   const auto count = static_cast<int64_t>(part.image_names.size());
   const auto [first, last] =
@@ -96,8 +96,8 @@ std::string RotationSentence(const OutlierFilterSummary& summary) {
          FormatNumber(suspect.max_error_without, 4) + " px.\n";
 }
 
-// What noise there is and, as little is worse than not to know, whether what is
-// kept fits worse than before.
+// Reports the noise, and whether the errors of the kept observations have
+// risen, however little: the user should not have to find that out.
 std::string SnoopingSentences(const OutlierFilterSummary& summary) {
   if (!summary.snooping) return "";
   const SnoopingSummary& snooping = *summary.snooping;
@@ -139,7 +139,7 @@ std::string SnoopingSentences(const OutlierFilterSummary& summary) {
   return text;
 }
 
-// What noise explains, and what follows from that.
+// Says what noise explains, and what follows from that.
 std::string NoiseSentence(const OutlierFilterSummary& summary) {
   if (!summary.noise) return "";
   const NoiseSummary& noise = *summary.noise;

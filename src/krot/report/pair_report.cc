@@ -55,7 +55,7 @@ std::vector<size_t> WronglyPosedImages(const PairCheck& check) {
   return wrong;
 }
 
-// With the most matches first.
+// Pairs with wrong matches, those with the most matches first.
 std::vector<const CheckedPair*> WronglyMatchedPairs(const PairCheck& check) {
   std::vector<const CheckedPair*> wrong;
   for (const CheckedPair& pair : check.pairs) {
@@ -272,7 +272,7 @@ Json PairJson(const PairCheck& check) {
 
 namespace {
 
-// Of a pair that agrees, and of any other.
+// How many matches are shown of a kept pair, and of any other.
 constexpr size_t kMatchesOfKept = 30;
 constexpr size_t kMatchesOfOthers = 100;
 
@@ -354,7 +354,7 @@ class PairView {
   const Database& database_;
   const PairCheck& check_;
   const std::vector<ImageGeometry> geometries_;
-  std::vector<double> scales_;  // of images
+  std::vector<double> scales_;  // pixels on the page per pixel of the image
 };
 
 }  // namespace

@@ -16,14 +16,13 @@
 
 namespace krot::internal {
 
-// What the reports of a precision say beyond its own numbers.
+// Figures that the reports on a precision derive from it.
 
-// An error of delta0 sigma / sqrt(r) in an observation is found with a
-// probability of 80 % by a test that finds one in 0.1 % of sound ones [Baarda
-// 1968].
+// A test with 0.1 % false alarms detects an error of delta0 sigma / sqrt(r) in
+// an observation with a probability of 80 % [Baarda 1968].
 inline constexpr double kDelta0 = 4.13;
 
-// What an observation is called, and its figures.
+// An observation with its ids and figures.
 struct NamedObservation {
   const ObservationPrecision* precision = nullptr;
   const Image* image = nullptr;
@@ -38,7 +37,7 @@ struct NamedObservation {
   }
 };
 
-// The figures of a precision that no loop of the adjustment gives.
+// The figures that are derived from a precision.
 struct PrecisionFigures {
   // Keeps a reference to `precision`, which must be the model's.
   PrecisionFigures(const AdjustmentPrecision& precision, const Model& model);
@@ -55,12 +54,14 @@ struct PrecisionFigures {
   std::map<int, int64_t> num_with_rays;
   double mean_angle_deg = 0;
   int64_t num_tested = 0;
-  int64_t num_uncontrolled = 0;  // in a direction or in both
+  // Observations of which one direction or both are not controlled.
+  int64_t num_uncontrolled = 0;
   double critical_w = kNaN;
   int64_t num_above = 0;
 
  private:
-  // Those with the largest `key`, which must not be NaN to be among them.
+  // The observations with the largest `key`; those whose key is NaN are
+  // skipped.
   template <typename Key>
   std::vector<NamedObservation> Worst(const Key& key) const;
 
@@ -74,9 +75,9 @@ struct Correlation {
   double value;
 };
 
-// The square roots of the diagonal.
+// The standard deviations: square roots of the diagonal.
 Eigen::VectorXd Deviations(const Eigen::MatrixXd& covariance);
-// Those above 95 %.
+// The correlations whose absolute value is above 0.95.
 std::vector<Correlation> HighCorrelations(const Eigen::MatrixXd& covariance);
 
 // The names of a camera model's parameters: "f", "cx", "cy", "k".

@@ -28,7 +28,7 @@ Json NumbersJson(const Eigen::VectorXd& values) {
   return list;
 }
 
-// Row by row; null if it is not known.
+// The rows of a matrix; null if it is not known.
 template <typename Matrix>
 Json CovarianceJson(const std::optional<Matrix>& covariance) {
   if (!covariance) return nullptr;

@@ -34,7 +34,7 @@ std::string DatumSentence(const AdjustmentPrecision& precision) {
          "extent of all cameras have no error.";
 }
 
-// What the figures do not hold for; empty if they do.
+// Says why the figures are only approximate; empty if they are exact.
 std::string ValiditySentence(const AdjustModelSummary& summary) {
   if (!summary.precision->is_least_squares) {
     return "A robust loss or a cap has led the adjustment: sigma0 and all "
@@ -59,7 +59,7 @@ std::string CorrelationWords(const Eigen::MatrixXd& covariance,
   return words;
 }
 
-// Decimals with which the median of some deviations shows two digits.
+// The number of decimals that shows two digits of the median deviation.
 int DecimalsFor(std::vector<double> sigmas) {
   sigmas.erase(std::remove_if(sigmas.begin(), sigmas.end(),
                               [](double s) { return !(s > 0 && s < 1e300); }),

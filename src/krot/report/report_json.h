@@ -16,7 +16,7 @@
 
 namespace krot::internal {
 
-// What the JSON writers of this folder share; for its .cc files alone.
+// What the JSON writers share; only .cc files of this folder use this header.
 using Json = nlohmann::ordered_json;
 
 Json NumberOrNull(const std::optional<double>& value);
@@ -25,44 +25,45 @@ Json FiniteOrNull(double value);
 
 Json VectorJson(const Eigen::Vector3d& vector);
 
-// {max, p99, mean, rms}, each null where nothing was counted.
+// {max, p99, mean, rms}, each null if nothing was counted.
 Json ErrorJson(const PixelErrorStatistics& errors);
 
-// The same behind {count, not_finite}.
+// {count, not_finite} and these.
 Json CountedErrorJson(const PixelErrorStatistics& errors);
 
-// The counts, by reason.
+// An object that maps each reason to its count.
 Json LeftOutJson(const LeftOutCounts& left_out);
 
 // How often tracks and images contradict each other.
 Json ContradictionsJson(const Contradictions& contradictions);
 
-// What is odd about the poses.
+// The suspicious properties of the poses.
 Json PosesJson(const PoseChecks& poses);
 
-// Null where there was no certificate.
+// Null if there is no certificate.
 Json VerdictJson(const std::optional<CertificateVerdict>& verdict);
 
-// Null unless a file gave the rotations.
+// Null unless the rotations come from a file.
 Json RotationsJson(const std::optional<RotationInput>& rotations);
 
 // The images and points that do not hold their place.
 Json NotHeldJson(const LooseParts& loose);
 
-// The frame that known positions have of their own; null without.
+// The known positions' own frame; null if they have none.
 struct SolveReport;
 Json PositionFrameJson(const SolveReport& report);
 
-// Null without; `names` are the keys of the models' lengths, scene units.
+// Null without a report; `names` are the keys under which the lengths in each
+// model are written, scene units.
 Json DistancesJson(const std::optional<DistanceReport>& report,
                    const std::vector<std::string>& names);
 
-// The text of a report. Image names are bytes, not always UTF-8: what is not
-// is replaced.
+// The text of a report. Image names are bytes; sequences that are not UTF-8 are
+// replaced.
 std::string ReportText(const Json& json);
 
-// The same, with what every run that solves records: `seconds` are those
-// between reading and writing.
+// The same, together with what every run that solves records; `seconds` are
+// those of the steps between reading and writing.
 std::string ReportText(Json json, const RunRecord& run, const Json& seconds);
 
 }  // namespace krot::internal

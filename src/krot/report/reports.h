@@ -27,22 +27,22 @@
 
 namespace krot::internal {
 
-// Surveyed points that had no say, against a model's.
+// Surveyed points that did not take part, compared with those of a model.
 struct CheckPoints {
   struct Point {
     Point3DId point3D_id = 0;
     Eigen::Vector3d surveyed = Eigen::Vector3d::Zero();
-    // The model's minus the surveyed, after the similarity that fits them best,
-    // in the survey's frame and unit.
+    // The model's position minus the surveyed one, in the survey's frame and
+    // unit, after the similarity that fits the model best to the survey.
     Eigen::Vector3d difference = Eigen::Vector3d::Zero();
   };
 
-  double scale = 1;  // the survey's unit for one of the model's
+  double scale = 1;  // the survey's unit, for one unit of the model
   std::vector<Point> points;
 };
 
-// Of points' positions. None if there are fewer than three, or if they are on a
-// line.
+// Compares the model's points with the surveyed ones. None if there are fewer
+// than three, or if they are on a line.
 std::optional<CheckPoints> CompareWithSurvey(
     const Model& model, const std::vector<KnownPosition>& surveyed);
 
@@ -56,55 +56,57 @@ struct AdjustmentReport {
 // For the terminal: errors before and after, what took part, why it ended.
 std::string AdjustmentTable(const AdjustmentReport& report);
 
-// report.json; the keys are listed in docs/cli.md. What is not known is null.
-// `model` is the one that is written.
+// report.json; docs/cli.md lists its keys. What is not known is null. `model`
+// is the one that is written.
 std::string AdjustmentJson(const AdjustmentReport& report, const Model& model);
 
-// The same as a protocol to read: with precision, that of every camera, image
-// and point.
+// A protocol for people to read; if the precision was computed, with that of
+// every camera, image and point.
 std::string AdjustmentText(const AdjustmentReport& report, const Model& model);
 
-// What both say of the precision: sigma0, redundancy, standard deviations and
+// The precision for report.json: sigma0, redundancy, standard deviations and
 // reliability.
 nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
                                      const Model& model);
-// Null where there are none.
+// Null if there are none.
 nlohmann::ordered_json CheckPointsJson(const std::optional<CheckPoints>& check);
 std::string PrecisionSentence(const AdjustmentPrecision& precision);
 
-// Why there is no model below the cap, with the bound that proves it if one
+// Says why there is no model below the cap, and which bound proves it, if one
 // does. Requires the termination kInfeasibleStart.
 std::string NoModelBelowCapSentence(const AdjustModelSummary& summary);
 
 // "nothing to adjust: ...". Requires the termination kNothingToAdjust.
 std::string NothingToAdjustSentence(const BundleAdjustmentSummary& summary);
 
-// As report.json has it: "converged", "max_iterations", ...
+// The name in report.json: "converged", "max_iterations", ...
 std::string AdjustmentTerminationName(BundleAdjustmentTermination termination);
 
-// The first `max_positions` known positions of a support; empty without any.
+// The first `max_positions` known positions of a support; empty if it has none.
 std::string PositionsTable(const std::vector<SupportPosition>& positions,
                            int max_positions);
 
-// The `max_observations` worst of a support.
+// The `max_observations` observations of a support with the largest errors.
 std::string SupportTable(const std::vector<SupportObservation>& support,
                          int max_observations);
 
-// An accepted certificate as a text for the terminal: the bound, the model's
-// own cost and gap, and the `max_observations` worst of the support.
+// An accepted certificate for the terminal: the bound, the model's own cost and
+// gap, and the `max_observations` observations of the support with the largest
+// errors.
 std::string CertificateTable(const CertificateVerdict& verdict,
                              int max_observations);
 
-// Of an accepted certificate of baselines the `max_pairs` pairs of which the
-// least share is explained.
+// For an accepted certificate of baselines: the `max_pairs` pairs with the
+// smallest share of explained matches.
 std::string BaselineTable(const Model& model,
                           const BaselineCertificate& certificate,
                           int max_pairs);
 
-// What certificate_checker says of an accepted file of conflicts.
+// What certificate_checker prints about an accepted file of conflicts.
 std::string ConflictTable(const ConflictVerdict& verdict);
 
-// report.json of certificate_checker for what it accepted: one of the three.
+// report.json of certificate_checker; exactly one of the three is given, which
+// was accepted.
 std::string CheckJson(const std::optional<CertificateVerdict>& certificate,
                       const std::optional<ConflictVerdict>& conflicts,
                       const std::optional<BaselineCertificate>& baselines,
@@ -119,35 +121,36 @@ struct CheckReport {
   PixelErrorStatistics pixel_error_after;  // of the cured model
   std::vector<std::string> moved;          // ModelCure
   double seconds_check = 0;                // wall clock
-  // For the commands that come next; "": a name in capitals stands for it.
+  // For the commands that NextSteps suggests; if empty, a name in capitals is
+  // printed instead.
   std::string input_path;
   std::string output_path;
   std::string database_path;
 };
 
-// Why an image has its verdict; empty for one that is fine.
+// Why an image has its verdict; empty if it is fine.
 std::string ReasonOf(const ModelCheck& check, const ImageCheck& image);
 
-// "2 of 41 images and 37 of 20,785 observations are wrong", or "Nothing is
-// wrong", and why.
+// For example "2 of 41 images and 37 of 20,785 observations are wrong", or
+// "Nothing is wrong", with the reason.
 std::string CheckSentence(const CheckReport& report);
 
-// For the terminal: the sentence, what matches say (PairTable), images by
-// verdict, observations by w, tracks of two points, what to do next. At most
-// max_rows of each.
+// For the terminal: the sentence, the verdict of the matches (PairTable),
+// images by verdict, observations by w, tracks of two points, and what to do
+// next. At most max_rows of each.
 std::string CheckTable(const CheckReport& report, int max_rows);
 
-// report.json; the keys are listed in docs/cli.md. What is not known is null.
+// report.json; docs/cli.md lists its keys. What is not known is null.
 std::string CheckJson(const CheckReport& report);
 
 // How two models differ: `krot model_comparer`.
 struct ComparisonReport {
   std::string version;
   ComparisonSummary summary;
-  Contradictions contradictions1;  // of the models as their files have them
+  Contradictions contradictions1;  // of the models as their files are
   Contradictions contradictions2;
   std::optional<DistanceReport> distances;
-  // Accepted ones, where given.
+  // The models' accepted certificates, if given.
   std::optional<CertificateVerdict> certificate1;
   std::optional<CertificateVerdict> certificate2;
 };
@@ -155,23 +158,25 @@ struct ComparisonReport {
 // "frame", "similarity" or "none".
 std::string AlignmentName(AlignmentKind kind);
 
-// For the terminal; of images, points and supports the `max_rows` worst.
+// For the terminal; the `max_rows` worst images, points and support
+// observations.
 std::string ComparisonTable(const ComparisonReport& report, int max_rows);
 
-// The same as JSON, with all shared images; docs/formats.md lists the keys.
+// The comparison as JSON, with all shared images; docs/formats.md lists its
+// keys.
 std::string ComparisonJson(const ComparisonReport& report);
 
-// COLMAP's errors.csv: one line per shared image with a pose in both, holding
-// the angle between its rotations in degrees and the distance of its centres;
-// then its name.
+// COLMAP's errors.csv: one line for each shared image with a pose in both
+// models, with the angle between its rotations in degrees, the distance of its
+// centres, and its name.
 std::string PoseErrorsCsv(const ComparisonSummary& summary);
 
-// What EstimateNoise says, in figures; of none where nothing can be told.
+// The figures of EstimateNoise; none where nothing is known.
 struct NoiseFigures {
   struct Quantile {
-    double share = 0;  // of the tested observations, that w is not above
+    double share = 0;  // of the tested observations, that have at most this w
     double w = 0;
-    double gaussian_w = 0;  // the same of Gaussian noise
+    double gaussian_w = 0;  // the same quantile for Gaussian noise
   };
 
   std::optional<double> sigma_px;
@@ -179,17 +184,17 @@ struct NoiseFigures {
   double critical_w = 0;
   int64_t num_tested = 0;
   int64_t num_above = 0;
-  // Observations whose error would not show in one direction, or in any.
+  // Observations with one, or without any, controlled direction.
   int64_t num_half_controlled = 0;
   int64_t num_uncontrolled = 0;
   std::vector<Quantile> quantiles;
   std::vector<int64_t> num_above_by_image;  // as Model::images
 };
 
-// What a model's errors, tracks and depths look like: `krot model_analyzer`.
+// The errors, tracks and depths of a model: `krot model_analyzer`.
 struct ModelReport {
   ColmapStatistics colmap;
-  Contradictions contradictions;  // of the model as its files have it
+  Contradictions contradictions;  // of the model as its files are
   PoseChecks poses;
   PixelErrorStatistics pixel_error;  // true errors of all observations
   std::vector<ImageErrors> images;
@@ -204,19 +209,19 @@ struct ModelReport {
   std::optional<DistanceReport> distances;
 };
 
-// Requires a valid model (ValidateModel) and num_worst >= 0.
-// O(sum of squared track lengths).
+// Collects the figures of a model. Requires a valid model (ValidateModel) and
+// num_worst >= 0. O(sum of squared track lengths).
 ModelReport AnalyzeModel(const Model& model, int num_worst,
                          int num_threads = -1);
 
-// For the terminal: COLMAP's figures under COLMAP's names, then KROT's. Cameras
-// and images are the `max_rows` with the largest errors.
+// For the terminal: COLMAP's figures under COLMAP's names, then KROT's. Of
+// cameras and images the `max_rows` with the largest errors.
 std::string ModelTable(const ModelReport& report, int max_rows);
 
-// One line per camera, then per image, behind a line of names (docs/cli.md).
+// A header, then one line per camera and one per image (docs/cli.md).
 std::string ModelCsv(const ModelReport& report);
 
-// The same as JSON, with all images; the keys are listed in docs/cli.md.
+// The report as JSON, with all images; docs/cli.md lists its keys.
 std::string ModelJson(const ModelReport& report, const std::string& version);
 
 // What one run of `krot outlier_filter` did.
@@ -225,32 +230,33 @@ struct OutlierReport {
   OutlierFilterSummary summary;
 };
 
-// "removed 74 of 26,268; at least 61 must go (61 disjoint conflicts,
-// certificate)".
+// For example "removed 74 of 26,268; at least 61 must go (61 disjoint
+// conflicts, certificate)".
 std::string BracketSentence(const OutlierFilterSummary& summary);
 
-// Why positions from nothing are not to be relied on, and what to do next:
-// parts whose scale hardly anything holds, a bound beyond reason, or more
-// observations that do not fit than do. Empty if they are, or have not been
-// found from nothing.
+// Says why positions from nothing are not reliable, and what to do next: the
+// scale of a part is hardly held, the bound is beyond reason, or more
+// observations do not fit than do. Empty if they are reliable, or not from
+// nothing.
 std::string UnreliableSentence(const OutlierFilterSummary& summary);
 
-// [{"image_names": ..}], of OutlierFilterSummary::weak_parts.
+// OutlierFilterSummary::weak_parts as an array: [{"image_names": ..}].
 nlohmann::ordered_json WeakPartsJson(const OutlierFilterSummary& summary);
 
-// For the terminal: the bracket, errors before and after, who is to blame.
+// For the terminal: BracketSentence, errors before and after, and the suspects.
 std::string OutlierTable(const OutlierReport& report);
 
-// report.json; the keys are listed in docs/cli.md. What is not known is null.
+// report.json; docs/cli.md lists its keys. What is not known is null.
 std::string OutlierJson(const OutlierReport& report);
 
-// The error profile alone (docs/formats.md), which there must be.
+// The error profile as a file of its own (docs/formats.md); requires that there
+// is one.
 std::string ProfileJson(const OutlierReport& report);
 
-// One line per removed observation, worst first, behind a line of names.
+// A header, then one line per removed observation, worst first.
 std::string OutlierCsv(const OutlierFilterSummary& summary);
 
-// As --OutlierFilter.method takes it.
+// The name that --OutlierFilter.method takes.
 std::string OutlierMethodName(OutlierMethod method);
 
 // What one run of `krot solver` or `krot point_triangulator` did.
@@ -259,24 +265,25 @@ struct SolveReport {
   std::string command;
   std::string method;
   SolveSummary summary;
-  // Where not everything was to stay; its own solve is the summary above.
+  // Set if observations were removed; their own solve is the summary above.
   std::optional<OutlierFilterSummary> outliers;
-  // Where positions and points come from a database's.
+  // Set if positions and points come from the matches of a database.
   std::optional<MatchTracksSummary> matches;
-  // Of known positions, where they have one of their own; and whether the model
-  // is written in it.
+  // The known positions' own frame, if they have one, and whether the model is
+  // written in it.
   std::optional<PositionFrame> position_frame;
   bool is_in_position_frame = false;
   std::optional<DistanceReport> distances;  // before and after
 };
 
-// A row for each known distance: what is known, its length in each model, in
-// metres by that model's scale, and which contradict the others. `heads` name
-// the models.
+// A row for each known distance: its known length, its length in each model, in
+// metres by that model's scale, and whether it contradicts the others. `heads`
+// name the models.
 std::string DistanceTable(const DistanceReport& report,
                           const std::vector<std::string>& heads);
 
-// What contradicts the others in the last model, a sentence each.
+// A sentence for each known distance that contradicts the others in the last
+// model.
 std::vector<std::string> ContradictedDistances(const DistanceReport& report);
 
 // "57 of 60 positions agree with the model, to 0.631 m (median); ..."
@@ -289,7 +296,7 @@ std::string WrongPositionSentence(const WrongPosition& wrong);
 // how long it took.
 std::string SolveTable(const SolveReport& report);
 
-// report.json; the keys are listed in docs/cli.md. What is not known is null.
+// report.json; docs/cli.md lists its keys. What is not known is null.
 std::string SolveJson(const SolveReport& report);
 
 LeftOutCounts LeftOutByReason(const SolveSummary& summary);
@@ -298,15 +305,15 @@ LeftOutCounts LeftOutByReason(const SolveSummary& summary);
 // the termination kNothingToSolve.
 std::string NothingToSolveSentence(const SolveSummary& summary);
 
-// The points in whose tracks an image occurs more than once, of the support.
+// The points in the support whose tracks see an image more than once.
 std::vector<Point3DId> SameImageInSupport(const SolveSummary& summary);
 
-// Whether the cost is, to the digits shown, the largest error of the model that
-// is written: it is with p = 2 if every observation takes part.
+// Whether the cost equals, to the digits shown, the largest error of the
+// written model. It does with p = 2 if every observation takes part.
 bool CostIsMaximum(const SolveSummary& summary);
 
-// The maximum of the model that is written and what is proved of it, and what
-// is not: on the terminal, in the report and on the page.
+// The maximum of the written model, what is proved about it, and what is not;
+// for the terminal, the report and the page.
 std::string VerdictSentence(const SolveSummary& summary);
 
 // "0.0100 %", "less than 0.0001 %".
@@ -319,23 +326,25 @@ std::string GapWords(double relative_gap);
 // is_underdetermined.
 std::string UnderdeterminedWords(const SolveSummary& summary);
 
-// "the gap asked for is not reached after 300 iterations, as many as ...".
+// For example "the gap asked for is not reached: no further progress was made;
+// ...".
 std::string MissedGapSentence(const SolveSummary& summary);
 
-// That of the last round's linear problem; none if nothing is proved of it.
+// The relative gap of the last round's linear problem; none if no bound of it
+// is proved.
 std::optional<double> LinearRelativeGap(const SolveSummary& summary);
 
-// What was written instead of a better model. Requires is_given_back.
+// Says what was written instead of a better model. Requires is_given_back.
 std::string GivenBackSentence(const SolveSummary& summary);
 
-// As --Solver.method takes it.
+// The name that --Solver.method takes.
 std::string MethodName(SolveMethod method);
 
-// As --Solver.norm takes it: "1", "2", "inf", "1.5".
+// The value that --Solver.norm takes: "1", "2", "inf", "1.5".
 std::string NormName(Norm norm);
 
-// The errors before, after and, if there was such a step, polished, which a
-// sentence then explains.
+// The errors before, after and, if there was such a step, after the polish,
+// with a sentence about that.
 std::string SolveErrorTable(const SolveSummary& summary);
 
 // What one run of `krot tolerance_analyzer` found.
@@ -343,18 +352,18 @@ struct ToleranceReport {
   RunRecord run;
   ToleranceSummary summary;
   PixelErrorStatistics pixel_error_before;  // of the input
-  PixelErrorStatistics pixel_error_after;   // of the model around which
+  // The errors of the model that the boxes are around.
+  PixelErrorStatistics pixel_error_after;
 };
 
-// For the terminal: what holds place and scale, and the proved boxes; of more
-// than `max_rows` those that are not bounded, then the widest.
+// For the terminal: what holds place and scale, and the proved boxes. If there
+// are more than `max_rows`, unbounded boxes are shown first, then the widest.
 std::string ToleranceTable(const ToleranceReport& report, int max_rows);
 
-// report.json; the keys are listed in docs/cli.md. An end without a proof is
-// null.
+// report.json; docs/cli.md lists its keys. An end without a proof is null.
 std::string ToleranceJson(const ToleranceReport& report);
 
-// One line per coordinate behind a line of names (docs/formats.md).
+// A header, then one line per coordinate (docs/formats.md).
 std::string ToleranceCsv(const ToleranceSummary& summary);
 
 }  // namespace krot::internal

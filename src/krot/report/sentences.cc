@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kNumNamed = 5;
 
-// The first few, with commas.
+// The first few items, separated by commas.
 template <typename Item, typename Name>
 std::string FirstFew(const std::vector<Item>& items, const Name& name) {
   std::string list;
@@ -254,7 +254,7 @@ std::vector<std::string> PoseSentences(const PoseChecks& poses) {
 
 std::string RotationsSentence(const std::string& path,
                               const RotationInput& input) {
-  // Far more than a noisy sensor's error.
+  // Far more than the error of a noisy sensor.
   constexpr double kLargeDeg = 10;
   const ReplacedRotations& replaced = input.replaced;
   std::string line =

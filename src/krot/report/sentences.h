@@ -15,7 +15,7 @@
 
 namespace krot::internal {
 
-// What a model of poses alone lacks, and where it comes from.
+// What a model without observations lacks, and how to get it.
 inline constexpr char kNoObservations[] =
     "the model has no observations (2D points that see 3D points); krot "
     "point_triangulator makes them from its poses and a database of matches";
@@ -31,31 +31,33 @@ std::string LeftOutWords(const LeftOutCounts& left_out);
 std::string NothingToDoSentence(const std::string& what,
                                 const LeftOutCounts& left_out);
 
-// " contradicts itself: ...", behind the model's path: how often, how both
-// sides fit the model's own positions, and what is followed.
+// The rest of a sentence that begins with the model's path, " contradicts
+// itself: ...": how often, how well both statements fit the model's own
+// positions, and which one is followed.
 std::string ContradictionSentence(const Contradictions& contradictions);
 
-// Throws ModelError where the model at `path` is not to be read as neither side
-// fits.
+// Throws ModelError if neither of the two statements fits, so the model at
+// `path` must not be read without the user's choice.
 void RequireSettled(const std::string& path,
                     const Contradictions& contradictions);
 
-// "by the images' side, which COLMAP's bundle adjustment reads, the largest
-// error rises from 1.0973 px to 131.9991 px": before and after, pixels.
+// For example "by the images' side, which COLMAP's bundle adjustment reads, the
+// largest error rises from 1.0973 px to 131.9991 px". `max_px`: before and
+// after, pixels.
 std::string WorseImagesWords(const std::pair<double, double>& max_px);
 
-// "the errors fall only where all 1721 points that two cameras see lie in one
-// place, so that nothing is left of the scene". Requires IsWhole().
+// For example "the errors fall only where all 1721 points that two cameras see
+// lie in one place, so that nothing is left of the scene". Requires IsWhole().
 std::string WholeCollapseWords(const Collapse& collapse);
 
-// What came to lie in cameras and at infinity, one line each; "" if nothing.
+// The points that fell into cameras, and those that went to infinity, one line
+// each; "" if there are none.
 std::string CollapseLines(const Collapse& collapse);
 
 // "point3D_id 5, 17, 9, ...".
 std::string PointList(const std::vector<Point3DId>& points);
 
-// "2 frames, 4 images, 1 point, 8 observations", of a summary with these
-// counts.
+// For example "2 frames, 4 images, 1 point, 8 observations".
 template <typename Summary>
 std::string CountsWords(const Summary& summary) {
   return Counted(summary.num_frames, "frame") + ", " +
@@ -64,15 +66,16 @@ std::string CountsWords(const Summary& summary) {
          Counted(summary.num_observations, "observation");
 }
 
-// What does not hold its place, and what became of that, of so many images: a
-// line for each kind, that ends in '\n'; empty where everything holds it.
+// A line for each kind of images and points that do not hold their place, with
+// what was done about them; each ends in '\n'. Empty if all hold it.
+// `num_images` is the number of all images.
 std::string LooseSentences(const LooseParts& loose, int64_t num_images);
 
-// What a user should know of the poses that were read; empty if nothing is odd.
+// A sentence for each suspicious property of the poses; empty if there is none.
 std::vector<std::string> PoseSentences(const PoseChecks& poses);
 
-// What the rotations of the file `path` did; begins with "warning: " where they
-// are probably wrong.
+// What the file of rotations at `path` changed; begins with "warning: " if its
+// rotations are probably wrong.
 std::string RotationsSentence(const std::string& path,
                               const RotationInput& input);
 
@@ -81,7 +84,7 @@ struct RunRecord {
   std::string version;            // KROT's
   Contradictions contradictions;  // of the input
   PoseChecks poses;               // likewise
-  // Where the input's rotations were not its own.
+  // Set if the rotations come from a file, not from the model.
   std::optional<RotationInput> rotations;
   double seconds_read = 0;  // wall clock
   double seconds_write = 0;
@@ -91,7 +94,8 @@ struct RunRecord {
   uint64_t seed = 0;
 };
 
-// Version, threads, the time since the timer was made, the process's memory.
+// Records version, threads, the time since the timer was made, and the memory
+// of the process.
 void RecordEnd(const Timer& timer, int num_threads, RunRecord* run);
 
 // "Read 0.10 s, MIDDLE, wrote 0.20 s; 1.50 s in all on 2 threads, ...\n".

@@ -147,7 +147,8 @@ const char* TerminationName(SolveTermination termination) {
   return "not_run";
 }
 
-// Of the observations that are left out as another's twins.
+// The largest error of observations that were left out because their track has
+// a closer one of the same image.
 std::optional<double> LargestTwin(const SolveSummary& summary) {
   const int64_t count =
       summary.left_out[static_cast<size_t>(LeftOut::kSameImage)];

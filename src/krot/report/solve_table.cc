@@ -21,7 +21,8 @@ std::string PolishSentence(const SolveSummary& summary) {
          "maximum it no longer has.\n";
 }
 
-// The cost, unless it is the maximum that is there already.
+// Adds the cost, unless it is the same as the maximum, which the table has
+// already.
 void AddCost(const SolveSummary& summary, TextTable* table) {
   if (summary.is_given_back || CostIsMaximum(summary)) return;
   table->AddRow({"cost (max optimised, p = " + NormName(summary.norm) + ")",
@@ -50,13 +51,14 @@ namespace {
 
 // How many observations of the support the terminal shows.
 constexpr int kListedSupport = 10;
-// From which share of the true gap on the rows' own is no other number.
+// The gap of the rows is worth mentioning if it is below this share of the true
+// gap.
 constexpr double kNoticeablySmaller = 0.5;
 
-// "no translations and points bring all errors below 3.4201 px", which has to
-// be proved.
+// For example "no translations and points bring all errors below 3.4201 px".
+// Requires a proved bound.
 std::string BoundWords(const SolveSummary& summary) {
-  // Downwards: more than this is not proved.
+  // Rounded downwards, because more is not proved.
   const double bound = std::floor(*summary.lower_bound * 1e4) / 1e4;
   const bool has_fixed =
       summary.num_fixed_frames + summary.num_fixed_points > 0;
@@ -69,7 +71,8 @@ std::string BoundWords(const SolveSummary& summary) {
          FormatNumber(bound, 4) + " px";
 }
 
-// Where the linear problem has the gap asked for and the true one has not.
+// Explains why the true gap is not reached if the linear problem's gap is much
+// smaller.
 std::string LinearGapSentence(const SolveSummary& summary) {
   const std::optional<double> linear_gap = LinearRelativeGap(summary);
   if (summary.termination == SolveTermination::kGapReached || !linear_gap ||
@@ -81,7 +84,7 @@ std::string LinearGapSentence(const SolveSummary& summary) {
          "; the rest is the curvature of lenses, and rounding.";
 }
 
-// What the room above the lowest maximum was for.
+// Reports the finish: what the room above the lowest maximum was used for.
 std::string FinishSentence(const SolveSummary& summary) {
   if (!summary.finish) return "";
   const BoundedSummary& solve = summary.finish->solve;
@@ -104,7 +107,8 @@ std::string FinishSentence(const SolveSummary& summary) {
               : "; a little less might be possible.");
 }
 
-// " on 3 % of the observations"; empty where the joint solver did not run.
+// For example " on 3 % of the observations"; empty if the joint solver did not
+// run.
 std::string WorkingSetWords(const SolveSummary& summary) {
   const int64_t count = summary.num_working_observations.value_or(0);
   if (count == 0) return "";
@@ -117,8 +121,8 @@ std::string WorkingSetWords(const SolveSummary& summary) {
          " % of the observations";
 }
 
-// " after 2 rounds, 12 joint iterations on 3 % of the observations and 4
-// sweeps".
+// For example " after 2 rounds, 12 joint iterations on 3 % of the observations
+// and 4 sweeps".
 std::string StepsWords(const SolveSummary& summary) {
   const std::string sweeps =
       Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
@@ -187,8 +191,9 @@ std::string SolveCountsSentence(const SolveSummary& summary) {
               : ".");
 }
 
-// One of an image's observations in a track is wrong, at least; where those are
-// that set the maximum, or what became of them.
+// If a track sees an image more than once, at least one of these observations
+// is wrong. Says whether such observations set the maximum, or what was done
+// with them.
 std::string SameImageSentence(const SolveSummary& summary) {
   if (summary.num_same_image_tracks == 0) return "";
   const std::string tracks = Counted(summary.num_same_image_tracks, "track") +
@@ -217,7 +222,7 @@ std::string SameImageSentence(const SolveSummary& summary) {
          ".\n";
 }
 
-// How cameras and points stand to where they are known to be.
+// Says how far cameras and points are from where they are known to be.
 std::string PositionsKeptSentence(const SolveSummary& summary) {
   if (summary.num_positions == 0) return "";
   const std::string ratio =
@@ -231,7 +236,7 @@ std::string PositionsKeptSentence(const SolveSummary& summary) {
                    " kept; the farthest is off by " + ratio;
 }
 
-// By what their radii were multiplied.
+// Says by which factor the radii were multiplied.
 std::string PositionFactorSentence(const SolveSummary& summary) {
   if (!summary.position_factor) return "";
   const PositionFactor& factor = *summary.position_factor;
@@ -248,7 +253,7 @@ std::string PositionFactorSentence(const SolveSummary& summary) {
          ".\n";
 }
 
-// What was left out so that all else is within a bound.
+// Says which observations were left out so that all others are within a bound.
 std::string BracketOf(const SolveReport& report) {
   if (!report.outliers) return "";
   const OutlierFilterSummary& outliers = *report.outliers;

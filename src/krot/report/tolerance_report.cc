@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kAxes[] = {"x", "y", "z"};
 constexpr int kMaxDecimals = 12;
 
-// So that the narrowest interval has three digits.
+// The number of decimals that shows three digits of the narrowest interval.
 int DecimalsFor(const std::vector<ToleranceBox>& boxes) {
   double narrowest = 0;
   for (const ToleranceBox& box : boxes) {
@@ -35,7 +35,7 @@ std::string EndText(const BoxEnd& end, int decimals) {
   return end.proved ? FormatNumber(*end.proved, decimals) : "-";
 }
 
-// The length of the longest side; infinite where an end is not proved.
+// The length of the box's longest side; infinite if an end is not proved.
 double Width(const ToleranceBox& box) {
   double width = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -49,7 +49,7 @@ double Width(const ToleranceBox& box) {
   return width;
 }
 
-// In their order, or the widest of more than `max_rows`.
+// All boxes in their order or, if they are more than `max_rows`, the widest.
 std::vector<ToleranceBox> Listed(std::vector<ToleranceBox> boxes,
                                  size_t max_rows) {
   if (boxes.size() <= max_rows) return boxes;
@@ -135,8 +135,8 @@ Json LengthsJson(const std::vector<ToleranceLength>& lengths) {
   return json;
 }
 
-// Six significant digits. Of proved ends the last one is `outwards`, -1 or 1,
-// of the number: more is not proved.
+// Six significant digits. A proved end is rounded in the direction `outwards`
+// (-1 or 1), so that no more is printed than is proved.
 std::string LengthText(std::optional<double> length, int outwards = 0) {
   if (!length) return "-";
   if (outwards != 0 && *length > 0) {
@@ -149,7 +149,7 @@ std::string LengthText(std::optional<double> length, int outwards = 0) {
   return text.str();
 }
 
-// The least and the greatest lengths; "" if none was asked for.
+// The table of the smallest and largest lengths; "" if none was asked for.
 std::string LengthTable(const ToleranceSummary& summary) {
   const std::vector<ToleranceLength>& lengths = summary.lengths;
   if (lengths.empty()) return "";

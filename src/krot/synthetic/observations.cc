@@ -116,7 +116,7 @@ Eigen::Matrix3d RandomRotation(double sigma_deg, Random* random) {
   return Eigen::AngleAxisd(angle_deg * (kPi / 180), axis).toRotationMatrix();
 }
 
-// A Gaussian displacement no longer than max_length.
+// A Gaussian displacement, shortened to max_length if it is longer.
 Eigen::Vector3d RandomDisplacement(double sigma, double max_length,
                                    Random* random) {
   Eigen::Vector3d displacement = sigma * random->GaussianVector();
@@ -125,7 +125,7 @@ Eigen::Vector3d RandomDisplacement(double sigma, double max_length,
   return displacement;
 }
 
-// Of a panorama, which sees in all directions, distances.
+// For panoramas, which see in all directions, these are distances.
 struct SmallestDepths {
   std::vector<double> of_frame;
   std::vector<double> of_point;

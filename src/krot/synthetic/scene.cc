@@ -59,7 +59,8 @@ void Check(const SceneOptions& options) {
 
 namespace {
 
-// What follows the principal point, by COLMAP's model id.
+// Default values of the parameters after the principal point, by COLMAP's model
+// id.
 const std::vector<double>& DefaultDistortion(int model_id) {
   static const std::vector<std::vector<double>> kDistortions = {
       {},                               // SIMPLE_PINHOLE
@@ -134,7 +135,7 @@ ImageId ImageIdOf(int frame, int sensor, int num_sensors) {
   return static_cast<ImageId>(frame * num_sensors + sensor + 1);
 }
 
-// As COLMAP lays out the images of a rig: one folder per camera.
+// The name as COLMAP expects for rigs: one folder per camera.
 std::string ImageName(int frame, int sensor, int num_sensors) {
   constexpr size_t kDigits = 6;
   std::string number = std::to_string(frame + 1);
@@ -155,7 +156,7 @@ Rig MakeRig(const SceneGeometry& geometry) {
   return rig;
 }
 
-// Cameras, rigs, frames and images without poses and 2D points.
+// Cameras, rigs, frames and images, but no poses and 2D points.
 Model MakeSkeleton(const SceneOptions& options, const SceneGeometry& geometry) {
   const int num_sensors = options.sensors_per_rig;
   Model model;

@@ -13,9 +13,9 @@
 
 namespace krot::internal {
 
-// Random numbers that are the same on every platform: the engine's bits are
-// fixed by the C++ standard, and the distributions (which the standard leaves
-// to each library) are our own.
+// Random numbers that are the same on every platform. The C++ standard fixes
+// the bits of the engine, but leaves the distributions to each library, so they
+// are implemented here.
 class Random {
  public:
   explicit Random(uint64_t seed) : engine_(seed) {}
@@ -37,18 +37,18 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-// Where everything in a scene is: what a solver estimates, and what it keeps.
+// The geometry of a scene: what a solver estimates, and what it keeps.
 struct SceneGeometry {
   std::vector<Pose> rig_from_world;   // per frame
   std::vector<Pose> sensor_from_rig;  // the reference sensor first
   std::vector<Eigen::Vector3d> points;
 };
 
-// cam_from_world of every image: sensor s of frame f is the image
-// f num_sensors + s.
+// cam_from_world of every image: image f num_sensors + s is that of sensor s in
+// frame f.
 std::vector<Pose> CamFromWorld(const SceneGeometry& geometry);
 
-// Poses of the scene, their quaternions of unit norm.
+// ---- Poses with quaternions of unit norm ----
 
 Pose UnitPose(const RigidTransform& transform);
 
@@ -56,39 +56,40 @@ Pose UnitPose(const RigidTransform& transform);
 Pose PoseFromCenter(const Eigen::Matrix3d& rotation,
                     const Eigen::Vector3d& center);
 
-// Where the frames of a scene stand, and how far they look.
+// The poses of a scene's frames, and how far they see.
 struct Trajectory {
   std::vector<Pose> rig_from_world;
-  // Depths of the points in the frame that they are sampled from.
+  // Range of the depths at which points are sampled from a frame.
   double min_depth = 0;
   double max_depth = 0;
-  // A point sampled from frame f may be seen by frame f + offset, for these
-  // offsets; modulo the number of frames if the trajectory is closed.
+  // A point that was sampled from frame f may be seen by frame f + offset, for
+  // each of these offsets; modulo the number of frames if the trajectory is
+  // closed.
   std::vector<int> neighbor_offsets;
   bool is_closed = false;
 };
 
-// Frames in the order of the path. Requires checked options. O(num_frames).
+// Makes frames in the order of the path. Requires checked options.
+// O(num_frames).
 Trajectory MakeTrajectory(const SceneOptions& options, Random* random);
 
-// sensor_from_rig of every sensor: the reference sensor (the identity) first,
-// the others on a circle around it, turned alternately to the right and to
-// the left.
+// sensor_from_rig of every sensor. The reference sensor (the identity) comes
+// first; the others are on a circle around it, turned alternately to the right
+// and to the left.
 std::vector<Pose> MakeRigSensors(const SceneOptions& options);
 
-// The nearest that a point may be to an image that sees it, in viewing
+// The smallest distance of a point from an image that sees it, in viewing
 // distances.
 inline constexpr double kMinDepth = 0.2;
 
-// Which points the images of a scene see, and where: all images are taken
-// with copies of one camera.
+// Says which points the images of a scene see, and at which pixels. All images
+// have copies of the same camera.
 class Imaging {
  public:
-  // A point is in view if it is `margin_px` or more inside the image's
-  // border, at least kMinDepth away and, but for panoramas, less than 80
-  // degrees off the axis.
-  // Throws std::invalid_argument if the camera has no ray for a pixel of the
-  // border.
+  // A point is in view if its pixel is at least `margin_px` inside the image's
+  // border, it is at least kMinDepth away and, except for panoramas, its ray is
+  // less than 80 degrees off the axis. Throws std::invalid_argument if the
+  // camera has no ray for a pixel of the border.
   Imaging(const Camera& camera, double margin_px,
           const std::vector<Pose>& cam_from_world);
 
@@ -98,15 +99,16 @@ class Imaging {
   std::optional<Eigen::Vector2d> Project(int image,
                                          const Eigen::Vector3d& x_world) const;
 
-  // The point on the ray of the pixel at a fraction of width and height, at
-  // the given depth, on a panorama distance, if it is in view.
+  // The point at the given depth (for a panorama: distance) on the ray of a
+  // pixel, which is given as a fraction of width and height; none if it is not
+  // in view.
   std::optional<Eigen::Vector3d> PointAt(int image,
                                          const Eigen::Vector2d& fraction,
                                          double depth) const;
 
  private:
   Camera camera_;
-  Eigen::Vector2d lower_;  // pixels in view
+  Eigen::Vector2d lower_;  // the smallest and largest pixel in view
   Eigen::Vector2d upper_;
   bool has_image_plane_ = true;
   double max_ray_radius_ = 0;  // ||u|| on z = 1, if there is one
@@ -128,31 +130,31 @@ struct Structure {
 };
 
 // Samples points by back-projection, an equal number from every image, and
-// looks for other images that see them among the frames near by: no search
-// over all frames. Image s of frame f is f sensors_per_rig + s. Throws
-// std::invalid_argument if an image finds no second one to share a point
-// with. O(sightings).
+// looks for other images that see them among the neighbouring frames only, not
+// among all. Image s of frame f is f sensors_per_rig + s. Throws
+// std::invalid_argument if some image shares no point with another one.
+// O(sightings).
 Structure SampleStructure(const SceneOptions& options,
                           const Trajectory& trajectory, const Imaging& imaging,
                           Random* random);
 
-// How far inside the image exact projections should lie, in pixels, so that
-// noise rarely has to be cut at the border.
+// How far inside the image's border exact projections should be, in pixels, so
+// that noise rarely has to be cut off there.
 double ObservationMargin(const SceneOptions& options);
 
-// Adds the structure to `model`, whose images stand in the order of
-// Sighting::image: 2D points with noise, outliers and twins; 3D points
-// (without coordinates) and their tracks. Returns the indices of the outliers
-// in Model::track_elements, ascending. O(sightings).
+// Adds the structure to `model`, whose images must be in the order of
+// Sighting::image: 2D points with noise, outliers and twins, 3D points without
+// coordinates, and their tracks. Returns the indices of the outliers in
+// Model::track_elements, ascending. O(sightings).
 std::vector<int64_t> WriteObservations(const Structure& structure,
                                        const SceneOptions& options,
                                        Random* random, Model* model);
 
-// A copy of `truth` with the rotations, frame centres and points that
-// `options` perturb. All depths stay positive: with d the smallest depth in
-// which a frame sees a point (after its rotation), or a point is seen, frame
-// and point each move by 0.45 d at most, so that a tenth of every depth is
-// left. O(sightings).
+// A copy of `truth` with rotations, frame centres and points perturbed as
+// `options` say. All depths stay positive: let d be the smallest depth of the
+// points that a frame sees (after its rotation), or of a point in the frames
+// that see it. Each frame and point moves by at most 0.45 d, which leaves a
+// tenth of every depth. O(sightings).
 SceneGeometry PerturbStart(const SceneGeometry& truth,
                            const Structure& structure,
                            const SceneOptions& options, Random* random);

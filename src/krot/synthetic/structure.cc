@@ -11,7 +11,7 @@
 namespace krot::internal {
 namespace {
 
-constexpr double kMaxTangent = 5.67;  // of 80 degrees
+constexpr double kMaxTangent = 5.67;  // tangent of 80 degrees
 
 std::optional<Eigen::Vector2d> RayOf(const Camera& camera,
                                      const Eigen::Vector2d& pixel) {
@@ -23,8 +23,9 @@ std::optional<Eigen::Vector2d> RayOf(const Camera& camera,
   return undistorted.u;
 }
 
-// The largest ||u|| on the image's border, which bounds that of its interior:
-// beyond it, a projection may fold back into the image.
+// The largest ||u|| on the image's border, which bounds that of the interior.
+// It is needed because a projection may fold rays beyond it back into the
+// image.
 double MaxRayRadius(const Camera& camera) {
   constexpr int kSamplesPerSide = 16;
   const double width = static_cast<double>(camera.width);
@@ -111,8 +112,8 @@ class StructureSampler {
         random_(random),
         offsets_(trajectory.neighbor_offsets) {}
 
-  // Fills track_ with a point sampled from the image `anchor`; false if no
-  // other image sees it.
+  // Samples a point from the image `anchor` and fills track_; false if no other
+  // image sees the point.
   bool SamplePoint(int anchor) {
     track_.clear();
     const double across = random_->Uniform();
@@ -131,7 +132,8 @@ class StructureSampler {
   const std::vector<Sighting>& track() const { return track_; }
 
  private:
-  // Uniform around the mean, as wide as [2, number of images] allows.
+  // Uniform around the mean; the interval is as wide as [2, number of images]
+  // allows.
   size_t SampleTrackLength() {
     const double mean = options_.track_length;
     const double half_width = std::min(mean - 2, imaging_.num_images() - mean);
@@ -140,8 +142,8 @@ class StructureSampler {
     return static_cast<size_t>(whole) + random_->Chance(length - whole);
   }
 
-  // The anchor and its frame's other images first, then neighbours in random
-  // order.
+  // Collects the anchor, then its frame's other images, then neighbouring
+  // frames in random order.
   void CollectTrack(int anchor, size_t length) {
     const int num_sensors = options_.sensors_per_rig;
     const int num_frames = options_.num_frames;
@@ -158,8 +160,8 @@ class StructureSampler {
     }
   }
 
-  // The n-th element of a random permutation (Fisher and Yates), which may
-  // start from any order.
+  // The n-th element of a random permutation (Fisher and Yates). The offsets
+  // may be in any order before.
   int DrawOffset(size_t n) {
     const size_t rest = offsets_.size() - n;
     const size_t pick =

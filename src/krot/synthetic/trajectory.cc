@@ -62,7 +62,8 @@ Pose PoseFromCenter(const Eigen::Matrix3d& rotation,
 
 namespace {
 
-// The rotation of a camera that looks along `forward`; world y points down.
+// The rotation of a camera that looks along `forward`; the world's y axis
+// points down.
 Eigen::Matrix3d LookAlong(const Eigen::Vector3d& forward) {
   const Eigen::Vector3d z = forward.normalized();
   const Eigen::Vector3d x = Eigen::Vector3d::UnitY().cross(z).normalized();
@@ -71,7 +72,8 @@ Eigen::Matrix3d LookAlong(const Eigen::Vector3d& forward) {
   return cam_from_world;
 }
 
-// Offsets -reach .. reach without 0, or all frames but one if those wrap.
+// The offsets from -reach to reach without 0, or to all other frames once if
+// these overlap around a closed trajectory.
 std::vector<int> NeighborOffsets(int reach, int num_frames, bool is_closed) {
   reach = std::min(reach, num_frames - 1);
   int first = -reach;
@@ -87,7 +89,8 @@ std::vector<int> NeighborOffsets(int reach, int num_frames, bool is_closed) {
   return offsets;
 }
 
-// Frames that a point needs as candidates: about half of them see it.
+// How many neighbours on each side are candidates for seeing a point; about
+// half of them do.
 int CandidateReach(const SceneOptions& options) {
   return static_cast<int>(std::ceil(2 * options.track_length));
 }
@@ -114,8 +117,8 @@ Trajectory MakeOrbit(const SceneOptions& options, Random* random) {
   return trajectory;
 }
 
-// A path that winds gently; the frames look to its side. They stand so close
-// that about 2 track_length of them see a point.
+// A gently winding path, with frames that look to its side. They are so close
+// together that about 2 track_length of them see a point.
 Trajectory MakeStreet(const SceneOptions& options, Random* random) {
   const double focal_length =
       options.focal_length_factor *
