@@ -12,19 +12,19 @@
 
 namespace krot::internal {
 
-// What every elimination of the points shares. With the unknowns of points s
-// and of frames t, the normal equations are
+// The common part of all eliminations of points. With the unknowns s of points
+// and t of frames, the normal equations are
 //
 //   [ H_ss  H_st ] [ s ]   [ g_s ]
 //   [ H_ts  H_tt ] [ t ] = [ g_t ]
 //
-// and H_ss consists of a 3x3 block for each point. Without the points they are
+// and H_ss consists of a 3x3 block for each point. Eliminating the points gives
 // (H_tt - H_ts H_ss^-1 H_st) t = g_t - H_ts H_ss^-1 g_s: a reduced camera
-// system, which is a sum over points. The same bits at any number of threads,
-// and of ranks that share the points: the first rank has the system then.
+// system, which is a sum over points. The same bits at any number of threads
+// and of ranks that share the points; only the first rank has the system.
 class SchurComplement {
  public:
-  // Of a solution whose error nothing takes away afterwards, relative.
+  // Relative tolerance of solutions that are not refined afterwards.
   static constexpr double kTolerance = 1e-10;
 
   using Use = ReducedCameraSystem::Use;
@@ -33,7 +33,7 @@ class SchurComplement {
   SchurComplement(const BlockStructure& structure, const Context& context,
                   Use use = Use::kManySolutions);
 
-  // add(k, part) adds what is left of point k to that part of reduced().
+  // add(k, part) adds the contribution of point k to that part of reduced().
   template <typename Add>
   void AddPoints(const Add& add) {
     parts_.Sum(num_threads_, reduced_.num_numbers(), add, reduced_.parts());
@@ -41,9 +41,9 @@ class SchurComplement {
   // False if there is no factor even when it is regularised.
   bool Factorize();
 
-  // Solves for the frames. reduce(k, part, rhs) adds to the right-hand side,
-  // whose numbers stand in the columns of reduced(), what is left of point k;
-  // `g_t`, if it is not null, is added to that. Fixed frames are 0.
+  // Solves for the frames. reduce(k, part, rhs) adds the contribution of point
+  // k to the right-hand side, which is indexed by the columns of reduced().
+  // `g_t` is added unless it is null. The result is 0 for fixed frames.
   template <typename Reduce>
   void Solve(const Reduce& reduce, const std::vector<Eigen::Vector3d>* g_t,
              double tolerance, std::vector<Eigen::Vector3d>* t) {
@@ -77,9 +77,9 @@ class SchurComplement {
   const PointParts fine_parts_;
 };
 
-// The linear systems of the known rotation problem. Where rotations stay, a row
-// knows a point k and a frame f only by how far the point is from the frame's
-// centre c_f:
+// The linear systems of the known rotation problem. As rotations do not change,
+// a row of point k and frame f depends only on the difference between the point
+// and the frame's centre c_f:
 //
 //   H x = g + A'r,   H = A'A,   (A x)_i = B_i (s_k - c_f),   B_i kRows x 3.
 //
@@ -95,18 +95,19 @@ class SchurComplement {
 //                                                           .'        | H_tt
 //
 // Near an optimum the rows differ by ten orders of magnitude, so H_ss is never
-// formed or inverted. With B = Q R of a point's own rows and G_f = Q'B of those
-// of frame f, the point leaves of the frames' blocks
+// formed or inverted. With the QR factorisation B = Q R of a point's own rows,
+// and G_f = Q'B of the rows of frame f, the point contributes to the reduced
+// camera system
 //
 //   S_ff = B_f'B_f - G_f'G_f = G_f' sum_{g != f} G_g,   S_fg = -G_f'G_g.
 //
 // The difference cancels only where frame f all but determines the point,
-// |Q_f|^2 > 1/2. As |Q|^2 = 3, there are fewer than six such frames, and of
-// them the sum is taken, in which nothing cancels.
+// |Q_f|^2 > 1/2. As |Q|^2 = 3, there are fewer than six such frames; for them
+// the sum is used, in which nothing cancels.
 //
-// Fill rows; Factorize; then Solve and Multiply as often as need be, until the
-// rows are filled anew. What is fixed has s_k = 0 and c_f = 0, and so has a
-// direction that no row tells.
+// Usage: fill rows; Factorize; then Solve and Multiply as often as necessary,
+// until the rows are filled anew. Solutions have s_k = 0 and c_f = 0 for what
+// is fixed, and 0 for unknowns of points that no row determines.
 template <int kRows>  // per observation: 3 or 4
 class CentredLeastSquares {
  public:
@@ -125,7 +126,7 @@ class CentredLeastSquares {
   // null for 0. If `image` is not null it becomes A x; it may be r.
   void Solve(const BlockVector* g, const double* r, BlockVector* x,
              double* image = nullptr);
-  // To a relative error in the energy norm.
+  // The same to a relative error of `tolerance` in the energy norm.
   void Solve(const BlockVector* g, const double* r, double tolerance,
              BlockVector* x, double* image);
   // The same with a step of iterative refinement, which removes the effect of
