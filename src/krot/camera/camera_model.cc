@@ -102,7 +102,7 @@ namespace {
 
 constexpr double kCosOf80Degrees = 0.17364817766693033;
 
-// Whether a direction of length 1 has its chart on z = 1.
+// Whether the chart of a unit vector with this z is the plane z = 1.
 bool IsOnImagePlane(PerspectiveLens, double) { return true; }
 bool IsOnImagePlane(DivisionLens, double z) { return z > kCosOf80Degrees; }
 template <typename Lens>
@@ -188,8 +188,8 @@ Eigen::Vector2d Project(const double* params, const Eigen::Vector3d& x_cam) {
   return pixel;
 }
 
-// RowAtProjection in front of a perspective lens, whose chart is z = 1: value
-// and derivatives in one go. False, and no E, everywhere else.
+// RowAtProjection for points in front of a perspective lens, whose chart is
+// z = 1; computes value and derivatives at once. Returns false for all others.
 template <typename Model>
 bool RowOnImagePlane(const double* params, const Eigen::Vector2d& pixel,
                      const Eigen::Vector3d& x_hat, Eigen::Matrix3d* E) {

@@ -4,11 +4,11 @@
 
 namespace krot::internal {
 
-// A distortion moves a point (a, b) of the lens plane to (x, y) in the same
+// A distortion D maps a point (a, b) of the lens plane to (x, y) in the same
 // units, before focal length and principal point. It keeps the centre:
 // D(0) = 0 and D'(0) = I.
 //
-//   Apply(k, a, b, &x, &y)    for any scalar, by + - * / alone;
+//   Apply(k, a, b, &x, &y)    for any scalar; uses only + - * /;
 //   DeviationBound(k, r)      an upper bound on the norm of D'(q) - I for all
 //                             |q| <= r. Below 1, D is injective on that disc
 //                             and det D' > 0 there (I + E with |E| < 1).

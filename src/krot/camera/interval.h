@@ -8,18 +8,20 @@
 
 namespace krot::internal {
 
-// All numbers in [lo, hi]: arithmetic on sets, so that a function evaluated on
-// an interval encloses its values there (not tightly, but the tighter the
-// narrower the interval). Every operation rounds outwards, so that an
-// enclosure is a proof. A quotient by an interval that holds 0 is the whole
-// line; a bound that is NaN compares false with everything: it proves nothing.
+// The set of all numbers in [lo, hi]. A function evaluated on an interval
+// returns an interval that contains all its values there; it is the tighter the
+// narrower the argument is. Every operation rounds outwards, so that such an
+// enclosure is a proof. A quotient by an interval that contains 0 is the whole
+// line. A bound that is NaN compares false with everything, so it proves
+// nothing.
 struct Interval {
   double lo = 0;
   double hi = 0;
 };
 
-// [lo, hi] made wider by 4 `ulps` units of the last place on each side: more
-// than what `ulps` roundings to nearest and those of this function take.
+// [lo, hi] widened on each side by 4 `ulps` units of roundoff, relative. That
+// covers an error of `ulps` units in the last place and the rounding in this
+// function.
 inline Interval RoundOutwards(double lo, double hi, int ulps = 1) {
   constexpr double kFourUnits = 4 * std::numeric_limits<double>::epsilon() / 2;
   constexpr double kTiny = std::numeric_limits<double>::min();
@@ -53,7 +55,7 @@ inline Interval operator*(const Interval& a, const Interval& b) {
   const double lh = a.lo * b.hi;
   const double hl = a.hi * b.lo;
   const double hh = a.hi * b.hi;
-  // min and max would lose a NaN.
+  // std::min and std::max might drop a NaN.
   if (std::isnan((ll + lh) + (hl + hh))) return {kNaN, kNaN};
   return RoundOutwards(std::min(std::min(ll, lh), std::min(hl, hh)),
                        std::max(std::max(ll, lh), std::max(hl, hh)));
@@ -82,26 +84,27 @@ inline bool operator<(const Interval& a, const Interval& b) {
   return a.hi < b.lo;
 }
 
-// Not a number if some number of a has no root.
+// NaN if some number of a has no square root.
 inline Interval sqrt(const Interval& a) {
   if (!(a.lo >= 0)) return {kNaN, kNaN};
   const Interval root = RoundOutwards(std::sqrt(a.lo), std::sqrt(a.hi));
   return {std::max(root.lo, 0.0), root.hi};
 }
 
-// The functions below trust the C library to 4 units of the last place.
+// The functions below assume that the C library is accurate to 4 units in the
+// last place.
 
 inline Interval atan(const Interval& a) {
   return RoundOutwards(std::atan(a.lo), std::atan(a.hi), 4);
 }
 
-// Not a number unless a lies between two poles, around 0.
+// NaN unless a lies between the two poles around 0.
 inline Interval tan(const Interval& a) {
   if (!(a.lo > -1.57 && a.hi < 1.57)) return {kNaN, kNaN};
   return RoundOutwards(std::tan(a.lo), std::tan(a.hi), 4);
 }
 
-// By |sin'|, |cos'| <= 1 from one end.
+// Enclosed by the value at one end and |sin'|, |cos'| <= 1.
 inline Interval sin(const Interval& a) {
   const Interval at_end = RoundOutwards(std::sin(a.lo), std::sin(a.lo), 4);
   return at_end + Interval{a.lo - a.hi, a.hi - a.lo};
@@ -111,8 +114,8 @@ inline Interval cos(const Interval& a) {
   return at_end + Interval{a.lo - a.hi, a.hi - a.lo};
 }
 
-// The angle of (x, y). Not a number if the box meets the half line x <= 0,
-// y = 0, where the angle jumps.
+// The angle of (x, y). NaN if the box meets the half line x <= 0, y = 0, where
+// the angle jumps.
 inline Interval atan2(const Interval& y, const Interval& x) {
   constexpr double kHalf = 1.5707963267948966;
   if (x.lo > 0) return atan(y / x);
@@ -125,8 +128,8 @@ inline Interval atan2(const Interval& y, const Interval& x) {
 // A value with its derivatives by two variables, for forward differentiation
 // of the camera models: f(Dual{u, 1, 0}, Dual{v, 0, 1}) carries df/du, df/dv.
 //
-// Scalar is double, or Interval to bound derivatives on a set.
-// Only what the camera models use is defined. No allocation, no branches.
+// Scalar is double, or Interval to bound derivatives on a set. Only the
+// operations that the camera models use are defined.
 template <typename Scalar>
 struct Dual {
   Scalar value{};
@@ -236,9 +239,9 @@ inline Dual<S> atan2(const Dual<S>& y, const Dual<S>& x) {
           (x.value * y.dv - y.value * x.dv) / norm2};
 }
 
-// What the camera models (models.h) need to be evaluated on intervals, with
-// parameters that are intervals too: P = Interval, T = Interval or
-// Dual<Interval>. What comes out encloses the exact values and derivatives.
+// Operations by which the camera models (models.h) are evaluated on intervals,
+// with parameters that are intervals, too: P = Interval, T = Interval or
+// Dual<Interval>. The results enclose the exact values and derivatives.
 
 inline Dual<Interval> operator+(const Dual<Interval>& a, const Interval& b) {
   return {a.value + b, a.du, a.dv};
@@ -251,11 +254,12 @@ inline Dual<Interval> operator*(const Dual<Interval>& a, const Interval& b) {
 }
 
 // S(t) = atan(z) / z with z^2 = t is the integral of 1 / (1 + t y^2) over
-// [0, 1]: decreasing and convex for t > -1, so that the ends of an interval
-// enclose S and S' on it.
+// [0, 1]. It is decreasing and convex for t > -1, so the values at the ends of
+// an interval enclose S and S' on it.
 inline constexpr double kEndOfAtanSeries = 1e-3;
 
-// Encloses S(t) for one t >= -1e-3. The series leaves out less than 1e-19.
+// Encloses S(t) for one t >= -1e-3. The omitted terms of the series are below
+// 1e-19.
 inline Interval EncloseAtanOverRoot(double t) {
   if (!(t >= -kEndOfAtanSeries)) return {kNaN, kNaN};
   double value =
@@ -266,8 +270,8 @@ inline Interval EncloseAtanOverRoot(double t) {
   return RoundOutwards(value, value, 4);
 }
 
-// Encloses S'(t) = (1 / (1 + t) - S) / (2 t) for one t >= -1e-3. The series
-// leaves out less than 1e-18.
+// Encloses S'(t) = (1 / (1 + t) - S) / (2 t) for one t >= -1e-3. The omitted
+// terms of the series are below 1e-18.
 inline Interval EncloseAtanOverRootSlope(double t) {
   if (!(t >= -kEndOfAtanSeries)) return {kNaN, kNaN};
   if (t < kEndOfAtanSeries) {

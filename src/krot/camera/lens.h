@@ -13,12 +13,12 @@ namespace krot::internal {
 //   ToRay(lens, a, b, &u, &v)     its closed-form inverse; false if the ray
 //                                 is 90 degrees or more off the axis.
 //
-// and, beyond 90 degrees too, the direction of (X, Y, Z) of any length:
+// For directions (X, Y, Z) of any length, which may be beyond 90 degrees:
 //
 //   Sees(lens, X, Y, Z)           whether the lens has a point for it; the set
 //                                 of these directions is connected;
-//   FromPoint(lens, X, Y, Z, &a, &b)     the point, for any scalar; continues
-//                                 FromRay(X / Z, Y / Z) to where it sees;
+//   FromPoint(lens, X, Y, Z, &a, &b)     that point, for any scalar; continues
+//                                 FromRay(X / Z, Y / Z) to all that it sees;
 //   ToPoint(lens, a, b, &X, &Y, &Z)      its inverse; false if there is none.
 //
 // `lens` points at kNumParams parameters. Every lens is radial, a = u h(r)
@@ -26,8 +26,8 @@ namespace krot::internal {
 // once between the axis and any ray, so that det d(a, b)/d(u, v) > 0 at a ray
 // means det > 0 from the axis to that ray.
 
-// atan(z) / z by z^2, smooth at 0; the series' first omitted term is below
-// 1e-19.
+// atan(z) / z as a function of z^2, smooth at 0. The first omitted term of the
+// series is below 1e-19.
 template <typename T>
 T AtanOverRoot(const T& z2) {
   using std::atan;
@@ -41,8 +41,9 @@ T AtanOverRoot(const T& z2) {
   return atan(z) / z;
 }
 
-// The angle of (Z, r) over r, by r^2 and Z: atan(r / Z) / r where Z > 0, and on
-// from there to all directions but that of -Z. Homogeneous of degree -1.
+// The angle of (Z, r) divided by r, as a function of r^2 and Z: atan(r / Z) / r
+// where Z > 0, continued to all directions except r = 0, Z < 0. Homogeneous of
+// degree -1.
 template <typename T>
 T AngleOverRadius(const T& r2, const T& Z) {
   using std::atan2;
@@ -142,12 +143,12 @@ struct EquidistantLens {
 
 // Field of view omega [Devernay, Faugeras 2001]:
 //   |(a, b)| = atan(2 r tan(omega / 2)) / omega
-// For omega^2 < 1e-4 COLMAP defines the model by another polynomial,
+// For omega^2 < 1e-4 COLMAP defines the model by a polynomial,
 //   |(a, b)| = r (1 + omega^2 (r^2 / 3 - 1 / 12)),
-// and so does KROT: parameters mean what the program that wrote them computes.
-// (The Taylor series of the first formula has the opposite sign; the two
-// differ by less than 0.02 px at r = 1 and a focal length of 1000 px.) That
-// polynomial ends at 90 degrees; the first formula goes on as
+// and so does KROT, as parameters mean what COLMAP computes from them. (The
+// Taylor series of the first formula has the opposite sign of the omega^2 term;
+// the two differ by less than 0.02 px at r = 1 and a focal length of 1000 px.)
+// The polynomial ends at 90 degrees; the first formula continues as
 //   |(a, b)| = angle of (Z, 2 R tan(omega / 2)) / omega,  R^2 = X^2 + Y^2.
 struct FovLens {
   static constexpr int kNumParams = 1;
@@ -226,8 +227,9 @@ struct FovLens {
   }
 
  private:
-  // r / radius where r (1 - omega2 / 12) + r^3 omega2 / 3 = radius: a convex
-  // increasing function, on which Newton descends to the root from above.
+  // r / radius for the r with r (1 - omega2 / 12) + r^3 omega2 / 3 = radius.
+  // The left side is convex and increasing, so Newton's method converges to the
+  // root from above.
   static double SmallOmegaScale(double omega2, double radius) {
     if (radius == 0) return 1 / (1 - omega2 / 12);
     double r = radius / (1 - omega2 / 12);
@@ -241,12 +243,12 @@ struct FovLens {
   }
 };
 
-// The lenses whose image radius follows from a square root.
+// The image radius of the following lenses is given by a square root.
 
 // Division model of Fitzgibbon (2001): the ray of the lens point is
 // (a, b, 1 + k (a^2 + b^2)), so that
 //   (a, b) = (u, v) 2 / (1 + sqrt(1 - 4 k r^2)).
-// Not a number where 4 k r^2 > 1: no lens point has that ray.
+// NaN where 4 k r^2 > 1: no lens point has that ray.
 struct DivisionLens {
   static constexpr int kNumParams = 1;
 

@@ -8,15 +8,15 @@
 
 namespace krot::internal {
 
-// COLMAP's camera models, each a lens (lens.h), a distortion (distortion.h)
-// and one or two focal lengths:
+// COLMAP's camera models. Each consists of a lens (lens.h), a distortion
+// (distortion.h) and one or two focal lengths:
 //
 //   ray (u, v, 1) --lens--> (a, b) --distortion--> (x, y) --focal--> pixel
 //   pixel = (fx x + cx, fy y + cy)
 //
-// Parameters stand in COLMAP's order: focal length(s), cx, cy, then those of
-// the lens or of the distortion (no model has both). P is double, or T where
-// the parameters themselves are differentiated.
+// Parameters are in COLMAP's order: focal length(s), cx, cy, then those of the
+// lens or of the distortion (no model has both). P is the type of parameters:
+// double, or T where parameters are differentiated, too.
 template <int id, int kNumFocal, typename LensType, typename DistortionType>
 struct ImagePlaneModel {
   static constexpr int kId = id;  // COLMAP's
@@ -72,7 +72,7 @@ struct ImagePlaneModel {
     *y = *y * FocalY(params) + CenterY(params);
   }
 
-  // That pixel less (x, y).
+  // ProjectPoint minus (x, y).
   template <typename P, typename T>
   static void ErrorAt(const P* params, double x, double y, const T& X,
                       const T& Y, const T& Z, T* error_x, T* error_y) {
@@ -126,8 +126,8 @@ struct Equirectangular {
     *y = (atan2(Y, T(sqrt(T(X * X + Z * Z)))) * (1 / kPi) + 0.5) * params[1];
   }
 
-  // That pixel less (x, y), the shorter way round: with the azimuth taken from
-  // that of x, nothing jumps at the seam.
+  // ProjectPoint minus (x, y), by the shorter way round. Azimuths are measured
+  // from that of x, so that there is no jump at the seam.
   template <typename P, typename T>
   static void ErrorAt(const P* params, double x, double y, const T& X,
                       const T& Y, const T& Z, T* error_x, T* error_y) {
@@ -169,7 +169,7 @@ decltype(auto) VisitCameraModel(int model_id, Visitor&& visitor) {
       model_id, visitor);
 }
 
-// The same, EQUIRECTANGULAR included.
+// The same, including EQUIRECTANGULAR.
 template <typename Visitor>
 decltype(auto) VisitEveryCameraModel(int model_id, Visitor&& visitor) {
   if (model_id == Equirectangular::kId) return visitor(Equirectangular{});

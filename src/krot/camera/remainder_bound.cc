@@ -94,14 +94,15 @@ std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
 
 namespace {
 
-// Half the sides of the parallelogram in level_px of the linearised lens; the
-// first whose boundary holds no |f| <= gamma is taken.
+// Half the sides of the parallelogram, in units of level_px of the linearised
+// lens. The first one is taken with |f| > gamma on the whole boundary.
 constexpr std::array<double, 4> kReaches = {1.125, 1.5, 2.5, 4};
 
-// The pixel's ray may be this far from x_hat in the latter's chart.
+// The smallest n'u for the unit vector u of the pixel's ray, with the n of
+// x_hat's chart: it limits how far the two are apart.
 constexpr double kSmallestDepth = 0.1;
 
-// Above the relative error of a few operations on doubles.
+// More than the relative error of a few operations on doubles.
 constexpr double kRounding = 1e-14;
 
 bool IsPinhole(int model_id) {
@@ -118,7 +119,7 @@ struct Region {
   double reach = 0;
 };
 
-// U of remainder_bound.h.
+// Finds U of remainder_bound.h.
 std::optional<Region> FindRegion(int model_id, const double* params,
                                  const Eigen::Vector2d& pixel,
                                  const Eigen::Vector3d& x_hat, double level_px,
@@ -183,8 +184,8 @@ std::optional<double> SupportBound(int model_id, const double* params,
     return length == 0 ? std::optional<double>(0) : std::nullopt;
   if (IsPinhole(model_id)) {
     if (!RowAtProjection(model_id, params, pixel, x_hat)) return std::nullopt;
-    // The linear error is the true one but for the rounding of the row, which
-    // is relative to what it is the difference of.
+    // The linear error is the true one except for the rounding of the row,
+    // which is proportional to the terms whose difference the row is.
     const Eigen::Vector2d centre = model_id == SimplePinhole::kId
                                        ? Eigen::Vector2d(params[1], params[2])
                                        : Eigen::Vector2d(params[2], params[3]);

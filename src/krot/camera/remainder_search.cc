@@ -21,7 +21,7 @@ struct Box {
 
 double Middle(const Interval& a) { return 0.5 * a.lo + 0.5 * a.hi; }
 
-// The numbers |x| for x in a; not a number if a is.
+// The set of |x| for x in a; NaN if a is.
 Interval Absolute(const Interval& a) {
   if (!(a.lo <= a.hi)) return {kNaN, kNaN};
   if (a.lo >= 0) return a;
@@ -29,7 +29,7 @@ Interval Absolute(const Interval& a) {
   return {0, std::max(-a.lo, a.hi)};
 }
 
-// What is not below -1 or above 1, of a that meets [-1, 1].
+// The part of a within [-1, 1]; a must meet that.
 Interval ClipToUnit(const Interval& a) {
   return {std::max(a.lo, -1.0), std::min(a.hi, 1.0)};
 }
@@ -46,7 +46,7 @@ Interval IntervalNorm(const Interval& x, const Interval& y, double p) {
   return {std::max(a.lo, b.lo), std::max(a.hi, b.hi)};
 }
 
-// What is known of f and m on a box, by the mean value theorem from its middle.
+// Enclosures of f and m on a box, by the mean value theorem from its middle.
 struct Enclosure {
   Interval f[2];
   Interval m[2];
@@ -79,10 +79,11 @@ bool IsOutside(const Enclosure& enclosure, double p) {
   return IntervalNorm(enclosure.f[0], enclosure.f[1], p).lo > 1;
 }
 
-// An upper bound of |m| where |f| <= 1, from m = f - r:
+// An upper bound on |m| where |f| <= 1, from m = f - r:
 //   p = 2:         |m|^2 = |f|^2 - r'(f + m) <= 1 - r'(2 f - r)
 //   p = 1, inf:    s'm = s'f - s'r <= 1 - s'r for all s with |s|_* = 1,
-// and s'f <= its own enclosure where that is less. NaN if nothing is known.
+// where s'f is bounded by its own enclosure if that is below 1. NaN if there is
+// no bound.
 double BoundLinearError(const Enclosure& enclosure, double p) {
   const Interval* r = enclosure.remainder;
   const double direct = IntervalNorm(enclosure.m[0], enclosure.m[1], p).hi;
@@ -116,8 +117,8 @@ double BoundLinearError(const Enclosure& enclosure, double p) {
   return direct < bound ? direct : bound;
 }
 
-// A box some of whose points may have |f| <= 1, and a bound of |m| there:
-// infinite as long as det f' > 0 is not proved.
+// A box in which some points may have |f| <= 1, and the bound that is searched
+// for them; infinite as long as det f' > 0 is not proved.
 struct Cell {
   Box box;
   double bound;
@@ -135,8 +136,8 @@ std::pair<Box, Box> Halves(const Box& box) {
   return halves;
 }
 
-// value(f, m) at a point with |f| near 1 in direction d, if one is found there:
-// what a search compares its bound with.
+// The value of `value` at a point where f is near d / |d|, or minus infinity if
+// none is found. A search ends when its bound is near the sampled value.
 template <typename Value>
 double Sample(const ErrorMap& map, double p, double d1, double d2,
               const Value& value) {
@@ -165,8 +166,9 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
          SegmentIsOutside(map, p, second, depth + 1);
 }
 
-// Branch and bound: an upper bound, of what `bound_on` bounds on a box, over
-// all points of the box |q|_inf <= reach with |f| <= 1.
+// Branch and bound: an upper bound over all points of the box |q|_inf <= reach
+// with |f| <= 1. `bound_on` returns an upper bound on a smaller box. Ends when
+// the bound is at most `target`.
 template <typename BoundOn>
 std::optional<double> Search(const ErrorMap& map, double p, double reach,
                              double target, const BoundOn& bound_on) {
@@ -192,7 +194,8 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
     add(first);
     add(second);
   }
-  // The pixel's own ray is never outside.
+  // The box with the pixel's own ray is never outside, so the heap should not
+  // become empty.
   if (heap.empty() || heap.front().bound == kInfinity) return std::nullopt;
   return heap.front().bound;
 }
@@ -241,7 +244,7 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
   const auto along = [&y](const Interval* v) {
     return v[0] * -y[0] + v[1] * -y[1];
   };
-  // Where a plane with normal -y touches the ball |f| <= 1.
+  // The point at which a line with normal -y touches the ball |f| <= 1.
   double d[2] = {-y[0], -y[1]};
   if (p == 1) d[std::abs(y[0]) < std::abs(y[1]) ? 0 : 1] = 0;
   if (std::isinf(p)) {
@@ -251,8 +254,8 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
       Sample(map, p, d[0], d[1], [&](const auto& at, double size) {
         return along(at.m).lo / std::max(size, 1.0);
       });
-  // -y'm = -y'f + y'r, of which the first is at most |f| <= 1, and the second
-  // small of second order around x_hat.
+  // -y'm = -y'f + y'r. The first term is at most |f| <= 1, and the second is of
+  // second order around x_hat.
   return Search(map, p, reach, std::max(sampled + kAlongSlack, sufficient),
                 [&](const Enclosure& enclosure) {
                   const double direct = along(enclosure.m).hi;

@@ -25,14 +25,14 @@ Interval EncloseDeterminant(const double* k, const Eigen::Vector2d& q,
 }
 
 // Whether det D' > 0 everywhere between the centre and q: whether q lies
-// before the first fold of the distortion. True is a proof (up to rounding);
-// false also where 2^-16 of the segment is still too long to tell, since
-// det D' comes within some 1e-4 of 0 or since the distortion is the small
-// difference of huge terms.
+// before the first fold of the distortion. If true, that is proved (up to
+// rounding). It is also false if parts of 2^-16 of the segment are too long for
+// a decision, because det D' comes within about 1e-4 of 0 or because the
+// distortion is the small difference of huge terms.
 //
-// A bound on D' - I over the whole disc decides for all but strong
-// distortions, in some ten operations. Otherwise the segment is bisected until
-// interval arithmetic shows each part positive: a few parts, 0.1 to 0.3
+// For all but strong distortions, a bound on D' - I over the whole disc decides
+// in about ten operations. Otherwise the segment is bisected until interval
+// arithmetic proves each part positive. That takes a few parts, at 0.1 to 0.3
 // microseconds each.
 template <typename Distortion>
 bool IsRegularSegment(const double* k, const Eigen::Vector2d& q) {
@@ -59,11 +59,11 @@ bool IsRegularSegment(const double* k, const Eigen::Vector2d& q) {
   return true;
 }
 
-// UndistortPixel (camera_model.h) for one model known at compile time; what
-// it promises is said there. The pixel is taken back to the lens plane, the
-// distortion is inverted there by Newton's method, and the lens in closed form.
+// UndistortPixel (camera_model.h) for a model known at compile time. The pixel
+// is mapped back to the lens plane, the distortion is inverted there by
+// Newton's method, and the lens in closed form.
 
-// d (x, y) / d (a, b) and the value, from a function of dual numbers.
+// The value (x, y) and d (x, y) / d (a, b), from a function of dual numbers.
 struct PlaneMap {
   Eigen::Vector2d value;
   Eigen::Matrix2d derivative;
@@ -90,8 +90,8 @@ std::optional<Eigen::Vector2d> InvertDistortion(const double* k,
                                                 bool stay_regular) {
   constexpr int kMaxIterations = 100;
   constexpr double kMinStepScale = 1e-6;
-  // Convergence is quadratic: a relative step below this leaves an error near
-  // the square of it.
+  // The last step is one below this, relative: as convergence is quadratic, the
+  // error that it leaves is about the square of that.
   constexpr double kLastStep = 1e-8;
 
   const auto distort = [k](const auto& a, const auto& b, auto* x, auto* y) {
@@ -122,10 +122,10 @@ std::optional<Eigen::Vector2d> InvertDistortion(const double* k,
   return q;
 }
 
-// Where the search for the lens plane's point of a pixel may start, and what it
-// must end at: calls `accept` with one candidate after the other, each a root
-// of the distortion, until it answers anything but kNotConverged. `start` is
-// tried first, if there is one and the model has a distortion.
+// Searches the point of the lens plane that belongs to a pixel, from several
+// starts: `start` first, if it is given and the model has a distortion. Calls
+// `accept` with each candidate, a root of the distortion before the first fold,
+// until that returns something other than kNotConverged.
 template <typename Model, typename Accept>
 UndistortStatus SearchLensPlane(const double* params,
                                 const Eigen::Vector2d& pixel,
@@ -166,7 +166,8 @@ UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
   using Lens = typename Model::Lens;
   const double* lens = Model::LensParams(params);
 
-  // From the lens plane's q to the ray; kNotConverged unless q is the answer.
+  // Sets *result from the lens plane's q; kNotConverged if its ray does not
+  // reproduce the pixel.
   const auto accept = [&](const Eigen::Vector2d& q) {
     if (!q.allFinite()) return UndistortStatus::kNotConverged;
     Eigen::Vector2d u;

@@ -12,12 +12,13 @@ namespace krot::internal {
 
 // The symmetric cones of one observation and their Jordan algebras
 // [Alizadeh, Goldfarb 2003]: for p = 2 the second-order cone ||v|| <= gamma w
-// in R^3; for p = 1 and infinity four half-planes.
+// in R^3; for p = 1 and infinity four half-lines, the positive orthant of R^4.
 //
 // Each offers, for vectors of kDim numbers: the identity, the product, the
-// solution y of x o y = r (Divide), the smallest eigenvalue, the square of that
-// of a pair (SmallestProduct), the vector with its eigenvalues limited to a
-// range (Clamp), and the longest step that stays in the cone.
+// solution y of x o y = r (Divide), the smallest eigenvalue, the square of the
+// smallest eigenvalue of a scaled pair (SmallestProduct), the vector with its
+// eigenvalues limited to a range (Clamp), and the longest step that stays in
+// the cone.
 
 struct SecondOrderCone {
   static constexpr int kDim = 3;
@@ -51,8 +52,8 @@ struct SecondOrderCone {
     return x[0] - x.tail<2>().norm();
   }
 
-  // Of lambda = W z = W^-1 s, W being the scaling of a pair in the cone
-  // (NtScaling), the smallest eigenvalue squared: the lesser root of
+  // The square of the smallest eigenvalue of lambda = W z = W^-1 s, where W is
+  // the scaling of the pair s, z (NtScaling): the smaller root of
   // t^2 - 2 s'z t + det(s) det(z).
   static double SmallestProduct(const Vector& s, const Vector& z) {
     const double half_sum = s.dot(z);
@@ -61,7 +62,7 @@ struct SecondOrderCone {
     return product / (half_sum + root);
   }
 
-  // With the eigenvectors of x; x itself if its eigenvalues are in the range.
+  // Keeps the eigenvectors of x; returns x if its eigenvalues are in the range.
   static Vector Clamp(const Vector& x, double low, double high) {
     const double norm = x.tail<2>().norm();
     if (x[0] - norm >= low && x[0] + norm <= high) return x;
@@ -82,9 +83,10 @@ struct SecondOrderCone {
     const double a = d[0] * d[0] - d.tail<2>().squaredNorm();
     const double b = x[0] * d[0] - x.tail<2>().dot(d.tail<2>());
     const double c = Determinant(x);
-    // b^2 >= a c, with equality towards the apex: there only rounding differs.
+    // b^2 >= a c but for rounding, with equality if d points at the apex.
     const double root = std::sqrt(std::max(0.0, b * b - a * c));
-    // The smallest positive root, without cancellation, is where x leaves.
+    // x leaves the cone at the smallest positive root; this form of the roots
+    // avoids cancellation.
     const double q = b > 0 ? -b - root : -b + root;
     for (const double alpha : {q / a, c / q}) {
       if (alpha > 0) limit = std::min(limit, alpha);
@@ -126,7 +128,8 @@ struct FourHalfLines {
   }
 };
 
-// T: (top; v) into the cone of kDim numbers, which it is in if ||v||_p <= top.
+// T maps (top; v) to kDim numbers that are in the cone exactly if
+// ||v||_p <= top.
 template <int kDim>
 Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
   Eigen::Matrix<double, kDim, 3> T;
@@ -140,7 +143,7 @@ Eigen::Matrix<double, kDim, 3> ConeMap(Norm norm) {
   return T;
 }
 
-// A z of the cone with T'z = (lambda; y), where ||y||_dual <= lambda.
+// A vector z of the cone with T'z = (lambda; y); requires ||y||_dual <= lambda.
 template <int kDim>
 Eigen::Matrix<double, kDim, 1> FromMultiplier(Norm norm, double lambda,
                                               const Eigen::Vector2d& y) {
@@ -162,8 +165,8 @@ Eigen::Matrix<double, kDim, 1> FromMultiplier(Norm norm, double lambda,
   return z;
 }
 
-// A cone and a half-line: of the pairs of an observation that may exceed its
-// bound by a slack.
+// The product of a cone and a half-line, for observations that may exceed their
+// bound by a slack: the last number is the slack's.
 template <typename Cone>
 struct WithHalfLine {
   static constexpr int kDim = Cone::kDim + 1;

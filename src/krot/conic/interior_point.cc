@@ -12,19 +12,21 @@
 namespace krot::internal {
 namespace {
 
-// Linear programme: mu at the start, beside ObjectiveLength; how much longer a
-// change that makes the multipliers stationary could be, and one that is small.
+// Linear programme: mu at the start, relative to ObjectiveLength.
 constexpr double kMuPerLength = 2;
+// Linear programme: the change that makes multipliers stationary is taken if
+// this many times the change stays in the cones. If even kSmallChange times
+// does, the system need not be factorised anew.
 constexpr double kStationaryRoom = 1.25;
 constexpr double kSmallChange = 1e3;
-// Known multipliers: a start begins with the centred ones by this share for
-// each margin that it has, and by the second at most.
+// With known multipliers, the share of the centred ones at the start is the
+// start margin times the first factor, but at most the second.
 constexpr double kCentredPerMargin = 100. / 3;
 constexpr double kLargestCentredShare = 0.3;
 
-// One run of the interior point. Slacks are recomputed at every trial: top = g
-// w is bilinear. Where it is linear, in the feasibility programme, slacks and
-// multipliers have step lengths of their own.
+// One run of the interior point. Slacks are recomputed at every trial, as top =
+// g w is bilinear. In the other programmes top is linear, and slacks and
+// multipliers have their own step lengths.
 template <typename Cone>
 class ConicSolver : public ConePath<NewtonSystem<Cone>> {
  public:
@@ -53,7 +55,7 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
     return summary_;
   }
 
-  // FollowPath's.
+  // What FollowPath calls.
   bool Factorize() {
     return std::exchange(is_factorized_, false) || system_.Factorize(now_);
   }
@@ -109,10 +111,10 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   using Base::system_;
   using Base::trial_;
 
-  // z = s^-1, perfectly centred: scaled so that the row of g holds, which is
-  // sum lambda w = 1 in the cost programme; likewise near known ones; or, in
-  // the linear programme, so that from the middle of the cones they are soon
-  // stationary.
+  // Starts with z = s^-1 times a factor, perfectly centred. With this factor
+  // the row of g holds, which is sum lambda w = 1 in the cost programme; in the
+  // linear programme the multipliers are soon stationary. Known multipliers, if
+  // given, are mixed in.
   void FindStartMultipliers() {
     system_.loop().ForEach([&](int64_t i) {
       now_.z[i] = Cone::Divide(system_.Slack(now_, i), Cone::Identity());
@@ -132,9 +134,10 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
       JoinKnownMultipliers(*options_.known_multipliers);
     }
   }
-  // All but a small share of the centred ones give way to the known ones: far
-  // from the path, but near to where it ends. The share goes with the margin
-  // that the start has, so that both are as far from there.
+  // Replaces the centred multipliers by the known ones, except for a small
+  // share. That is far from the central path, but near to its end. The share is
+  // proportional to the start margin, so that gamma and the multipliers are
+  // about equally far from the end.
   void JoinKnownMultipliers(const std::vector<Multiplier>& known) {
     const double share = std::min(kCentredPerMargin * options_.start_margin,
                                   kLargestCentredShare);
@@ -148,9 +151,9 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
     });
   }
 
-  // Factorises at the iterate. The linear programme's multipliers take the
-  // least change, in the scaling, that makes them stationary, if that stays
-  // well inside of the cones; the second change is for what rounding left.
+  // Factorises at the iterate of a linear programme, and makes the multipliers
+  // stationary by the least change in the scaling, if that stays well inside
+  // the cones. A second change removes what rounding left.
   bool FactorizeStationary() {
     if (!system_.Factorize(now_)) return false;
     for (int change = 0; change < 2; ++change) {
@@ -174,7 +177,8 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
         [&](int64_t i) { return -ResidualOf(viewed[i], options_.norm); });
   }
 
-  // The linear programme's is relative to the way from the start to the dual's.
+  // The gap relative to gamma or, in the linear programme, to the distance in
+  // h'x between the start and the bound that the multipliers prove.
   double RelativeGap() const {
     if (!program_.IsLinear()) return now_.gap / now_.scalar;
     return now_.gap / std::max(now_.gap, start_ - now_.scalar + now_.gap);
@@ -184,11 +188,11 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   const Context context_;
   const ConeProgram program_;
   bool is_factorized_ = false;  // system_, at now_
-  // Linear programme: the dual residual vanishes up to rounding. Until then
-  // steps only centre: where nothing is active it would be missed by as much
-  // as there is.
+  // Linear programme: whether the dual residual vanishes up to rounding. Until
+  // then steps only centre, which keeps the multipliers large enough to be
+  // changed.
   bool is_stationary_ = false;
-  const double start_;  // g there
+  const double start_;  // g at the start
   Estimate best_;
   double best_reached_ = 0;  // the lowest cost or, in a linear programme, h'x
   std::vector<Multiplier> multipliers_;
@@ -262,8 +266,9 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
   const ConeProgram program = {ConeProgram::Kind::kFeasibility, bound,
                                unit_depth};
   const Estimate origin = AllAtOrigin(problem);
-  // The least tau that leaves every cone at the origin, and a margin: the
-  // origin's depths and v vanish but for the baselines.
+  // The smallest tau with which everything at the origin is in all cones, to
+  // which a margin of 1 is added. Depths and v at the origin vanish unless
+  // there are baselines or fixed positions.
   double scalar = 1;
   for (const Observation& observation : problem.observations) {
     const ViewedPoint viewed = ViewPoint(problem, observation, origin);

@@ -18,7 +18,7 @@ struct Multiplier {
   Eigen::Vector2d y = Eigen::Vector2d::Zero();
 };
 
-// What an iteration has reached.
+// The state after an iteration.
 struct ConicIterate {
   int iteration = 0;
   double gamma = 0;  // every residual is below it, pixels; MinimizeLinear: h'x
@@ -33,9 +33,9 @@ struct ConicIterate {
 struct InteriorPointOptions {
   Norm norm;                  // p = 1, 2 or infinity
   double start_margin = 0.1;  // gamma starts at (1 + margin) cost; > 0
-  // MinimizeJointly: those of a similar problem's last iterate, per
-  // observation, zero where they are not known. The smaller the margin is, the
-  // nearer to them it starts. May alias the output.
+  // For MinimizeJointly: the multipliers of a similar problem's last iterate,
+  // one per observation, zero where unknown. The smaller start_margin is, the
+  // nearer to them the multipliers start. May alias the output.
   const std::vector<Multiplier>* known_multipliers = nullptr;
   double smallest_gap = 1e-9;  // stop there, relative; > 0
   int max_iterations = 200;    // >= 1
@@ -45,8 +45,8 @@ struct InteriorPointOptions {
 
 enum class InteriorPointTermination {
   kNotRun,
-  kConverged,  // what was asked for: a small gap, or all tolerances
-  kStopped,    // options.stop said so
+  kConverged,  // the gap is small enough, or all tolerances are met
+  kStopped,    // options.stop returned true
   kFeasible,   // FindFeasible: every residual is below the bound
   kMaxIterations,
   kNoProgress,  // steps have become too short, or gain next to nothing
@@ -68,7 +68,7 @@ struct InteriorPointSummary {
 //
 // in (x, gamma) at once (docs/method/joint_solver.md). The problem
 // must be connected and all depths of `*estimate` positive (throws
-// std::invalid_argument otherwise); it is left at the best iterate, never
+// std::invalid_argument otherwise). `*estimate` becomes the best iterate, never
 // worse than the start. `multipliers` are those of the last iterate.
 InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
                                      const InteriorPointOptions& options,
@@ -79,11 +79,11 @@ InteriorPointSummary MinimizeJointly(const KnownRotationProblem& problem,
 //
 //   min tau   subject to   ||v_i||_p <= bound (w_i - 1 + tau),
 //
-// from scratch: `*estimate` is only written, and only if one is found
-// (kFeasible). Otherwise the multipliers converge to a proof that there is
-// none. `stop` sees tau as gamma. With metric baselines, or fixed positions,
-// the depth of 1 is replaced by `unit_depth`, scene units, which must be small
-// against the scene.
+// starting from nothing: `*estimate` is not read, and is written only if an
+// estimate is found (kFeasible). Otherwise the multipliers converge to a proof
+// that there is none. ConicIterate::gamma is tau. In general the depth of 1 is
+// `unit_depth`, scene units; with metric baselines or fixed positions it must
+// be small against the scene.
 InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
                                   const InteriorPointOptions& options,
                                   const Context& context, double bound,
@@ -94,20 +94,21 @@ InteriorPointSummary FindFeasible(const KnownRotationProblem& problem,
 // frames' centres in the world, -R_rw' t_f.
 struct LinearObjective {
   BlockVector h;
-  std::optional<BlockVector> e;  // none: nothing of the kind is kept
+  std::optional<BlockVector> e;  // none: without this constraint
 };
 
-// How far estimates whose residuals are all at most `bound` > 0, pixels, reach
-// in one direction:
+// Finds how far estimates whose residuals are all at most `bound` > 0, pixels,
+// reach in one direction:
 //
 //   min h'x   subject to   ||v_i||_p <= bound w_i,   e'x as at the start,
 //
-// from `*estimate`, whose residuals must all be below the bound (throws
-// std::invalid_argument otherwise) and which becomes the one with the lowest
-// h'x that was met. The problem must be connected and something in it fixed.
-// Soon the dual residual is h but for rounding and a multiple of e, and then
-// the multipliers prove what krot/verify/extent_check.h says. The gap is
-// relative to how far it is from the start to the end that they prove.
+// starting from `*estimate`, whose residuals must all be below the bound
+// (throws std::invalid_argument otherwise). It becomes the iterate with the
+// lowest h'x. The problem must be connected and something in it must be fixed.
+// After the first iterations the multipliers satisfy stationarity up to
+// rounding (A'z = h plus a multiple of e); then they prove what
+// krot/verify/extent_check.h says. The gap is relative to the distance, in h'x,
+// from the start to the bound that they prove.
 InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
                                     const InteriorPointOptions& options,
                                     const Context& context, double bound,
@@ -115,25 +116,27 @@ InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
                                     Estimate* estimate,
                                     std::vector<Multiplier>* multipliers);
 
-// Slack relaxation: by how much observations must exceed a bound b, pixels, in
-// all [Olsson, Eriksson, Hartley 2010; Dalalyan, Keriven 2009]:
+// Slack relaxation: finds the smallest sum of the amounts by which observations
+// must exceed a bound b, pixels [Olsson, Eriksson, Hartley 2010; Dalalyan,
+// Keriven 2009]:
 //
 //   min sum_i c_i sigma_i   subject to   ||v_i||_p <= b w_i + sigma_i,
 //                                        sigma_i >= 0,  e'x = const.
 //
 // c_i is observation i's weight over its depth at the start, so that
-// c_i sigma_i is in pixels there, and e'x the size of the frames' centres along
-// those at the start, which keeps everything from shrinking where no baseline
-// sets the scale. (The mean depth, which holds from nothing, would go to a few
-// points far away.) The sum stands in for the number of the sigma_i > 0, which
-// is what one would like to know.
+// c_i sigma_i is in pixels there. e'x keeps everything from shrinking where no
+// baseline sets the scale: it is the projection of the frames' centres on those
+// at the start. (A start from nothing holds the mean depth instead; otherwise
+// that would let a few points far away take up the scale.) The sum is the
+// convex substitute for the number of the sigma_i > 0, which is what one would
+// like to minimise.
 //
-// The dual is about conflicts: multipliers lambda_i <= c_i that are stationary
+// The dual describes conflicts: multipliers lambda_i <= c_i that are stationary
 // (krot/verify/certificate_check.h) but for a multiple of e. An observation
-// without a multiplier is in none of them.
+// without a multiplier is in no conflict.
 struct SlackOptions {
   Norm norm;                    // p = 1, 2 or infinity
-  double smallest_mu = 1e-5;    // stop there; of b; > 0
+  double smallest_mu = 1e-5;    // stop there; relative to b; > 0
   int max_iterations = 100;     // >= 1
   std::vector<double> weights;  // > 0; empty: 1
 };
@@ -146,9 +149,9 @@ struct SlackSolution {
 };
 
 // The problem must be connected; depths of `*estimate` need not be positive. If
-// most are not, as those of zeros, it starts from nothing: from the origin,
-// with mean depth 1, and w_i less a small share of that in place of w_i, as
-// otherwise all but a few points would shrink into one. Same memory as
+// most are not, as if everything is at the origin, it starts from nothing: with
+// all at the origin, the mean depth held at 1, and w_i - 0.05 in place of w_i,
+// as otherwise all but a few points would shrink into one. Takes the memory of
 // MinimizeJointly, and about its work per iteration.
 SlackSolution MinimizeSlack(const KnownRotationProblem& problem, double bound,
                             const SlackOptions& options, const Context& context,

@@ -24,15 +24,15 @@ namespace krot::internal {
 //   feasibility:  top = b (w + u (g - 1))  g < 1 makes every residual < b
 //   linear:       top = b w              g = h'x
 //
-// with w the depth and u a unit of depth. The first is homogeneous in the
-// unknowns where no baseline sets a scale; the second needs no positive depth
-// to start.
+// with w the depth and u a unit of depth. The cost programme is homogeneous in
+// the unknowns where no baseline sets a scale. The feasibility programme can
+// start where depths are not positive.
 struct ConeProgram {
   enum class Kind { kCost, kFeasibility, kLinear };
   Kind kind = Kind::kCost;
-  double bound = 0;       // b, pixels; not of the cost programme
-  double unit_depth = 1;  // u, scene units; 0 of the linear programme
-  const LinearObjective* linear = nullptr;  // of the linear programme
+  double bound = 0;       // b, pixels; not used by the cost programme
+  double unit_depth = 1;  // u, scene units; 0 in the linear programme
+  const LinearObjective* linear = nullptr;  // h and e of the linear programme
 
   bool IsCost() const { return kind == Kind::kCost; }
   bool IsLinear() const { return kind == Kind::kLinear; }
@@ -51,28 +51,29 @@ struct ConeProgram {
 //
 //   1/2 sum_i | W_i^-1 ds_i - f_i |^2 + dg,   ds_i = (A dx + b dg)_i,
 //
-// a linear least squares problem, along the gauge e'dx = 0. The multipliers
-// follow: W dz = f - lambda - W^-1 ds. All that is kept per observation is
-// scaled by W, and so are A and b here. x stands for points and for the frames'
-// centres in the world. With H = A'A, g and the gauge are a border of two rows
-// and columns:
+// a linear least squares problem with the gauge e'dx = 0. The multipliers
+// follow from W dz = f - lambda - W^-1 ds. Everything stored per observation is
+// scaled by W, and so are A and b from here on. x stands for points and for the
+// frames' centres in the world. With H = A'A, g and the gauge are a border of
+// two rows and columns:
 //
 //   [ H     A'b    e    ] [ dx ]   [ A'f     ]
 //   [ b'A   b'b    0    ] [ dg ] = [ b'f - 1 ]
 //   [ e'    0    -1/mu  ] [ nu ]   [ -sigma  ]
 //
-// where baselines set the scale: depths are only kept from growing without
-// bound, less and less. Where the scale is free, 0 stands for -1/mu and for
-// sigma. In the feasibility programme there is no e. In the linear programme b
-// is 0, and the right-hand side of dx is A'f - h.
+// where baselines set the scale: then e'x has the weight mu only, which keeps
+// depths from growing without bound and vanishes in the end. Where the scale is
+// free, -1/mu and sigma are replaced by 0. In the feasibility programme there
+// is no e. In the linear programme b is 0, and the right-hand side of dx is
+// A'f - h.
 //
 // For the cost programme, top = g w is bilinear. Its second-order term is left
 // out, so that the system is that of a Dinkelbach step based at the iterate,
 // and convex.
 //
-// Factorize at an iterate; then Solve for one f after another, each of which
-// may be made of lambda() and the last target() and direction(). Restore puts
-// an earlier direction back, but not its target.
+// Usage: call Factorize at an iterate, then Solve for one f after the other; an
+// f may be computed from lambda() and from the last target() and direction().
+// Restore sets direction() to an earlier one, but not target().
 template <typename ConeType>
 class NewtonSystem {
  public:
@@ -109,7 +110,7 @@ class NewtonSystem {
     direction_.dz.resize(problem.observations.size());
   }
 
-  // Sets what x has every observation view.
+  // Sets state->viewed, the depth and v of every observation, from x.
   void ViewAll(State* state) const {
     state->viewed.resize(problem_.observations.size());
     loop_.ForEach([&](int64_t i) {
@@ -129,17 +130,17 @@ class NewtonSystem {
   Eigen::Vector3d ToMultiplier(const Vector& z) const {
     return T_.transpose() * z;
   }
-  // Stationarity of the cost programme holds for one g, and so primal and dual
-  // steps are of one length there.
+  // Stationarity of the cost programme depends on g, so primal and dual steps
+  // must have the same length there.
   bool HasOneStep() const { return program_.IsCost(); }
-  // Along the direction; leaves z alone.
+  // Moves x and g along the direction; z is not changed.
   void Move(const State& from, double step, State* to) const {
     MoveCentres(rig_from_world_, from.x, step, direction_.dx, &to->x);
     to->scalar = from.scalar + step * direction_.dscalar;
     ViewAll(to);
   }
 
-  // Whether the linearised top = g w may hold between two iterates.
+  // Whether two iterates are near enough for the linearisation of top = g w.
   bool IsPlausible(const State& from, const State& to, int64_t i) const {
     if (!program_.IsCost()) return true;
     const double depth = to.viewed[i].depth;
@@ -171,7 +172,7 @@ class NewtonSystem {
           static_cast<double>(loop_.count() * Cone::kDegree);
     if (!least_squares_.Factorize()) return false;
 
-    // What the border needs of the factorised part.
+    // Solutions for the right-hand sides that are columns of the border.
     if (program_.IsLinear()) {
       least_squares_.SolveRefined(&program_.linear->h, nullptr, &x_border_,
                                   rest_[0].data());
@@ -185,20 +186,19 @@ class NewtonSystem {
     return true;
   }
 
-  // The direction for the targets f = target(i), which may depend on the last
-  // f and direction, and for the centring sigma of the depths' growth where
-  // baselines set the scale.
+  // Finds the direction for the targets f = target(i), which may depend on the
+  // last f and direction. `sigma` is the centring of the gauge's row, used
+  // where baselines set the scale.
   template <typename Target>
   void Solve(const Target& target, double sigma) {
     loop_.ForEach([&](int64_t i) { target_[i] = target(i); });
     SolveForTarget(sigma);
   }
 
-  // Linear programme: the least change of z, in the scaling, after which the
-  // dual residual vanishes, A'z = h but for a multiple of e; as the direction's
-  // dz.
-  // dz = W^-2 A H^-1 (h - A'z + nu e), nu such that what is missing has no part
-  // in e: it is small then, and so is what the solution costs in digits.
+  // Linear programme: sets the direction's dz to the least change of z, in the
+  // scaling, after which A'z = h but for a multiple of e:
+  // dz = W^-2 A H^-1 (h - A'z + nu e). nu makes the vector in parentheses
+  // orthogonal to e: it is small then, and the solution loses few digits.
   void SolveForStationarity(const std::vector<Vector>& z) {
     BlockVector missing = program_.linear->h;
     missing.Add(-1, GradientOf(problem_, structure_, [&](int64_t i) {
@@ -214,9 +214,9 @@ class NewtonSystem {
   }
 
   const ObservationLoop& loop() const { return loop_; }
-  double mu() const { return mu_; }  // of each pair, on the central path
-  // Linear programme: how much h'x may change within the ellipsoid |A dx| <= 1
-  // along the gauge.
+  double mu() const { return mu_; }  // mean of s'z per degree of the cones
+  // Linear programme: the largest change of h'x within the ellipsoid
+  // |A dx| <= 1 with e'dx = 0.
   double ObjectiveLength() const {
     double squared = program_.linear->h.Dot(x_border_);
     if (program_.linear->e) {
@@ -229,7 +229,7 @@ class NewtonSystem {
   const std::vector<Vector>& lambda() const { return lambda_; }
   const std::vector<Vector>& target() const { return target_; }  // the last f
 
-  // Where the last Solve leads; ds and dz are scaled.
+  // The result of the last Solve; ds and dz are scaled by W.
   struct Direction {
     BlockVector dx;
     double dscalar = 0;
@@ -237,7 +237,7 @@ class NewtonSystem {
   };
   const Direction& direction() const { return direction_; }
   void Restore(Direction direction) { direction_ = std::move(direction); }
-  // The multipliers' direction without its scaling.
+  // The multipliers' direction, with the scaling removed.
   Vector UnscaledDz(int64_t i) const {
     return scaling_[i].ApplyInverse(direction_.dz[i]);
   }
@@ -247,15 +247,15 @@ class NewtonSystem {
   // Depths below this share of the median depth are small: they may grow by any
   // factor.
   static constexpr double kSmallDepth = 0.1;
-  // No other depth grows by more than this factor in a step: far beyond,
-  // neither the gauge nor the linearised top = g w holds.
+  // No other depth may grow by more than this factor in a step: the gauge and
+  // the linearisation of top = g w do not hold over longer ways.
   static constexpr double kMaxDepthGrowth = 3;
 
   // e = mean of c_i, in units of the median depth: e'dx is the change of the
-  // mean depth, so that e is the same throughout. With weights that follow the
-  // iterate, as of relative changes of the depths, no depth is held near the
-  // others: points would drift towards infinity, or a part of the scene into
-  // one place, and from there back no force leads.
+  // mean depth. Apart from that unit e is the same in all iterations. Weights
+  // that follow the iterate, as for relative changes of depths, would not hold
+  // depths near each other: points would drift to infinity, or a part of the
+  // scene would shrink to a point, and nothing would pull them back.
   void FindGauge(const std::vector<ViewedPoint>& viewed) {
     if (!program_.IsCost()) {
       gauge_.SetZero(problem_.num_points, problem_.num_frames);
@@ -273,13 +273,14 @@ class NewtonSystem {
     });
   }
 
-  // The direction for the targets f, and the multipliers'. The first row of the
-  // system is dx = Xf - Xb dg - Xe nu; put into the other two, it leaves
+  // Finds the direction of x, g and the multipliers for the targets f. The
+  // first row of the system is dx = Xf - Xb dg - Xe nu. Substituted into the
+  // other two, it leaves
   //
   //   [ (b - A Xb)'b   -b'A Xe         ] [ dg ]   [ b'(f - A Xf) - 1 ]
   //   [ -e'Xb          -e'Xe  (- 1/mu) ] [ nu ] = [ -e'Xf  (- sigma) ]
   //
-  // In the linear programme 1 takes the place of dg there, as Xb = H^-1 h.
+  // In the linear programme dg is set to 1 in this system, as Xb = H^-1 h.
   void SolveForTarget(double sigma) {
     least_squares_.SolveRefined(nullptr, target_[0].data(), &x_target_);
     Eigen::Matrix2d M;

@@ -11,18 +11,19 @@
 
 namespace krot::internal {
 
-// What the interior point methods share. Each follows a path of minima of
+// The common part of the interior point methods. Each follows the minima of
 // barrier problems as their weight mu falls: it factorises Newton's system at
 // an iterate, finds a direction and takes a step along it.
 
 // The main loop. `method` offers
 //
-//   Factorize()         Newton's system at the iterate; false: no factor
-//   IsThere()           whether the iterate is what was asked for
-//   FindDirection(step) after a step of that length
-//   TakeStep()          the length of the step that was taken; 0: none was
-//   Recover()           after that, whether another direction may be tried
-//   Report(n, step)     after iteration n, the reason to end here, if any
+//   Factorize()         factorises Newton's system at the iterate; false if
+//                       that fails
+//   IsThere()           whether the iterate has converged
+//   FindDirection(step) finds a direction; `step` is the last step's length
+//   TakeStep()          takes a step, returns its length; 0 if none is possible
+//   Recover()           called after a step of 0: whether to try once more
+//   Report(n, step)     called after iteration n: the reason to end, if any
 template <typename Method>
 InteriorPointTermination FollowPath(const Context& context, int max_iterations,
                                     Method* method, int* num_iterations) {
@@ -44,21 +45,21 @@ InteriorPointTermination FollowPath(const Context& context, int max_iterations,
   return Termination::kMaxIterations;
 }
 
-// Mehrotra's choice of sigma, the share of mu that a direction aims at: the
-// cube of the share of the gap that a predictor leaves [Mehrotra 1992], but not
-// below `least`.
+// Mehrotra's choice of sigma, which makes sigma mu the target of a direction:
+// the cube of the share of the gap that a predictor leaves [Mehrotra 1992],
+// within `least` and 1.
 inline double MehrotraSigma(double share_left, double least) {
   const double left = std::max(0.0, share_left);
   return std::min(1.0, std::max(least, left * left * left));
 }
 
-// After a step shorter than this the next one only centres.
+// After a step shorter than this, the next direction only centres.
 inline constexpr double kShortStep = 0.1;
 
-// What rounding may add to a barrier cost, relative.
+// Rounding may raise a barrier cost by this, relative.
 inline constexpr double kCostRounding = 1e-12;
-// Multipliers above this count as active where the weight of a squared error
-// is 1.
+// Multipliers above this count as active, in programmes where squared errors
+// have the weight 1.
 inline constexpr double kActiveMultiplier = 1e-3;
 
 // The first of the lengths `longest`, 0.7 of it, 0.7 of that, ... for which
@@ -75,19 +76,18 @@ double Backtrack(double longest, const TryStep& try_step) {
 // The primal-dual method for cone programmes, in a wide neighbourhood of the
 // central path:
 //
-//   FindDirection   one solve each for
-//                     a predictor, f = 0               } not after a short
-//                     step, a corrector [Mehrotra 1992]      } which only
-//                     centres then up to System::kNumCorrectors centrality
-//                     correctors [Gondzio 1996]
-//   TakeStep        the longest, then shorter ones until one is in the
-//                   neighbourhood: trial_ becomes now_
+//   FindDirection   a predictor, f = 0, and a corrector [Mehrotra 1992]; or,
+//                   after a short step, centring only. Then up to
+//                   System::kNumCorrectors centrality correctors [Gondzio
+//                   1996]. Each takes one solve.
+//   TakeStep        tries the longest step, then shorter ones, until one is in
+//                   the neighbourhood: trial_ becomes now_
 //
 // `System` is the Newton system of a programme. It offers the Cone of its pairs
 // s_i, z_i; a State with x, viewed, z and gap; Slack(state, i), which is s_i;
-// Move and IsPlausible for trials; whether primal and dual steps are of one
-// length; and Solve for targets f, which leads to a direction with ds and dz
-// scaled so that W z = W^-1 s = lambda().
+// Move and IsPlausible for trials; HasOneStep, whether primal and dual steps
+// must have the same length; and Solve for targets f, which finds a direction
+// with ds and dz scaled so that W z = W^-1 s = lambda().
 template <typename System>
 class ConePath {
  public:
@@ -95,9 +95,9 @@ class ConePath {
   using State = typename System::State;
   using Vector = typename Cone::Vector;
 
-  // Sigma after a short step. Scaling or leaving out the corrector instead took
-  // more iterations (docs/history/journal.md, "The interior point, variants
-  // without effect").
+  // Sigma after a short step. Scaling or leaving out the corrector instead
+  // takes more iterations (docs/history/journal.md, "The interior point,
+  // variants without effect").
   static constexpr double kCentring = 0.8;
 
   template <typename... Arguments>
@@ -123,22 +123,22 @@ class ConePath {
   }
 
  protected:
-  // Along ds, and so x, and along dz.
+  // Primal: of ds, and so of x. Dual: of dz.
   struct StepLengths {
     double primal = 0;
     double dual = 0;
     double Least() const { return std::min(primal, dual); }
   };
 
-  // Every pair keeps its smallest eigenvalue above this share of their mean. A
-  // larger share shortens steps, a smaller one lets the next ones become short.
+  // The square of the smallest eigenvalue of every scaled pair stays above this
+  // share of mu. A larger share shortens steps; a smaller one makes the steps
+  // after it short.
   static constexpr double kNeighbourhood = 1e-3;
   static constexpr double kLeastSigma = 1e-6;
-  // A step goes so far of the way to the boundary.
+  // Fraction to the boundary of a step.
   static constexpr double kDamping = 0.98;
 
-  // Only centres, with this sigma, or aims at the end.
-  // Of lambda o f = sigma mu e.
+  // Finds a direction that only centres, for lambda o f = sigma mu e.
   void Centre(double sigma) {
     system_.Solve(
         [&](int64_t i) -> Vector {
@@ -149,7 +149,8 @@ class ConePath {
     ImproveCentrality(sigma);
   }
 
-  // Of lambda o f = 0, then of lambda o f = sigma mu e - ds o dz of that.
+  // Solves for the predictor, f = 0, then for the corrector with
+  // lambda o f = sigma mu e - ds o dz, where ds and dz are the predictor's.
   void PredictAndCorrect() {
     system_.Solve([](int64_t) -> Vector { return Vector::Zero(); }, 0);
     const double sigma = PredictedSigma();
@@ -172,7 +173,7 @@ class ConePath {
   State now_, trial_;
 
  private:
-  // `damping` times the steps to the boundary, at most 1.
+  // `damping` times the step lengths to the boundary, at most 1.
   StepLengths MaxSteps(double damping) const {
     const auto max_step = [&](const std::vector<Vector>& direction) {
       return damping * system_.loop().Min([&](int64_t i) {
@@ -196,12 +197,12 @@ class ConePath {
     return MehrotraSigma(MuOf(gap) / system_.mu(), kLeastSigma);
   }
 
-  // Centrality correctors, each a solve without a factor. One aims at a step
-  // that is longer by kLonger: it adds to lambda o f what the products of the
-  // pairs lack there of being within a factor kRange of mu. It is taken back if
-  // the step becomes shorter, and one that does not gain kWorthwhile is the
-  // last [Colombo, Gondzio 2008]. Two took a fifth of the joint iterations away
-  // (docs/history/journal.md).
+  // Centrality correctors; each is one solve with the same factor. A corrector
+  // aims at a step that is longer by kLonger: it corrects lambda o f so that
+  // there the products of the pairs are within a factor kRange of mu. It is
+  // undone if the step becomes shorter, and the last one if the step grows by
+  // less than kWorthwhile [Colombo, Gondzio 2008]. Two of them save a fifth of
+  // the joint iterations (docs/history/journal.md).
   void ImproveCentrality(double sigma) {
     if constexpr (System::kNumCorrectors > 0) {
       constexpr double kLonger = 0.3;

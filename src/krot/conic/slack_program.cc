@@ -13,18 +13,18 @@
 namespace krot::internal {
 namespace {
 
-// Smaller depths than this share of the median count as much in the costs.
+// For the costs c_i, depths are at least this share of the median depth.
 constexpr double kSmallestDepthInCosts = 0.1;
-// From nothing: what depths are less by, as a share of the mean depth.
+// From nothing, this is subtracted from all depths, relative to the mean depth.
 constexpr double kMinDepthFromNothing = 0.05;
-// Where mu starts, as a share of the bound. From an estimate it is lower: its
-// multipliers are soon stationary.
+// The first mu, relative to the bound. It is lower for a start from an
+// estimate, where the multipliers are soon stationary.
 constexpr double kStartMuFromNothing = 0.5;
 constexpr double kStartMu = 0.15;
 constexpr int kNewtonSteps = 8;
 
-// The depths at the start, those that are not positive or small raised; empty
-// if most are not positive.
+// The depths at the start, raised to at least a share of their median; empty if
+// most are not positive.
 std::vector<double> DepthsForCosts(const KnownRotationProblem& problem,
                                    const Estimate& start) {
   std::vector<double> depths;
@@ -52,7 +52,7 @@ std::vector<double> CostsFor(const SlackOptions& options,
 template <typename BoundCone>
 class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
  public:
-  // `depths` are those at the start, 1 where it starts from nothing.
+  // `depths` are those at the start, or 1 for a start from nothing.
   SlackSolver(const KnownRotationProblem& problem, double bound,
               const SlackOptions& options, const Context& context,
               const Estimate& start, const std::vector<double>& depths,
@@ -83,7 +83,7 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
     return solution;
   }
 
-  // FollowPath's.
+  // What FollowPath calls.
   bool Factorize() {
     return system_.Factorize(now_, size_ - system_.Size(now_.x));
   }
@@ -103,11 +103,13 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
   using Base::system_;
   using Base::trial_;
 
-  // Where the multipliers of both pairs, centred, add up to the cost,
+  // The sigma at which the centred multipliers of both pairs add up to the
+  // cost,
   //
-  //   mu (q's^-1 + 1 / sigma) = c_i,
+  //   mu (q's^-1 + 1 / sigma) = c_i.
   //
-  // whose left side is convex and falls: Newton's method, from below.
+  // The left side is convex and falls with sigma, so Newton's method converges
+  // from below.
   double CentredSigma(const ViewedPoint& viewed, double cost, double mu) const {
     const double least =
         std::max(0.0, NormOf(viewed.v, options_.norm) -
@@ -126,7 +128,7 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
     return sigma;
   }
 
-  // Centred, z = mu s^-1 and zeta = mu / sigma, whatever the weights.
+  // Sets a perfectly centred start, z = mu s^-1 and zeta = mu / sigma.
   void Start(const Estimate& start, double mu) {
     now_.x = start;
     now_.sigma.resize(costs_.size());
@@ -145,7 +147,7 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
   const double min_depth_;
   const std::vector<double>& depths_;
   const std::vector<double> costs_;
-  double size_ = 1;  // e'x
+  double size_ = 1;  // the value at which e'x is held
 };
 
 }  // namespace

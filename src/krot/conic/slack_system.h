@@ -22,13 +22,13 @@ namespace krot::internal {
 //   ds_i = A_i dx + q dsigma_i,   d_i^2 = zeta_i / sigma_i,   q = T e_1,
 //
 // along the gauge. With b = W^-1 q and beta = b'b + d^2, an observation's own
-// unknown is dsigma = (b'(f - W^-1 A dx) + d g - c) / beta; without it, what is
-// left of the rows W^-1 A is S W^-1 A with
+// unknown is dsigma = (b'(f - W^-1 A dx) + d g - c) / beta. Eliminating it
+// turns the rows W^-1 A into S W^-1 A with
 //
 //   S S = I - b b' / beta,   S = I - kappa b b',
 //
-// rows of CentredLeastSquares; an observation whose sigma is large hardly
-// counts along b.
+// which are the rows of CentredLeastSquares. If sigma is large, an observation
+// has hardly any weight along b.
 template <typename BoundCone>
 class SlackSystem {
  public:
@@ -46,15 +46,16 @@ class SlackSystem {
     double gap = 0;         // sum s'z
   };
 
-  // Where a direction leads; ds and dz are scaled by W and d.
+  // The result of Solve; ds and dz are scaled by W and d.
   struct Direction {
     BlockVector dx;
     std::vector<double> dsigma;
     std::vector<Vector> ds, dz;
   };
 
-  // `costs` are the c_i, and `depths` those that are 1 in the gauge; or that is
-  // about the centres of `start`, if there is one.
+  // `costs` are the c_i. Where the scale is free and `start` is given, the
+  // gauge is the size of the frames' centres along those of `start`; otherwise,
+  // or if these coincide, e'x is the mean of w_i / depths_i.
   SlackSystem(const KnownRotationProblem& problem, Norm norm, double bound,
               std::vector<double> costs, const std::vector<double>& depths,
               double min_depth, const Estimate* start, int num_threads)
@@ -76,19 +77,19 @@ class SlackSystem {
     direction_.dz.resize(problem.observations.size());
     direction_.dsigma.resize(problem.observations.size());
     if (start != nullptr && has_free_scale_) gauge_ = CentresGauge(*start);
-    if (gauge_.frames.empty()) {  // e'x is the mean of w_i / depths_i
+    if (gauge_.frames.empty()) {
       gauge_ = GradientOf(problem, structure_, [&](int64_t i) -> Vector3d {
         return {1 / (static_cast<double>(loop_.count()) * depths[i]), 0, 0};
       });
     }
   }
 
-  // e'x, but for what the frame that stays put adds.
+  // e'x, without the contribution of the frame that is held fixed.
   double Size(const Estimate& x) const {
     return gauge_.Dot({x.points, CentresOf(rig_from_world_, x.translations)});
   }
 
-  // Sets viewed from x.
+  // Sets state->viewed, the depth and v of every observation, from x.
   void ViewAll(State* state) const {
     state->viewed.resize(problem_.observations.size());
     loop_.ForEach([&](int64_t i) {
@@ -107,7 +108,7 @@ class SlackSystem {
     return Cone::Join(BoundSlack(state.viewed[i], state.sigma[i]),
                       state.sigma[i]);
   }
-  // q'z.
+  // q'z, the multiplier of the slack.
   double Multiplier(const typename BoundCone::Vector& z) const {
     return T_.col(0).dot(z);
   }
@@ -122,8 +123,8 @@ class SlackSystem {
 
   bool IsPlausible(const State&, const State&, int64_t) const { return true; }
 
-  // `shortfall`: what e'x is to grow by, where the scale is free. False if
-  // there is no factor.
+  // Factorises at an iterate; false if that fails. Where the scale is free, e'x
+  // is to grow by `shortfall`.
   bool Factorize(const State& at, double shortfall) {
     using Rows = Eigen::Matrix<double, kDim, 3, Eigen::RowMajor>;
     loop_.ForEach([&](int64_t i) {
@@ -156,8 +157,9 @@ class SlackSystem {
     return true;
   }
 
-  // `target(i)`, (f; g), may depend on the last direction; `sigma` is the
-  // centring.
+  // Finds the direction for the targets (f; g) = target(i), which may depend on
+  // the last direction; `sigma` is the centring of the gauge's row, used where
+  // baselines set the scale.
   template <typename MakeTarget>
   void Solve(const MakeTarget& target, double sigma) {
     loop_.ForEach([&](int64_t i) { target_[i] = target(i); });
@@ -168,7 +170,7 @@ class SlackSystem {
   double mu() const { return mu_; }  // of each pair
   const std::vector<Vector>& lambda() const { return lambda_; }
   const Direction& direction() const { return direction_; }
-  // Without its scaling.
+  // The multipliers' direction, with the scaling removed.
   Vector UnscaledDz(int64_t i) const {
     const Scaled& own = scaled_[i];
     const Vector& dz = direction_.dz[i];
@@ -188,8 +190,8 @@ class SlackSystem {
     double kappa = 0;
   };
 
-  // e'x = sum_f C_f'(C_f^0 - mean C^0) over the same of the start. Empty if all
-  // its centres are in one place.
+  // The e with e'x = sum_f C_f'(C_f^0 - mean C^0), divided by the same sum for
+  // the start. Empty if all centres of the start are in one place.
   BlockVector CentresGauge(const Estimate& start) const {
     const std::vector<Vector3d> centres =
         CentresOf(rig_from_world_, start.translations);
@@ -221,7 +223,7 @@ class SlackSystem {
   }
 
   void SolveForTarget(double sigma) {
-    // - (W^-1 A)'b (d g - c) / beta: c itself, along b, where d vanishes.
+    // The right-hand side is -(W^-1 A)'b (d g - c) / beta.
     const BlockVector gradient =
         GradientOf(problem_, structure_, [&](int64_t i) -> Vector3d {
           const Scaled& own = scaled_[i];

@@ -16,13 +16,14 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A runaway moves by more than so many times the median move: where much is
-// moved a lot, as from a rough start, nobody runs away.
+// A runaway moves by more than this times the median move. If many cameras move
+// a lot, as from a rough start, there are no runaways.
 constexpr double kTypicalMoves = 10;
-// The common move is found from those that share it, which it decides on.
+// The common move depends on which cameras keep their place, and the other way
+// round, so they are found in turn, this often at most.
 constexpr int kMaxRounds = 3;
 
-// after -> before.
+// Maps centres `after` to `before`.
 struct CommonMove {
   double scale = 1;
   Vector3d shift = Vector3d::Zero();
@@ -43,7 +44,8 @@ CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
   return move;
 }
 
-// With the centroids and, if it is free, the RMS distances from them.
+// The move between the centroids of the cameras that count; if the scale is
+// free, it also makes the RMS distances from them equal.
 CommonMove MoveOf(const std::vector<CameraMove>& cameras,
                   const std::vector<char>& counts, bool scale_is_free) {
   double count = 0;
@@ -72,7 +74,7 @@ CommonMove MoveOf(const std::vector<CameraMove>& cameras,
   return move;
 }
 
-// The RMS distance, before, of those that count from their centroid.
+// The RMS distance of the cameras that count from their centroid, before.
 double Radius(const std::vector<CameraMove>& cameras,
               const std::vector<char>& counts) {
   double count = 0;
@@ -155,11 +157,11 @@ using Eigen::Quaterniond;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The nearest rotation is unique if the two least singular values, the last
-// one signed, do not cancel; relative to the largest.
+// The nearest rotation is unique if the sum of the two smallest singular
+// values, with the sign of the last one, exceeds this times the largest.
 constexpr double kNotUnique = 1e-9;
-// A normalised quaternion's squared norm is 1 up to this: four squares and a
-// division, half a unit in the last place each.
+// The squared norm of a normalised quaternion is 1 up to this: the rounding of
+// four squares and a division, half a unit in the last place each.
 constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 
 }  // namespace

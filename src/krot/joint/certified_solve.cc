@@ -12,47 +12,49 @@
 namespace krot::internal {
 namespace {
 
-// Whether a proof is worth while is asked when the interior point's own gap is
-// this small, and again whenever it has fallen by the factor below.
+// `take` is called when the interior point's own gap is this small, and again
+// whenever it has fallen by the factor below.
 constexpr double kFirstGapToAsk = 0.1;
 constexpr double kGapBetweenQuestions = 0.1;
 // A certificate is tried once the interior point's own gap is as small as the
 // one asked for, and again whenever it has fallen by this factor.
 constexpr double kGapBetweenCertificates = 0.3;
-// Of the gap asked for, where the interior point has gone far enough: what is
-// not proved there is none of its optimum's.
+// The interior point ends at this share of the gap asked for. Below this gap, a
+// missing proof is not the interior point's fault.
 constexpr double kFarBelow = 1e-2;
 // Iterations after which a start is given up if the gap is still large. Most
 // models take 10 to 50 in all; a start whose points hug the boundary of the
 // cones can hold the interior point back for hundreds.
 constexpr int kIterationsPerStart = 60;
 constexpr double kLargeGap = 0.1;
-// So many iterations must halve the gap, or the start is given up.
+// If the gap does not halve within this many iterations, the start is given up.
 constexpr int kPatience = 30;
 constexpr int kWarmPatience = 15;
-// A fresh start is found by bisection, to this width, relative to the cost; if
-// that was in vain, to a share of it.
+// A fresh start is found by bisection to this width, relative to the cost; the
+// next bisection goes to a share of that width.
 constexpr double kFirstWidth = 1e-2;
 constexpr double kShareOfWidth = 0.25;
+// Start margins: how far above the cost gamma starts, relative. A warm start's
+// is proportional to its distance from the known optimum, within limits.
 constexpr double kStartMargin = 0.1;
 constexpr double kWarmMarginOfDistance = 0.06;
 constexpr double kLargestWarmMargin = 3e-3;
 constexpr double kLeastWarmMargin = 1e-3;
-// Where the known optimum is another problem's: that of another component, or
-// of positions' rows at another level.
+// A known optimum farther from the cost than this, relative, is that of another
+// problem: of another component, or of positions' rows at another level.
 constexpr double kFarFromKnown = 0.5;
 constexpr double kFarMargin = 0.03;
-// Of an estimate that is found near the cost, and of the start from it.
+// Start margin of a fresh start. Also how far above the cost an estimate may be
+// that is to replace one with points in cameras.
 constexpr double kFreshStartMargin = 1e-3;
-// Smaller depths, of the median, are those of points in a camera.
+// Depths below this, relative to the median, mean that a point is in a camera.
 constexpr double kDepthInCamera = 1e-6;
-// In the unit of depth, of the median.
+// FeasibleStartOptions::unit_depth, relative to the median depth.
 constexpr double kUnitDepth = 0.1;
 constexpr double kHopelessGap = 1e-5;
-// Whether there is anything below the cost is asked at this share of the gap
-// that is to be shown.
+// A fresh start is sought this share of the gap asked for below the cost.
 constexpr double kShareOfGapBelow = 0.5;
-// What is lost of a bound when it is proved, at most, relative.
+// The proof of a bound lowers it by at most this, relative.
 constexpr double kProofLoss = 1e-3;
 
 CertificateOptions Sufficient(double bound) {
@@ -89,7 +91,8 @@ CertifiedSolve::CertifiedSolve(const KnownRotationProblem& problem,
       are_multipliers_known_(!multipliers_.empty()),
       known_optimum_(known_optimum) {}
 
-// The more, the farther the start seems to be from its optimum.
+// The start margin of a warm start: the farther the start seems to be from its
+// optimum, the more.
 double CertifiedSolve::WarmMargin() const {
   const double distance = std::abs(1 - known_optimum_ / cost_);
   if (distance > kFarFromKnown) return kFarMargin;
@@ -171,11 +174,11 @@ FeasibleStartOptions CertifiedSolve::OptionsForStart(
   return options;
 }
 
-// Where a point lies in a camera, coordinates do not resolve its depth and its
-// multipliers are as large as the depth is small: the interior point would
-// settle far from balance. An estimate from the middle of the cones, where
-// points and cameras have come apart, takes its place, be it a little worse.
-// Whether there is one.
+// Where a point is in a camera, coordinates do not resolve its depth, and its
+// multipliers become huge: the interior point would stall far from
+// stationarity. So the start is replaced by one that is found from nothing and
+// has points and cameras apart, even if it is slightly worse. Returns whether
+// the start was replaced.
 bool CertifiedSolve::LeaveCameras(const IterationReport& report,
                                   Estimate* start) {
   if (!HasPointsInCameras(problem_, *start)) return false;
@@ -185,8 +188,9 @@ bool CertifiedSolve::LeaveCameras(const IterationReport& report,
                            &multipliers) == InteriorPointTermination::kFeasible;
 }
 
-// Either an estimate below `bound`, pixels, far from the boundary of the cones,
-// which becomes the best; or a proof, if all goes well, that there is none.
+// Looks for an estimate below `bound`, pixels, far from the boundary of the
+// cones. If one is found, it becomes the best one. Otherwise tries to prove
+// that there is none.
 bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
   const FeasibleStartOptions options = OptionsForStart(report);
   std::vector<Multiplier> multipliers;
@@ -204,7 +208,8 @@ bool CertifiedSolve::TryBelow(double bound, const IterationReport& report) {
   return false;
 }
 
-// Brings cost and what is known to be infeasible together. Whether there is a
+// Bisects between the cost and the largest bound at which no estimate was
+// found, until they are within `width`, relative. Returns whether there is a
 // new estimate.
 bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
   bool is_fresh = false;
@@ -221,10 +226,9 @@ bool CertifiedSolve::Bisect(double width, const IterationReport& report) {
   return is_fresh;
 }
 
-// Whether there is a new estimate. One just below the cost is sought first, or
-// the proof that there is none: cost and what is known to be infeasible are
-// only brought together where neither is found, or where the last such estimate
-// led hardly lower.
+// Returns whether there is a new estimate. First tries to find one just below
+// the cost, or to prove that there is none. Bisects if neither succeeds, or if
+// the last estimate found in this way did not lead to a clearly lower cost.
 bool CertifiedSolve::FindFreshStart(const IterationReport& report) {
   const bool has_led_lower = cost_ < (1 - width_) * fresh_cost_;
   if (has_led_lower &&
@@ -262,7 +266,7 @@ JointTermination CertifiedSolve::Run(int max_iterations,
       return JointTermination::kMaxIterations;
     }
     if (std::exchange(are_multipliers_known_, false) && gap_ > kLargeGap) {
-      start_margin = kStartMargin;  // again, as if nothing were known
+      start_margin = kStartMargin;  // once more, without a warm start
       continue;
     }
     start_margin = kFreshStartMargin;

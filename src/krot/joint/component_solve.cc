@@ -13,23 +13,24 @@
 namespace krot::internal {
 namespace {
 
-// A working set takes in the points that do not fit in below this share of its
-// optimum, the worst first, and grows by this factor at most.
+// A working set takes in the points with residuals above this share of its
+// cost, the worst first, and its points grow by at most this factor.
 constexpr double kShareOfLevel = 0.9;
 constexpr double kMaxGrowth = 3;
-// Of the gap asked for, the share that a working set's own proof may leave; the
-// rest is what other points may exceed its cost by.
+// The share of the gap asked for that a working set's own proof may leave. The
+// rest is how far other points may exceed the set's cost.
 constexpr double kShareOfGapForProof = 0.5;
-// After so many rounds it takes in everything.
+// After this many working sets, everything is taken in.
 constexpr int kMaxRounds = 12;
-// A component of fewer points for each frame is solved as it is: ties alone
-// take in most of it.
+// A component with fewer points per frame is solved as a whole: ties alone
+// would take in most of it.
 constexpr int kFewPointsPerFrame = 10;
-// Of the median depth.
+// Baselines below this, relative to the median depth, hardly set the scale.
 constexpr double kSizeThatSetsScale = 1e-3;
 
-// A scale that only tiny baselines set is the last that multipliers come to
-// balance in: far from the path they may not.
+// Whether known multipliers may be used as a start. Where only tiny baselines
+// set the scale, stationarity in the scale is reached last, and from a start
+// off the central path perhaps never.
 bool CanStartWarm(const KnownRotationProblem& problem,
                   const Estimate& estimate) {
   if (IsScaleFree(problem)) return true;
@@ -40,7 +41,8 @@ bool CanStartWarm(const KnownRotationProblem& problem,
   return size >= kSizeThatSetsScale * MedianDepth(problem, estimate);
 }
 
-// The first rank's certificate of a gathered part, on every rank.
+// Broadcasts the first rank's certificate of a gathered part to every rank,
+// with observation indices of the whole.
 std::optional<Certificate> InWhole(const GatheredPart& part,
                                    std::optional<Certificate> certificate,
                                    Ranks* ranks) {
@@ -82,8 +84,8 @@ std::vector<int64_t> ComponentSolve::Place::InWhole(
   return names;
 }
 
-// A working set whose solution leaves other points above it is not worth a
-// proof, but more points.
+// Solves one connected part of the working set. If other points exceed its
+// cost, the solve ends without a proof: the set needs more points first.
 JointTermination ComponentSolve::SolvePart(const Place& place,
                                            const ProblemSubset& part,
                                            const IterationReport& report) {
@@ -97,7 +99,7 @@ JointTermination ComponentSolve::SolvePart(const Place& place,
                            ? known_.Of(names)
                            : std::vector<Multiplier>(),
                        known_.optimum());
-  // What is below another part's bound already is good enough.
+  // A part whose cost is below the bound of another one is good enough.
   if (solve.cost() <= lower_bound_) return JointTermination::kGapReached;
   if (iterations_ >= options_.max_iterations) {
     return JointTermination::kMaxIterations;
@@ -157,8 +159,8 @@ JointTermination ComponentSolve::SolveWorkingSet(const IterationReport& report,
                     std::move(observations), report);
 }
 
-// The first rank solves the set; whenever it asks whether the others' points
-// fit in, all find out.
+// SolveWorkingSet where ranks share the points. The first rank solves the set;
+// whenever it calls fit_others, all ranks take part in FitOthers.
 JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
                                                Estimate* candidate) {
   Ranks& ranks = *context_.ranks;
@@ -200,8 +202,8 @@ JointTermination ComponentSolve::SolveGathered(const IterationReport& report,
   return termination;
 }
 
-// Whether the working set's solution extends to all points, none exceeding its
-// cost by more than the gap leaves room for.
+// Whether the working set's solution can be extended to all points such that
+// none exceeds the set's cost by more than the gap allows.
 bool ComponentSolve::FitOthers(Estimate* candidate) {
   level_ = set_.Cost(*candidate, options_.norm);
   const double highest =
@@ -219,7 +221,8 @@ void ComponentSolve::Keep(const Estimate& candidate) {
   estimate_ = candidate;
 }
 
-// A working set is a step of its own.
+// Solves the working set, or reads its result from the checkpoint: it is a step
+// of its own.
 JointTermination ComponentSolve::SolveOrTake(const IterationReport& report,
                                              Estimate* candidate) {
   JointTermination termination = JointTermination::kNotRun;

@@ -17,37 +17,38 @@
 
 namespace krot::internal {
 
-// Told of every iteration, of which only gap and target are filled in.
+// Called after every iteration, with only `gap` or `target` filled in.
 using IterationReport = std::function<void(const JointIteration&)>;
 
-// Whether some depth is so small beside the median that coordinates do not
-// resolve it. O(observations).
+// Whether a point is in a camera: its depth there is so small, compared with
+// the median depth, that the digits of coordinates do not resolve it.
+// O(observations).
 bool HasPointsInCameras(const KnownRotationProblem& problem,
                         const Estimate& estimate);
 
-// The interior point on a connected problem, from an estimate to the certified
-// gap: it tries certificates on the way and leaves starts that hold it back.
-// Internal to SolveJoint.
+// Solves a connected problem by the interior point, from an estimate to the
+// certified gap. Tries certificates on the way, and begins again from another
+// start where the interior point gets stuck. Internal to SolveJoint.
 class CertifiedSolve {
  public:
-  // Takes an estimate on the way; whether it is worth while to go on from there
+  // Called with estimates on the way; returns whether it is worth going on
   // towards a proof.
   using TakeEstimate = std::function<bool(const Estimate&)>;
 
-  // Keeps a reference to `problem`. All depths of `start` are positive. A cost
-  // that is as low as `known_bound`, pixels, allows is low enough. Known
-  // multipliers are a similar problem's, zero where unknown, or empty; its
-  // optimum was about `known_optimum`, pixels.
+  // Keeps a reference to `problem`. All depths of `start` must be positive.
+  // `known_bound`, pixels, is a bound that is proved already: a cost within the
+  // gap of it is low enough. `known_multipliers` are those of a similar problem
+  // whose optimum was about `known_optimum`, pixels; zero where unknown, or
+  // empty.
   CertifiedSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Context& context,
                  const Estimate& start, double known_bound,
                  std::vector<Multiplier> known_multipliers,
                  double known_optimum);
 
-  // Takes at most `max_iterations`, except for those towards a fresh start,
-  // which it ends once begun. Hands an estimate to `take` now and then, and
-  // before every certificate that it tries, and ends as kStalled if it is not
-  // worth while to go on.
+  // Takes at most `max_iterations`, but does not interrupt a search for a fresh
+  // start. Calls `take` now and then, and before every certificate that it
+  // tries; ends as kStalled if that returns false.
   JointTermination Run(int max_iterations, const TakeEstimate& take,
                        const IterationReport& report);
 
@@ -57,11 +58,11 @@ class CertifiedSolve {
   // What the certificate proves, pixels; without one, the known bound.
   double lower_bound() const { return lower_bound_; }
   const std::optional<Certificate>& certificate() const { return certificate_; }
-  // Of the interior point's last run; empty if there was none.
+  // Of the interior point's last run, or the known ones if there was none.
   const std::vector<Multiplier>& multipliers() const { return multipliers_; }
-  // Where that would have come to, pixels; no bound.
+  // An estimate of the optimum from the last run's gap, pixels; no bound.
   double likely_optimum() const { return (1 - gap_) * cost_; }
-  // Those towards a fresh start included.
+  // Includes the iterations of searches for a fresh start.
   int iterations() const { return iterations_; }
 
  private:
@@ -91,26 +92,26 @@ class CertifiedSolve {
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
   std::vector<Multiplier> multipliers_;
-  bool are_multipliers_known_;  // to the next run
+  bool are_multipliers_known_;  // the next run starts from multipliers_
   int iterations_ = 0;
   int max_iterations_ = 0;
   double width_ = 0;       // of the next bisection, relative
-  double fresh_cost_ = 0;  // of the last estimate that was found near the cost
+  double fresh_cost_ = 0;  // of the last fresh start found just below the cost
   double gap_ = 0;         // of the interior point, where its last run ended
   const double known_optimum_;
   bool is_given_up_ = false;
 };
 
-// A connected component on its way to its certified optimum, by way of the
-// optima of growing working sets. Internal to SolveJoint.
+// Solves a connected component to its certified optimum by solving growing
+// working sets. Internal to SolveJoint.
 //
-// Where ranks share the points the first one solves the working sets; all find
-// out what does not fit in below, and have the same estimate, bound and
-// certificate, whose observations are numbered through the whole.
+// Where ranks share the points, the first one solves the working sets, and all
+// together find the points that exceed a set's cost. All have the same frames,
+// bound and certificate; the certificate uses observation indices of the whole.
 class ComponentSolve {
  public:
-  // `known` are multipliers of a similar problem with the same observations,
-  // and then the last working set's.
+  // `known` are multipliers of a similar problem with the same observations;
+  // they are replaced by those of the working sets that are solved.
   ComponentSolve(const KnownRotationProblem& problem,
                  const JointOptions& options, const Context& context,
                  const Estimate& start, KnownMultipliers* known);
@@ -136,13 +137,14 @@ class ComponentSolve {
   bool IsLowEnough() const {
     return cost_ <= options_.sufficient_cost || IsZeroUpToRounding(cost_);
   }
-  // Where a working set is solved.
+  // The problem from which a working set is taken: the component itself or,
+  // where ranks share the points, the set gathered on the first rank.
   struct Place {
-    const KnownRotationProblem& problem;  // has all of it
-    const Estimate& best;                 // of that problem, so far
-    Estimate* candidate;                  // likewise
+    const KnownRotationProblem& problem;  // contains the working set
+    const Estimate& best;                 // the best so far, of `problem`
+    Estimate* candidate;                  // the one being solved, of `problem`
     std::function<bool()> fit_others;     // FitOthers of the candidate
-    // Its observations in the whole; null: called the same.
+    // Maps observations of `problem` to the whole's; null means identity.
     const std::vector<int64_t>* in_whole;
 
     std::vector<int64_t> InWhole(const ProblemSubset& part) const;
@@ -167,12 +169,12 @@ class ComponentSolve {
   const Context context_;
   Estimate estimate_;  // the best so far
   double cost_ = 0;
-  KnownMultipliers& known_;  // named as in the whole
+  KnownMultipliers& known_;  // with indices of the whole
   WorkingSet set_;
-  // By a solve of all points that is under way.
+  // The best cost so far of a solve whose working set is everything.
   double reached_ = std::numeric_limits<double>::infinity();
   double level_ = 0;  // the cost of the working set's solution, pixels
-  bool do_others_fit_ = false;  // when that was last tried
+  bool do_others_fit_ = false;  // what FitOthers returned last
   double lower_bound_ = 0;
   std::optional<Certificate> certificate_;
   int iterations_ = 0;

@@ -7,18 +7,19 @@
 namespace krot::internal {
 namespace {
 
-// Tracks that a rank puts forward at a time.
+// The number of tracks that a rank offers at a time.
 constexpr size_t kTracksAtOnce = 2048;
 
 int64_t LengthOf(const KnownRotationProblem& problem, int32_t point) {
   return problem.point_begin[point + 1] - problem.point_begin[point];
 }
 
-// One rank's next tracks: whether there are none behind them, then of each its
+// One rank's next tracks in the order of FindTies. offer[0] is 1 if the rank
+// has no more tracks after these, otherwise 0; then follow, for each track, its
 // length and its frames.
 using Offer = std::vector<int32_t>;
 
-// An offer that is being read.
+// Reads the tracks of an offer one after the other.
 struct Reader {
   const Offer& offer;
   size_t next = 1;
@@ -40,8 +41,8 @@ class Ties {
         tied_(std::move(tied)) {}
 
   Offer MakeOffer();
-  // Decides on the tracks of all ranks' offers, as far as their order is
-  // known. Whether any is left.
+  // Takes or rejects the tracks of all ranks' offers, as long as it is known
+  // which track comes next. Returns whether any are left.
   bool Decide(const std::vector<Offer>& offers, int rank);
 
   std::vector<int32_t> Taken() && { return std::move(taken_); }
@@ -57,12 +58,13 @@ class Ties {
   std::vector<int32_t> others_;
   const int count_;
   std::vector<int64_t> tied_;     // per frame
-  std::vector<int32_t> offered_;  // points here that are undecided
+  std::vector<int32_t> offered_;  // undecided points of this rank
   size_t next_ = 0;               // of others_
   std::vector<int32_t> taken_;
 };
 
-// Tracks that miss no frame any more never will.
+// Offers only tracks with a frame that still needs ties. The others are dropped
+// for good, as the number of ties never falls.
 Offer Ties::MakeOffer() {
   Offer offer = {0};
   const auto add = [&](int32_t k) {
@@ -90,8 +92,9 @@ Offer Ties::MakeOffer() {
   return offer;
 }
 
-// The longest first, of the same length those of the first rank; an offer that
-// is used up before its rank's tracks are hides what comes next.
+// Takes the longest track of all offers first, and of equal lengths that of the
+// lower rank. Once the offer of a rank that has more tracks is used up, it is
+// unknown which track comes next.
 bool Ties::Decide(const std::vector<Offer>& offers, int rank) {
   std::vector<Reader> readers;
   for (const Offer& offer : offers) readers.push_back({offer});

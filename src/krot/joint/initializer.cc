@@ -14,9 +14,11 @@
 namespace krot::internal {
 namespace {
 
-// Of the longest baseline or distance of fixed positions: a depth that is small
-// against the scene. Without either there is no scale, and any depth will do.
+// A depth that is small against the scene, relative to the longest baseline or
+// distance of fixed positions. Without either the scale is free, and any depth
+// will do.
 constexpr double kUnitDepthPerBaseline = 1e-2;
+// LowerByFeasibility looks for estimates at this share of the cost.
 constexpr double kShare = 0.25;
 
 double UnitDepth(const KnownRotationProblem& problem) {
@@ -66,20 +68,22 @@ bool LowerByFeasibility(const KnownRotationProblem& problem,
 
 namespace {
 
-// To prove a bound infeasible, an estimate is sought at this many times the
-// bound, and again, and its cost lowered to the optimum.
+// Where no estimate is found at a bound, one is sought at this many times the
+// bound, again and again up to the largest.
 constexpr double kBoundGrowth = 10;
 constexpr double kLargestBound = 1e7;  // pixels
-// A bound that is proved above another one, relative: well above roundings.
+// To prove that a bound cannot be met, the proved bound must exceed it by this,
+// relative, which is well above rounding.
 constexpr double kClearlyAbove = 1e-9;
-// When lowering a start that already meets the bound is given up.
+// FeasibleStartOptions::hopeless_gap for lowering a start that already meets
+// the bound.
 constexpr double kHopelessStartGap = 1e-2;
 
-// A component's way to a start.
+// Searches a start of one component.
 class StartSearch {
  public:
-  // Keeps references to the part, the timer and the summary. Adds iterations to
-  // `summary`, and what was proved.
+  // Keeps references to the part, the timer and the summary. Adds the
+  // iterations and a certificate, if one is found, to `summary`.
   StartSearch(const ProblemSubset& part, const InitializerOptions& options,
               const Context& context, const Timer& timer,
               InitializerSummary* summary)
@@ -125,9 +129,10 @@ FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
   return start;
 }
 
-// Where no estimate was found at the bound, the optimum decides: sought from an
-// estimate that misses the bound, it proves that there is none, or meets the
-// bound itself.
+// Called where no estimate was found at the bound, nor a proof that there is
+// none. Finds an estimate at a larger bound and solves from there for the
+// optimum: it meets the bound itself, or its certificate proves that there is
+// no start.
 InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
   std::vector<Multiplier> multipliers;
   for (double bound = kBoundGrowth * options_.max_error; bound <= kLargestBound;
@@ -160,8 +165,8 @@ InitializerTermination StartSearch::DecideByOptimum(Estimate* estimate) {
   return InitializerTermination::kFailed;
 }
 
-// Whether a certificate of the part shows that there is no start. Keeps it
-// then.
+// Whether a certificate of the part proves that there is no start. If so, keeps
+// it in the summary.
 bool StartSearch::Proves(Certificate certificate) {
   const CertificateCheck check =
       CheckCertificate(part_.problem(), options_.norm, certificate);

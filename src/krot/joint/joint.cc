@@ -32,7 +32,7 @@ void KnownMultipliers::Keep(const std::vector<int64_t>& names,
   }
   std::vector<CertifiedObservation> all;
   all.reserve(kept.size() + known_.size());
-  // Of equal names it takes the first range's.
+  // If both ranges have the same name, set_union takes the first range's.
   std::set_union(kept.begin(), kept.end(), known_.begin(), known_.end(),
                  std::back_inserter(all), HasSmallerName);
   known_ = std::move(all);
@@ -121,7 +121,7 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
     if (termination == JointTermination::kInterrupted) break;
   }
   summary.cost_final = cost_of(*estimate);
-  // A component that fell short matters only if it sets the maximum.
+  // A component that did not reach the gap matters only if it sets the maximum.
   if (summary.termination != JointTermination::kInterrupted &&
       summary.RelativeGap() <= options.relative_gap) {
     summary.termination = JointTermination::kGapReached;

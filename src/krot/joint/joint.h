@@ -15,25 +15,25 @@
 
 namespace krot::internal {
 
-// What a solve leaves to the next, similar one: multipliers of some of a
-// problem's observations, named by increasing numbers. Only those that are
-// known take memory.
+// Multipliers that a solve leaves to the next, similar one for a warm start.
+// They are of some of a problem's observations, which are named by increasing
+// numbers. Only known multipliers take memory.
 class KnownMultipliers {
  public:
-  // `multipliers` of the observations that `names` ascend through take the
-  // place of what was known of them; `optimum`, pixels, is where their solve
-  // would have come to. O(known + names).
+  // Sets the multipliers of the observations `names`, which must ascend; others
+  // stay. `optimum`, pixels, is the likely optimum of their solve.
+  // O(known + names).
   void Keep(const std::vector<int64_t>& names,
             const std::vector<Multiplier>& multipliers, double optimum);
 
-  // Of the solve that was kept last; 0: none was.
+  // The optimum that was given to Keep last; 0 if it was never called.
   double optimum() const { return optimum_.empty() ? 0 : optimum_[0]; }
 
-  // Of the observations that `names` ascend through, zero where it is not
-  // known; empty if none is. O(known + names).
+  // The multipliers of the observations `names`, which must ascend: zero where
+  // unknown, and empty if none is known. O(known + names).
   std::vector<Multiplier> Of(const std::vector<int64_t>& names) const;
 
-  // For a checkpoint; where ranks share a problem, the first one's.
+  // For a checkpoint. Where ranks share a problem, only the first one's count.
   void NameValues(StepValues* values) {
     values->OnFirst(&known_);
     values->OnFirst(&optimum_);
@@ -44,7 +44,7 @@ class KnownMultipliers {
   std::vector<double> optimum_;  // one, if any
 };
 
-// What steps have in common.
+// Values that several steps of a checkpoint store.
 
 inline void NameValues(StepValues* values, Estimate* estimate) {
   values->Values(&estimate->translations);
@@ -60,20 +60,20 @@ inline void NameValues(StepValues* values,
   });
 }
 
-// The global optimum of the known rotation problem, with a proof: all frames
-// and points at once by the interior point of conic/, each connected component
-// for itself, until a certificate that CheckCertificate accepts shows the
-// relative gap.
+// The joint solver finds the global optimum of the known rotation problem, with
+// a proof. It moves all frames and points at once by the interior point of
+// conic/, one connected component after the other, until a certificate that
+// CheckCertificate accepts shows the relative gap.
 
-// An iteration of the interior point: on the problem, or, with a `target`, on
-// the way to a start.
+// An iteration of the interior point, either on the problem or, with a
+// `target`, in the search for a start.
 struct JointIteration {
   std::optional<double> cost;  // pixels, the best so far, if there is one
   std::optional<double> lower_bound;  // pixels, certified so far
-  // Of the interior point on the problem: an estimate, not a bound.
+  // The interior point's own relative gap: an estimate, not a bound.
   std::optional<double> gap;
   double seconds = 0;  // since the call
-  // Pixels: a start is looked for whose residuals are all below.
+  // The search is for a start whose residuals are all below this, pixels.
   std::optional<double> target = std::nullopt;
 };
 
@@ -85,7 +85,7 @@ struct JointOptions {
   Norm norm;                         // p = 1, 2 or infinity
   double relative_gap = 1e-4;        // (cost - lower_bound) / cost; > 0
   int max_iterations = 2000;         // per component; >= 1
-  double sufficient_cost = 0;        // nothing below it is sought, pixels; >= 0
+  double sufficient_cost = 0;        // stops once it is reached, pixels; >= 0
   JointCallback callback;            // counts over all components; may be empty
   Checkpoint* checkpoint = nullptr;  // of working sets; may be null
 };
@@ -107,7 +107,7 @@ struct JointSummary {
   std::optional<Certificate> certificate;
   double lower_bound = 0;  // pixels, what the certificate proves; 0 if none
   int32_t num_components = 0;
-  // Of the working sets whose optima were the whole's in the end.
+  // The size of the last working sets, over all components.
   int64_t num_working_observations = 0;
   std::vector<JointIteration> iterations;
 
@@ -117,12 +117,12 @@ struct JointSummary {
 };
 
 // Improves `estimate`, all of whose depths must be positive (throws
-// std::invalid_argument otherwise, and for options out of range). Never worse
-// than the start. Frames and points without observations stay. Takes about
-// 600 bytes for each observation that it looks at, beside the reduced camera
-// system. Where there is one component, `known` are multipliers of a similar
-// problem with the same observations, which save iterations, and then this
-// one's.
+// std::invalid_argument otherwise, and for options out of range). The result is
+// never worse than the start. Frames and points without observations stay.
+// Takes about 600 bytes for each observation of a working set, beside the
+// reduced camera system. If `known` is given and there is one component, it has
+// multipliers of a similar problem with the same observations, which save
+// iterations, and receives those of this problem.
 JointSummary SolveJoint(const KnownRotationProblem& problem,
                         const JointOptions& options, const Context& context,
                         Estimate* estimate, KnownMultipliers* known = nullptr);
@@ -130,34 +130,34 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
 struct FeasibleStartOptions {
   Norm norm;
   int max_iterations = 200;  // >= 1
-  // A depth that is small against the scene, scene units; it only shapes the
-  // way. None: a share of the longest baseline or distance
-  // of fixed positions, or 1 where the scale is free.
+  // A depth that is small against the scene, scene units. It affects the path
+  // of the iterations, not what is feasible. None: a share of the longest
+  // baseline or distance of fixed positions, or 1 where the scale is free.
   std::optional<double> unit_depth;
-  // Nothing below this is sought, pixels.
+  // A proved lower bound, pixels: LowerByFeasibility looks for nothing below.
   double known_bound = 0;
-  // Gives up once the programme's gap is this small and the
-  // bound not met; 0: never.
+  // Gives up if the bound is not met once the programme's gap is below this; 0
+  // means never.
   double hopeless_gap = 0;
-  // Called after every iteration with the bound that it is to meet, pixels; may
+  // Called after every iteration with the bound that is to be met, pixels; may
   // be empty.
   std::function<void(double bound)> callback;
 };
 
-// An estimate of a connected problem whose residuals are all below `bound`,
-// pixels, from nothing: FindFeasible with a unit of depth that suits the
-// problem's baselines. As that starts from the centre of the cones, the
-// estimate is a good start for MinimizeJointly. `*estimate` is only written if
-// one is found (kFeasible); otherwise `*multipliers` may prove that there is
-// none (MakeInfeasibilityCertificate).
+// Finds, from nothing, an estimate of a connected problem whose residuals are
+// all below `bound`, pixels: FindFeasible with a unit of depth that suits the
+// problem's baselines. As that stays near the middle of the cones, the estimate
+// is a good start for MinimizeJointly. `*estimate` is only written if one is
+// found (kFeasible); otherwise `*multipliers` may prove that there is none
+// (MakeInfeasibilityCertificate).
 InteriorPointTermination FindEstimateBelow(
     const KnownRotationProblem& problem, double bound,
     const FeasibleStartOptions& options, const Context& context,
     Estimate* estimate, std::vector<Multiplier>* multipliers);
 
-// Lowers an estimate by FindEstimateBelow at a quarter of its cost, again and
-// again as long as there is one; returns whether there was. Takes some five
-// iterations each.
+// Replaces an estimate by one at a quarter of its cost (FindEstimateBelow), as
+// often as one is found. Returns whether any was found. Each takes about five
+// iterations.
 bool LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
                         const Context& context, Estimate* estimate);
@@ -189,12 +189,12 @@ struct InitializerSummary {
   double lower_bound = 0;  // pixels, what it proves
 };
 
-// Finds an estimate whose residuals are all below max_error, and as far below
-// as comes easily, each connected component for itself; `*estimate` is only
-// written if there is one, its points and frames without observations not even
-// then. Where nothing is fixed and baselines do not set the scale, components
-// come out with a median depth of one. Throws std::invalid_argument for options
-// out of range.
+// Finds an estimate whose residuals are all below max_error, by lowering it
+// with LowerByFeasibility even far below, for one connected component after the
+// other. `*estimate` is only written if one is found; points and frames without
+// observations stay. Where nothing is fixed and baselines do not set the scale,
+// components get a median depth of one. Throws std::invalid_argument for
+// options out of range.
 InitializerSummary FindStart(const KnownRotationProblem& problem,
                              const InitializerOptions& options,
                              const Context& context, Estimate* estimate);

@@ -14,20 +14,25 @@
 namespace krot::internal {
 namespace {
 
+// The first working set has the points with a residual above this share of the
+// cost.
 constexpr double kShareOfCost = 0.9;
 constexpr int kTiesPerFrame = 20;
+// The usual ShareOfLevel.
 constexpr double kNearShare = 0.7;
-// Of the median depth.
+// Baselines below this, relative to the median depth, are tiny.
 constexpr double kTinyBaseline = 1e-3;
-// Of a point that comes in for some of its observations, so many at least.
-// With fewer the others soon have it come in again.
+// AddAbove takes at least this many observations of a point. With fewer, the
+// point's other observations soon exceed the level.
 constexpr size_t kLeastPerPoint = 4;
 constexpr int64_t kPointsPerChunk = 1024;
 
-using Candidate = std::pair<double, int64_t>;  // -residual, whose
+// A residual with changed sign, so that sorting puts the worst first, and the
+// index of its point or observation.
+using Candidate = std::pair<double, int64_t>;
 
-// The power of two below the median depth: counts are the same for all ranks,
-// where the median itself is not to be had.
+// The median depth, rounded down to a power of two. Ranks can add up counts of
+// depths per power of two; the median itself would need all depths.
 double CoarseMedianDepth(const KnownRotationProblem& problem,
                          const Estimate& estimate, const Context& context) {
   constexpr int kLowest = std::numeric_limits<double>::min_exponent - 1;
@@ -80,7 +85,8 @@ void WorkingSet::CountTaken() {
   num_observations_ = SumOfRanks(context_, num_observations_here_);
 }
 
-// 0 if there is none.
+// The largest residual of the point's observations outside of the set; 0 if
+// there are none.
 double WorkingSet::LargestOutside(const std::vector<AffineMap>& cameras,
                                   const Estimate& estimate, Norm norm,
                                   int32_t k) const {
@@ -222,12 +228,13 @@ WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
 
 namespace {
 
-// A point that is to fit in need not go further below the level: less than what
-// would have the working set take it in (component_solve.cc).
+// PlacePoints stops moving a point below this share of the level. It is less
+// than the share above which a working set takes points in
+// (component_solve.cc).
 constexpr double kSufficientShareOfLevel = 0.7;
-// Sweeps move the blocks above this share of the highest cost allowed, as far
-// as this tolerance. They end with the one that leaves more than that share of
-// the excess.
+// The sweeps of ExtendSolution solve blocks above kShareOfHighest of the
+// highest cost allowed, to kSweepTolerance, relative. They end if a sweep
+// leaves more than kExcessLeft of the excess over the highest cost.
 constexpr double kShareOfHighest = 0.9;
 constexpr double kSweepTolerance = 1e-3;
 constexpr double kExcessLeft = 0.8;

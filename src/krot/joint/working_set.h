@@ -10,34 +10,36 @@
 
 namespace krot::internal {
 
-// Of `others`, ascending, the longest tracks first, every point that sees a
-// frame of which fewer than `count` observations are tied so far: `tied`, per
-// frame, and those of the points before it. Where ranks share the points all
-// call it, with the same `tied`, and each gets its own of those that one
-// process takes. O(observations).
+// Chooses points of `others`, which ascend, that tie frames to the working set.
+// Goes through them by falling length of their tracks and takes every point
+// that is seen by a frame with fewer than `count` observations so far: those of
+// `tied`, per frame, and those of the points taken before. Where ranks share
+// the points, all must call it, with the same `tied`; each gets its share of
+// the points that one process would take. O(observations).
 std::vector<int32_t> FindTies(const KnownRotationProblem& problem,
                               std::vector<int32_t> others, int count,
                               std::vector<int64_t> tied,
                               const Context& context);
 
-// The observations of a problem that the joint solver looks at: of points whose
-// residuals come near the maximum those that do, and enough others to tie every
-// frame. The optimum of a working set is a lower bound on that of the whole,
-// and equals it as soon as all other observations fit in below.
+// The observations of a problem that the joint solver looks at: those with
+// residuals near the maximum, and enough others to tie every frame. The optimum
+// of a working set is a lower bound on that of the whole. Both are equal if all
+// other observations can have residuals below it as well.
 //
-// Where ranks share the points each has its share of the set, which is the one
-// that one process has; they call what is O(observations) together.
+// Where ranks share the points, each has its share of the set, and all ranks
+// together have the set that one process would have. All must call the
+// functions that are O(observations) together.
 class WorkingSet {
  public:
   // Empty. Keeps a reference to `problem`.
   explicit WorkingSet(const KnownRotationProblem& problem,
                       const Context& context = {});
 
-  // Takes in points that have an observation outside of the set whose residual
-  // is above `level`, pixels, the worst first and at most `max_points` of them;
-  // returns how many. Of each it takes the observations above `share` of the
-  // level, and a few more if these are few: the least that holds a point well.
-  // With a share of 0 it takes all. O(observations).
+  // Adds points that have an observation outside of the set whose residual is
+  // above `level`, pixels: the worst first, at most `max_points` of them.
+  // Returns how many. Of each point it takes the observations above
+  // `share` * `level`, but at least four if there are so many; with a share of
+  // 0, all. O(observations).
   int64_t AddAbove(const Estimate& estimate, Norm norm, double level,
                    int64_t max_points, double share = 0);
 
@@ -51,9 +53,9 @@ class WorkingSet {
   // Whether the set has an observation of the point.
   bool Contains(int32_t point) const { return contains_[point] != 0; }
   bool IsAll() const { return num_observations_ == num_observations_of_whole_; }
-  // Of the whole set.
+  // Points of the whole set, over all ranks.
   int64_t num_points() const { return num_points_; }
-  // Of the share here, ascending.
+  // Observations of this rank's share, ascending.
   std::vector<int64_t> Observations() const;
   // The largest residual of its observations, pixels. O(observations).
   double Cost(const Estimate& estimate, Norm norm) const;
@@ -69,45 +71,47 @@ class WorkingSet {
   const Context context_;
   std::vector<char> contains_;  // per point
   std::vector<char> takes_;     // per observation
-  // Of the share here.
+  // Counts of the set on this rank.
   int64_t num_points_here_ = 0;
   int64_t num_observations_here_ = 0;
-  // Of the whole: the set's, all, and the points before the share here.
+  // Over all ranks: counts of the set, the number of all observations, and the
+  // number of points on the ranks before this one.
   int64_t num_points_ = 0;
   int64_t num_observations_ = 0;
   int64_t num_observations_of_whole_;
   int64_t first_point_ = 0;
 };
 
-// The share with which the joint solver calls AddAbove; 0 where the baselines
-// that set the scale are tiny beside the depths: what a few observations tell
-// of it is lost in roundings. O(observations), by all ranks together.
+// The `share` with which the joint solver calls AddAbove. It is 0 where the
+// baselines that set the scale are tiny beside the depths: a few observations
+// would determine the scale only up to rounding. O(observations); all ranks
+// must call it.
 double ShareOfLevel(const KnownRotationProblem& problem,
                     const Estimate& estimate, const Context& context);
 
-// The set that the joint solver begins with at an estimate of positive depths:
-// the points above some share of `cost`, pixels, which is the estimate's, with
-// their observations above ShareOfLevel, and ties of every frame.
-// O(observations).
+// The working set with which the joint solver begins, at an estimate of
+// positive depths whose cost is `cost`, pixels: points above 0.9 of the cost
+// (AddAbove, with ShareOfLevel), and ties of every frame. O(observations).
 WorkingSet FirstWorkingSet(const KnownRotationProblem& problem,
                            const Estimate& estimate, Norm norm, double cost,
                            const Context& context = {});
 
-// Lowers the largest residual of every point that is above `level`, pixels, as
-// the frames stand, to its optimum; points behind a camera stay. Whether there
-// are none of those. O(observations).
+// Moves every point with a residual above `level`, pixels, towards the optimum
+// of its largest residual with the frames fixed; points behind a camera stay.
+// Returns whether there are no such points. O(observations).
 bool PlacePoints(const KnownRotationProblem& problem, Norm norm,
                  const Context& context, double level, Estimate* estimate);
 
 // Extends the solution of a working set, whose cost is `level`, to all other
 // observations, so that no residual exceeds `highest` >= level, pixels. Points
-// stay where they are if that is good enough, and otherwise take their own
-// optimum as the frames stand. If that does not suffice, sweeps move the frames
-// as well, and the set's points with them: its solution is seldom the only one,
-// and what leaves a point above it is often a frame that the set hardly holds.
+// with residuals above `level` are moved by PlacePoints. If that does not
+// suffice, sweeps move the frames and all points: the set's solution is seldom
+// unique, and a point often stays above it because the set hardly determines
+// one of its frames.
 //
-// Whether it succeeded; `estimate` is as far as it came either way. Points
-// behind a camera stay there, and it fails. O(observations) per sweep.
+// Returns whether it succeeded; `estimate` keeps what was reached in any case.
+// Fails if a point is behind a camera, where it stays. O(observations) per
+// sweep.
 bool ExtendSolution(const KnownRotationProblem& problem, Norm norm,
                     const Context& context, double level, double highest,
                     Estimate* estimate);

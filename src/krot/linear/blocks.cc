@@ -24,7 +24,7 @@ class SymbolicFactor : private Eigen::SimplicialLLT<PatternMatrix, Eigen::Lower,
   const Eigen::VectorXi& counts() const { return m_nonZerosPerCol; }
 };
 
-// The free frames, numbered; -1: fixed.
+// Per frame, its number among the free frames; -1 if it is fixed.
 std::vector<int32_t> NumberFreeFrames(const BlockStructure& structure) {
   std::vector<int32_t> numbers(structure.num_frames(), -1);
   int32_t num_free = 0;
@@ -48,7 +48,7 @@ std::vector<std::vector<int32_t>> PointsOfFrames(
   return points;
 }
 
-// The union of the ranks' patterns.
+// Replaces the pattern by the union of all ranks' patterns.
 void UniteOverRanks(Ranks* ranks, BlockPattern* pattern) {
   std::vector<std::pair<int32_t, int32_t>> pairs;  // column and row
   const int32_t num_columns = pattern->num_columns();
@@ -126,7 +126,7 @@ BlockPattern PairsThatSharePoints(const BlockStructure& structure,
       static_cast<int32_t>(std::count(structure.frame_is_fixed.begin(),
                                       structure.frame_is_fixed.end(), char{0}));
   BlockPattern pattern;
-  std::vector<int32_t> last_column(num_free, -1);  // that has this row
+  std::vector<int32_t> last_column(num_free, -1);  // with this row
   for (int32_t j = 0; j < num_free; ++j) {
     pattern.row.push_back(j);
     last_column[j] = j;
@@ -165,8 +165,8 @@ SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern) {
 
 namespace {
 
-// A column that keeps less than this share of its norm is a combination of the
-// ones before it.
+// If less than this share of a column's norm is left after orthogonalisation,
+// the column counts as a combination of the ones before it.
 constexpr double kRankTolerance = 1e-13;
 
 // column -= q q'column; returns q'column. Done twice, Gram-Schmidt is as

@@ -12,9 +12,9 @@
 namespace krot::internal {
 
 // Least squares of bundle adjustment, in blocks of three columns: those of
-// points, and those of frames or of whatever else points share.
+// points, and those of frames or of other parameters that points share.
 
-// Which observation sees what. Observations stand in the order of their points.
+// Which frame each observation belongs to. Observations are sorted by point.
 struct BlockStructure {
   std::vector<int64_t> point_begin;  // num_points + 1
   std::vector<int32_t> frame_of;     // per observation
@@ -33,8 +33,9 @@ struct BlockStructure {
   }
 };
 
-// Each point's observations by frame, equal frames by observation: where those
-// of point k stand from point_begin[k] on, relative to that.
+// Each point's observations sorted by frame, and by index for the same frame.
+// From point_begin[k] on there are the observations of point k, as offsets from
+// point_begin[k].
 std::vector<int32_t> OrderByFrame(const BlockStructure& structure);
 
 // A number for every column.
@@ -50,8 +51,8 @@ struct BlockVector {
   void Add(double factor, const BlockVector& other);  // += factor * other
 };
 
-// The 3x3 blocks that a symmetric matrix has, by its lower triangle: for each
-// block column its block rows, ascending, beginning with the diagonal's.
+// The nonzero 3x3 blocks in the lower triangle of a symmetric matrix: for each
+// block column its block rows, ascending, beginning with the diagonal block.
 struct BlockPattern {
   std::vector<int64_t> begin = {0};  // num_columns + 1
   std::vector<int32_t> row;          // per block
@@ -65,23 +66,23 @@ struct BlockPattern {
 
 BlockPattern FullPattern(int32_t num_columns);
 
-// The pairs of free frames that share a point, of any rank where ranks share
-// the points. A block column stands for a free frame. O(sum of the squared
-// lengths of tracks).
+// The pattern with a block for every pair of free frames that share a point, on
+// any rank where ranks share the points. Block columns are the free frames.
+// O(sum of the squared lengths of tracks).
 BlockPattern PairsThatSharePoints(const BlockStructure& structure,
                                   Ranks* ranks = nullptr);
 
-// The sparse Cholesky factor of a matrix of this pattern, in Eigen's
-// fill-reducing order, by a symbolic factorisation of one number per block:
-// that takes next to nothing beside the factor itself.
+// The size of the sparse Cholesky factor of a matrix of this pattern, in
+// Eigen's fill-reducing order. Found by a symbolic factorisation with one
+// number per block, which costs next to nothing beside the factor itself.
 struct SparseFactorSize {
   int64_t numbers;
-  double operations;  // additions and multiplications that make it
+  double operations;  // additions and multiplications to compute it
 };
 SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern);
 
 // R of A = Q R, 3x3 and upper triangular. An infinite number on the diagonal
-// stands for a direction that no row of A tells: its unknown is 0.
+// marks an unknown that no row of A determines: solutions set it to 0.
 struct UpperTriangle {
   double r00 = 0, r01 = 0, r02 = 0, r11 = 0, r12 = 0, r22 = 0;
 
@@ -106,9 +107,9 @@ struct UpperTriangle {
 // ones before it, up to rounding, becomes 0 in Q. O(n).
 UpperTriangle Orthogonalize(int64_t n, double* rows);
 
-// L^-1 of A = L L', lower triangular, of a positive definite 3x3 matrix. Pivots
-// that are not above `least_pivot` > 0 are replaced by it; then it returns
-// false.
+// Computes L^-1, lower triangular, for A = L L', a positive definite 3x3
+// matrix. Pivots that are not above `least_pivot` > 0 are replaced by it, and
+// then the function returns false.
 template <typename Scalar>
 bool InvertCholesky(const Eigen::Matrix<Scalar, 3, 3>& A, Scalar least_pivot,
                     Eigen::Matrix<Scalar, 3, 3>* inverse) {

@@ -16,22 +16,23 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Eigen::VectorXf;
 
-// The blocks of a column that are kept, as a share of those that A has below
-// the diagonal. More of them take more time than they save in iterations
-// (docs/history/scale.md).
+// The share of blocks that a column of the factor keeps, relative to the number
+// that A has below the diagonal. More blocks would cost more time than they
+// save in iterations (docs/history/scale.md).
 constexpr double kKept = 0.5;
-// Where a factor does not exist, the first shift; it grows by this factor up to
-// the same number.
+// The first shift if no factor exists without one. It is multiplied by
+// kShiftGrowth up to a shift of kShiftGrowth.
 constexpr float kFirstShift = 1e-5F;
 constexpr float kShiftGrowth = 10;
-// The least pivot, squared, of a block whose diagonal is about 1; the second is
-// relative to the block's trace.
+// The smallest pivot, squared: of the incomplete factor, where diagonals are
+// about 1, and of the blocks that are whitened, relative to their trace.
 constexpr float kLeastPivot = 1e-7F;
 constexpr double kLeastWhitenedPivot = 1e-14;
-// Products are summed in so many parts.
+// Products are summed in this many parts.
 constexpr int64_t kNumChunks = 4;
 
-// Those of a column that has so many, with the diagonal's.
+// The number of blocks that a column of the factor keeps, with the diagonal
+// block, if A's has `num_blocks`.
 int64_t NumKept(int64_t num_blocks) {
   return 1 + std::llround(kKept * static_cast<double>(num_blocks - 1));
 }
@@ -40,7 +41,7 @@ int64_t NumKept(int64_t num_blocks) {
 
 bool IncompleteCholesky::Factorize(const BlockPattern& pattern,
                                    const std::vector<Matrix3d>& blocks) {
-  // What helped last time, if anything was needed, or a little less.
+  // Begins with a tenth of the last shift, or without one if it was minimal.
   float shift = shift_ > kFirstShift ? shift_ / kShiftGrowth : 0;
   while (!TryShift(pattern, blocks, shift)) {
     shift = std::max(kShiftGrowth * shift, kFirstShift);
@@ -50,7 +51,8 @@ bool IncompleteCholesky::Factorize(const BlockPattern& pattern,
   return true;
 }
 
-// Column after column takes what those before have in its row.
+// Computes the factor column by column. From each one, the products of all
+// earlier columns with a block in its row are subtracted.
 bool IncompleteCholesky::TryShift(const BlockPattern& pattern,
                                   const std::vector<Matrix3d>& blocks,
                                   float shift) {
@@ -102,7 +104,8 @@ void IncompleteCholesky::SubtractColumn(int32_t k) {
   if (next_[k] < end) waiting_[L_[next_[k]].row].push_back(k);
 }
 
-// Of the column at hand, the diagonal's and the largest others, by rows.
+// Keeps `count` blocks of the present column, the diagonal one and the largest
+// others, and sorts them by row.
 void IncompleteCholesky::KeepLargest(int64_t count) {
   if (count < static_cast<int64_t>(column_.size())) {
     std::nth_element(column_.begin() + 1, column_.begin() + count,
@@ -156,7 +159,8 @@ bool ConjugateGradients::Factorize(const BlockPattern& pattern,
   return !has_factor || incomplete_.Factorize(pattern, blocks_);
 }
 
-// A block without rows, as of a frame that nothing holds, stays 0.
+// Replaces the blocks by those of W A W'. For a diagonal block of zeros, as of
+// a frame without observations, W is 0.
 void ConjugateGradients::Whiten() {
   W_.assign(pattern_->num_columns(), Matrix3d::Zero());
   for (int32_t j = 0; j < pattern_->num_columns(); ++j) {
@@ -173,7 +177,7 @@ void ConjugateGradients::Whiten() {
 
 VectorXd ConjugateGradients::Precondition(const VectorXd& residual) const {
   if (!has_factor_) return residual;
-  // Scaled, as the exponents of single precision end early.
+  // Scaled, as single precision has a small range of exponents.
   const double scale = residual.cwiseAbs().maxCoeff();
   if (!(scale > 0)) return VectorXd::Zero(residual.size());
   const VectorXf scaled = (residual / scale).cast<float>();
@@ -223,7 +227,8 @@ VectorXd ConjugateGradients::Unwhitened(const VectorXd& y) const {
   return x;
 }
 
-// From y = 0. With M the preconditioner, |error|_A^2 = r'A^-1 r is about r'M r.
+// Starts at y = 0. With the preconditioner M, |error|_A^2 = r'A^-1 r is about
+// r'M r.
 bool ConjugateGradients::Solve(const VectorXd& rhs, double tolerance,
                                VectorXd* x, int max_iterations,
                                const Multiply& other_blocks) {

@@ -11,10 +11,11 @@ KROT_DECLARE_KERNELS(LinearKernels, kLinearKernels)
 
 namespace {
 
-// Eigen's products of tiles of 192 take half as long again per number; tiles of
-// 96 and 160 are between.
+// With tiles of 192, Eigen's products take 1.5 times as long per number; tiles
+// of 96 and 160 are in between.
 constexpr int64_t kTile = 128;
-// With fewer columns, waking a thread takes longer than its share of a solve.
+// With fewer columns, Solve uses one thread: waking another takes longer than
+// its share of the work.
 constexpr int64_t kFewColumns = 1000;
 
 const LinearKernels& Kernels() { return KROT_BEST_KERNELS(kLinearKernels); }
@@ -83,8 +84,8 @@ bool DenseCholesky::Factorize(int num_threads) {
   return true;
 }
 
-// L^-1 x, then L'^-1 x: each tile of x that is found is taken off all others
-// that need it.
+// Computes L^-1 x, then L'^-1 of that. Each tile of x, once it is final, is
+// subtracted from all others that depend on it.
 void DenseCholesky::Solve(double* x) const {
   const int num_threads = size_ < kFewColumns ? 1 : num_threads_;
   const LinearKernels& kernels = Kernels();

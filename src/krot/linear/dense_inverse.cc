@@ -17,12 +17,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// A pivot below this share of its diagonal is rounding.
+// Pivots below this share of the diagonal are rounding.
 constexpr double kNoPivot = 1e-12;
 constexpr int64_t kColumns = 64;  // per chunk of a parallel loop
 
-// The inverse of a positive definite matrix, in its place, by columns on all
-// threads. False if a pivot is not above so much of its diagonal.
+// Replaces a positive definite matrix by its inverse, by columns on all
+// threads. False, with the matrix as it was, if a pivot is not above
+// `least_pivot` times its diagonal element.
 bool Invert(int num_threads, double least_pivot, MatrixXd* matrix) {
   const Index size = matrix->rows();
   const VectorXd diagonal = matrix->diagonal();
@@ -46,8 +47,8 @@ bool Invert(int num_threads, double least_pivot, MatrixXd* matrix) {
   return true;
 }
 
-// The unknowns in an order in which the first `*rank` determine the others:
-// Cholesky's factor with the largest pivot first.
+// Orders the unknowns so that the rows of the first `*rank` span all rows, by a
+// Cholesky factorisation that takes the largest pivot first.
 std::vector<Index> OrderByPivots(const MatrixXd& matrix, Index* rank) {
   const Index size = matrix.rows();
   std::vector<Index> order(size);

@@ -1,6 +1,7 @@
-// This file is compiled for other vector units than the rest, perhaps for
-// several, in a namespace each. Eigen has names of its own here, which CMake
-// gives: of functions that have one name the linker keeps a single one.
+// This file is compiled for other vector units than the rest, perhaps several
+// times, each in its own namespace. CMake also renames Eigen's namespace here:
+// otherwise the linker would keep only one version of each Eigen function,
+// perhaps one for vector units that the machine lacks.
 
 #include "krot/linear/native_kernels.h"
 
@@ -23,14 +24,14 @@ ConstTile At(const MatrixTile& tile) {
                    Eigen::OuterStride<>(tile.stride));
 }
 
-// What the callers own.
+// A writable view of a tile. Callers own the numbers, which are not const.
 Tile Mutable(const MatrixTile& tile) {
   return Tile(const_cast<double*>(tile.numbers), tile.rows, tile.columns,
               Eigen::OuterStride<>(tile.stride));
 }
 
-// So many numbers side by side. Runs are short, often of six: compilers that
-// vectorise the loop over them by themselves are half as fast.
+// Vectors of two and four numbers. Runs are short, often of six numbers; a loop
+// over them that compilers vectorise by themselves is half as fast.
 using Two = double __attribute__((vector_size(16)));
 using Four = double __attribute__((vector_size(32)));
 
@@ -52,7 +53,7 @@ inline void SubtractNumbers(const double* const g[3], const double s[9],
 
 void SubtractFromColumns(const double* const g[3], const double s[9], int64_t n,
                          double* first_column, int64_t stride) {
-  double local[9];  // which the columns do not overlap
+  double local[9];  // a copy, which no column can overlap
   std::memcpy(local, s, sizeof(local));
   const double* const rows[3] = {g[0], g[1], g[2]};
   int64_t k = 0;

@@ -12,10 +12,10 @@
 namespace krot::internal {
 
 // Loops and sums whose result has the same bits at any number of threads, and
-// of ranks that share the points: each rank loops over its own observations or
-// points, and a sum is that of the whole, added up in one fixed order.
+// at any number of ranks that share the points. Each rank loops over its own
+// observations or points; sums are over all ranks, added up in one fixed order.
 
-// Over observations, in chunks of a fixed size.
+// Loops over observations, in chunks of a fixed size.
 class ObservationLoop {
  public:
   ObservationLoop(int64_t count, int num_threads)
@@ -50,14 +50,15 @@ class ObservationLoop {
                   [](double a, double b) { return std::min(a, b); });
   }
 
-  // combine(... combine(start, term(0)) ..., term(count - 1)), chunk by chunk;
-  // `start` must change nothing where it is combined.
+  // combine(... combine(start, term(0)) ..., term(count - 1)), chunk by chunk.
+  // `start` must be neutral: combine(start, x) is x.
   template <typename Value, typename Term, typename Combine>
   Value Reduce(const Value& start, const Term& term,
                const Combine& combine) const {
-    // Chunks are those of the whole. One that begins on one rank and ends on
-    // another is added up by both, one after the other: `head` ends where the
-    // first chunk begins here.
+    // Chunks count from the first observation of all ranks. If a chunk begins
+    // on one rank and ends on another, both add up their parts, one after the
+    // other. `head` is the number of observations here before the first chunk
+    // that begins here.
     const int64_t head = std::min(count_, (kChunk - first_ % kChunk) % kChunk);
     std::vector<Value> parts(NumChunks(count_ - head, kChunk), start);
     const auto add = [&](int64_t begin, int64_t end, Value value) {
@@ -99,23 +100,23 @@ class ObservationLoop {
 
   template <typename Value>
   struct OpenSum {
-    Value closed;  // of chunks that are complete
-    Value open;    // of the chunk that is not
+    Value closed;  // of all complete chunks
+    Value open;    // of the present, incomplete chunk
   };
 
   int64_t count_;
   int num_threads_;
   int64_t whole_count_;
   Ranks* ranks_ = nullptr;
-  int64_t first_ = 0;  // the first observation's number in the whole
+  int64_t first_ = 0;  // number of observations on the ranks before
 };
 
-// Over points, in parts of about equal work, which grows with the square of the
-// track. The parts depend on the tracks of the whole alone. Where ranks share
-// the points, a part may begin on one rank and end on another.
+// Loops over points, in parts of about equal work, which grows with the square
+// of a track's length. The parts depend only on the tracks of all ranks. Where
+// ranks share the points, a part may begin on one rank and end on another.
 class PointParts {
  public:
-  // `point_begin`: where each point's observations begin, and the end.
+  // `point_begin` has the first observation of each point, and the end.
   PointParts(const std::vector<int64_t>& point_begin, int num_parts,
              Ranks* ranks = nullptr)
       : num_parts_(num_parts), ranks_(ranks) {
@@ -159,9 +160,9 @@ class PointParts {
     });
   }
 
-  // The same for a body that adds to (*sums)[part], `size` numbers that are 0
-  // at first. Where ranks share the points a part's sum goes from rank to rank,
-  // and in the end the first rank has all of them.
+  // The same for a body that adds to (*sums)[part], which are `size` numbers
+  // that start at 0. Where ranks share the points, a part's sum is passed from
+  // rank to rank, and in the end only the first rank has the sums.
   template <typename Body>
   void Sum(int num_threads, int64_t size, const Body& body,
            std::vector<std::vector<double>>* sums) const {
@@ -211,7 +212,7 @@ class PointParts {
   bool IsHolder(int part, int rank) const {
     return has_points_[rank * num_parts_ + part] != 0;
   }
-  // The last of the ranks before one that has points of a part; -1: none.
+  // The last rank before `rank` that has points of the part; -1 if none has.
   int HolderBefore(int part, int rank) const {
     while (--rank >= 0 && !IsHolder(part, rank)) {
     }

@@ -9,31 +9,33 @@
 namespace krot::internal {
 namespace {
 
-// The first is relative to the diagonal; whoever solves removes the error that
-// it causes by refinement. It grows up to the second.
+// Regularisation, relative to the diagonal: it begins with the first and grows
+// at most to the second. Callers remove its error by iterative refinement.
 constexpr double kRegularization = 1e-14;
 constexpr double kLargestRegularization = 1e-7;
-// Up to here a dense factor is the fastest way whatever the pattern.
+// Up to this many frames, a dense factor is fastest for all patterns.
 constexpr int64_t kAlwaysDenseFrames = 500;
-// Parts of the sum.
+// The sum over points is taken in this many parts.
 constexpr int kNumParts = 4;
 
-// What is predicted to take the least time, in operations of a dense factor.
-// An operation of a sparse factor takes so many: 12 to 21 were measured with
-// 800 to 3000 frames of many patterns, on one thread.
+// Costs that predict which kind takes the least time. The unit is the time of
+// one operation of a dense factor. An operation of a sparse factor costs this
+// much: 12 to 21 were measured with 800 to 3000 frames of many patterns, on one
+// thread.
 constexpr double kSparseOperation = 15;
-// So does reading a number of a matrix that is multiplied by a vector.
+// Reading a number of a matrix that is multiplied by a vector costs this.
 constexpr double kNumberRead = 60;
-// The systems that are solved with a factor: an interior point's, each refined.
+// The number of systems solved with one factor of an interior point, including
+// refinements.
 constexpr double kSolves = 12;
-// The iterations that a solve is thought to take. They grow from 30 to 200 and
-// more on the way to an optimum.
+// The expected number of iterations of a solve by conjugate gradients. It grows
+// from 30 to 200 and more on the way to an optimum.
 constexpr int kLikelyIterations = 100;
-// Those of all rough solutions of a matrix.
+// The same for all rough solutions of a matrix together.
 constexpr int kRoughIterations = 60;
 
-// That of a factor without any fill. Its columns of c blocks take 27 c^2, and
-// the sum of these is least where all are alike.
+// The cost of a sparse factor without fill, a lower bound. A column of c blocks
+// takes 27 c^2 operations, and their sum is least if all columns are alike.
 double LeastSparseCost(const BlockPattern& pattern) {
   const auto num_blocks = static_cast<double>(pattern.num_blocks());
   return kSparseOperation * 27 * num_blocks * num_blocks /
@@ -98,9 +100,10 @@ double ReducedCameraSystem::ImplicitCost(int num_iterations) const {
   return num_iterations * kNumberRead * 9 * num_observations_;
 }
 
-// The size of a sparse factor is looked at only where it may be the cheapest.
-// Without a preconditioner a long chain takes many more iterations than what
-// hangs together so closely that its factor would fill.
+// The size of a sparse factor is determined only where it may be the cheapest.
+// For rough solutions a sparse factor is preferred to conjugate gradients: it
+// is small for long chains of frames, where these, without a factor, take many
+// iterations.
 ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
   const bool is_rough = use_ == Use::kRoughSolutions;
   const double dense = DenseCost();
@@ -129,7 +132,7 @@ ReducedCameraSystem::Block ReducedCameraSystem::BlockOf(int part, int32_t a,
   const int32_t col = column(b) / 3;
   const int64_t begin = pattern_.begin[col];
   const int64_t end = pattern_.begin[col + 1];
-  // Where a column has no gaps, as in a band: no search.
+  // Where a column has no gaps, as in a band, no search is necessary.
   int64_t n = row - col;
   if (n >= end - begin || pattern_.row[begin + n] != row) {
     n = std::lower_bound(pattern_.row.begin() + begin,
@@ -149,7 +152,7 @@ void ReducedCameraSystem::AddBlock(int part, int32_t a, int32_t b,
   }
 }
 
-// By runs of frames that follow each other: there the rows do, too.
+// Works on runs of consecutive frames, whose rows are consecutive, too.
 void ReducedCameraSystem::SubtractSquare(int part,
                                          const std::vector<int32_t>& frames,
                                          const std::vector<char>& is_apart,
@@ -189,9 +192,8 @@ void ReducedCameraSystem::AddUpParts() {
               });
 }
 
-// Calls visit(row, column, count, numbers) for runs of numbers of the sum that
-// stand below each other, column by column; of blocks on the diagonal for both
-// triangles.
+// Calls visit(row, column, count, numbers) for runs of consecutive numbers of
+// the sum, column by column. Diagonal blocks are visited with both triangles.
 template <typename Visit>
 void ReducedCameraSystem::ForEachRun(const Visit& visit) const {
   const double* numbers = parts_[0].data();
@@ -323,7 +325,7 @@ int64_t ReducedCameraSystem::MemoryBytes() const {
     case Kind::kDense:
       numbers += n * n / 2;
       break;
-    case Kind::kSparse:  // with their rows
+    case Kind::kSparse:  // half as much again for the indices
       numbers +=
           1.5 * (2 * block_numbers + static_cast<double>(num_sparse_numbers_));
       break;

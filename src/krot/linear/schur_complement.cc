@@ -16,11 +16,13 @@ using Rows = Eigen::Map<const Eigen::Matrix<double, kRows, 1>>;
 
 // Beyond this |Q_f|^2 of a frame, B_f'B_f and G_f'G_f all but cancel.
 constexpr double kHighLeverage = 0.5;
-// Parts of the loops that add up nothing.
+// The number of parts of loops over points that do not sum.
 constexpr int kFineParts = 64;
-// Waking a thread takes longer than its share of so few observations.
+// With fewer observations, one thread is used: waking another takes longer than
+// its share of the work.
 constexpr int64_t kFewObservations = 4000;
-// Of the frames' solution, relative, where a refinement squares it.
+// Relative tolerance of the frames' solution before a refinement, which squares
+// it.
 constexpr double kToleranceBeforeRefinement = 1e-4;
 
 }  // namespace
@@ -94,15 +96,15 @@ void SchurComplement::SolveReduced(VectorXd rhs,
   }
 }
 
-// The frames that see a point, and what they see of it.
+// The frames that see a point, and the matrices of their rows.
 template <int kRows>
 struct CentredLeastSquares<kRows>::Sightings {
   std::vector<int32_t> frames;  // free, ascending
   std::vector<Matrix3d> H;      // B_f'B_f of each
   std::vector<double> G[3];     // rows of [G_0 G_1 ...]
-  Matrix3d fixed_G;             // of fixed frames together
-  std::vector<char> is_high;    // whose leverage is
-  std::vector<size_t> high;     // those
+  Matrix3d fixed_G;             // sum over the fixed frames
+  std::vector<char> is_high;    // per frame: its leverage is high
+  std::vector<size_t> high;     // indices of the frames with high leverage
 
   Matrix3d FrameG(size_t f) const {
     Matrix3d block;
@@ -127,7 +129,7 @@ CentredLeastSquares<kRows>::CentredLeastSquares(const BlockStructure& structure,
   num_factors_.resize(structure.num_points());
 }
 
-// Sets Q and R, too.
+// Finds the sightings of point k. Sets its Q_ and R_, too.
 template <int kRows>
 void CentredLeastSquares<kRows>::FindSightings(int64_t k,
                                                Sightings* sightings) {
@@ -142,7 +144,7 @@ void CentredLeastSquares<kRows>::FindSightings(int64_t k,
   for (std::vector<double>& row : s.G) row.resize(3 * m);
   double* const own = Q_.data() + kBlock * begin;
   if (structure_.IsFixedPoint(k)) {
-    std::fill_n(own, kBlock * m, 0.0);  // no row tells anything: s is 0
+    std::fill_n(own, kBlock * m, 0.0);  // so that its solution is 0
   } else {
     std::copy_n(rows_.data() + kBlock * begin, kBlock * m, own);
   }
@@ -256,7 +258,7 @@ bool CentredLeastSquares<kRows>::Factorize() {
   return schur_.Factorize();
 }
 
-// What is left of the equations is
+// After the elimination the equations are
 //
 //   [ R  -sum G_f c_f ] [ s ]   [ top                  ]   top = Q'r + R^-T g_s
 //   [ 0   S           ] [ c ] = [ g_t - B'(r - Q top)  ]

@@ -14,19 +14,19 @@
 
 namespace krot::internal {
 
-// What every elimination of the points shares. With the unknowns of points s
-// and of frames t, the normal equations are
+// The common part of all eliminations of points. With the unknowns s of points
+// and t of frames, the normal equations are
 //
 //   [ H_ss  H_st ] [ s ]   [ g_s ]
 //   [ H_ts  H_tt ] [ t ] = [ g_t ]
 //
-// and H_ss consists of a 3x3 block for each point. Without the points they are
+// and H_ss consists of a 3x3 block for each point. Eliminating the points gives
 // (H_tt - H_ts H_ss^-1 H_st) t = g_t - H_ts H_ss^-1 g_s: a reduced camera
-// system, which is a sum over points. The same bits at any number of threads,
-// and of ranks that share the points: the first rank has the system then.
+// system, which is a sum over points. The same bits at any number of threads
+// and of ranks that share the points; only the first rank has the system.
 class SchurComplement {
  public:
-  // Of a solution whose error nothing takes away afterwards, relative.
+  // Relative tolerance of solutions that are not refined afterwards.
   static constexpr double kTolerance = 1e-10;
 
   using Use = ReducedCameraSystem::Use;
@@ -35,25 +35,26 @@ class SchurComplement {
   SchurComplement(const BlockStructure& structure, const Context& context,
                   Use use = Use::kManySolutions);
 
-  // add(k, part) adds what is left of point k to that part of reduced().
+  // add(k, part) adds the contribution of point k to that part of reduced().
   template <typename Add>
   void AddPoints(const Add& add) {
     parts_.Sum(num_threads_, reduced_.num_numbers(), add, reduced_.parts());
   }
   // False if there is no factor even when it is regularised.
   bool Factorize();
-  // Whether reduced() is never formed, but for its blocks on the diagonal.
+  // Whether only the diagonal blocks of reduced() are formed.
   bool is_implicit() const {
     return reduced_.kind() == ReducedCameraSystem::Kind::kImplicit;
   }
 
-  // add_product(k, x, y) adds to y what all blocks of point k but those on the
-  // diagonal are, times x. Numbers stand in the columns of reduced().
+  // add_product(k, x, y) adds to y the product of x with point k's contribution
+  // to all blocks of reduced() but the diagonal ones.
   using AddProduct = std::function<void(int64_t k, const double* x, double* y)>;
 
-  // Solves for the frames. reduce(k, part, rhs) adds to the right-hand side
-  // what is left of point k; `g_t`, if it is not null, is added to that. Fixed
-  // frames are 0. `add_product` is needed if is_implicit().
+  // Solves for the frames. reduce(k, part, rhs) adds the contribution of point
+  // k to the right-hand side, which is indexed by the columns of reduced().
+  // `g_t` is added unless it is null. The result is 0 for fixed frames.
+  // `add_product` is needed if is_implicit().
   template <typename Reduce>
   void Solve(const Reduce& reduce, const std::vector<Eigen::Vector3d>* g_t,
              double tolerance, std::vector<Eigen::Vector3d>* t,
@@ -72,7 +73,7 @@ class SchurComplement {
   const BlockStructure& structure() const { return structure_; }
 
  private:
-  // Of what add(k, part, sum) adds; on the first rank.
+  // The sum of what add(k, part, sum) adds, on the first rank.
   template <typename Add>
   Eigen::VectorXd SumOverPoints(const Add& add) const {
     std::vector<std::vector<double>> parts;
@@ -86,7 +87,7 @@ class SchurComplement {
     }
     return sum;
   }
-  // All ranks get the first one's.
+  // Replaces the numbers of all ranks by those of the first.
   void Share(Eigen::VectorXd* numbers) const;
   void SolveReduced(Eigen::VectorXd rhs,
                     const std::vector<Eigen::Vector3d>* g_t, double tolerance,
@@ -101,9 +102,9 @@ class SchurComplement {
   const PointParts fine_parts_;
 };
 
-// The linear systems of the known rotation problem. Where rotations stay, a row
-// knows a point k and a frame f only by how far the point is from the frame's
-// centre c_f:
+// The linear systems of the known rotation problem. As rotations do not change,
+// a row of point k and frame f depends only on the difference between the point
+// and the frame's centre c_f:
 //
 //   H x = g + A'r,   H = A'A,   (A x)_i = B_i (s_k - c_f),   B_i kRows x 3.
 //
@@ -119,21 +120,23 @@ class SchurComplement {
 //                                                           .'        | H_tt
 //
 // Near an optimum the rows differ by ten orders of magnitude, so H_ss is never
-// formed or inverted. With B = Q R of a point's own rows and G_f = Q'B of those
-// of frame f, the point leaves of the frames' blocks
+// formed or inverted. With the QR factorisation B = Q R of a point's own rows,
+// and G_f = Q'B of the rows of frame f, the point contributes to the reduced
+// camera system
 //
 //   S_ff = B_f'B_f - G_f'G_f = G_f' sum_{g != f} G_g,   S_fg = -G_f'G_g.
 //
 // The difference cancels only where frame f all but determines the point,
-// |Q_f|^2 > 1/2. As |Q|^2 = 3, there are fewer than six such frames, and of
-// them the sum is taken, in which nothing cancels.
+// |Q_f|^2 > 1/2. As |Q|^2 = 3, there are fewer than six such frames; for them
+// the sum is used, in which nothing cancels.
 //
-// Where conjugate gradients need no more than products S c, blocks of two
-// frames are not formed: (S c)_f = S_ff c_f - G_f' sum_{g != f} G_g c_g.
+// If the reduced camera system is implicit, conjugate gradients need only
+// products, (S c)_f = S_ff c_f - G_f' sum_{g != f} G_g c_g, and the blocks of
+// two frames are not formed.
 //
-// Fill rows; Factorize; then Solve and Multiply as often as need be, until the
-// rows are filled anew. What is fixed has s_k = 0 and c_f = 0, and so has a
-// direction that no row tells.
+// Usage: fill rows; Factorize; then Solve and Multiply as often as necessary,
+// until the rows are filled anew. Solutions have s_k = 0 and c_f = 0 for what
+// is fixed, and 0 for unknowns of points that no row determines.
 template <int kRows>  // per observation: 3 or 4
 class CentredLeastSquares {
  public:
@@ -152,7 +155,7 @@ class CentredLeastSquares {
   // null for 0. If `image` is not null it becomes A x; it may be r.
   void Solve(const BlockVector* g, const double* r, BlockVector* x,
              double* image = nullptr);
-  // To a relative error in the energy norm.
+  // The same to a relative error of `tolerance` in the energy norm.
   void Solve(const BlockVector* g, const double* r, double tolerance,
              BlockVector* x, double* image);
   // The same with a step of iterative refinement, which removes the effect of
@@ -165,7 +168,7 @@ class CentredLeastSquares {
  private:
   static constexpr int kBlock = 3 * kRows;
   struct Sightings;
-  // G_f of a free frame.
+  // G_f of a free frame, by columns.
   struct FrameFactor {
     int32_t column;
     double G[9];
@@ -183,8 +186,8 @@ class CentredLeastSquares {
   std::vector<double> Q_;
   std::vector<UpperTriangle> R_;
   std::vector<int32_t> order_;  // of a point's observations by frame
-  // If the system is implicit: those of point k from point_begin[k] on, and how
-  // many.
+  // If the system is implicit: the factors of point k begin at point_begin[k],
+  // and how many there are.
   std::vector<FrameFactor> factors_;
   std::vector<int32_t> num_factors_;
 };

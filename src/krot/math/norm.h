@@ -7,8 +7,7 @@
 
 namespace krot::internal {
 
-// Throws std::invalid_argument unless the norm's cone is one of the conic
-// solvers'.
+// Throws std::invalid_argument unless the conic solvers can handle the norm.
 inline void CheckConic(Norm norm) {
   CheckArgument(norm.p == 2 || norm.IsPolyhedral(), "norm.p", norm.p,
                 "1, 2 or infinity");

@@ -21,24 +21,25 @@ using Eigen::Vector3d;
 constexpr double kDependence = 1e-10;
 // Pieces above the level by less than this, relative, do not violate it.
 constexpr double kRounding = 1e-15;
-// Well-posed inputs need far fewer changes, about 2 per final piece. The limit
-// ends cycles, which only rounding could cause.
+// The limit of changes of the active set. It ends cycles, which only rounding
+// could cause: ordinary inputs need about 2 changes per final piece.
 constexpr int kMaxChanges = 200;
 
 // The active pieces of a solution, with the affine hull of their gradients,
-// g_0 + range(D), as D = Q U by Gram-Schmidt: the columns of Q orthogonal, U
-// unit upper triangular. Columns of leading pieces that stay active are kept.
+// g_0 + range(D). D = Q U by Gram-Schmidt, where Q has orthogonal columns and U
+// is unit upper triangular. After a change, the columns of leading pieces that
+// stay active are kept.
 class ActiveSet {
  public:
-  // `scale`: the largest gradient's length.
+  // `scale` is the length of the largest gradient.
   ActiveSet(const LinearPiece* pieces, double scale,
             SimplexQpSolution* solution)
       : pieces_(pieces),
         smallest_squared_(kDependence * scale * kDependence * scale),
         active_(*solution) {}
 
-  // Brings the weights to the minimiser on the convex hull of a subset of the
-  // active pieces.
+  // Moves the weights to the minimiser on the convex hull of the active pieces,
+  // dropping pieces whose weights vanish on the way.
   void Minimize() {
     while (active_.size > 1) {
       if (!CompleteHull()) {
@@ -56,8 +57,8 @@ class ActiveSet {
   }
 
   // Adds piece j. If its gradient depends on the others, it replaces the piece
-  // whose weight vanishes first as that of j grows. Returns false if none does,
-  // which only rounding could cause.
+  // whose weight vanishes first as the weight of j grows. Returns false if no
+  // weight vanishes, which only rounding could cause.
   bool Add(int j) {
     const Coordinates column = CoordinatesOf(pieces_[j].gradient);
     const int k = active_.size;
@@ -86,7 +87,7 @@ class ActiveSet {
     for (int k = 0; k < active_.size; ++k) {
       active_.step -= active_.weight[k] * Gradient(k);
     }
-    active_.level = 0;  // as a weighted mean; at the minimiser all are equal
+    active_.level = 0;  // the weighted mean, as all values are equal there
     for (int k = 0; k < active_.size; ++k) {
       active_.level += active_.weight[k] * (pieces_[active_.index[k]].value +
                                             Gradient(k).dot(active_.step));
@@ -152,7 +153,7 @@ class ActiveSet {
 
   // Moves the weights along `direction`, by the step `limit` or until the first
   // of them vanishes, and drops the pieces whose weights have vanished. Returns
-  // the step; if nothing bounds it, infinity, and then nothing has moved.
+  // the step. If it is unbounded, returns infinity and changes nothing.
   double MoveWeights(const double direction[4], double limit) {
     double step = limit;
     int blocking = -1;

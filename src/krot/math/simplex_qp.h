@@ -16,8 +16,9 @@ struct LinearPiece {
 // R^3, found in its dual
 //
 //   min over mu >= 0, sum mu = 1   1/2 |sum mu_i gradient_i|^2
-//                                  - sum mu_i value_i,     d = -sum mu
-//                                  gradient.
+//                                  - sum mu_i value_i,
+//
+// with d = -sum mu_i gradient_i.
 //
 // With all values equal, -d is the point of least norm of the convex hull of
 // the gradients.
@@ -32,8 +33,8 @@ struct SimplexQpSolution {
 
 // Wolfe's active-set method for the nearest point of a polytope [Wolfe 1976],
 // extended by the linear term. Requires count >= 1 and finite pieces. A
-// previous solution in `*solution` (size > 0, indices still valid) is a warm
-// start. Exact up to rounding: each active set is visited at most once.
+// previous solution in `*solution` (size > 0, indices still valid) serves as a
+// warm start. Exact up to rounding, as each active set is visited at most once.
 // O(count) per change of the active set.
 void SolveSimplexQp(const LinearPiece* pieces, int count,
                     SimplexQpSolution* solution);

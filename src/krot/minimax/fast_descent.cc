@@ -127,8 +127,8 @@ DescentSummary FastDescent::Minimize(const DescentGoal& goal,
                           active, x);
 }
 
-// [Zhang18, Alg. 2]. The text has no test for a step that fails to lower the
-// cost, which tolerances make possible: it ends the descent.
+// [Zhang18, Alg. 2]. Because of the tolerances a step may fail to lower the
+// cost, for which the paper has no test: here that ends the descent.
 DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
   DescentSummary summary;
   summary.cost_initial = residuals_.Evaluate(*x, norm_);
@@ -167,7 +167,8 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
 
 namespace {
 
-// What a lane's end is called. Its status is one that is not kLaneGivesUp.
+// The termination for the status of a lane that has ended, which must not be
+// kLaneGivesUp.
 DescentTermination TerminationOf(double status) {
   if (status == kLaneStationary) return DescentTermination::kStationary;
   if (status == kLaneZeroCost) return DescentTermination::kZeroCost;
@@ -175,7 +176,7 @@ DescentTermination TerminationOf(double status) {
   return DescentTermination::kBehind;
 }
 
-// Entry k of a row that is 0 / 1.
+// Entry k of a row with the residual 0 / 1.
 double IdleEntry(int k) { return k == kLaneRow - 1 ? 1 : 0; }
 
 }  // namespace
@@ -215,7 +216,7 @@ void SideBySideDescent::Begin(int lane, int num_rows, const DescentGoal& goal,
   descents_.Begin(lane);
 }
 
-// Rows that are 0 / 1 where problems have fewer than `num_rows`.
+// Adds residuals 0 / 1 to problems that have fewer than `num_rows`.
 void SideBySideDescent::Fill(int num_rows) {
   for (int k = 0; k < kLanes; ++k) {
     int& i = lanes_[k].num_filled;
@@ -270,7 +271,8 @@ void SideBySideDescent::Finish(int lane) {
   *problem.active = active;
 }
 
-// From its start: the problem's x and warm start are what they were.
+// Solves a lane's problem by FastDescent, from its start: problem.x and
+// problem.active are still the original ones.
 void SideBySideDescent::MinimizeAlone(int lane, const DescentGoal& goal) {
   Problem& problem = *lanes_[lane].problem;
   lanes_[lane].problem = nullptr;

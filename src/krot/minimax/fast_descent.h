@@ -18,16 +18,18 @@ namespace krot::internal {
 // [Zhang18, (6)]: all r_i(x) >= (1 - active_tolerance) max_i r_i(x), (5) with
 // a relative tolerance. For p = 1 and infinity every active piece of an active
 // residual contributes one. Residuals without gradient (r = 0) contribute
-// none. Requires that residuals.Evaluate(x, norm) came last. O(N).
+// none. Requires that residuals.Evaluate(x, norm) was the last evaluation.
+// O(N).
 void FindDescentNormals(const ResidualSet& residuals, const Eigen::Vector3d& x,
                         Norm norm, double active_tolerance,
                         std::vector<Eigen::Vector3d>* descent_normals);
 
 // The unit vector along the centre of the minimum enclosing ball of the
 // descent normals [Zhang18, Alg. 3]; none if the centre is within
-// `stationarity_tolerance` (eps_0) of the origin or there are no normals. Up
-// to four normals by the closed form, more by their point of least norm,
-// which is the same; `scratch` keeps its memory between calls.
+// `stationarity_tolerance` (eps_0) of the origin or there are no normals. For
+// up to four normals it uses the closed form; for more, the point of least norm
+// of their convex hull, which is the same. `scratch` keeps its memory between
+// calls.
 std::optional<Eigen::Vector3d> FindDescentDirection(
     const std::vector<Eigen::Vector3d>& descent_normals,
     double stationarity_tolerance, std::vector<LinearPiece>* scratch);
@@ -60,8 +62,9 @@ double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
 void CheckOptions(const FastDescentOptions& options);
 
 // Solves problems (1), min over x in R^3 of max_i r_i(x), one after another
-// [Zhang18, Alg. 2]. Owns their residuals and the scratch memory: refilling
-// and solving do not allocate once warm. Not thread-safe: one per thread.
+// [Zhang18, Alg. 2]. Owns the residuals and the scratch memory, so that
+// refilling and solving do not allocate once warm. Not thread-safe: use one per
+// thread.
 class FastDescent {
  public:
   // Throws std::invalid_argument for options or a p out of range.
@@ -69,12 +72,12 @@ class FastDescent {
 
   ResidualSet& residuals() { return residuals_; }
 
-  // Lowers the cost from *x; never raises it. Where a depth at *x is not
-  // positive nothing is done, and the cost is infinite.
+  // Lowers the cost from *x; never raises it. If a depth at *x is not positive,
+  // does nothing, and the cost is infinite.
   DescentSummary Minimize(Eigen::Vector3d* x);
 
-  // As far as `goal` says; `*active` is a warm start, and that of the next
-  // descent afterwards. Both are without effect on kPaper.
+  // The same, but only as far as `goal` asks. `*active` is a warm start and
+  // becomes that of the next descent. kPaper ignores both.
   DescentSummary Minimize(const DescentGoal& goal, ActiveResiduals* active,
                           Eigen::Vector3d* x);
 
@@ -90,31 +93,30 @@ class FastDescent {
   std::vector<LineResidual> line_;
 };
 
-// Solves many small problems (1), min over x in R^3 of max_i r_i(x): each to
-// its goal as FastDescent does, but for p = 2 eight at a time, one per lane of
-// a vector (kernels.h). A lane whose problem ends takes the next one.
-// What comes of a problem depends on that problem alone: not on which others
-// there are, nor in which order.
+// Solves many small problems (1), min over x in R^3 of max_i r_i(x), to the
+// same goal as FastDescent. For p = 2 it solves eight at a time, one per lane
+// of a vector (kernels.h); a lane whose problem ends takes the next one. The
+// result of a problem does not depend on the other problems or on their order.
 //
-// A problem that gives lanes trouble (an optimum far away, many steps), and one
-// with more than kMaxResiduals, is handed to FastDescent, from its start; with
-// `paper` settings, other norms and short vectors (LaneKernels::lanes_pay)
-// every one is.
+// FastDescent solves problems that are difficult for lanes (an optimum far
+// away, many steps) or have more than kMaxResiduals, from their start. It
+// solves all of them with `paper` settings, with other norms, and on machines
+// with short vectors (LaneKernels::lanes_pay).
 class SideBySideDescent {
  public:
-  // Longer problems fill the lanes of a vector by themselves, and eight of them
-  // no cache.
+  // A longer problem fills the lanes of a vector by itself, and eight of them
+  // would not fit into a cache.
   static constexpr int kMaxResiduals = 128;
 
   struct Problem {
-    // The start, and the optimum afterwards. Not null.
+    // The start, which becomes the optimum. Not null.
     Eigen::Vector3d* x = nullptr;
-    // A warm start, and that of the next descent afterwards. Not null.
+    // A warm start, which becomes that of the next descent. Not null.
     ActiveResiduals* active = nullptr;
     DescentSummary summary = {};
   };
 
-  // The rows of the residuals of one problem, a_1, b_1, a_2, b_2, c, d.
+  // Writes the residuals of one problem, as rows a_1, b_1, a_2, b_2, c, d.
   class RowWriter {
    public:
     void Add(const double row[kLaneRow]) {
@@ -133,11 +135,11 @@ class SideBySideDescent {
     int count_ = 0;
   };
 
-  // Throws as FastDescent's.
+  // Throws like the constructor of FastDescent.
   SideBySideDescent(const FastDescentOptions& options, Norm norm);
 
-  // Minimises all problems; `add_rows(n, &writer)` writes the rows of number n.
-  // It is called once for each, in order: fewest steps are idle where problems
+  // Minimises all problems. `add_rows(n, &writer)` writes the rows of problem
+  // n; it is called once for each, in order. Lanes are idle least if problems
   // of similar length follow each other.
   template <typename AddRows>
   void Minimize(const DescentGoal& goal, const AddRows& add_rows,
@@ -156,9 +158,9 @@ class SideBySideDescent {
 
  private:
   struct Lane {
-    Problem* problem = nullptr;  // none: idle
+    Problem* problem = nullptr;  // null if the lane is idle
     int num_rows = 0;
-    int num_filled = 0;  // with those that are 0 / 1
+    int num_filled = 0;  // including rows that are 0 / 1
   };
 
   bool IsBusy() const;

@@ -5,65 +5,71 @@
 
 namespace krot::internal {
 
-// What the descent of one problem (newton_descent.h) and those of problems
+// Constants that descents of one problem (newton_descent.h) and of problems
 // side by side have in common.
 
-// Residuals this small are zero, in pixels.
+// Residuals below this count as zero, pixels.
 inline constexpr double kZeroPixels = 1e-10;
 
-// kappa. A small one makes steps Newton's, a large one safe; the first and the
-// smallest are those with the fewest steps on random triangulations, of 1e-3,
-// 1e-2, 3e-2 and of 1e-6, 1e-5 (docs/history/journal.md, "One triangulation").
-// Rounding in the model is about 1e-16 / kappa.
+// kappa weighs the term that shortens steps. With a small kappa steps are
+// Newton's, with a large one they are safe. These values need the fewest steps
+// on random triangulations: the first of 1e-3, 1e-2, 3e-2, the smallest of
+// 1e-6, 1e-5 (docs/history/journal.md, "One triangulation"). Rounding in the
+// model is about 1e-16 / kappa.
 inline constexpr double kFirstKappa = 1e-2;
 inline constexpr double kSmallestKappa = 1e-5;
 inline constexpr double kLargestKappa = 1e9;
-// A descent that ends at a tolerance needs none far below it: steps of coarse
-// sweeps end sooner (docs/history/journal.md, "Res-Int, the first ten
+// A descent to a coarse tolerance does not need a kappa far below it, and takes
+// fewer steps without (docs/history/journal.md, "Res-Int, the first ten
 // sweeps").
 inline double SmallestKappa(double tolerance) {
   return std::max(kSmallestKappa, 0.1 * tolerance);
 }
-// What it is multiplied by after a good trial and after a failed one.
+// Factors of kappa after a good trial and after a failed one.
 inline constexpr double kKappaFall = 0.01;
 inline constexpr double kKappaRise = 10;
 
-// Shares of its promise that a trial keeps: it is taken beyond the first, good
-// beyond the second. Taking less would move on by next to nothing.
+// A model promises that a step lowers the cost by some amount. A trial that
+// keeps more than the first share of this promise is accepted; one that keeps
+// more than the second is good. Accepting less would make next to no progress.
 inline constexpr double kSufficientShare = 0.1;
 inline constexpr double kGoodShare = 0.5;
-// Promises below this, relative, are rounding if the trial does not keep them:
-// at two cameras they were tried again and again (docs/history/journal.md,
-// "One triangulation", step 4).
+// A promise below this, relative to the cost, counts as rounding if the trial
+// does not keep it. Otherwise points seen by two cameras would be tried again
+// and again (docs/history/journal.md, "One triangulation", step 4).
 inline constexpr double kPromiseRounding = 1e-10;
-// The least tolerance of a descent (DescentGoal).
+// The smallest tolerance of a descent (DescentGoal).
 inline constexpr double kFinestTolerance = 1e-11;
 
-// So often a failed trial may teach the model before kappa rises, and a lesson
-// after which the next trial costs no less than this share of the one before
-// was none. Without an end to lessons, frames whose residuals all point the
-// same way stay where they are (tests/minimax/degenerate_test.cc).
+// After a failed trial the model is improved (a lesson) and tried again. After
+// kMaxLessons of them kappa rises instead, and also if the cost of a failed
+// trial is not below kLessonWorth of that of the failed trial before. Without
+// these limits, frames whose residuals all point the same way would not move
+// (tests/minimax/degenerate_test.cc).
 inline constexpr int kMaxLessons = 5;
 inline constexpr double kLessonWorth = 0.99;
 
-// Weights that the residuals bear together below this are rounding.
+// If the weights of all residuals sum to less than this, they are rounding.
 inline constexpr double kSmallestWeight = 1e-9;
-// Multipliers have grown much where they exceed (factor, offset) their last.
+// A multiplier has grown much if it exceeds kMuchGrowth times its last value
+// plus kLeastGrowth.
 inline constexpr double kMuchGrowth = 2;
 inline constexpr double kLeastGrowth = 1e-3;
-// Falls of depths below the first, relative, count as none: steps that are cut
-// short cost iterations. No depth falls below the second of what it is.
+// A step is not shortened if depths fall by less than kSmallFall, relative, as
+// shorter steps cost iterations. No depth falls below kSmallestDepthShare of
+// its present value.
 inline constexpr double kSmallFall = 0.1;
 inline constexpr double kSmallestDepthShare = 0.1;
 inline constexpr double kLargestFall = 1 - kSmallestDepthShare;
-// Keeps H invertible where rounding would not: relative to its trace.
+// Smallest pivot of H, relative to its trace: it keeps H invertible despite
+// rounding.
 inline constexpr double kPivotRounding = 1e-14;
-// G serves as long as (what has changed since, relative)^2 is below this. Kept
-// wherever kappa is small, it missed optima at infinity; cold points take 2 %
-// longer for this (docs/history/journal.md, "Res-Int, the first ten
+// The metric G is kept as long as the squared relative change of residuals and
+// depths since it was set is below this. If it were kept longer, optima at
+// infinity would be missed (docs/history/journal.md, "Res-Int, the first ten
 // sweeps").
 inline constexpr double kMetricReach = 1e-2;
-// Up to this growth of depths the minimiser is not far away.
+// If depths grow by less than this factor, the minimiser is not far away.
 inline constexpr double kNearby = 1e3;
 
 // Plain memory, no Eigen: this header is shared with code compiled for other
@@ -89,7 +95,7 @@ struct alignas(64) GradientBlock {
   double bend[3][kResidualLanes];
 };
 
-// What residual_kernel.cc is compiled to.
+// The functions that residual_kernel.cc defines for one kind of vector units.
 struct ResidualKernels {
   // values[i] = r_i(x) for all lanes of `num_blocks` blocks (infinity unless
   // the depth is positive); returns the largest. p >= 1 or infinity. About 1 ns
@@ -112,8 +118,7 @@ struct ResidualKernels {
 };
 extern const ResidualKernels& best_residual_kernels;
 
-// Problems (1) side by side, one per lane of a vector. Plain memory, no Eigen:
-// this header is shared with code compiled for other vector units.
+// Problems (1) side by side, one per lane of a vector.
 
 inline constexpr int kLanes = 8;
 using LaneDoubles = double[kLanes];
@@ -126,7 +131,8 @@ struct alignas(64) LaneRow {
   LaneDoubles entry[kLaneRow];
 };
 
-// The residual near x: value + gradient . d. What every iteration writes anew.
+// A residual of every lane near x, value + gradient . d. Every iteration writes
+// them anew.
 struct alignas(64) LanePiece {
   LaneDoubles value;
   LaneDoubles gradient[3];
@@ -135,19 +141,19 @@ struct alignas(64) LanePiece {
 };
 
 inline constexpr double kNoPieceIndex = -2;
-// As many pieces as can bear a step.
+// The largest number of active pieces.
 inline constexpr int kCorners = 4;
 
-// What has become of a lane's problem.
-inline constexpr double kLaneIdle = 0;   // there is none
-inline constexpr double kLaneFresh = 1;  // has not been looked at yet
+// The status of a lane's problem.
+inline constexpr double kLaneIdle = 0;   // the lane has no problem
+inline constexpr double kLaneFresh = 1;  // not evaluated yet
 inline constexpr double kLaneRuns = 2;
-// The ends, as those of NewtonDescent:
+// The problem has ended, like a NewtonDescent:
 inline constexpr double kLaneStationary = 3;
 inline constexpr double kLaneZeroCost = 4;
 inline constexpr double kLaneLowEnough = 5;
 inline constexpr double kLaneBehind = 6;
-// Not one for lanes: it is far away, or takes too many steps.
+// Not for lanes: the minimiser is far away, or it takes too many steps.
 inline constexpr double kLaneGivesUp = 7;
 
 // As DescentGoal.
@@ -158,9 +164,9 @@ struct LaneGoal {
   int max_iterations;
 };
 
-// The descents of all lanes between two steps. A lane begins with `status`
-// kLaneFresh, `count`, `x`, the active residuals of a warm start, if there is
-// any, and what Begin sets.
+// The descents of all lanes between two steps. For a new problem the caller
+// sets `status` to kLaneFresh, `count`, `x`, `index` and `multiplier` of a warm
+// start (0 without one), and then calls Begin.
 struct alignas(64) LaneDescents {
   LaneDoubles status;
   LaneDoubles count;  // residuals, >= 1
@@ -169,15 +175,15 @@ struct alignas(64) LaneDescents {
   LaneDoubles cost;
   LaneDoubles iterations;  // steps tried
 
-  // The active set: indices of residuals, of lane_hull.h or kNoPieceIndex, and
-  // weights.
+  // The active set: indices of residuals, kZeroPieceIndex (lane_hull.h) or
+  // kNoPieceIndex, and their weights.
   LaneDoubles index[kCorners];
   LaneDoubles weight[kCorners];
-  // What they give to H of the next step: over residuals alone, with sum 1.
+  // Their multipliers in H of the next step: of residuals only, with sum 1.
   LaneDoubles multiplier[kCorners];
 
-  LaneDoubles is_cold;  // whether a first step is for the multipliers alone
-  LaneDoubles raises;   // whether multipliers only rise
+  LaneDoubles is_cold;  // whether the next step only finds multipliers
+  LaneDoubles raises;   // whether multipliers may only rise
   LaneDoubles kappa;
   LaneDoubles lessons;
   LaneDoubles cost_failed;
@@ -186,21 +192,22 @@ struct alignas(64) LaneDescents {
   LaneDoubles x_metric[3];
   LaneDoubles metric[6];
 
-  // Prepares a lane whose problem, warm start included, is set.
+  // Sets the other fields of a lane with a new problem.
   void Begin(int lane);
 };
 
-// What lane_descent.cc is compiled to.
+// The functions that lane_descent.cc defines for one kind of vector units.
 struct LaneKernels {
-  // Whether the vectors are long enough, four numbers or more.
+  // Whether lanes are faster than one problem after the other: vectors have
+  // four numbers or more.
   bool lanes_pay;
   // One step of NewtonDescent, for p = 2, in every lane that has a problem, or
-  // part of one where active sets change often: minimises the model of all
-  // residuals and tries the step. Failed trials teach the model multipliers,
-  // but no tangents. Ends as NewtonDescent does, or gives up. What a lane does
-  // depends on its own problem alone. `pieces`: memory for as many as rows, the
-  // same in all steps. About 30 ns per row and step, all lanes together, and
-  // 400 ns.
+  // a part of a step if the active set changes often: minimises the model of
+  // all residuals and tries the step. A failed trial adds multipliers to the
+  // model, but no tangents. A lane ends as NewtonDescent does, or gives up; it
+  // does not depend on other lanes. `pieces` is memory for `num_rows` pieces,
+  // the same in all steps. About 30 ns per row and step for all lanes together,
+  // plus 400 ns.
   void (*step_lanes)(const LaneRow* rows, int num_rows, const LaneGoal& goal,
                      LaneDescents* descents, LanePiece* pieces);
 };

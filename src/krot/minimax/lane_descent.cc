@@ -9,10 +9,11 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// A lane that takes so many steps gives up: what is left of its kind takes more
-// than twice as many, or fares better with tangents.
+// A lane gives up after this many steps. Problems that take so many need more
+// than twice as many, or converge faster with tangents.
 constexpr double kMaxSteps = 25;
-// Nor does it call so often: active sets that change without an end.
+// It also gives up after this many calls: its active set changes without an
+// end.
 constexpr double kMaxCalls = 60;
 
 LaneMask IsSet(const LaneDoubles& flag) { return Load(flag) == 1; }
@@ -55,12 +56,12 @@ class Stepping {
   LaneDescents& descents_;
   LanePiece* pieces_;
 
-  // Between calls in `descents_`.
+  // Kept in `descents_` between calls.
   Lanes status_, cost_, kappa_, lessons_, cost_failed_;
   Lanes3 x_;
   LaneHull hull_;
 
-  // Of this call.
+  // Used within this call only.
   LaneMask is_fresh_, is_running_, is_far_, is_cold_;
   LaneMatrix curvature_, metric_;
   LaneStep step_;
@@ -129,7 +130,8 @@ void Stepping::UpdateMetric() {
   Store(metric_, &descents_.metric);
 }
 
-// The first step of a cold start is one of G alone, for its multipliers.
+// The first step of a cold start has H = curvature + G, and only its
+// multipliers are used.
 void Stepping::Minimize() {
   const LaneMatrix H = curvature_ + Select(is_cold_, 1, kappa_) * metric_;
   step_ = MinimizeLaneModel(pieces_, rows_.count,
@@ -165,7 +167,7 @@ void Stepping::Try() {
   cost_trial_ = EvaluateLanes(rows_, x_trial_);
 }
 
-// See NewtonDescent's Run.
+// See Run in newton_descent.cc.
 void Stepping::Decide() {
   const Lanes smallest_kappa = SmallestKappa(goal_.tolerance);
   const Lanes promise = cost_ - step_.level;
@@ -214,7 +216,7 @@ void Stepping::Decide() {
   SetStatus(is_running_ & (is_far_ | (is_solved_ & ~is_number)), kLaneGivesUp);
 }
 
-// What NewtonDescent's Learn does, without tangents.
+// See Learn in newton_descent.cc; here without tangents.
 void Stepping::Learn(const LaneMask& learns) {
   const LaneMask is_worth_it = has_grown_ & (lessons_ < kMaxLessons) &
                                (cost_trial_ < kLessonWorth * cost_failed_);
@@ -246,7 +248,7 @@ void StepLanes(const LaneRow* rows, int num_rows, const LaneGoal& goal,
 
 }  // namespace
 
-// With two numbers to a vector, lanes take longer than one problem after the
+// With two numbers per vector, lanes are slower than one problem after the
 // other.
 extern const LaneKernels kLaneKernels = {kVectorLanes >= 4, &StepLanes};
 

@@ -6,11 +6,11 @@
 
 namespace krot::internal::KROT_UNITS {
 
-// The active sets of simplex_qp.cc in all lanes at once: the same moves of the
-// same weights, one at a time and in every lane that is due one. For kernels
-// alone.
+// The active-set method of simplex_qp.cc in all lanes at once: it makes the
+// same moves of weights, one at a time, in every lane that needs one. For
+// kernels only.
 
-// The zero below which no residual falls, as a piece.
+// The index of the zero piece: no residual falls below 0.
 inline constexpr double kZeroPieceIndex = -1;
 
 // An active piece, in the coordinates where the curvature is 1.
@@ -18,7 +18,7 @@ struct LaneCorner {
   Lanes index;
   Lanes weight;  // > 0, sum 1; 0 where there is no piece
   Lanes value;
-  Lanes multiplier;  // that comes with it
+  Lanes multiplier;  // of its residual in H
   Lanes3 gradient;
 };
 
@@ -35,28 +35,28 @@ struct LaneHull {
   Lanes size;
   LaneCorner corner[kCorners];  // the first `size` of them
 
-  // Moves the weights towards the minimiser on the affine hull. Where one of
-  // them vanishes before, its corner is dropped, and another move is due: those
-  // lanes are returned.
+  // Moves the weights towards the minimiser on the affine hull. If a weight
+  // vanishes before that is reached, drops its corner. Returns the lanes where
+  // it did, which need another move.
   LaneMask MoveWeights();
 
-  // The minimiser -sum weight gradient, where no move is due, and the level of
-  // the pieces there; minus infinity if there are none.
+  // The minimiser -sum weight gradient, in lanes that need no move, and the
+  // level of the pieces there; minus infinity if there are none.
   Lanes3 Step() const;
   Lanes Level(const Lanes3& step) const;
 
-  // Adds `piece` in the lanes `adding`, where no move is due: as another corner
-  // or, if its gradient depends on theirs, in place of the one that blocks the
-  // move in its favour. Returns where it did; elsewhere nothing blocks, by
-  // rounding only.
+  // Adds `piece` in the lanes `adding`, which must need no move: as another
+  // corner or, if its gradient depends on theirs, in place of the corner whose
+  // weight vanishes first as the weight of `piece` grows. Returns where it did;
+  // it fails only by rounding.
   LaneMask Add(const LaneMask& adding, const LaneCorner& piece);
 
-  // The largest |gradient|^2.
+  // The largest |gradient|^2 of the corners.
   Lanes Scale() const;
 
-  // Where corner a is one.
+  // The lanes in which corner a exists.
   LaneMask Has(int a) const { return Lanes(a) < size; }
-  // Where `index` names a corner.
+  // The lanes in which a corner has this index.
   LaneMask Holds(const Lanes& index) const;
 
  private:
@@ -65,8 +65,8 @@ struct LaneHull {
   void Barycentric(const Lanes y[3], Lanes weights[kCorners]) const;
   void Drop(const Lanes& dropped);
 
-  // gradient_k - gradient_0 = Q U: columns that depend on others, up to
-  // rounding, have 1 / |q|^2 = 0.
+  // gradient_k - gradient_0 = Q U with orthogonal columns q. For a column that
+  // depends on others, up to rounding, inverse_squared_ is 0 for 1 / |q|^2.
   Lanes3 q_[3];
   Lanes inverse_squared_[3];
   Lanes u01_, u02_, u12_;
@@ -77,7 +77,7 @@ namespace detail {
 // See simplex_qp.cc.
 inline constexpr double kLaneDependence = 1e-10;
 
-// The least of `step` and `ratios` where those count, and of which corner.
+// The smallest of `step` and of the ratios that count, and its corner.
 struct FirstBlocking {
   Lanes step;
   Lanes corner = kNoPieceIndex;
@@ -172,7 +172,8 @@ inline LaneMask LaneHull::MoveWeights() {
   return drops;
 }
 
-// The last corner takes the place of number `dropped`, where that is one.
+// Replaces the corner number `dropped`, in lanes where it is >= 0, by the last
+// corner.
 inline void LaneHull::Drop(const Lanes& dropped) {
   LaneCorner last = corner[0];
   for (int a = 1; a < kCorners; ++a) last = Select(Has(a), corner[a], last);
@@ -190,7 +191,8 @@ inline Lanes3 LaneHull::Step() const {
   return step;
 }
 
-// The mean: all agree at the minimiser.
+// Computed as the weighted mean, as all pieces have the same value at the
+// minimiser.
 inline Lanes LaneHull::Level(const Lanes3& step) const {
   Lanes level = 0;
   for (const LaneCorner& c : corner) {

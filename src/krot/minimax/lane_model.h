@@ -8,9 +8,9 @@
 
 namespace krot::internal::KROT_UNITS {
 
-// What the residuals of all lanes do around x, for p = 2: passes over their
-// rows. The model is that of newton_descent.h with all residuals as members.
-// For kernels alone.
+// The local model of newton_descent.h in all lanes, for p = 2, with all
+// residuals as members. Each function passes over the rows once. For kernels
+// only.
 
 // One residual of every lane: v = A x + b, w = c'x + d.
 struct LaneResidual {
@@ -56,10 +56,10 @@ inline Lanes EvaluateLanes(const LaneRows& rows, const Lanes3& x) {
   return Sqrt(largest);
 }
 
-// Writes the pieces at x, those of the hull's corners there as well, and
-// returns sum_i mu_i c_i b_i b_i'. mu_i is `multiplier[a]` where corner a is
-// piece i and, in the lanes `raises`, no less than before. *cost is the maximum
-// at x.
+// Writes the pieces at x, also to the hull's corners, and returns
+// sum_i mu_i c_i b_i b_i'. mu_i is `multiplier[a]` if corner a is piece i,
+// otherwise 0; in the lanes `raises` it is no less than before. *cost is the
+// maximum at x.
 inline LaneMatrix LinearizeLanes(const LaneRows& rows, const Lanes3& x,
                                  const Lanes multiplier[kCorners],
                                  const LaneMask& raises, LanePiece* pieces,
@@ -106,7 +106,7 @@ inline LaneMatrix LinearizeLanes(const LaneRows& rows, const Lanes3& x,
   return curvature;
 }
 
-// G of `count` residuals, which come first, and the largest of their depths.
+// G of the first `count` residuals, and the largest of their depths.
 inline LaneMatrix MetricOfLanes(const LaneRows& rows, const Lanes3& x,
                                 const Lanes& cost, const Lanes& count,
                                 Lanes* depth) {
@@ -123,7 +123,7 @@ inline LaneMatrix MetricOfLanes(const LaneRows& rows, const Lanes3& x,
   return (1 / (cost * count)) * sum;
 }
 
-// The largest share of itself by which a depth falls with the step d.
+// The largest relative fall of a depth by the step d.
 inline Lanes FallOfLanes(const LaneRows& rows, const LanePiece* pieces,
                          const Lanes3& d) {
   Lanes fall = 0;
@@ -134,8 +134,8 @@ inline Lanes FallOfLanes(const LaneRows& rows, const LanePiece* pieces,
   return fall;
 }
 
-// The piece that is highest at d and above `threshold`; none where there is no
-// such piece.
+// The piece with the largest value at d, if that is above `threshold`;
+// otherwise its index is kNoPieceIndex.
 inline LaneCorner HighestPiece(const LanePiece* pieces, int count,
                                const Lanes3& d, const Lanes& threshold) {
   LaneCorner piece;
@@ -158,22 +158,23 @@ inline LaneCorner HighestPiece(const LanePiece* pieces, int count,
   return piece;
 }
 
-// What the minimiser of the model does.
+// The minimiser of the model.
 struct LaneStep {
   Lanes3 d;
   Lanes level;
   Lanes held_back;   // d'Hd
-  LaneMask is_open;  // where it has not been found yet
+  LaneMask is_open;  // lanes in which it is not found yet
 };
 
-// How many moves of weights one call makes: lanes that need more go on in the
-// next one. With fewer, iterations wait for them; with more, the others do.
+// At most this many moves of weights are made in one call; lanes that need more
+// continue in the next one. With fewer moves, steps take more calls; with more,
+// other lanes wait longer.
 inline constexpr int kMovesPerStep = 4;
 // See simplex_qp.cc.
 inline constexpr double kLevelRounding = 1e-15;
 
-// Minimises the model with H^-1 = L'L in the lanes `running`, from the hull's
-// active set, whose gradients become scaled.
+// Minimises the model with H^-1 = L'L in the lanes `running`, starting from the
+// hull's active set. Scales the gradients of the hull by L.
 inline LaneStep MinimizeLaneModel(const LanePiece* pieces, int count,
                                   const LaneMatrix& L, const Lanes& cost,
                                   const LaneMask& running, LaneHull* hull) {

@@ -6,12 +6,11 @@
 
 namespace krot::internal::KROT_UNITS {
 
-// Arithmetic in all lanes at once, for kernels alone (krot_native_kernel): the
-// vectors are as long as those of the machine that the file is compiled for,
-// and there are as many as the lanes fill. GCC's and Clang's vector types say
-// so; loops over lanes of this size are not reliably made vector code. No
-// operation but Any looks from one lane into another: what comes out of a lane
-// depends on that lane alone.
+// Arithmetic in all lanes at once, for kernels only (krot_native_kernel). The
+// lanes are stored in vectors of the length for which the file is compiled. It
+// uses the vector types of GCC and Clang, as compilers do not reliably
+// vectorise loops over so few lanes. Except for Any, no operation mixes lanes:
+// the result in a lane depends on that lane only.
 
 #if defined(__AVX512F__)
 inline constexpr int kVectorBytes = 64;
@@ -34,7 +33,7 @@ struct Lanes {
   }
 };
 
-// True where all bits are set, false where none is.
+// Per lane: true if all bits are set, false if none is.
 struct LaneMask {
   typedef long long Vector __attribute__((vector_size(kVectorBytes)));
   Vector v[kVectors];
@@ -167,8 +166,7 @@ inline void Store(const Lanes3& lanes, LaneDoubles (*memory)[3]) {
   Store(lanes.z, &(*memory)[2]);
 }
 
-// A 3 x 3 matrix in every lane, symmetric or lower triangular. For kernels
-// alone.
+// A 3 x 3 matrix in every lane, symmetric or lower triangular.
 struct LaneMatrix {
   Lanes m00, m10, m20, m11, m21, m22;
 };
@@ -208,8 +206,8 @@ inline Lanes3 TransposedTimes(const LaneMatrix& L, const Lanes3& g) {
           L.m22 * g.z};
 }
 
-// The inverse of the Cholesky factor L of H = L L'. Pivots below
-// `rounding` times the trace are that.
+// The inverse of the Cholesky factor L of H = L L'. Pivots below `rounding`
+// times the trace are raised to that.
 inline LaneMatrix InverseCholesky(const LaneMatrix& H, double rounding) {
   const Lanes floor = rounding * (H.m00 + H.m11 + H.m22);
   const Lanes i00 = 1 / Sqrt(H.m00);

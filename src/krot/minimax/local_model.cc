@@ -15,8 +15,9 @@ using Eigen::Vector3d;
 constexpr int kZeroPiece = 0;
 constexpr int kNoMember = -1;
 
-// How far x is from where v and w vanish: from the camera or, if that is what
-// moves, from its point. Up to a factor near 1.
+// The distance of x from the place where v and w vanish: if x is a point, its
+// distance from the camera; if x is a translation, the camera's distance from
+// the point. Exact up to a factor near 1.
 double DistanceFromCamera(const Residual& residual, const Vector3d& x) {
   const double focal_length = residual.A.norm() / std::sqrt(2.0);
   return std::hypot(residual.Depth(x),
@@ -52,7 +53,7 @@ void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
     AddPieces();
   }
   if (!IsMetricGood(cost)) SetMetric(cost);
-  // A warm start of the next step must not name tangents that are gone.
+  // The warm start of the next step must not refer to tangents, which are gone.
   const int num_pieces = static_cast<int>(pieces_.size());
   for (int k = 0; k < solution_.size; ++k) {
     if (solution_.index[k] >= num_pieces) solution_.size = 0;
@@ -91,8 +92,8 @@ void LocalModel::AddPieces() {
   }
 }
 
-// Whether G was set with the same members near x: so near that, by G itself,
-// neither residuals nor depths change by much.
+// Whether G was set for the same members and so near x that, as measured by G
+// itself, neither residuals nor depths have changed much.
 bool LocalModel::IsMetricGood(double cost) const {
   if (num_members_of_metric_ != members_.size()) return false;
   const Vector3d d = x_ - x_metric_;
@@ -157,8 +158,9 @@ LocalModel::Step LocalModel::Minimize(double kappa) {
           solution_.step.squaredNorm()};
 }
 
-// Over the residuals alone and with sum 1: at a positive optimum the zero
-// piece bears none. False if the zero piece bears all.
+// Sets the last multipliers of the residuals, with sum 1. The zero piece is
+// left out, as it has no weight at a positive optimum. False if it has all the
+// weight.
 bool LocalModel::UpdateLastMultipliers() {
   double sum = 0;
   for (int k = 0; k < solution_.size; ++k) {
@@ -180,7 +182,7 @@ void LocalModel::StartFrom(const ActiveResiduals& active) {
   for (int k = 0; k < active.size; ++k) {
     const int m = FindMember(active.index[k]);
     members_[m].multiplier = active.multiplier[k] / sum;
-    if (norm_.IsPolyhedral()) continue;  // which of its pieces is not known
+    if (norm_.IsPolyhedral()) continue;  // its active piece is not known
     solution_.index[k] = m + 1;
     solution_.weight[k] = members_[m].multiplier;
     solution_.size = k + 1;
@@ -223,7 +225,7 @@ bool LocalModel::RaiseMultipliers() {
 
 bool LocalModel::AddTangents(const Vector3d& x_trial,
                              const double* trial_values, double level) {
-  if (norm_.IsPolyhedral()) return false;  // all its planes are pieces
+  if (norm_.IsPolyhedral()) return false;  // all planes are pieces already
   bool added = false;
   for (size_t m = 0; m < members_.size(); ++m) {
     const double value = trial_values[members_[m].index];
@@ -237,8 +239,8 @@ bool LocalModel::AddTangents(const Vector3d& x_trial,
   return added;
 }
 
-// Where all depths fall by the same share f of themselves, a residual changes
-// with d / (1 + f) as much as its linearisation does with d.
+// If all depths fall by the same share f, a residual changes by the step
+// d / (1 + f) as much as its linearisation does by d.
 double LocalModel::ShareOf(const Vector3d& d) const {
   const Vector3d longer = (kLargestFall / kSmallFall) * d;
   const double share = best_residual_kernels.depth_share(
@@ -256,7 +258,7 @@ double LocalModel::DepthGrowth() const {
     depth =
         std::max(depth, members_[member_of_piece_[solution_.index[k]]].depth);
   }
-  // A distance is no less than the depth, which is at hand.
+  // Depths are at hand, and a distance is at least the depth.
   if (depth <= kNearby * depth_start_) return depth / depth_start_;
   double distance = 0;
   for (int m = 0; m < rows_.size(); ++m) {

@@ -13,13 +13,14 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Residuals become members so many at a time, the largest first. More make
-// every step dearer, fewer take more trials to find those that matter.
+// At most this many residuals become members at a time, the largest first. With
+// more, steps cost more; with fewer, it takes more trials to find those that
+// matter.
 constexpr int kMaxAdded = 8;
 
-// Whether the minimiser lies so far away that going on has no point: where
-// depths have grown a millionfold nothing changes by more than 1e-6 of it any
-// more, and long before that little is left to gain.
+// Whether the minimiser is so far away, perhaps at infinity, that going on is
+// useless: once depths have grown a millionfold, residuals change by at most
+// 1e-6 of their value. Beyond kNearby, it is useless if the promise is small.
 bool IsFarAway(double depth_growth, double relative_promise) {
   return depth_growth > 1e6 ||
          (depth_growth > kNearby && relative_promise < 1e-8);
@@ -37,7 +38,7 @@ class Descent {
         model_(*model),
         is_member_(*is_member) {}
 
-  // The residuals have been evaluated at x, where their maximum is `cost`.
+  // Requires that the residuals were evaluated at x; `cost` is their maximum.
   void Start(const Vector3d& x, double cost, const ActiveResiduals& active);
   DescentTermination Run(int max_iterations);
 
@@ -46,14 +47,14 @@ class Descent {
   int iterations() const { return iterations_; }
 
  private:
-  // What the model would do.
+  // A step of the model.
   struct Proposal {
     LocalModel::Step step;
-    double promise;         // by how much the step is to lower the cost
-    double share;           // of the step that is taken
+    double promise;         // decrease of the cost that the model predicts
+    double share;           // of the step that is tried
     bool promises_nothing;  // up to the tolerance
   };
-  // What comes of it.
+  // The result of trying it.
   struct Trial {
     Vector3d x;
     double cost;
@@ -82,12 +83,13 @@ class Descent {
   double cost_ = 0;
   double kappa_ = kFirstKappa;
   int iterations_ = 0;
-  // Since x has moved:
+  // Since x has moved last:
   int lessons_ = 0;
   double cost_failed_ = kInfinity;  // of the last trial that failed
 };
 
-// The first multipliers are those given or, without any, of a gradient step.
+// The first multipliers are those of `active` or, without any, of a step with
+// H = G.
 void Descent::Start(const Vector3d& x, double cost,
                     const ActiveResiduals& active) {
   x_ = x;
@@ -136,8 +138,8 @@ DescentTermination Descent::Run(int max_iterations) {
   return DescentTermination::kMaxIterations;
 }
 
-// A promise that takes depths near zero says little: residuals go with
-// 1 / depth.
+// If the step is shortened because depths fall, its promise is unreliable and
+// only the finest tolerance counts.
 Descent::Proposal Descent::Propose() {
   const LocalModel::Step step = model_.Minimize(kappa_);
   const double promise = cost_ - step.level;
@@ -146,8 +148,9 @@ Descent::Proposal Descent::Propose() {
   return {step, promise, share, !(promise > tolerance * cost_)};
 }
 
-// A promise may be small for the sake of a kappa that nothing has raised here.
-// Counts as an iteration if so.
+// A promise may be small only because kappa is large. If kappa was not raised
+// by failed trials at this x, sets it to its smallest value; that counts as an
+// iteration. Returns whether it did.
 bool Descent::LowerKappaAtOnce() {
   if (!(kappa_ > smallest_kappa_ && lessons_ == 0)) return false;
   model_.RaiseMultipliers();
@@ -165,15 +168,16 @@ Descent::Trial Descent::Try(const Proposal& proposal) {
   return trial;
 }
 
-// Whether nothing is to be gained after this trial.
+// Whether nothing is left to gain after this trial.
 bool Descent::EndsWith(const Proposal& proposal, const Trial& trial) const {
   if (proposal.promises_nothing) return true;
-  // The pieces of polyhedral norms lack the curvature of Newton's step.
+  // For polyhedral norms the model has no curvature, so steps are not Newton's.
   const bool is_newton =
       !norm_.IsPolyhedral() && kappa_ <= smallest_kappa_ && proposal.share == 1;
   if (!is_newton) return false;
-  // What a Newton step leaves for the next one, to first order: what the trial
-  // misses of the level, and what the quadratic term held back.
+  // The decrease that a Newton step leaves to the next one, to first order: how
+  // far the trial's cost is above the model's level, or what the quadratic term
+  // held back.
   const double left =
       std::max(trial.cost - proposal.step.level, proposal.step.held_back);
   const bool is_rounding = !(trial.kept > kSufficientShare) &&
@@ -197,14 +201,15 @@ void Descent::Accept(const Trial& trial) {
   cost_failed_ = kInfinity;
 }
 
-// Teaches the model by a trial that failed; `overlooked` is the largest of the
-// residuals above the level that were no members. Whether that is worth
-// another trial with the same kappa.
+// Improves the model after a failed trial; `overlooked` is the largest of the
+// residuals above the level that were no members. Returns whether another trial
+// with the same kappa is worthwhile.
 bool Descent::Learn(const Proposal& proposal, const Trial& trial,
                     const std::optional<double>& overlooked) {
   if (overlooked) {
     model_.Linearize(x_, cost_, norm_);
-    // It has not misjudged a residual that it did not know.
+    // The maximum is a residual that the model did not have, so the model has
+    // not misjudged a member: this does not count as a lesson.
     if (!(*overlooked < trial.cost)) return true;
   } else {
     bool learned = model_.RaiseMultipliers();
@@ -217,8 +222,8 @@ bool Descent::Learn(const Proposal& proposal, const Trial& trial,
   return ++lessons_ <= kMaxLessons;
 }
 
-// Makes the largest residuals above `level` members, if they are not yet.
-// Returns the largest of them, if there were any.
+// Makes the largest residuals above `level` members, if they are not members
+// yet. Returns the largest of these, if there are any.
 std::optional<double> Descent::AddMembers(double level) {
   const double* values = residuals_.values();
   int largest[kMaxAdded];  // indices, by falling value

@@ -36,7 +36,7 @@ struct NormLp {
   }
 };
 
-// v and w of (2).
+// v and w of [Zhang18, (2)].
 struct Lane {
   double v1, v2, w;
 };
@@ -51,7 +51,7 @@ inline Lane EvaluateLane(const double (&row)[kResidualRow][kResidualLanes],
 template <typename NormFunction>
 double Evaluate(const ResidualBlock* blocks, int64_t num_blocks,
                 NormFunction norm, const double point[3], double* values) {
-  const double x[3] = {point[0], point[1], point[2]};  // `values` is not it
+  const double x[3] = {point[0], point[1], point[2]};  // not aliased by values
   double largest[kResidualLanes] = {};
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;

@@ -10,7 +10,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// For p < 2 the curvature of ||v||_p is unbounded towards the axes.
+// Limits the curvature of ||v||_p, which for p < 2 is unbounded near the axes.
 constexpr double kSmallestRatio = 1e-6;
 
 // The four signed sums whose maximum is ||v||_p, p = 1 or infinity.
@@ -100,7 +100,7 @@ ResidualPiece TangentPiece(const Residual& residual, const Vector3d& x,
   return piece;
 }
 
-// A block whose lanes are idle: r = 0 / 1.
+// Adds a block whose lanes all hold r = 0 / 1.
 void ResidualSet::AddBlock() {
   const size_t block = size_ / kResidualLanes;
   if (block == blocks_.size()) {

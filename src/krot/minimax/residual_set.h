@@ -10,9 +10,9 @@
 
 namespace krot::internal {
 
-// A smooth function near x of which r is the maximum: its value, gradient and
-// curvature. For 1 < p < infinity there is one piece, r itself; for p = 1 and
-// infinity ||v||_p = max s'v over the signs s, and each gives a piece.
+// One of the smooth functions whose maximum is r near x: its value, gradient
+// and curvature. For 1 < p < infinity there is one piece, r itself. For p = 1
+// and infinity ||v||_p = max s'v over the signs s, and each s gives a piece.
 struct ResidualPiece {
   double value = 0;                                    // s'v / w
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  // (A's - value c) / w
@@ -25,18 +25,18 @@ struct ResidualPiece {
 inline constexpr int kMaxPieces = 4;
 
 // Writes the pieces of r at x whose value is at least `share` of r(x), share
-// in [-1, 1], and returns how many. Requires positive depth. Where r(x) = 0,
-// which has no gradient, one piece with gradient and curvature 0.
+// in [-1, 1], and returns how many. Requires positive depth. If r(x) = 0, which
+// has no gradient, writes one piece with value, gradient and curvature 0.
 int ResidualPieces(const Residual& residual, const Eigen::Vector3d& x,
                    Norm norm, double share, ResidualPiece pieces[kMaxPieces]);
 
-// s'v / w at x, s the gradient of ||v||_p at `x_touch`: below r everywhere and
-// equal to it there. Its curvature is left 0. Requires 1 < p < infinity and
-// positive depth at x.
+// s'v / w at x, where s is the gradient of ||v||_p at `x_touch`. This function
+// is nowhere above r, and equals r at x_touch. Its curvature is left 0.
+// Requires 1 < p < infinity and positive depth at x.
 ResidualPiece TangentPiece(const Residual& residual, const Eigen::Vector3d& x,
                            const Eigen::Vector3d& x_touch, Norm norm);
 
-// a_1, b_1, a_2, b_2, c, d.
+// Writes a residual as a row: a_1, b_1, a_2, b_2, c, d.
 inline void RowOf(const Residual& residual, double row[kResidualRow]) {
   for (int k = 0; k < 3; ++k) {
     row[k] = residual.A(0, k);
@@ -48,8 +48,8 @@ inline void RowOf(const Residual& residual, double row[kResidualRow]) {
   row[11] = residual.d;
 }
 
-// The residuals of one problem (1), stored in blocks of lanes. Refilling it
-// does not allocate once it has held as many.
+// The residuals of one problem (1), stored in blocks of lanes. Refilling
+// allocates only if there are more residuals than ever before.
 class ResidualSet {
  public:
   void Clear() { size_ = 0; }
@@ -65,7 +65,7 @@ class ResidualSet {
     RowOf(residual, row);
     Add(row);
   }
-  // Number i of `other`.
+  // Adds residual number i of `other`.
   void AddFrom(const ResidualSet& other, int i);
 
   int size() const { return size_; }
@@ -95,7 +95,7 @@ class ResidualSet {
   double Evaluate(const Eigen::Vector3d& x, Norm norm);
   const double* values() const { return values_.data(); }
 
-  // In the layout of the kernel; the last block's idle lanes hold r = 0 / 1.
+  // In the kernels' layout; unused lanes of the last block hold r = 0 / 1.
   const ResidualBlock* blocks() const { return blocks_.data(); }
   int num_blocks() const {
     return (size_ + kResidualLanes - 1) / kResidualLanes;

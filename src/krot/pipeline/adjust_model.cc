@@ -11,7 +11,8 @@
 namespace krot::internal {
 namespace {
 
-// Every error, so that what COLMAP recomputes is below the cap, too.
+// Looks at the errors of all observations, so that the errors that COLMAP
+// recomputes are below the cap, too.
 bool IsBelow(const PixelErrorStatistics& errors, double max_error) {
   return errors.not_finite == 0 && errors.max < max_error;
 }
@@ -23,8 +24,8 @@ std::string PixelText(double error_px) {
   return text.str();
 }
 
-// Where a bounded adjustment starts, and its cap; none if there is no estimate
-// below it.
+// The model from which a bounded adjustment starts; none if no estimate below
+// the cap was found. Sets the cap, summary->max_error.
 std::optional<Model> BoundedStart(const Model& model,
                                   const AdjustModelOptions& options,
                                   const Context& context,

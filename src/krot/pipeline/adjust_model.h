@@ -15,14 +15,14 @@ namespace krot::internal {
 // does between reading and writing.
 
 struct AdjustModelOptions {
-  // With adjustment.max_error, a model whose errors are not all below that is
-  // first brought there by the known rotation problem; with lower_max_error it
-  // always is brought to the lowest maximum of that.
+  // With adjustment.max_error, a model with an error that is not below it is
+  // first solved as a known rotation problem, which lowers the largest error.
+  // With lower_max_error, that solve always comes first.
   BundleAdjustmentOptions adjustment;
-  // Takes the place of adjustment.max_error: the cap is so many times the
-  // lowest maximum of the known rotation problem; > 1.
+  // Replaces adjustment.max_error: the cap is the lowest maximum of the known
+  // rotation problem times this factor; > 1.
   std::optional<double> max_error_factor;
-  // For the known rotation problem, which goes without its finish.
+  // For the solve of the known rotation problem; it is run without a finish.
   SolveModelOptions start;
   // What the precision refers to, and whether it is computed.
   AdjustmentDatum datum = AdjustmentDatum::kCameras;
@@ -32,8 +32,8 @@ struct AdjustModelOptions {
 struct AdjustModelSummary {
   // kInfeasibleStart: no estimate below the cap was found.
   BundleAdjustmentSummary adjustment;
-  std::optional<double> max_error;    // the cap of the end, pixels
-  std::optional<SolveSummary> start;  // if there was such a solve
+  std::optional<double> max_error;    // the final cap, pixels
+  std::optional<SolveSummary> start;  // of AdjustModelOptions::start, if it ran
   // Over all observations of the model.
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_start;  // where the adjustment began
@@ -42,13 +42,14 @@ struct AdjustModelSummary {
 };
 
 struct AdjustModelResult {
-  // A copy of the input if there is nothing to adjust or no start.
+  // A copy of the input if there is nothing to adjust or no start below the
+  // cap was found.
   Model model;
   AdjustModelSummary summary;
 };
 
-// Stored point errors are updated. Requires and throws as AdjustBundle and
-// SolveModel.
+// Updates the stored point errors, too. Has the requirements and exceptions of
+// AdjustBundle and SolveModel.
 AdjustModelResult AdjustModel(const Model& model,
                               const AdjustModelOptions& options,
                               const Context& context = {});

@@ -37,7 +37,7 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file,
   const std::string head = kMagic + run + "\n";
   const std::string found = ReadAt(0, head.size());
   if (found == head.substr(0, found.size())) {
-    // Its own, or begun, or empty.
+    // The file is of this run, or empty, or its head was written in part.
     if (found.size() < head.size()) WriteBehind({head});
     offset_ = static_cast<int64_t>(head.size());
   } else if (found.compare(0, sizeof(kMagic) - 1, kMagic) == 0) {
@@ -53,14 +53,14 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file,
   offset_ = begin;
 }
 
-// As many bytes as there are, up to `size`.
+// Returns fewer than `size` bytes if the file ends before.
 std::string CheckpointFile::ReadAt(int64_t offset, size_t size) const {
   std::string bytes;
   if (!descriptor_.ReadAt(offset, size, &bytes)) ThrowNotRead(name_);
   return bytes;
 }
 
-// A record is its size, its digest and its bytes.
+// Reads the record at offset_: its size, its digest and its bytes.
 std::optional<std::string> CheckpointFile::ReadRecord() {
   uint64_t size = 0;
   constexpr size_t kHeadSize = sizeof(size) + kDigestSize;
@@ -92,7 +92,7 @@ void CheckpointFile::Append(const std::string& record) {
   WriteBehind({head, record});
 }
 
-// And nothing behind that.
+// Writes the parts at offset_, after cutting off whatever follows there.
 void CheckpointFile::WriteBehind(
     std::initializer_list<std::string_view> parts) {
   is_broken_ = true;

@@ -12,22 +12,22 @@
 
 namespace krot::internal {
 
-// A checkpoint in a file (docs/formats.md). A step counts once it is there as a
-// whole, with its digest: what was being written when the process was killed or
-// the power cut is as if it were not there.
+// A checkpoint in a file (docs/formats.md). A step counts only if its whole
+// record is in the file and matches its digest. So a record that was being
+// written when the process was killed or the power failed is ignored.
 class CheckpointFile : public Checkpoint {
  public:
-  // Opens the file for this process alone, or begins it if there is none.
-  // `run` is a digest of what is computed. Throws CheckpointError for a file
-  // of another run, of another kind, or that another process has open,
-  // WriteError if it cannot be written.
+  // Opens the file for this process alone, or creates it if there is none.
+  // `run` is a digest of what is computed. Throws CheckpointError if the file
+  // belongs to another run, is no checkpoint, or is open in another process;
+  // throws WriteError if it cannot be written.
   CheckpointFile(const std::filesystem::path& file, const std::string& run);
 
-  // Steps that it held when it was opened.
+  // The number of steps that the file held when it was opened.
   int64_t num_steps() const { return num_steps_; }
 
   std::optional<std::string> Next() override;
-  // Forces the step to the disk. After a failure it keeps no more.
+  // Forces the record to the disk. After a failure, later calls do nothing.
   void Append(const std::string& record) override;
 
  private:
@@ -38,9 +38,9 @@ class CheckpointFile : public Checkpoint {
   const std::string name_;
   FileDescriptor descriptor_;
   int64_t num_steps_ = 0;
-  int64_t offset_ = 0;      // behind the last step that was given or appended
-  bool is_past_ = false;    // all steps that it held are given
-  bool is_broken_ = false;  // it could not be written
+  int64_t offset_ = 0;      // end of the last record read or appended
+  bool is_past_ = false;    // all records that the file held have been read
+  bool is_broken_ = false;  // writing has failed
 };
 
 }  // namespace krot::internal

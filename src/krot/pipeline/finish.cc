@@ -74,11 +74,14 @@ const char* PolishName(Polish polish) {
 
 namespace {
 
-// Of the slack, a gap that still leaves room.
+// The cap is based on the proved bound only if the gap is at most this share of
+// the slack: then there is room between the estimate and the cap.
 constexpr double kShareOfSlack = 0.5;
-// What rounding may add to the largest error, relative.
+// The finish stays this far below the cap, relative, as rounding may raise the
+// largest error.
 constexpr double kRounding = 1e-7;
-// How much of what positions may be off by the finish takes: more than rounds.
+// The share of the tolerance of positions that the finish may use. It is more
+// than rounds use, so that the finish starts strictly inside.
 constexpr double kShareOfKept = 0.75;
 
 void FinishByLeastSquares(const Reprojection& reprojection,
@@ -90,14 +93,16 @@ void FinishByLeastSquares(const Reprojection& reprojection,
   FinishSummary finish;
   finish.lowest_cost = summary->cost_final;
   finish.loss = options.finish.loss;
-  // With a gap that leaves little room above the bound, it is the reached one.
+  // If the gap leaves too little room above the proved bound, the cap is based
+  // on the maximum that was reached.
   const double largest_gap = std::min(options.joint.relative_gap,
                                       kShareOfSlack * options.finish.slack);
   const bool is_lowest_known =
       lower_bound &&
       finish.lowest_cost - *lower_bound <= largest_gap * finish.lowest_cost;
   const double lowest = is_lowest_known ? *lower_bound : finish.lowest_cost;
-  // The input's errors say nothing where positions hold it back.
+  // Where positions are known, the start need not keep them, so its largest
+  // error is no limit.
   const double highest =
       built->positions.empty() ? summary->cost_initial : kInfinity;
   finish.cap = options.finish.max_error.value_or(

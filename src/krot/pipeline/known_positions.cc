@@ -16,14 +16,16 @@
 namespace krot::internal {
 namespace {
 
-// Of d log G / d log L, which is below 1.
+// Upper limit of the estimated slope d log G / d log L, which is below 1.
 constexpr double kSteepest = 0.98;
-// What it counts as at least where the level's excess is chosen.
+// The smallest slope that is assumed when choosing how far above the fixed
+// point the next level is.
 constexpr double kLeastSlope = 0.5;
-// Of the tolerance, whatever the slope seems to be: what is chosen below, and
-// some.
+// A level whose logarithm exceeds that of the cost by more than this times the
+// tolerance is never good enough, whatever the slope. It is a quarter more than
+// the largest distance above the fixed point that is chosen below.
 constexpr double kMostExcess = 1.25 / kLeastSlope;
-// Levels that are nearer to each other, relative, show no slope.
+// Levels that differ by less than this, relative, do not determine a slope.
 constexpr double kNear = 1e-5;
 
 }  // namespace
@@ -31,7 +33,7 @@ constexpr double kNear = 1e-5;
 std::optional<double> PositionLevel::Next(double level, double optimum,
                                           double cost, double ratio) {
   const bool is_kept = ratio <= 1 + kKeptInRounds;
-  // Where no position holds a camera back, the level has no say.
+  // Where no position holds a camera back, the level does not matter.
   if (is_kept && level * ratio < (1 - tolerance_) * cost) return std::nullopt;
   if (!(optimum > 0)) return std::nullopt;
   const double x = std::log(level);
@@ -41,13 +43,14 @@ std::optional<double> PositionLevel::Next(double level, double optimum,
                       kSteepest);
   }
   last_ = {x, y};
-  // A level e above the fixed point costs slope e, and leaves (1 - slope) e.
+  // In logarithms: if the level is e above the fixed point, the cost is about
+  // slope e above it, so the excess is (1 - slope) e.
   const double excess = x - std::log(cost);
   if (is_kept && slope_ * excess <= 2 * (1 - slope_) * tolerance_ &&
       excess <= kMostExcess * tolerance_) {
     return std::nullopt;
   }
-  // As G rises slower than L, the fixed point is beyond y as seen from x.
+  // As G rises slower than L, the fixed point is beyond y when seen from x.
   if (y > x) lowest_ = std::max(lowest_, y);
   if (y < x) highest_ = std::min(highest_, y);
   double target = (y - slope_ * x) / (1 - slope_);
@@ -59,11 +62,12 @@ std::optional<double> PositionLevel::Next(double level, double optimum,
 
 namespace {
 
-// Of the gap asked for, the level's excess, and how far below the cost proofs
-// try it.
+// Shares of the gap asked for: the tolerance of the level, and how far below
+// the cost the levels are at which a proof is tried.
 constexpr double kShareOfLevel = 0.2;
 constexpr double kSharesOfProof[] = {0.3, 0.6, 0.9};
-// Errors below it, pixels, are a level that positions can do without.
+// The smallest level of the first round, pixels, for a start whose errors are
+// almost zero.
 constexpr double kLeastLevel = 1e-3;
 
 }  // namespace
@@ -106,7 +110,8 @@ void KeptPositions::SetLevel(const Estimate& estimate, double level) const {
   TakePositionRows(built_, estimate, &built_.problem);
 }
 
-// Bounds above their level are the positions'.
+// Only a bound that is at least the level of the rows it was proved with holds
+// for the positions themselves.
 std::optional<PixelCertificate> KeptPositions::Refute(
     const Estimate& estimate, const Certificate& rows,
     std::vector<int64_t> support) const {
@@ -141,26 +146,29 @@ std::optional<PixelCertificate> KeptPositions::Prove(
 
 namespace {
 
-// Of the bracket, relative.
+// The bracket of the factor is narrow enough at this width, relative.
 constexpr double kBracketWidth = 1e-3;
-// Of it, how far beside the place where it is believed to be a factor is tried.
+// A factor is tried beside the place where the root is expected, by this share
+// of kBracketWidth, so that it cuts off the longer part of the bracket.
 constexpr double kBeside = 0.3;
-// Of solves on the way; the less they leave open, the narrower the bracket.
+// Largest relative gap of the solves that narrow the bracket. The smaller it
+// is, the fewer factors near the root stay undecided.
 constexpr double kGapOnTheWay = 2e-4;
 constexpr double kFirstStep = 2;
 constexpr double kLargestStep = 16;
 constexpr double kLargestFactor = 1e6;
 constexpr int kMaxFactors = 30;
 
-// All in logarithms: what is known of the lowest maximum as a function of the
-// factor, less that of the bound asked for.
+// Brackets the smallest factor at which the lowest maximum is at most the bound
+// asked for. All in logarithms: x is that of the factor, y that of the lowest
+// maximum over the bound asked for, so that y = 0 is searched.
 class FactorBracket {
  public:
   double lowest() const { return lowest_; }
   double highest() const { return highest_; }
   bool IsClosed() const { return highest_ - lowest_ <= kBracketWidth; }
 
-  // A solve at `x` that proved `bound` and reached `cost`.
+  // Adds a solve at `x` that proved `bound` and reached `cost`.
   void Add(double x, double bound, double cost) {
     if (cost <= 0) {
       highest_ = std::min(highest_, x);
@@ -177,7 +185,7 @@ class FactorBracket {
     last_ = {x, y};
   }
 
-  // Where to solve next; none if it would decide nothing.
+  // Where to solve next; none if another solve would not narrow the bracket.
   std::optional<double> Next() const {
     if (IsClosed()) return std::nullopt;
     if (!open_.empty()) return BesideOpen();
@@ -198,7 +206,8 @@ class FactorBracket {
   }
 
  private:
-  // Half-way to what is decided, from where nothing was.
+  // Where solves were undecided: halfway from them to the nearest place where
+  // the answer is known.
   std::optional<double> BesideOpen() const {
     const auto [first, last] = std::minmax_element(open_.begin(), open_.end());
     const double below = *first - lowest_;
@@ -280,7 +289,8 @@ class PositionInflater {
     return true;
   }
 
-  // That of the upper end, finished; where there is none, the last one.
+  // The result of the bracket's upper end, with a finish; the last result if no
+  // upper end was found.
   SolveModelResult Result() {
     if (context_.IsCancelled()) return std::move(last_);
     if (!std::isfinite(bracket_.highest())) {
@@ -312,7 +322,7 @@ class PositionInflater {
   SolveModelOptions on_the_way_;
   FactorBracket bracket_;
   std::optional<SolveSummary> first_;
-  // Of the bracket's upper end or, without one, the last.
+  // The result of the bracket's upper end or, without one, of the last solve.
   SolveModelResult last_;
   std::optional<CertificateFile> refutation_;
 };

@@ -14,41 +14,43 @@
 
 namespace krot::internal {
 
-// Within this of the radius, relative, positions are kept in rounds: less than
-// is allowed in the end, so that the finish begins inside.
+// Relative tolerance on the radius within which rounds regard a position as
+// kept. It is less than what is allowed in the end, so that the finish starts
+// strictly inside its constraints.
 inline constexpr double kKeptInRounds = kKeptPosition / 2;
 
-// The level at which positions are kept, pixels. Rows of a level L have
-// residuals below the cost where every camera is within cost / L of its radius,
-// so their optimum G(L) is that of the problem at L = G(L). G rises with L,
-// slower than L: the fixed point is found by secants in logarithms, a solve
-// each.
+// Finds the level of the rows that keep positions, pixels. With rows of level
+// L, residuals below a cost keep every camera within cost / L times its radius.
+// So their optimum G(L) is that of the true problem where L = G(L). G rises
+// with L, but slower than L. The fixed point is found by secant steps in
+// logarithms; each step takes one solve.
 class PositionLevel {
  public:
-  // Relative: by how much the optimum may be missed.
+  // `tolerance` says how far the cost may end above the optimum, relative.
   explicit PositionLevel(double tolerance) : tolerance_(tolerance) {}
 
-  // After a solve at `level` whose rows' optimum is `optimum`, pixels, the
-  // estimate having a levelled cost of `cost` and the largest ratio of a
-  // camera's distance from its position to the radius: the level of the next
-  // one, a little above the fixed point, so that positions are kept; none if
-  // the level will do.
+  // Call it after a solve with rows of `level`. `optimum` is the rows' optimum
+  // and `cost` the levelled cost of the estimate, all in pixels; `ratio` is the
+  // largest ratio of a camera's distance from its position to its radius.
+  // Returns the level of the next solve, a little above the fixed point so that
+  // positions are kept; none if the present level is good enough.
   std::optional<double> Next(double level, double optimum, double cost,
                              double ratio);
 
  private:
   double tolerance_;
   double slope_ = 0;
-  // Logarithms: of the last level and its optimum, of bounds of the fixed
+  // All in logarithms: the last level and its optimum, and bounds of the fixed
   // point.
   std::optional<std::pair<double, double>> last_;
   double lowest_ = -std::numeric_limits<double>::infinity();
   double highest_ = std::numeric_limits<double>::infinity();
 };
 
-// What rounds do beside where cameras are known to be (reprojection.h): they
-// look for the level, keep the best estimate that keeps all positions, and try
-// proofs at levels below what is reached. Internal to SolveInRounds.
+// The additional work of rounds where positions are known (reprojection.h):
+// finding the level, remembering the best estimate that keeps all positions,
+// and trying proofs at levels below the cost that was reached. Internal to
+// SolveInRounds.
 class KeptPositions {
  public:
   // Keeps references. Sets the first level: the start's cost.
@@ -58,23 +60,27 @@ class KeptPositions {
 
   bool Any() const { return !built_.positions.empty(); }
 
-  // Of the best estimate so far that keeps all; infinite without one.
+  // The true cost of the best estimate so far that keeps all positions, pixels;
+  // infinite without one.
   double cost() const { return cost_; }
   const Estimate& estimate() const { return estimate_; }
+  // Remembers the estimate if it keeps all positions and is the best so far.
   void Keep(const Estimate& estimate);
 
-  // After a round whose rows' optimum was `optimum` and that ended at
-  // `estimate` with a levelled cost of `cost`: whether it takes another level.
-  // If so, the rows are of that.
+  // Call it after a round whose rows' optimum was `optimum` and that ended at
+  // `estimate` with a levelled cost of `cost`. Returns whether another level is
+  // needed; if so, the rows of `built` are taken anew at that level.
   bool TakeLevel(const Estimate& estimate, double optimum, double cost);
 
-  // A proof that positions take every error above what a start may have, from
-  // the rows' certificate and its support.
+  // Tries to prove, from the rows' certificate and its support, that no
+  // estimate which keeps the positions has all errors below
+  // options.init_max_error. None if that is not proved.
   std::optional<PixelCertificate> Refute(const Estimate& estimate,
                                          const Certificate& rows,
                                          std::vector<int64_t> support) const;
 
-  // ProveInPixels, at levels a little below the estimate's cost.
+  // ProveInPixels, at several levels a little below the estimate's cost until
+  // one of them gives a proof.
   std::optional<PixelCertificate> Prove(const Estimate& estimate,
                                         const std::vector<int64_t>& support,
                                         double sufficient) const;

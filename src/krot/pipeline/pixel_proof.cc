@@ -14,18 +14,19 @@
 namespace krot::internal {
 namespace {
 
-// Of the support's own problem: far below any gap that is asked for.
+// Relative gap to which the problem of the support is solved: far below any gap
+// that users ask for.
 constexpr double kGap = 1e-7;
-// A bound that loses less than this, relative, to the lenses is not worth
-// another solve.
+// If lenses lower the bound by less than this, relative, another solve is not
+// worth its time.
 constexpr double kNegligibleLoss = 1e-6;
 constexpr int kMaxSolves = 4;
-// A support of more observations is not solved once more: that would take as
-// long as the problem did.
+// A larger support is not solved as a problem of its own: that would take as
+// long as the whole problem did.
 constexpr size_t kLargeSupport = 20000;
 
-// The multipliers of a certificate of rows that have been taken anew since,
-// repaired for those.
+// For a certificate whose rows have been taken anew since it was made: repairs
+// its multipliers for the new rows, which is cheaper than solving them.
 std::optional<PixelCertificate> ProveByRepair(const Model& model,
                                               const BuiltProblem& built,
                                               const Estimate& x_hat, Norm norm,
@@ -102,7 +103,7 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
       const int64_t i = certificate.observations[n].observation;
       const auto place = std::lower_bound(support.begin(), support.end(), i);
       double width = widths[place - support.begin()];
-      if (built.HasPixel(i)) {  // else, whatever the bound, it is the ball's
+      if (built.HasPixel(i)) {  // rows of positions are never widened
         width *= std::max(1.0, lines[n] * certificate.lower_bound / level);
       }
       left.push_back(i);
@@ -136,8 +137,8 @@ void NameValues(StepValues* values, std::optional<PixelCertificate>* proof) {
   });
 }
 
-// On this rank. `certificate` is null where its rows were not those of `built`
-// alone: then there is only the support.
+// Proves on this rank alone. `certificate` is null if it has rows other than
+// those of `built`, as of trust regions; then only its support is used.
 std::optional<PixelCertificate> ProveHere(const Model& model,
                                           const BuiltProblem& built,
                                           const Estimate& x_hat, Norm norm,
@@ -227,7 +228,9 @@ std::vector<int64_t> SupportOf(const RowsCertificate& rows) {
 
 namespace {
 
-// By the first rank, which has the certificate, in the numbers of the whole.
+// Certify where ranks share the points: the first rank, which has the
+// certificate with indices of the whole problem, gathers the support and checks
+// it.
 void CertifyShared(const Model& model, const BuiltProblem& built,
                    const Estimate& estimate, const SolveModelOptions& options,
                    const Context& context, PixelCertificate certificate,

@@ -16,16 +16,17 @@
 
 namespace krot::internal {
 
-// A certificate of rows, and what its observations are called among those of
-// the whole problem, -1: none; empty: the same.
+// A certificate of rows. observation_of maps indices of its rows to those of
+// the whole problem's observations; -1 marks a row that is no observation;
+// empty means identity.
 struct RowsCertificate {
   Certificate certificate;
   std::vector<int64_t> observation_of;
 };
 
-// What rounds have proved so far, in true pixels and of the rows that were
-// solved last, and what that says of a true cost in pixels. Internal to
-// SolveInRounds.
+// The bounds that rounds have proved so far: in true pixels, and for the rows
+// that were solved last. Decides whether a true cost, in pixels, is near enough
+// to them. Internal to SolveInRounds.
 class RoundBounds {
  public:
   // The gap asked for.
@@ -33,7 +34,8 @@ class RoundBounds {
 
   const std::optional<RowsCertificate>& rows() const { return rows_; }
   void SetRows(std::optional<RowsCertificate> rows) { rows_ = std::move(rows); }
-  // The rows' certificate, to be proved in pixels: each is tried once.
+  // Hands out the rows' certificate for a proof in pixels and forgets it: each
+  // is tried once.
   std::optional<RowsCertificate> UseRows() {
     return std::exchange(rows_, std::nullopt);
   }
@@ -51,20 +53,22 @@ class RoundBounds {
     return proof_ && std::isfinite(cost) &&
            cost - proof_->lower_bound <= relative_gap_ * cost;
   }
-  // The proved bound that is enough: the rest is for roundings behind it.
+  // A bound that suffices for the gap at this cost. It leaves 5 % of the gap
+  // for the rounding of later steps.
   double Sufficient(double cost) const {
     constexpr double kShare = 0.95;
     return (1 - kShare * relative_gap_) * cost;
   }
-  // Whether the cost is so near to what is proved of the rows that its own
-  // proof may reach the gap.
+  // Whether the cost is so near to the rows' bound that a proof in pixels may
+  // reach the gap.
   bool IsWorthProving(double cost) const {
     constexpr double kGaps = 3;
     return rows_ && cost - rows_->certificate.lower_bound <=
                         kGaps * relative_gap_ * cost;
   }
-  // Whether it is as near to a bound as is asked for, or so near to that of the
-  // rows that a proof in pixels, which is below, should be as near.
+  // Whether the bound in pixels suffices for this cost, or the rows' bound is
+  // so near to the cost that a proof in pixels, which gives a lower bound than
+  // the rows, should suffice, too.
   bool IsNear(double cost) const {
     constexpr double kShareForRows = 0.7;
     return (proof_ && proof_->lower_bound >= Sufficient(cost)) ||
@@ -83,10 +87,10 @@ class RoundBounds {
 // the rows that were taken at `x_hat`; the nearer that is to the optimum of the
 // true errors, the higher is the bound.
 //
-// The support's own problem, which is small, is solved once more for these
-// rows; a row whose support line (pixel_certificate.h) is crossed by its
-// observation's true set is widened until it is not, and the problem solved
-// again, until the bound is `sufficient`, pixels. None if nothing is proved.
+// Solves the problem of the support alone, which is small, for these rows. If a
+// row's support line (pixel_certificate.h) cuts the set of rays whose true
+// error is within the bound, the row is widened and the problem solved again,
+// until the bound is `sufficient`, pixels. None if nothing is proved.
 std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               const BuiltProblem& built,
                                               const Estimate& x_hat, Norm norm,
@@ -95,29 +99,31 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
                                               const Context& context);
 
 // The same from a certificate of the rows that were solved. Where rows do not
-// depend on where they are taken it is that certificate's own. Where ranks
-// share the points the first one has the result, in the numbers of the whole
-// (certificate_file.h), the others its lower bound. Of the options it takes
-// norm and checkpoint: it is a step.
+// depend on where they are taken, as for pinholes, that certificate is itself
+// the proof. Where ranks share the points, the first one returns the result,
+// with indices of the whole problem (certificate_file.h), and the others only
+// its lower bound. It is one step of the checkpoint; of the options it uses
+// norm and checkpoint.
 std::optional<PixelCertificate> ProveRows(
     const Model& model, const BuiltProblem& built, const Estimate& x_hat,
     const SolveModelOptions& options, const RowsCertificate& rows,
     double sufficient, const Context& context);
 
-// The observations of a certificate, by what they are called in the whole;
-// those that are not there are left out.
+// The observations of a certificate, as indices of the whole problem; rows that
+// are no observations are left out.
 std::vector<int64_t> SupportOf(const RowsCertificate& rows);
 
-// Checks a certificate once more, apart from the solver that made it, and says
-// in the summary what it proves about the estimate. Where ranks share the
-// points all call it, and the first one's summary has it.
+// Checks a certificate independently of the solver that made it, and writes to
+// the summary what it proves about the estimate. Where ranks share the points
+// all must call it, and only the first one's summary is filled in.
 void Certify(const Model& model, const BuiltProblem& built,
              const Estimate& estimate, const SolveModelOptions& options,
              const Context& context,
              std::optional<PixelCertificate> certificate,
              SolveSummary* summary);
 
-// That no estimate is below a start's bound, in true pixels.
+// Certifies, in true pixels, that no estimate is below the bound of a start
+// from nothing; `certificate` is what FindFeasibleStart returned.
 void CertifyInfeasible(const Model& model, const BuiltProblem& built,
                        const SolveModelOptions& options, const Context& context,
                        const std::optional<Certificate>& certificate,

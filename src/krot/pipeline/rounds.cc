@@ -18,18 +18,23 @@ namespace krot::internal {
 namespace {
 
 constexpr int kMaxRounds = 30;
-// A round that lowers the true cost by less, relative, lowers nothing.
+// A round that lowers the true cost by less than this, relative, is idle.
 constexpr double kStationary = 1e-6;
-// So many such rounds in a row end it while bounds are being tightened.
+// While trust regions are being tightened, this many idle rounds in a row end
+// the solve; otherwise one does.
 constexpr int kPatience = 3;
-// What the rows' cost may be exceeded by for a linear promise to be kept.
+// An observation keeps what its linear row promised if its true error exceeds
+// the rows' cost by at most this, relative.
 constexpr double kKeptPromise = 1e-5;
-// Rows that have lowered the true cost to this share, and whose own is such a
-// share of that, are taken anew before they are solved.
+// If sweeps have lowered the true cost to this share of what it was, and the
+// rows' cost is at most this share of the true one, the rows no longer describe
+// the true errors and are taken anew.
 constexpr double kFarFromRows = 0.5;
-// What rounding may add to the cost of rows where they are taken, relative.
+// How far the cost of rows may exceed the true cost at the estimate where they
+// are taken, relative. More than this is not rounding.
 constexpr double kRowsRounding = 1e-3;
-// Where positions are known, rows are solved to this share of the gap.
+// Where positions are known, rows are solved to this share of the gap asked
+// for.
 constexpr double kShareWithPositions = 0.05;
 
 class Rounds {
@@ -78,7 +83,7 @@ class Rounds {
     return MaxOfRanks(
         context_, Cost(rows, estimate, options_.norm, context_.num_threads));
   }
-  // Of what would be the result.
+  // The cost of what would be returned now.
   double ReachedCost() const {
     return positions_.Any() ? positions_.cost() : cost_;
   }
@@ -89,8 +94,8 @@ class Rounds {
   bool IsInterrupted() const {
     return summary_.termination == SolveTermination::kInterrupted;
   }
-  // Whether the sweeps or iterations that were allowed are used up. Of points
-  // alone every round takes its sweep.
+  // Whether the limit of sweeps or iterations is reached. If only points move,
+  // every round is allowed its own sweep.
   bool IsUsedUp() const {
     return summary_.termination == SolveTermination::kMaxIterations ||
            (summary_.termination == SolveTermination::kMaxSweeps &&
@@ -103,7 +108,7 @@ class Rounds {
 
   const Model& model_;
   const SolveModelOptions options_;
-  SolveModelOptions rows_options_;  // of a round's rows
+  SolveModelOptions rows_options_;  // for SolveRows
   const SolveMethod method_;
   const Context& context_;
   const Timer& timer_;
@@ -112,18 +117,19 @@ class Rounds {
   Estimate& estimate_;
   SolveSummary& summary_;
   KeptPositions positions_;
-  double cost_;  // true, pixels, or by the level of positions if that is more
+  double cost_;  // LevelledCost of the estimate, pixels
   TrustRegions trust_;
   int num_idle_rounds_ = 0;
   RoundBounds bounds_;
-  // Whether, in this round, sweeps alone came as near to a bound of an earlier
-  // one as is asked for.
+  // Whether the sweeps of this round alone have brought the cost near enough to
+  // the bound of an earlier round.
   bool is_bound_near_ = false;
-  // Of the last round without bounds.
+  // Of the last round without trust regions, for a warm start of the next one.
   KnownMultipliers known_multipliers_;
 };
 
-// From the last round's certificate of the rows, which is used up.
+// Tries to prove a bound in true pixels from the last round's certificate of
+// the rows, which is used up.
 void Rounds::Prove() {
   const std::optional<RowsCertificate> rows = bounds_.UseRows();
   if (!rows) return;
@@ -136,8 +142,8 @@ void Rounds::Prove() {
                       context_));
 }
 
-// Where positions are known: whether the next round has another level, or it is
-// proved that there need not be any.
+// Where positions are known: whether the next round has another level. Ends the
+// solve as kInfeasible if no estimate that keeps the positions is good enough.
 bool Rounds::TakeLevel(double optimum) {
   positions_.Keep(estimate_);
   if (const auto& rows = bounds_.rows()) {
@@ -154,8 +160,9 @@ bool Rounds::TakeLevel(double optimum) {
   return is_another;
 }
 
-// Whether sweeps came so far that solving the rows would be in vain: they no
-// longer say what is left to gain, or there is nothing left.
+// Whether sweeps came so far that solving the rows would be in vain: because
+// the cost is near enough to a bound, or because the rows no longer describe
+// the true errors.
 bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) {
   if (reprojection_.IsLinear() || positions_.Any()) return false;
   const double cost = TrueCost(swept);
@@ -164,7 +171,7 @@ bool Rounds::HaveRowsServed(const Estimate& swept, double linear_cost) {
          (cost <= kFarFromRows * cost_ && linear_cost <= kFarFromRows * cost);
 }
 
-// Whether another round may lower the cost.
+// Runs a round. Returns whether another one may lower the cost.
 bool Rounds::RunOne() {
   context_.Stage("lowering the largest error, round " +
                  std::to_string(summary_.rounds.size() + 1));
@@ -176,7 +183,7 @@ bool Rounds::RunOne() {
     bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
   }
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
-  // Where a depth is rounding alone, so are rows and bounds that start from it.
+  // A depth that consists of rounding alone makes the rows useless.
   const double rows_cost = RowsCost(problem, estimate_);
   if (!std::isfinite(rows_cost) || (is_bounded && !positions_.Any() &&
                                     rows_cost > (1 + kRowsRounding) * cost_)) {
@@ -236,7 +243,7 @@ bool Rounds::RunOne() {
   if (certificate()) round.lower_bound = certificate()->lower_bound;
   round.seconds = timer_.Seconds();
   summary_.rounds.push_back(round);
-  // The published algorithms know one linear problem.
+  // The published algorithms solve one linear problem only.
   const bool is_as_in_paper =
       options_.res_int.fast_descent.settings == FastDescentSettings::kPaper;
   if (reprojection_.IsLinear() || is_as_in_paper || IsUsedUp() || IsRefuted() ||
@@ -247,8 +254,9 @@ bool Rounds::RunOne() {
   const bool is_idle = !(cost_ < (1 - kStationary) * before);
   num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
   if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};
-  // What stands still where its rows are proved, and their proof holds for no
-  // true errors, is the lowest of its surroundings alone.
+  // One idle round is enough without trust regions. It is enough, too, if the
+  // cost is near the rows' bound but that proves nothing in true pixels: then
+  // the estimate is a local minimum only.
   if (num_bounded == 0 || (is_tried && !certificate())) return !is_idle;
   return num_idle_rounds_ < kPatience;
 }
@@ -278,7 +286,7 @@ void Rounds::Run() {
   } else if (summary_.termination == SolveTermination::kGapReached ||
              summary_.termination == SolveTermination::kZeroCost ||
              summary_.termination == SolveTermination::kNotRun) {
-    summary_.termination = SolveTermination::kStalled;  // that was of the rows
+    summary_.termination = SolveTermination::kStalled;  // only rows reached it
   }
 }
 

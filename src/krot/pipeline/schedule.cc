@@ -8,8 +8,8 @@
 namespace krot::internal {
 namespace {
 
-// Of the gap asked for, what the rows' own proof may leave: the rest is for the
-// lenses and the gauge.
+// The share of the gap asked for that the proof for the rows may leave. The
+// rest is for what lenses and the gauge take from the bound.
 constexpr double kShareOfGap = 0.9;
 
 SolveTermination FromResInt(ResIntTermination termination) {
@@ -59,7 +59,8 @@ class Schedule {
   void Sweeps(ResIntOptions res_int);
   void LeadingSweeps();
   std::optional<Certificate> Joint(KnownMultipliers* known);
-  // Leaves an estimate that is still worse than a start found from nothing.
+  // If the cost is above init_max_error: looks for a start from nothing, and
+  // takes it if it is better.
   void StartAfresh();
 
   double cost() const { return cost_; }

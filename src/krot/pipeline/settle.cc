@@ -15,20 +15,22 @@
 namespace krot::internal {
 namespace {
 
-// A sum of squared errors that is higher by up to so many variances of the
-// noise is as good: three standard deviations of whatever it depends on.
+// A sum of squared errors counts as equally good if it rises by at most this
+// times the variance of the noise. Along one parameter that corresponds to
+// three standard deviations.
 constexpr double kAsGood = 9;
-// Errors of this size are rounding, pixels.
+// The noise is assumed to be at least this, pixels; smaller is rounding.
 constexpr double kRoundingError = 1e-9;
-// So many times as far away as anything is infinitely far.
+// This many times the distance of the point, or the typical one, stands for
+// infinity.
 constexpr double kFarAway = 1e6;
 
 }  // namespace
 
 using Eigen::Vector3d;
 
-// The squared error of observation i; infinite if it is above the level in the
-// norm of the solve.
+// The squared error of observation i; infinite if its error in the norm of the
+// solve is above `level`, pixels.
 double Settling::Squared(int64_t i, double level) const {
   const double error = reprojection_.Error(estimate_, Norm::L2(), i);
   if (level < kNoLevel &&
@@ -40,8 +42,10 @@ double Settling::Squared(int64_t i, double level) const {
   return error * error;
 }
 
-// The noise's variance per axis: a Gaussian's median error is sqrt(2 ln 2)
-// times its deviation, and what is fitted to it takes its share.
+// Estimates the noise's variance per axis. The median length of a Gaussian
+// error in the plane is sqrt(2 ln 2) times its standard deviation per axis, and
+// fitting the unknowns lowers the sum of squares by their share of its degrees
+// of freedom.
 void Settling::Measure() {
   level_ = MaxOfRanks(context_, reprojection_.TrueCost(estimate_, options_.norm,
                                                        context_.num_threads));
@@ -63,7 +67,7 @@ void Settling::Measure() {
   as_good_ = kAsGood * std::max(noise, kRoundingError * kRoundingError);
 }
 
-// From where cameras see points, by component; scene units.
+// The median distance between camera and point per component, scene units.
 std::vector<double> Settling::TypicalDistances() const {
   std::vector<double> distances;
   std::vector<int32_t> component_of;
@@ -78,6 +82,8 @@ std::vector<double> Settling::TypicalDistances() const {
   return GroupMedians(distances, component_of, components_.count, context_);
 }
 
+// Whether point k at `position` has a sum of squared errors up to `limit`, with
+// no error above `level`.
 bool Settling::IsAsGood(int32_t k, const Vector3d& position, double limit,
                         double level) {
   const Vector3d was = estimate_.points[k];
@@ -91,10 +97,10 @@ bool Settling::IsAsGood(int32_t k, const Vector3d& position, double limit,
   return sum <= limit;
 }
 
-// A point that is as good infinitely far away along its mean ray goes back to
-// where that is nearest to the input. It is loose if it is as good at the
-// typical distance, or nearer than that anyway: what is far away at least, as
-// clouds are, is determined well enough.
+// If a point fits as well infinitely far away along its mean ray, it goes to
+// the place on that ray that is nearest to the input. It is called loose only
+// if it also fits at the typical distance, or is nearer than that: a point that
+// is certainly far away, as clouds are, is determined well enough.
 void Settling::SettlePoint(int32_t k, double distance) {
   Vector3d centre = Vector3d::Zero();  // of its cameras
   Vector3d ray = Vector3d::Zero();     // the mean, unit length
@@ -201,7 +207,7 @@ void MeasureMoves(const Model& before, const Model& after, LooseParts* loose) {
   }
 }
 
-// Neither fixed nor at a known position.
+// The frames that are neither fixed nor at a known position.
 std::vector<int32_t> Settling::FramesThatMove() const {
   std::vector<char> has_position(problem_.num_frames, 0);
   for (const BuiltPosition& position : built_.positions) {
@@ -217,7 +223,7 @@ std::vector<int32_t> Settling::FramesThatMove() const {
   return frames;
 }
 
-// Sums of squares that are as good as a frame's own.
+// For each frame, the largest sum of squared errors that is as good as its own.
 std::vector<double> Settling::LimitsOf(
     const std::vector<int32_t>& frames) const {
   return SumsOf(frames, as_good_, [&](int64_t i, int64_t, double* limit) {
@@ -225,8 +231,9 @@ std::vector<double> Settling::LimitsOf(
   });
 }
 
-// Whether the frames are where their centres are shifted: one by one, each with
-// all else as it is.
+// For each frame, whether it fits as well if its centre is shifted, with all
+// else as it is: its sum of squares is within its limit and no error is above
+// `level`.
 std::vector<char> Settling::AreAsGood(const std::vector<int32_t>& frames,
                                       const std::vector<Vector3d>& shifts,
                                       const std::vector<double>& limits,
@@ -251,7 +258,8 @@ Vector3d Settling::FromFrame(int64_t i) const {
          CentreOf(problem_.views[o.view].frame, estimate_);
 }
 
-// Of the directions in which frames see points, unit length.
+// For each frame, the mean of the directions in which it sees its points, unit
+// length.
 std::vector<Vector3d> Settling::MeanRays(
     const std::vector<int32_t>& frames) const {
   std::vector<Vector3d> rays =
@@ -262,8 +270,8 @@ std::vector<Vector3d> Settling::MeanRays(
   return rays;
 }
 
-// Those that are as good where they are and farther from or nearer to what they
-// see by the typical distance.
+// Finds the frames that fit as well if they move by the typical distance away
+// from or towards what they see.
 void Settling::FindLooseFrames() {
   const std::vector<int32_t> frames = FramesThatMove();
   const std::vector<double> limits = LimitsOf(frames);
@@ -283,9 +291,10 @@ void Settling::FindLooseFrames() {
   }
 }
 
-// Along the mean of the frame's rays, which is where it is free to go, to what
-// is nearest to the input; where the input has its points behind it, towards
-// the typical distance in front of them.
+// Moves a frame along its mean ray, the direction in which it is not
+// determined, to the place nearest to the input. If that is beyond its points,
+// it moves to the typical distance in front of them instead. In both cases it
+// goes only as far as it fits as well.
 void Settling::MoveLooseFrame(int32_t f, double distance) {
   if (!input_.translations[f].allFinite()) return;
   const std::vector<int32_t> frame = {f};

@@ -19,7 +19,8 @@ inline constexpr double kNoLevel = kInfinity;
 
 inline constexpr int kBisections = 50;
 
-// How much of a way may be gone: the largest share that `is_good`, as 0 is.
+// The largest share in [0, 1] of a way for which `is_good` holds, by bisection.
+// Assumes that it holds at 0.
 template <typename IsGood>
 double LargestShare(const IsGood& is_good) {
   if (is_good(1.0)) return 1;
@@ -32,8 +33,8 @@ double LargestShare(const IsGood& is_good) {
   return good;
 }
 
-// What SettleEstimate does: measure, then the frames, then the points, one by
-// one, each with all others as they are.
+// The steps of SettleEstimate: the noise is measured, then every frame is moved
+// with all else fixed, then every point.
 class Settling {
  public:
   Settling(const Model& model, const BuiltProblem& built,
@@ -61,7 +62,7 @@ class Settling {
   LooseParts Describe() const;
 
  private:
-  // Sums over the observations of frames, of all ranks.
+  // For each frame, the sum over its observations on all ranks, from `zero` on.
   template <typename Sum, typename AddTo>
   std::vector<Sum> SumsOf(const std::vector<int32_t>& frames, const Sum& zero,
                           const AddTo& add_to) const;
@@ -101,7 +102,7 @@ class Settling {
   const std::vector<FrameGeometry> frames_;
   Estimate& estimate_;
   double level_ = 0;             // the largest error, pixels
-  double as_good_ = 0;           // pixels^2
+  double as_good_ = 0;           // a rise that noise explains, pixels^2
   std::vector<double> squared_;  // errors of the observations, pixels^2
   std::vector<char> is_loose_frame_;
   std::vector<char> is_held_frame_;

@@ -22,9 +22,10 @@
 namespace krot::internal {
 namespace {
 
-// A joint solver's stall is an answer only with a bound so near, relative.
+// If the joint solver stalls with a gap above this, relative, the answer is
+// called unproved.
 constexpr double kGapOfAnswer = 1e-2;
-// Of the bound of a start, the level at which it keeps positions.
+// The level at which a start keeps positions, as a share of its bound.
 constexpr double kShareOfStart = 0.99;
 
 void CheckOptions(const SolveModelOptions& options, const Context& context) {
@@ -55,8 +56,8 @@ void CheckOptions(const SolveModelOptions& options, const Context& context) {
                 "kNone with problem.positions");
 }
 
-// The counts are those of the whole; memory is that of one process, and not
-// announced to several.
+// Counts the parts of the whole problem, over all ranks. The memory needed is
+// estimated for one process only, so not where ranks share the points.
 void CountProblem(const Model& model, const BuiltProblem& built,
                   const Context& context, SolveSummary* summary) {
   const KnownRotationProblem& problem = built.problem;
@@ -84,8 +85,8 @@ void CountProblem(const Model& model, const BuiltProblem& built,
   summary->needed_bytes = EstimateSolveMemory(model, built, *summary, context);
 }
 
-// With the final cost. What is claimed is what the numbers say, whatever the
-// solver thought.
+// Sets gap and termination from the final cost and the certified bound, so that
+// what is claimed holds for these numbers, whatever the solver reported.
 void MeasureGap(double wanted_gap, SolveSummary* summary) {
   if (summary->cost_final == 0) summary->lower_bound = 0;  // without proof
   if (summary->lower_bound && std::isfinite(summary->cost_final)) {
@@ -95,7 +96,7 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
                   summary->cost_final
             : 0;
   }
-  // The gap that was asked for is one of the lowest maximum.
+  // The gap asked for refers to the lowest maximum, before the finish.
   const auto is_within = [&](double gap) {
     return summary->relative_gap &&
            summary->LowestCost() - *summary->lower_bound <=
@@ -123,8 +124,8 @@ void MeasureGap(double wanted_gap, SolveSummary* summary) {
   }
 }
 
-// Finds the estimate to start from; false, and the termination why, if there
-// is none.
+// Finds the estimate to start from. If there is none, returns false and sets
+// the termination to the reason.
 bool FindEstimate(const Model& model, const SolveModelOptions& options,
                   const Context& context, const Timer& timer, Start* start,
                   Estimate* estimate, SolveSummary* summary) {
@@ -132,7 +133,8 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
     *estimate = start->built.start;
     return true;
   }
-  // Below the bound that is to be proved, if there is none.
+  // If there is no start, rows of this level prove a bound for the positions:
+  // their level must be below it.
   TakePositionRowsOfStart(kShareOfStart * options.init_max_error,
                           &start->built);
   FoundStart found =
@@ -159,8 +161,8 @@ bool FindEstimate(const Model& model, const SolveModelOptions& options,
   return !start->built.problem.observations.empty();
 }
 
-// Whether the finish can do without a lower maximum, and nobody asks for one.
-// Then the rows are those at the estimate.
+// Whether the finish can start right away: the lowest maximum is not asked for,
+// and the estimate is below the cap. If so, takes the rows at the estimate.
 bool IsFinishEnough(const Model& model, const SolveModelOptions& options,
                     const Context& context, const Estimate& estimate,
                     BuiltProblem* built, SolveSummary* summary) {
@@ -180,8 +182,8 @@ bool IsFinishEnough(const Model& model, const SolveModelOptions& options,
   return true;
 }
 
-// The largest of the track elements in this role; infinite where a point does
-// not project.
+// The largest error of the track elements in this role; infinite where a point
+// does not project.
 double LargestOf(Role role, const std::vector<Role>& roles,
                  const std::vector<double>& errors_px, const Context& context) {
   double largest = 0;
@@ -194,7 +196,7 @@ double LargestOf(Role role, const std::vector<Role>& roles,
   return MaxOfRanks(context, largest);
 }
 
-// The errors that count: twins that were left out are wrong by assumption.
+// The errors without those of twins, which were left out as wrong.
 std::vector<double> Counted(const std::vector<Role>& roles,
                             std::vector<double> errors_px) {
   size_t num_kept = 0;
@@ -205,8 +207,8 @@ std::vector<double> Counted(const std::vector<Role>& roles,
   return errors_px;
 }
 
-// Whether an error that was finite is now above the largest that was, and above
-// what may be; all in the norm of the solve.
+// Whether some error that was finite before is now above the largest finite
+// error before, and above what is allowed; all in the norm of the solve.
 bool IsWorse(const std::vector<double>& errors_before_px,
              const std::vector<double>& errors_after_px, double allowed_px,
              const Context& context) {
@@ -223,8 +225,8 @@ bool IsWorse(const std::vector<double>& errors_before_px,
   return AnyRank(context, is_worse);
 }
 
-// Whether the observations are no more numbers than those that they are to
-// determine: then all errors can be zero, whatever the observations are.
+// Whether there are at most as many equations, two per observation, as unknowns
+// less the gauge. Then all errors may be zero whatever the observations are.
 bool IsUnderdetermined(const SolveSummary& summary,
                        const KnownRotationProblem& problem) {
   const bool is_held = summary.num_fixed_frames + summary.num_fixed_points > 0;
@@ -329,8 +331,8 @@ SolveModelResult SolveInFrame(const Model& model,
     const auto worse = WorseImagesSide(model, result.model, options.norm);
     if (worse && worse->second > allowed) summary.worse_images_side = worse;
   }
-  // Where positions are known, errors that were lower without them do not
-  // count.
+  // Where positions are known, the input need not keep them, so its lower
+  // errors do not count.
   if (start.built.positions.empty() &&
       (summary.collapse.IsWhole() || summary.worse_images_side ||
        IsWorse(Counted(roles, before_px), Counted(roles, after_px), allowed,

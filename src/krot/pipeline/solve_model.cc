@@ -30,7 +30,8 @@ int64_t ModelBytes(const Model& model) {
   return bytes;
 }
 
-// The observations and two indices to them; views, points and frames.
+// Bytes of the observations with two indices to each, and of the views, points
+// and frames.
 int64_t ProblemBytes(const KnownRotationProblem& problem) {
   return Size(problem.observations.size(), sizeof(Observation) + 8) +
          Size(problem.views.size(), sizeof(View)) +
@@ -41,12 +42,13 @@ int64_t EstimateBytes(const KnownRotationProblem& problem) {
   return 24 * (int64_t{problem.num_points} + problem.num_frames);
 }
 
-// Some of a problem's observations, as a problem, and their indices.
+// Bytes of a subset of a problem: a problem of its own, and the indices of its
+// observations.
 int64_t PartBytes(const KnownRotationProblem& problem) {
   return ProblemBytes(problem) + Size(problem.observations.size(), 8);
 }
 
-// What the joint solver looks at first.
+// The first working set of the joint solver, as a problem.
 ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm,
                                   const Context& context) {
   const KnownRotationProblem& problem = built.problem;
@@ -56,7 +58,7 @@ ProblemSubset FirstWorkingProblem(const BuiltProblem& built, Norm norm,
   return ProblemSubset(problem, set.Observations());
 }
 
-// What an interior point on these observations takes: so many bytes for each,
+// Bytes of an interior point on this problem: a constant for each observation,
 // and the reduced camera system.
 int64_t InteriorPointBytes(const KnownRotationProblem& problem,
                            size_t bytes_per_observation) {
@@ -70,33 +72,35 @@ int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
                             const SolveSummary& summary,
                             const Context& context) {
   constexpr int64_t kProcess = 14000000;  // code and libraries
-  // The record of a block, in sweeps.
+  // What sweeps store per point and per frame.
   constexpr int64_t kBytesPerBlock = 200;
-  // The start, the estimate, and those that sweeps and iterations compare.
+  // The start, the estimate, and the copies that sweeps and iterations compare.
   constexpr int64_t kEstimates = 5;
-  // Counted in the code of the joint solver and of the finish.
+  // Bytes per observation, counted in the code of the joint solver and of the
+  // finish.
   constexpr size_t kJointBytes = 600;
   constexpr size_t kFinishBytes = 300;
-  // What the allocator keeps beside what is in use.
+  // The allocator holds more memory than is in use, by this factor.
   constexpr double kAllocated = 1.05;
   const KnownRotationProblem& problem = built.problem;
   const int64_t held = kProcess + ModelBytes(model) + ProblemBytes(problem) +
                        kEstimates * EstimateBytes(problem);
   const int64_t sweeps =
       kBytesPerBlock * (int64_t{problem.num_points} + problem.num_frames);
-  // In the end, the model that is given back and the pixel errors.
+  // In the end: the model that is returned, and the pixel errors.
   const int64_t result =
       ModelBytes(model) + Size(model.track_elements.size(), 2 * sizeof(double));
   int64_t most = std::max(sweeps, result);
-  // The lists of which observation is in which component and working set, and
-  // the largest component, which is a copy unless there is but one.
+  // Which observation is in which component and working set, and a copy of the
+  // largest component unless there is only one.
   const int64_t component =
       Size(problem.observations.size(), 16) +
       (summary.num_components > 1 ? PartBytes(problem) : 0);
   if (summary.init == SolveInit::kFeasible) {
     most = std::max(most, component + InteriorPointBytes(problem, kJointBytes));
   } else if (summary.method != SolveMethod::kResInt) {
-    // Beside the interior point, sweeps place what it does not look at.
+    // Sweeps, which place the points outside the working set, hold their memory
+    // at the same time as the interior point.
     const ProblemSubset working =
         FirstWorkingProblem(built, summary.norm, context);
     most =
@@ -111,7 +115,8 @@ int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
 
 namespace {
 
-// Of a certificate's fixed positions, those that the model has.
+// Replaces the fixed positions of a certificate, which are in the local frame,
+// by those of the model, to the bit.
 void PlaceFixed(const Model& model, CertificateFile* certificate) {
   if (!certificate->fixed_images.empty()) {
     const std::vector<ImageGeometry> geometries = ImageGeometries(model);
@@ -127,7 +132,7 @@ void PlaceFixed(const Model& model, CertificateFile* certificate) {
   }
 }
 
-// Likewise, in the model's frame.
+// The same for the regions of known positions.
 void PlaceKnown(const Model& model, const std::vector<KnownPosition>& known,
                 CertificateFile* certificate) {
   for (CertificateFile::Position& position : certificate->positions) {

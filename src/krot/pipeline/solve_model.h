@@ -22,8 +22,8 @@
 
 namespace krot::internal {
 
-// What becomes of the room that the lowest maximum leaves: it is set by a few
-// observations, and the others may be anywhere below.
+// What is done after the lowest maximum is reached. That is set by a few
+// observations, and the errors of the others may be anything below.
 enum class Finish {
   kNone,
   kLeastSquares,  // the least squares of all estimates below the cap
@@ -36,10 +36,11 @@ struct FinishOptions {
   Finish finish = Finish::kLeastSquares;
   // eta: every error stays below (1 + slack) times the lowest maximum.
   double slack = 5e-4;  // > 0
-  // Pixels; > 0: the cap instead; no finish if the lowest maximum is above it.
+  // Replaces that cap; pixels; > 0. There is no finish if the lowest maximum is
+  // above it.
   std::optional<double> max_error;
   ErrorLoss loss;
-  // Told of every iteration; may be empty.
+  // Called after every iteration; may be empty.
   std::function<void(const BoundedIterate&)> callback;
 };
 
@@ -66,9 +67,8 @@ struct PolishSummary {
   PixelErrorStatistics pixel_error;  // over all observations, afterwards
 };
 
-// Adjusts the model in place, by least squares or the least of a robust loss,
-// and updates its stored point errors; what is fixed stays. `polish` must not
-// be kNone.
+// Adjusts the model in place, by least squares or a robust loss, and updates
+// its stored point errors. Fixed parts stay. `polish` must not be kNone.
 PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
                           const FixedParts& fixed, const Context& context,
                           Model* model);
@@ -79,58 +79,59 @@ const char* PolishName(Polish polish);
 // Images and points that do not hold their place (docs/method/positions.md,
 // "What is not determined").
 
-// A point of which its observations do not say whether it is in the scene or
+// A point whose observations do not determine whether it is in the scene or
 // infinitely far away.
 struct LoosePoint {
   Point3DId point3D_id = 0;
-  double moved = 0;
+  double moved = 0;  // from where the input has it, scene units
 };
 
 struct LooseParts {
   std::vector<LooseImage> images;
   std::vector<LoosePoint> points;  // of all ranks
-  bool have_moved = false;  // whether any, or any other point, was taken back
+  bool have_moved = false;         // some frame or point was taken back
 };
 
 struct SettleOptions {
   Norm norm;                  // of the largest error
-  bool update_frames = true;  // else frames stay, and there is no gauge
+  bool update_frames = true;  // else frames stay where they are
 };
 
 // Gives the estimate of a problem that was built from `model` the place and
-// scale of the model, as its held frames have them, and then moves what is not
-// determined as near to where the model has it as is equally good: no largest
-// error rises, and the sum of an image's or a point's squared errors by no more
-// than noise explains. Frames and points that are fixed or have known positions
-// stay. The same bits at any number of threads and ranks. O(observations).
+// scale that the model's held frames have (gauge.h). Then moves frames and
+// points that are not determined towards where the model has them, as far as
+// the fit stays equally good: the largest error does not rise, and the sum of a
+// frame's or a point's squared errors rises by no more than noise explains.
+// Fixed ones stay, and so do frames and points with known positions. The same
+// bits at any number of threads and ranks. O(observations).
 LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
                           const SettleOptions& options, const Context& context,
                           Estimate* estimate);
 
-// Sets how far the images and points have moved between two models that hold
-// the same of both. O(images + points).
+// Sets `moved` of the loose images and points: how far they have moved between
+// two models with the same images and points. O(images + points).
 void MeasureMoves(const Model& before, const Model& after, LooseParts* loose);
 
 // From a COLMAP model to a COLMAP model with a smaller largest reprojection
 // error: what `krot solver` and `krot point_triangulator` do between reading
 // and writing.
 
-// A solve of the linear rows, and the step that was taken from it.
+// A solve of the linear rows, and the step that was taken towards its solution.
 struct Round {
   double linear_cost = 0;                    // of the rows' solution, pixels
-  std::optional<double> linear_lower_bound;  // proved of the rows, pixels
-  double step = 0;                           // of the way there, in [0, 1]
-  double cost = 0;                           // true, after it, pixels
+  std::optional<double> linear_lower_bound;  // proved for the rows, pixels
+  double step = 0;                           // share of the way, in [0, 1]
+  double cost = 0;                           // true, after the step, pixels
   std::optional<double> lower_bound;         // highest so far, true pixels
   double seconds = 0;                        // since the solve's start
 };
 
-// By what all radii of positions were multiplied so that the largest error can
-// be at most `max_error`.
+// The factor by which all radii of positions were multiplied so that the
+// largest error can be at most `max_error`.
 struct PositionFactor {
   double factor = 1;
-  // None below is enough: `certificate` proves an error above max_error for
-  // radii times this; 1 without one.
+  // No smaller factor is enough: for radii times this, `certificate` proves
+  // that some error exceeds max_error. 1 if there is no certificate.
   double lower_bound = 1;
   double max_error = 0;  // pixels
   std::optional<CertificateFile> certificate;
@@ -138,7 +139,7 @@ struct PositionFactor {
 
 struct SolveSummary {
   SolveTermination termination = SolveTermination::kNotRun;
-  SolveMethod method = SolveMethod::kAuto;  // that was used, not asked for
+  SolveMethod method = SolveMethod::kAuto;  // the one used, not the one asked
   SolveInit init = SolveInit::kModel;       // likewise
   Norm norm;
 
@@ -150,33 +151,35 @@ struct SolveSummary {
   int32_t num_components = 0;
   int64_t num_fixed_frames = 0;
   int64_t num_fixed_points = 0;
-  int64_t num_positions = 0;  // that are known
-  // Of a camera's distance from its position to the radius, of the model
-  // written.
+  int64_t num_positions = 0;  // known positions
+  // The largest ratio of a camera's distance from its known position to the
+  // radius, in the model written.
   double largest_position_ratio = 0;
   std::optional<PositionFactor> position_factor;  // if asked for
   std::array<int64_t, kNumLeftOutReasons> left_out = {};
   int64_t num_retriangulated_points = 0;
-  int64_t num_same_image_tracks = 0;  // that hold an image more than once
-  // Of those left out as kSameImage, in the model written, pixels. They count
-  // in no error below but the points' own.
+  int64_t num_same_image_tracks = 0;  // tracks with an image more than once
+  // The largest error of the observations left out as kSameImage, in the model
+  // written, pixels. No other error of this summary counts them; only the
+  // points' stored errors do.
   double largest_twin_error = 0;
 
-  // The largest true error of the observations in the optimisation, pixels;
-  // initial: of the start, after re-triangulation; final: of the model written
-  // (before a polish): the input's if `is_given_back`, then infinite where a
-  // point does not project.
+  // The largest true error of the observations in the optimisation, pixels.
+  // Initial: at the start, after re-triangulation. Final: of the model written,
+  // before a polish. If `is_given_back` that is the input's, and infinite if a
+  // point of the input does not project.
   double cost_initial = 0;
   double cost_final = 0;
   std::vector<Round> rounds;
-  // Of all rounds. The costs of sweeps and iterations are those of the rows.
+  // The sweeps of all rounds. Costs of sweeps and iterations are those of rows.
   std::vector<Sweep> sweeps;
-  // Of the joint solver, and towards a start; seconds since the solve's start.
+  // Of the joint solver and of the search for a start. `seconds` counts from
+  // the solve's start.
   std::vector<JointIteration> iterations;
-  // That the joint solver looked at in the end; none if it did not run.
+  // The size of the joint solver's last working set; none if it did not run.
   std::optional<int64_t> num_working_observations;
 
-  // What a certificate proves that CheckPixelCertificate accepted in the end.
+  // What the final certificate proves, if CheckPixelCertificate accepted it.
   bool is_certified = false;
   std::optional<double> lower_bound;  // true pixels
   std::optional<double>
@@ -185,40 +188,41 @@ struct SolveSummary {
   std::vector<SupportPosition> support_positions;  // largest share first
   std::optional<CertificateFile> certificate;      // if asked for
 
-  // No estimate was found whose largest error in the p-norm, over all
-  // observations that had a finite one, is not above the input's, or above
-  // finish.max_error, or most points of the one that was found fell together
-  // (collapse.IsWhole()): the input is what is given back.
+  // The input is given back, because the estimate that was found is worse: its
+  // largest error in the p-norm, over all observations that had a finite error
+  // in the input, is above both the input's largest and finish.max_error; or
+  // most of its points fell together (collapse.IsWhole()).
   bool is_given_back = false;
-  // The largest error by the images' side of a model that contradicts itself,
-  // pixels in the p-norm, before and after (WorseImagesSide), where it is worse
-  // and above finish.max_error: then the input is given back, too. Of a model
-  // that is shared by processes it is not measured.
+  // For a model whose images and tracks contradict each other: the largest
+  // error by the images' side (WorseImagesSide) before and after, pixels in the
+  // p-norm. Set where it has become worse and is above finish.max_error; then
+  // the input is given back, too. Not measured where ranks share the points.
   std::optional<std::pair<double, double>> worse_images_side;
-  // What degenerated on the way from the input to the estimate.
+  // What has degenerated in the estimate, compared with the input.
   Collapse collapse;
-  // Whether the observations are no more numbers than what they determine, so
+  // Whether there are no more equations (two per observation) than unknowns, so
   // that an error of zero says nothing.
   bool is_underdetermined = false;
 
-  // What does not hold its place in the model written.
+  // The images and points that are not determined in the model written.
   LooseParts loose;
 
-  // The finish by least squares, if there was one: it gives up (cost_final -
-  // finish->lowest_cost) of the maximum.
+  // The finish by least squares, if there was one. It has raised the maximum by
+  // cost_final - finish->lowest_cost.
   std::optional<FinishSummary> finish;
-  // The largest error that was reached, pixels: what the gap asked for is
-  // about.
+  // The lowest maximum that was reached, pixels. The gap asked for refers to
+  // this one.
   double LowestCost() const {
     return finish ? finish->lowest_cost : cost_final;
   }
 
-  // Over all observations of the model, those left out included but for twins.
+  // Over all observations of the model, including those left out, except
+  // those left out as kSameImage.
   PixelErrorStatistics pixel_error_before;
   PixelErrorStatistics pixel_error_after;
 
-  // The least squares step behind all that, if asked for. The model given back
-  // is the polished one; everything above speaks of the one before.
+  // The final least squares, if asked for. The model returned is the polished
+  // one; everything above describes the model before it.
   std::optional<PolishSummary> polish;
 
   // What a process that holds the model is likely to need at its peak; see
@@ -233,36 +237,37 @@ struct SolveSummary {
 struct SolveModelOptions {
   SolveMethod method = SolveMethod::kAuto;
   SolveInit init = SolveInit::kModel;
-  double init_max_error = 100;        // pixels; > 0; the start's, if kFeasible
+  double init_max_error = 100;        // of a start found; pixels; > 0
   bool describe_certificate = false;  // fill SolveSummary::certificate
   BuildProblemOptions problem;
-  // Pixels; if given, the radii of problem.positions are multiplied by the
+  // If given, pixels: the radii of problem.positions are multiplied by the
   // smallest factor, at least 1, at which the largest error can be at most
   // this. That takes some ten solves.
   std::optional<double> inflate_positions_to;
   Polish polish = Polish::kNone;  // of SolveModel
 
-  // Takes the place of that in the stages' own options.
+  // Used by all stages instead of the norm in their own options.
   Norm norm;
 
-  // kResInt. Its fast_descent and callback serve all sweeps, of which those of
-  // kAuto are counted on.
+  // For kResInt. Its fast_descent and callback also serve the sweeps of kAuto,
+  // whose numbers continue over all rounds.
   ResIntOptions res_int;
-  // kAuto: the sweeps in front stop when one lowers the cost by less than the
-  // tolerance. They make a rough start several times better within the time of
-  // a few joint iterations, and do little for a good one.
+  // For kAuto: the leading sweeps stop when one lowers the cost by less than
+  // the tolerance. They make a rough start several times better in the time of
+  // a few joint iterations; a good start gains little.
   int max_leading_sweeps = 10;            // >= 0
   double leading_sweep_tolerance = 0.05;  // relative; >= 0
-  // kAuto, kJoint. Its callback is also told of iterations towards a start.
+  // For kAuto and kJoint. Its callback is also called for the iterations of the
+  // search for a start.
   JointOptions joint;
 
   FinishOptions finish;  // of kAuto
-  // kAuto with a finish by least squares below finish.max_error: whether the
-  // lowest maximum is looked for, and proved, first. If not, a start that is
-  // below that already goes straight to the finish.
+  // For kAuto with a finish by least squares below finish.max_error: whether
+  // the lowest maximum is found and proved first. If not, a start that is
+  // already below max_error goes straight to the finish.
   bool find_lowest = true;
 
-  // Takes the place of that in the stages' own options; null: of none.
+  // Used by all stages instead of the one in their own options; null: none.
   Checkpoint* checkpoint = nullptr;
 
   // Called once, with the counts filled in, before the solve; may be empty.
@@ -277,23 +282,24 @@ struct SolveModelResult {
 
 // Re-estimates translations and points and updates the stored point errors
 // (mean, true pixels). Rotations, intrinsics, ids, names, tracks, colours, 2D
-// points and all orders stay; so do, per connected component, the centroid of
-// the camera centres and, unless a rig fixes it, their RMS distance to it,
-// where the model has finite ones and but for summary.loose.images. What
-// options.problem.fixed marks keeps its bits, and place and scale come from it.
-// Cameras with options.problem.positions come to be within their radii (to 1e-6
-// of them), at the lowest maximum that leaves; that needs p = 2, a joint solver
-// and no polish. It may be above the input's: what is given back then is not
-// the input.
+// points and all orders stay. In each connected component the centroid of the
+// camera centres stays, and so does their RMS distance to it unless a rig fixes
+// the scale; this counts cameras with finite centres only, and not
+// summary.loose.images. What options.problem.fixed marks keeps its bits, and
+// then determines place and scale. Cameras with options.problem.positions end
+// within their radii (to 1e-6 of them), at the lowest maximum that this allows,
+// which may be above the input's; the input is not given back then. Positions
+// need p = 2, a joint solver and no polish.
 //
 // Models far from the origin are solved in a local frame
 // (krot/model/derived_models.h); costs and errors are those before the
 // coordinates are rounded to the model's own.
 //
-// kAuto takes a feasible start by itself where the model's own would leave out
-// observations (as behind or without a pose), has all centres in one place, or
-// is still above init_max_error after the leading sweeps; it is kResInt for a p
-// without a joint solver and for the paper's settings.
+// kAuto looks for a feasible start where the model's own start leaves out
+// observations (because they are behind their camera or have no pose), has all
+// centres in one place, or is still above init_max_error after the leading
+// sweeps. For a p without a joint solver and for the paper's settings, kAuto
+// means kResInt.
 //
 // Requires a valid model (ValidateModel); throws ModelError for cameras without
 // an image plane and std::invalid_argument for options out of range. Memory:
@@ -307,8 +313,9 @@ SolveModelResult TriangulateModel(const Model& model,
                                   const SolveModelOptions& options,
                                   const Context& context = {});
 
-// Points do not depend on each other with the frames fixed, so one sweep is all
-// there is: method, init, polish and the number of sweeps are replaced.
+// The options for solving points with all frames fixed. Points do not depend on
+// each other then, so one sweep solves them. Replaces method, init, polish and
+// the number of sweeps.
 SolveModelOptions PointsOnly(SolveModelOptions options);
 
 // The method that SolveModel uses for these options.

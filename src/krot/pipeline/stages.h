@@ -19,96 +19,100 @@ inline bool HasJointSolver(Norm norm) {
   return norm.p == 2 || norm.IsPolyhedral();
 }
 
-// SolveModel in the coordinates of the model, however far away: what that does
-// in a frame amid the model.
+// SolveModel in the coordinates of the model as they are. SolveModel calls it
+// with a model that was moved to a local frame near the origin if necessary.
 SolveModelResult SolveInFrame(const Model& model,
                               const SolveModelOptions& options,
                               const Context& context);
 
-// For the stages of a solve that iterate: appends every iteration to
-// `summary->iterations`, with the seconds of the solve's `timer`, and hands it
-// on to `callback`, counted over all stages. Keeps references to the other two.
+// A callback for the iterative stages of a solve: it appends every iteration to
+// `summary->iterations`, with the seconds of the solve's `timer`, and then
+// calls `callback`, with iterations counted over all stages. Keeps references
+// to `timer` and `summary`.
 JointCallback LogIterations(const JointCallback& callback, const Timer& timer,
                             SolveSummary* summary);
 
 // Where a solve starts.
 struct Start {
-  // Of all observations that the start can serve; built.start is what the
-  // model says, and the reference for its coordinate frame.
+  // Has all observations that can take part from this start. built.start are
+  // the model's own positions, also the reference for the coordinate frame.
   BuiltProblem built;
   SolveInit init = SolveInit::kModel;
 };
 
-// The model's own start or, if asked for or if `method` is kAuto and the
-// model's own is not fit for all observations, one to be found. Says so.
+// Decides where to start, and notes it: from the model's own estimate or, if
+// asked for or if `method` is kAuto and the model's own estimate does not serve
+// all observations, from one that is still to be found (SolveInit::kFeasible).
 Start ChooseStart(const Model& model, const SolveModelOptions& options,
                   SolveMethod method, const Context& context);
 
-// Whether a model's own translations are a start at all: there are observations
-// that they serve, and not all cameras stand in one place.
+// Whether a model's own translations can be a start at all: some observations
+// can take part, and not all cameras stand in one place.
 bool HasOwnStart(const BuiltProblem& own);
 
-// The model's own start; observations that it cannot serve are left out.
+// The model's own start; observations that cannot take part are left out.
 Start OwnStart(const Model& model, const SolveModelOptions& options,
                const Context& context);
 
 struct FoundStart {
   std::optional<Estimate> estimate;  // all depths are positive
-  // Without one: why.
+  // Why there is no estimate.
   SolveTermination termination = SolveTermination::kNotRun;
-  std::optional<Certificate> certificate;  // kInfeasible
+  std::optional<Certificate> certificate;  // if kInfeasible
 };
 
-// One whose residuals are below options.init_max_error. Iterations are told to
-// `log`.
+// Looks for an estimate whose residuals are below options.init_max_error. Calls
+// `log` for every iteration.
 FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
                              const SolveModelOptions& options,
                              const Context& context, const JointCallback& log);
 
-// After SolveInRounds, where that stalled far from any bound: the other ways to
-// the optimum, joint iterations alone from the model's own start and rounds
-// from a start that is found from nothing, until one is proved; the former come
-// first where that start has points in cameras. Leaves the
-// estimate of the least true cost, its problem, and the highest certificate;
-// appends to the summary's rounds, sweeps and iterations. Each way may take a
-// hundred iterations, or as many as the solve has taken.
+// Called after SolveInRounds. Where that stalled far from any bound, tries two
+// other ways to the optimum until one is proved: joint iterations alone from
+// the model's own start, and rounds from a start that is found from nothing.
+// The former come first where the present start has points in cameras. Leaves
+// the estimate of the least true cost, its problem, and the highest
+// certificate; appends to the summary's rounds, sweeps and iterations. Each way
+// may take a hundred iterations, or as many as the solve has taken if more.
 void TryOtherWays(const Model& model, const SolveModelOptions& options,
                   const Context& context, const Timer& timer, Start* start,
                   Estimate* estimate,
                   std::optional<PixelCertificate>* certificate,
                   SolveSummary* summary);
 
-// Minimises the largest *true* error in rounds: takes every row where its point
-// projects, solves the linear problem (SolveRows), goes as far along the way to
-// its solution as lowers the true cost most, and takes the rows anew, until a
+// Minimises the largest *true* error in rounds. A round takes every row where
+// its point projects, solves the linear problem (SolveRows), and takes the step
+// towards its solution that lowers the true cost most. Rounds end when a
 // certificate in true pixels shows the gap asked for or a round lowers nothing.
-// A fixed point satisfies the first-order conditions of the true problem. One
-// round where rows do not depend on where they are taken.
+// A fixed point satisfies the first-order conditions of the true problem. Where
+// rows do not depend on where they are taken, as for pinholes, one round is
+// enough.
 //
-// The true cost never rises. Where a full step would raise it, the next round
-// bounds how far the observations to blame may move (trust_regions.h).
+// The true cost never rises. After a step shorter than 1, the next round bounds
+// how far the projections move whose rows promised too much (trust_regions.h).
 //
 // Where positions are known (krot/convert/reprojection.h) every round has a
-// level, and what falls is the cost at that; the result is the best estimate
-// that keeps them, or kInfeasible with a proof that none does below
-// options.init_max_error.
+// level, and the levelled cost is what never rises within a level. The result
+// is the best estimate that keeps the positions, or kInfeasible with a proof
+// that no estimate does so with all errors below options.init_max_error.
 //
 // Fills in costs, rounds, termination, sweeps and iterations of the summary and
-// returns the highest certificate, unchecked. The rows of `built` are in the
-// end those at `*estimate`.
+// returns the certificate with the highest bound, unchecked. In the end the
+// rows of `built` are those taken at `*estimate`.
 std::optional<PixelCertificate> SolveInRounds(
     const Model& model, const SolveModelOptions& options, SolveMethod method,
     const Context& context, const Timer& timer, BuiltProblem* built,
     Estimate* estimate, SolveSummary* summary);
 
-// One round: the stages of `method` on the linear rows of a problem, from an
-// estimate of positive depths. Adds to the sweeps and the iterations of the
-// summary, with the seconds of `timer`, and sets its termination. Returns the
+// Solves the linear rows of one round by the stages of `method`, from an
+// estimate of positive depths. Appends to the summary's sweeps and iterations,
+// with the seconds of `timer`, and sets its termination. Returns the
 // certificate of the joint solver, if it has one. The rows' cost rises by
 // rounding at most. Only the first round of kAuto looks for another start.
-// kAuto ends with its sweeps, as kStalled, where `have_rows_served` says of
-// their estimate and the rows' cost, pixels, that it is better to take the rows
-// anew; may be empty.
+// `have_rows_served` may be empty. kAuto calls it after its sweeps, with their
+// estimate and the rows' cost in pixels; if it returns true, because it is
+// better to take the rows anew, the joint solver is not run and the termination
+// is kStalled.
 std::optional<Certificate> SolveRows(
     const KnownRotationProblem& problem, const SolveModelOptions& options,
     SolveMethod method, bool is_first_round,
@@ -117,42 +121,45 @@ std::optional<Certificate> SolveRows(
     const Context& context, const Timer& timer, Estimate* estimate,
     KnownMultipliers* known, SolveSummary* summary);
 
-// An estimate that is nearer to the cap, relative, leaves no room for a finish.
+// If the cost is within this of the cap, relative, there is no finish: it would
+// have no room to move.
 inline constexpr double kLeastRoom = 1e-6;
 
-// Takes an estimate whose largest true error is as low as it gets to the end
-// that the options ask for: the least squares of true errors below a cap, which
-// is max_error or, if there is none, (1 + slack) times the lowest maximum
-// (`lower_bound` if the gap asked for is reached and at most half of the slack,
-// else the estimate's own), but no more than the start's largest.
+// Runs the finish that the options ask for, from an estimate whose largest true
+// error is as low as it gets: the least squares of true errors below a cap. The
+// cap is max_error or, without that, (1 + slack) times the lowest maximum, but
+// at most the start's largest error unless positions are known. The lowest
+// maximum is `lower_bound` if that is within the gap asked for and within half
+// of the slack, otherwise the estimate's own.
 //
-// Fills in SolveSummary::finish if they were found. The rows of `built` are in
-// the end those at `*estimate`.
+// Fills in SolveSummary::finish if it succeeds. In the end the rows of `built`
+// are those taken at `*estimate`.
 void RunFinish(const Model& model, const SolveModelOptions& options,
                std::optional<double> lower_bound, const Context& context,
                BuiltProblem* built, Estimate* estimate, SolveSummary* summary);
 
-// Half the sum of the losses of the true errors, squared pixels: what the least
-// squares have lowered. O(observations).
+// Half the sum of the losses of the true errors, squared pixels: the objective
+// of the finish. O(observations).
 double SumOfLosses(const Reprojection& reprojection,
                    const KnownRotationProblem& problem, const ErrorLoss& loss,
                    const Estimate& estimate, const Context& context);
 
 // SolveModel with all radii of options.problem.positions times the smallest
 // factor, at least 1, at which the largest error can be at most
-// options.inflate_positions_to, pixels. The lowest maximum falls as radii grow;
-// the factor is bracketed by solves that end at most there and by bounds above
-// it, which prove that no smaller factor will do. The result is that of the
-// upper end; as with SolveModel, with the proof alone if even the largest
-// factor tried is refuted. Some ten solves, each from the last one's estimate.
+// options.inflate_positions_to, pixels. The lowest maximum falls as radii grow.
+// So solves that reach this error bracket the factor from above, and solves
+// with a lower bound above it prove that the factor must be larger. The result
+// is that of the bracket's upper end; if even the largest factor tried is
+// refuted, it is the input with that proof (kInfeasible). Takes some ten
+// solves, each from the last one's estimate.
 SolveModelResult SolveWithInflatedPositions(const Model& model,
                                             const SolveModelOptions& options,
                                             const Context& context);
 
-// The largest resident set, in bytes, of a process that holds `model` and runs
-// SolveModel on it with summary.method and summary.init, if the joint solver
-// gets by with the observations that it looks at first: within a quarter of the
-// truth then (docs/method/joint_solver.md, "Memory"). O(problem).
+// Estimates the largest resident set, in bytes, of a process that holds `model`
+// and runs SolveModel on it with summary.method and summary.init. The estimate
+// is within a quarter of the truth if the joint solver's working set does not
+// grow (docs/method/joint_solver.md, "Memory"). O(problem).
 int64_t EstimateSolveMemory(const Model& model, const BuiltProblem& built,
                             const SolveSummary& summary,
                             const Context& context = {});

@@ -32,9 +32,9 @@ int64_t NumObservations(const BuiltProblem& built, const Context& context) {
                     static_cast<int64_t>(built.problem.observations.size()));
 }
 
-// Whether all frames see the points from the same place, as in a model whose
-// translations are all zero: any translations are better then. Rigs with
-// baselines have several places.
+// Whether all images see the points from the same place, as in a model whose
+// translations are all zero. Such a start is worse than any other. A rig with
+// baselines has several such places.
 bool CentresCoincide(const BuiltProblem& built) {
   const auto centre = [&](const View& view) -> Eigen::Vector3d {
     const RigidTransform cam_from_rig{view.cam_from_rig_rotation,
@@ -50,8 +50,8 @@ bool CentresCoincide(const BuiltProblem& built) {
   return true;
 }
 
-// Whether the cameras are so far from where they are known to be that a start
-// from there is no help.
+// Whether the cameras are so far from their known positions that the model is
+// no useful start.
 bool IsFarFromPositions(const Model& model, const BuiltProblem& own,
                         const SolveModelOptions& options,
                         const Context& context) {
@@ -180,7 +180,8 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
 
 namespace {
 
-// A stall with a bound within so many times the gap asked for is left alone.
+// After a stall with a gap within this many times the one asked for, no other
+// way is tried.
 constexpr double kGapsOfAnswer = 10;
 constexpr size_t kFewIterations = 100;
 
@@ -189,7 +190,7 @@ bool IsWithin(double relative_gap,
   return certificate && cost - certificate->lower_bound <= relative_gap * cost;
 }
 
-// None without a start.
+// The estimate from which another way starts; none if none is found.
 std::optional<Estimate> OtherStart(const Start& other,
                                    const SolveModelOptions& options,
                                    const Context& context, const Timer& timer,
@@ -217,7 +218,8 @@ void TryOtherWays(const Model& model, const SolveModelOptions& options,
   other_options.joint.max_iterations = std::min(
       options.joint.max_iterations,
       static_cast<int>(std::max(kFewIterations, summary->iterations.size())));
-  // Sweeps leave points in cameras, and with them depths that are rounding.
+  // Sweeps leave points where they are, in a camera, and their depths consist
+  // of rounding. The way without sweeps comes first then.
   const bool is_own_first =
       HasPointsInCameras(start->built.problem, start->built.start);
   for (const bool is_own : {is_own_first, !is_own_first}) {

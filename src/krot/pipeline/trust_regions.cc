@@ -25,7 +25,7 @@ Vector3d InCamera(const KnownRotationProblem& problem, const Estimate& estimate,
   return map.leftCols<3>() * estimate.points[observation.point] + map.col(3);
 }
 
-// Orthonormal, across the ray of x_hat.
+// Orthonormal basis of the plane across the ray of x_hat.
 Basis BasisAcross(const Vector3d& x_hat) {
   const Vector3d n = x_hat.normalized();
   const Vector3d b1 = n.unitOrthogonal();
@@ -86,7 +86,7 @@ KnownRotationProblem TrustRegions::AddTo(
 
 namespace {
 
-// Steps tried: 1, then shorter ones by this factor, until they get worse.
+// Line searches try a step of 1, then steps shorter by this factor each.
 constexpr double kShorter = 0.7;
 constexpr double kShortestStep = 1e-3;
 

@@ -10,26 +10,28 @@
 
 namespace krot::internal {
 
-// Bounds on how far single observations' projections may move in one round:
-// those few, near the folds of strong lenses, whose linear rows promise what
-// the lens does not keep.
+// Bounds on how far the projections of single observations may move in one
+// round. They are for the few observations, near the folds of strong lenses,
+// whose linear row promises a lower error than the lens then has.
 //
 // A bound is one more cone, |u - u_hat| <= radius: as the row
 // (w; level/radius B x_cam), with B an orthonormal basis of the plane across
-// the ray of x_hat, it is one more observation whose residual is below `level`
-// exactly if the bound is kept.
+// the ray of x_hat, it is one more observation, whose residual is at most
+// `level` exactly if the bound is kept.
 class TrustRegions {
  public:
   bool IsEmpty() const { return radii_.empty(); }
   void Clear() { radii_.clear(); }
 
-  // Halves the way from `from` to `to` of every observation whose true error at
-  // `to` exceeds `level`, pixels. Returns how many there are. O(observations).
+  // For every observation whose true error at `to` exceeds `level`, pixels:
+  // sets its radius to half of the way that its projection moves between `from`
+  // and `to`, or of its present radius if that is less. Returns the number of
+  // such observations. O(observations).
   int64_t Shrink(const Reprojection& reprojection,
                  const KnownRotationProblem& problem, const Estimate& from,
                  const Estimate& to, Norm norm, double level);
 
-  // The rows with those of the bounds behind those of their points. Observation
+  // Adds the rows of the bounds, each after the rows of its point. Observation
   // i of the result is `(*observation_of)[i]` of `rows`, or -1 if it is a
   // bound.
   KnownRotationProblem AddTo(const KnownRotationProblem& rows,
@@ -40,18 +42,19 @@ class TrustRegions {
   std::map<int64_t, double> radii_;  // by observation
 };
 
-// How far to go along the segment from `from` to `to`, the solution of the
-// linear rows taken at `from`, in true errors and in how positions are kept: on
-// all of it the rows' cost is at most that at `from` [quasi-convexity], so a
-// short enough step lowers the true one wherever `from` is not stationary.
+// Line search from `from` to `to`, the solution of the linear rows taken at
+// `from`, by the levelled cost (reprojection.h). By quasi-convexity the rows'
+// cost on the whole segment is at most that at `from`, so a short enough step
+// lowers the true cost wherever `from` is not stationary.
 
-// The best estimate found, `from` if none is below it; `*step` in [0, 1].
-// O(observations) per trial.
+// Returns the best estimate found, or `from` if none is better; `*step` is in
+// [0, 1]. O(observations) per trial.
 Estimate BestOnSegment(const Reprojection& reprojection, const Estimate& from,
                        const Estimate& to, Norm norm, const Context& context,
                        double* step);
 
-// The same for every point on its own, where both have the same frames.
+// The same for every point on its own, if both estimates have the same frames:
+// takes for each the first step tried that does not raise its largest error.
 Estimate BestPointsOnSegments(const Reprojection& reprojection,
                               const KnownRotationProblem& problem,
                               const Estimate& from, const Estimate& to,

@@ -11,21 +11,22 @@
 
 namespace krot::internal {
 
-// The known rotation problem as linear systems see it: their unknowns are the
-// points s_k and the frames' centres in the world, C_f = -R_rw' t_f. As
+// The unknowns of the linear systems of the known rotation problem: the points
+// s_k and the frames' centres in the world, C_f = -R_rw' t_f. As
 //
 //   x_cam = R_sr (R_rw s + t_f) + t_sr = R_cw (s - C_f) + t_sr,
 //
-// a row knows a point and a frame by the difference of the two alone.
+// a row depends only on the difference between its point and its frame's
+// centre.
 
-// What the linear systems hold still: what the problem fixes and, of each
-// connected component in which it fixes nothing, the frame with the most
-// observations; so is a frame without any. Where ranks share the points, these
-// are those of the whole.
+// The structure of the linear systems. Held fixed are: everything that the
+// problem fixes; in each connected component without anything fixed, the frame
+// with the most observations; and frames without observations. Where ranks
+// share the points, components and counts are those of the whole problem.
 BlockStructure AnchoredStructure(const KnownRotationProblem& problem,
                                  const Context& context = {});
 
-// R_rw of each frame; the identity for one without views.
+// R_rw of each frame; the identity for a frame without views.
 std::vector<Eigen::Matrix3d> RigFromWorldRotations(
     const KnownRotationProblem& problem);
 
@@ -35,14 +36,14 @@ std::vector<Eigen::Vector3d> CentresOf(
     const std::vector<Eigen::Vector3d>& translations);
 
 // Sets `to` to `from`, moved by `step` along a direction of points and centres.
-// The two may be one.
+// `to` may be `from`.
 void MoveCentres(const std::vector<Eigen::Matrix3d>& rig_from_world,
                  const Estimate& from, double step,
                  const BlockVector& direction, Estimate* to);
 
-// The gradient of sum_i multiplier(i)'(w_i; v_i), with w_i the depth and v_i of
-// observation i, by points and by those centres that the structure does not
-// fix.
+// The gradient of sum_i multiplier(i)'(w_i; v_i), where w_i is the depth and
+// v_i the v of observation i, with respect to all points and to the centres
+// that the structure does not fix.
 BlockVector GradientOf(
     const KnownRotationProblem& problem, const BlockStructure& structure,
     const std::function<Eigen::Vector3d(int64_t i)>& multiplier);

@@ -13,13 +13,13 @@
 
 namespace krot::internal {
 
-// What rounding may add to an error, relative.
+// Rounding may raise an error by this, relative.
 inline constexpr double kErrorRounding = 1e-9;
 
-// x -> R x + o as the matrix [R o].
+// The map x -> R x + o as the matrix [R o].
 using AffineMap = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
-// Takes world coordinates to those of a view's camera if its frame has this
+// Maps world coordinates to those of a view's camera, if its frame has this
 // translation: R = R_sr R_rw, o = R_sr t_f + t_sr.
 inline AffineMap CamFromWorld(const View& view,
                               const Eigen::Vector3d& translation) {
@@ -42,8 +42,7 @@ inline std::vector<AffineMap> CamerasFromWorld(
   return cameras;
 }
 
-// Observation i as its camera sees it: the depth w and the v of the residual
-// ||v||_p / w.
+// The depth w and the v of an observation's residual ||v||_p / w.
 struct ViewedPoint {
   double depth;       // w, scene units
   Eigen::Vector2d v;  // pixels times scene units
@@ -66,8 +65,9 @@ inline double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   return residual < kInfinity ? residual : kInfinity;
 }
 
-// Whether every point is in front of every camera that sees it, w > 0: only
-// then is the cost finite. A third of the work of Cost.
+// Whether every point has z > 0 in every camera that sees it. For rows whose
+// depth w is z, as those of perspective lenses, the cost is finite only then. A
+// third of the work of Cost.
 bool AllDepthsPositive(const KnownRotationProblem& problem,
                        const Estimate& estimate, int num_threads);
 
@@ -76,8 +76,8 @@ bool AllDepthsPositive(const KnownRotationProblem& problem,
 double MedianDepth(const KnownRotationProblem& problem,
                    const Estimate& estimate);
 
-// Of observations [begin, end), the first residual above `level`, or the
-// largest residual if none is above it; pixels.
+// The first residual above `level` of observations [begin, end), or the largest
+// residual if none is above it; pixels.
 double ResidualAbove(double level, const KnownRotationProblem& problem,
                      const std::vector<AffineMap>& cameras,
                      const std::vector<Eigen::Vector3d>& points, Norm norm,
@@ -101,8 +101,8 @@ double Cost(const KnownRotationProblem& problem, const Estimate& estimate,
 // Whether a cost, pixels, may be the rounding error of residuals that are 0.
 inline bool IsZeroUpToRounding(double cost) { return cost < 1e-9; }
 
-// One observation as a residual of problem (1) of [Zhang18]: in the unknown x
-// (a point or a frame's translation, the other one held fixed) its
+// One observation as a residual of problem (1) of [Zhang18]. In the unknown x,
+// a point or a frame's translation with the other one held fixed, its
 //
 //   v = A x + b,   w = c'x + d                              [Zhang18, (2), (3)]
 //
@@ -130,15 +130,15 @@ inline void AffineRow(const Observation& observation, const AffineMap& map,
 
 }  // namespace detail
 
-// Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr.
+// For Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr.
 inline void IntersectionRow(const AffineMap& cam_from_world,
                             const Observation& observation,
                             double row[kResidualRow]) {
   detail::AffineRow(observation, cam_from_world, row);
 }
 
-// Res_j: the unknown is the frame's translation t_f, its point at `point`;
-// R = R_sr, o = R_sr R_rw s + t_sr.
+// For Res_j: the unknown is the frame's translation t_f, with the point s fixed
+// at `point`; R = R_sr, o = R_sr R_rw s + t_sr.
 inline void ResectionRow(const View& view, const Observation& observation,
                          const Eigen::Vector3d& point,
                          double row[kResidualRow]) {
@@ -154,8 +154,8 @@ inline bool IsReference(const View& view) {
   return view.cam_from_rig_rotation == Eigen::Matrix3d::Identity();
 }
 
-// ResectionRow of a view with R_sr = I, by 18 products instead of 45: A and c
-// are E's rows.
+// ResectionRow of a view with R_sr = I, where A and c are the rows of E. It
+// takes 18 products instead of 45.
 inline void ReferenceResectionRow(const View& view,
                                   const Observation& observation,
                                   const Eigen::Vector3d& point,

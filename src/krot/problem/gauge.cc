@@ -16,8 +16,7 @@
 namespace krot::internal {
 namespace {
 
-// The views that have observations: in this order, a frame's first one is that
-// of its first observation.
+// The views that have observations, in the order of their first observations.
 std::vector<int32_t> SeenViews(const KnownRotationProblem& problem,
                                const Context& context) {
   std::vector<int32_t> seen;
@@ -71,11 +70,11 @@ Vector3d ProjectionCentre(const FrameGeometry& frame, const Vector3d& t) {
   return frame.world_from_rig * (frame.centre_in_rig - t);
 }
 
-// How large one component is in one estimate.
+// The place and size of a component in an estimate.
 struct Extent {
   Vector3d centroid = Vector3d::Zero();  // of the centres; NaN without any
   double rms = 0;                        // distance of the centres to it
-  double weight = 0;                     // how often centres count
+  double weight = 0;                     // total of the centres' weights
   double point_distance = 0;  // the median, from the centroid; NaN without any
 
   bool CentresCoincide() const {
@@ -84,7 +83,7 @@ struct Extent {
   }
 };
 
-// One per component; frame f's centre counts num_views times.
+// The extent of each component; frame f's centre has the weight num_views.
 std::vector<Extent> MeasureExtents(const std::vector<FrameGeometry>& frames,
                                    const std::vector<char>& point_counts,
                                    const Components& components,
@@ -137,10 +136,10 @@ struct Move {
   }
 };
 
-// What is fixed in a component.
+// The fixed positions of a component.
 struct Hold {
-  std::optional<Vector3d> position;  // of the first; none: nothing is
-  bool coincides = true;             // all of it does
+  std::optional<Vector3d> position;  // the first; none if nothing is fixed
+  bool coincides = true;             // all fixed positions coincide
 
   void Add(const Vector3d& x) {
     if (!position) position = x;
@@ -164,8 +163,9 @@ std::vector<Hold> FindHolds(const KnownRotationProblem& problem,
   return holds;
 }
 
-// What the sizes of the two differ by: that of the centres or, where they
-// coincide, how far away the points are.
+// The factor between the sizes of reference and estimate: between the sizes
+// given, which are those of the centres, or, where centres coincide, between
+// the distances of the points.
 double ScaleBetween(const Extent& reference, const Extent& estimate,
                     double size_of_reference, double size_of_estimate) {
   const bool use_points =
@@ -176,7 +176,7 @@ double ScaleBetween(const Extent& reference, const Extent& estimate,
   return std::isfinite(scale) && scale > 0 ? scale : 1;
 }
 
-// The scale alone, about what is fixed.
+// A move that only scales, about the fixed position.
 Move ScaleAbout(const Vector3d& fixed, const Extent& reference,
                 const Extent& estimate) {
   const auto distance = [&](const Extent& extent) {  // RMS
@@ -207,7 +207,7 @@ std::vector<char> ScaleIsFree(const std::vector<FrameGeometry>& frames,
   return scale_is_free;
 }
 
-// How far away what a frame sees typically is: the median of its observations.
+// For each frame, the median distance of the points that it sees.
 std::vector<double> TypicalDistances(const KnownRotationProblem& problem,
                                      const Estimate& estimate,
                                      const Context& context) {

@@ -14,16 +14,17 @@ namespace krot::internal {
 // the component, coincide: rounding is a thousand times smaller.
 inline constexpr double kCoincident = 1e-12;
 
-// Where a frame's camera sits, once for all its views.
+// The projection centre of a frame: that of its first view with an observation.
 struct FrameGeometry {
   Eigen::Matrix3d world_from_rig = Eigen::Matrix3d::Identity();  // R_rw'
   Eigen::Vector3d centre_in_rig = Eigen::Vector3d::Zero();       // -R_sr' t_sr
-  int num_views = 0;                                             // that count
+  int num_views = 0;                                             // its weight
   bool is_seen_through = false;  // it has an observation
   bool has_two_centres = false;  // its observations fix the scale
 };
 
-// Of every frame; of the whole where ranks share the points. O(observations).
+// Describes every frame; from the observations of all ranks where ranks share
+// the points. O(observations).
 std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
                                           const Context& context);
 
@@ -34,47 +35,49 @@ std::vector<FrameGeometry> DescribeFrames(const KnownRotationProblem& problem,
 // Frame f moves as a whole: if its projection centre C_f shifts by d, then
 // t_f' = t_f - R_rw d. A component's scale is fixed as soon as one of its
 // frames sees points through two different projection centres. A component with
-// anything fixed keeps its place, and is free to be scaled about that alone,
-// if all that is fixed in it coincides.
+// anything fixed cannot be translated. It may be scaled only if all fixed
+// positions in it coincide, and only about these.
 
-// The frames that place and scale of their components come from: those that
-// have a position in `reference` and keep their place among the others from
-// there to `estimate` (krot/geometry/transform.h). What `is_loose` marks, if it
-// is not empty, does not count unless all frames of its component are loose.
-// 1 or 0 per frame. O(observations).
+// The held frames, which determine the place and scale of their components:
+// those that have a position in `reference` and keep their place among the
+// others between `reference` and `estimate` (FindConsensus,
+// krot/geometry/transform.h). Frames marked by `is_loose`, if that is not
+// empty, are not held unless all frames of their component are loose. Returns 1
+// or 0 per frame. O(observations).
 std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,
                                  const Estimate& reference,
                                  const Estimate& estimate,
                                  const std::vector<char>& is_loose = {},
                                  const Context& context = {});
 
-// Moves `estimate` onto the coordinate frame of `reference`, one component at
-// a time, so that the projection centres of its held frames keep the centroid
-// that they have in `reference` and, where the scale is free, the RMS distance
-// to it. Every view of a frame counts once, with the centre through which its
-// frame sees points. Where all these centres coincide (in either estimate), the
-// points keep the median of their distances from the centroid instead.
-// A component of which nothing is finite in `reference` stays. The cost does
-// not change. Frames and points without an observation stay, and so does what
-// is fixed, with all of its component but for the scale, if that is free: it is
-// that of the RMS distance to what is fixed. An estimate in the right place
-// keeps its bits. `held` is FindHeldFrames of the two if it is null.
+// Moves `estimate` into the coordinate frame of `reference`, one component at
+// a time, so that the projection centres of its held frames have the same
+// centroid as in `reference` and, where the scale is free, the same RMS
+// distance to it. A frame's centre counts once for each of its views. Where all
+// centres coincide (in either estimate), the median distance of the points from
+// the centroid takes the place of the RMS distance. A component of which
+// nothing is finite in `reference` stays. The cost does not change.
+//
+// Frames and points without an observation stay, and so does what is fixed. A
+// component with something fixed is only scaled, if its scale is free: then the
+// RMS distance from the fixed position becomes that of `reference`. An estimate
+// in the right place keeps its bits. If `held` is null, FindHeldFrames is used.
 // O(observations).
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate,
                   const Context& context = {},
                   const std::vector<char>* held = nullptr);
 
-// The same, unless it would raise the cost of its own rows, pixels, by more
-// than rounding: what is small and near the origin loses its digits elsewhere.
-// Then the estimate stays as it is.
+// The same, unless it would raise the cost of the problem's rows by more than
+// rounding; then the estimate stays as it is. That happens because coordinates
+// lose digits when something small is moved away from the origin.
 void RestoreGaugeIfHarmless(const KnownRotationProblem& problem,
                             const Estimate& reference, Norm norm,
                             const Context& context, Estimate* estimate,
                             const std::vector<char>* held = nullptr);
 
-// Scales an estimate to a median depth of one: that of a problem without
-// baselines (HasBaseline), whose scale is free. O(observations).
+// Scales an estimate to a median depth of one. The problem must have no
+// baselines (HasBaseline), so that its scale is free. O(observations).
 void NormalizeScale(const KnownRotationProblem& problem, Estimate* estimate);
 
 }  // namespace krot::internal

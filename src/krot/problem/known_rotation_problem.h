@@ -17,7 +17,7 @@ namespace krot::internal {
 // w is the depth; the ratio is the reprojection error in pixels, linearised
 // where the row E was taken (docs/method/problem.md).
 
-// One image: how its camera sits in its frame.
+// One image: the pose of its camera in its frame.
 struct View {
   Eigen::Matrix3d cam_from_world_rotation;   // R_sr R_rw
   Eigen::Matrix3d cam_from_rig_rotation;     // R_sr
@@ -33,12 +33,12 @@ struct Observation {
   int32_t point = 0;
 };
 
-// The row of an observation at its own ray: u on the plane z = 1 is the ray,
-// and J = d pixel / d u there, det J > 0. E = [e3'; J (I2 | -u)].
+// The row of an observation that is taken at the pixel's own ray. u is that ray
+// on the plane z = 1, and J = d pixel / d u there, det J > 0.
+// E = [e3'; J (I2 | -u)].
 Eigen::Matrix3d RowAtRay(const Eigen::Vector2d& u, const Eigen::Matrix2d& J);
 
-// Observations stand in the order of their points; an index lists them by
-// frame.
+// The observations are sorted by point; an index lists them by frame.
 struct KnownRotationProblem {
   int32_t num_frames = 0;
   int32_t num_points = 0;
@@ -50,8 +50,8 @@ struct KnownRotationProblem {
   // [frame_begin[f], frame_begin[f + 1]).
   std::vector<int64_t> frame_begin;
   std::vector<int32_t> frame_observations;
-  // Fixed positions: t_f per frame, s_k per point; empty if nothing of the kind
-  // is fixed. Every estimate of the problem must have them.
+  // Fixed positions: t_f per frame, s_k per point; empty if no frame, or no
+  // point, is fixed. Every estimate of the problem must have them.
   std::vector<std::optional<Eigen::Vector3d>> fixed_translations;
   std::vector<std::optional<Eigen::Vector3d>> fixed_points;
 
@@ -79,29 +79,28 @@ Estimate Between(const Estimate& from, const Estimate& to, double share);
 void IndexObservations(KnownRotationProblem* problem);
 
 // Whether any camera is away from its frame's origin, t_sr != 0. If none is,
-// the problem is homogeneous, and its scale is free unless two positions are
-// fixed (IsScaleFree). O(views).
+// and nothing is fixed, the problem is homogeneous. Without baselines the scale
+// is free unless two positions are fixed (IsScaleFree). O(views).
 bool HasBaseline(const KnownRotationProblem& problem);
 
-// Fixed are the frames and points for which the problem has a position. Once
-// one position is fixed, the translation of the whole is no longer free; once
-// two positions or a baseline are, nor is the scale (docs/method/positions.md,
-// "What is fixed").
+// Frames and points for which the problem has a position are fixed. One fixed
+// position determines the translation of the whole. Two fixed positions, or a
+// baseline, determine the scale (docs/method/positions.md, "What is fixed").
 
 // Whether anything is fixed.
 bool HasFixed(const KnownRotationProblem& problem);
 
-// One of the fixed positions: the centre of the first fixed frame's first view,
-// or the first fixed point. None if nothing is fixed. O(frames + views +
-// points).
+// One of the fixed positions: the centre of the first view whose frame is
+// fixed, or else the first fixed point. None if nothing is fixed. O(frames +
+// views + points).
 std::optional<Eigen::Vector3d> FixedOrigin(const KnownRotationProblem& problem);
 
 // The largest distance of a fixed position from FixedOrigin, scene units. 0 if
 // all coincide up to rounding, or nothing is fixed.
 double FixedExtent(const KnownRotationProblem& problem);
 
-// Whether scaling everything that moves, about FixedOrigin if there is one,
-// does not change the cost of a connected problem.
+// Whether the cost of a connected problem stays the same if everything that is
+// not fixed is scaled, about FixedOrigin if there is one.
 bool IsScaleFree(const KnownRotationProblem& problem);
 
 // An estimate with everything that is fixed in its place, and all other points

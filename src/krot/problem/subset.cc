@@ -158,7 +158,7 @@ std::vector<int64_t> PruneUnconstrained(
   std::vector<int64_t> doomed;  // to be dropped; may have duplicates
   std::vector<char> is_dropped(count, 0);
 
-  // Adds the only observation of a point, or of a frame.
+  // If a point or frame has only one observation left, adds it to `doomed`.
   const auto check_point = [&](int32_t k) {
     if (left_of_point[k] != 1 || p.IsFixedPoint(k)) return;
     for (int64_t i = p.point_begin[k]; i < p.point_begin[k + 1]; ++i) {
@@ -216,7 +216,7 @@ GatheredPart::GatheredPart(const KnownRotationProblem& problem,
   auto point = static_cast<int32_t>(
                    ranks->SumBefore(static_cast<int64_t>(points_.size()))) -
                1;
-  int32_t last = -1;  // its index on this rank
+  int32_t last = -1;  // index of the last point on this rank
   std::vector<Observation> own;
   std::vector<int64_t> in_whole;
   for (const int64_t i : observations) {
@@ -276,7 +276,7 @@ void UniteRanks(Ranks* ranks, std::vector<char>* is_seen,
   }
 }
 
-// Components of the graph that has these edges.
+// Components of the graph that has only these edges.
 Components FindComponentsOf(const KnownRotationProblem& problem,
                             const std::vector<int64_t>& observations,
                             const Context& context) {
@@ -288,7 +288,7 @@ Components FindComponentsOf(const KnownRotationProblem& problem,
   };
   const int64_t count = static_cast<int64_t>(observations.size());
 
-  // Two frames are connected if they see one point.
+  // Two frames are connected if they see the same point.
   DisjointSets frames(problem.num_frames);
   std::vector<char> is_seen(problem.num_frames, 0);
   for (int64_t n = 0; n < count; ++n) {

@@ -10,10 +10,10 @@
 
 namespace krot::internal {
 
-// Some of a problem's observations as a problem of its own, with only the
-// points, views and frames that take part in them, in the order of the whole.
-// Its optimal cost is at most that of the whole. A subset that has everything
-// refers to the whole and is no copy.
+// A subset of a problem's observations as a problem of its own. It has only the
+// points, views and frames of these observations, in the order of the whole
+// problem ("the whole"). Its optimal cost is at most that of the whole. A
+// subset with everything refers to the whole instead of copying it.
 class ProblemSubset {
  public:
   // `observations` must ascend strictly and be indices of `whole` (throws
@@ -22,7 +22,7 @@ class ProblemSubset {
   ProblemSubset(const KnownRotationProblem& whole,
                 std::vector<int64_t> observations);
 
-  // Everything.
+  // The subset with everything.
   explicit ProblemSubset(const KnownRotationProblem& whole) : whole_(whole) {}
 
   const KnownRotationProblem& problem() const {
@@ -53,8 +53,8 @@ class ProblemSubset {
             const std::vector<char>& has_frame);
 
   const KnownRotationProblem& whole_;
-  // Unless it refers to the whole: the problem, and the indices of its parts in
-  // the whole.
+  // Empty if it refers to the whole. Otherwise the problem, and the indices of
+  // its observations, points, views and frames in the whole.
   std::unique_ptr<KnownRotationProblem> copy_;
   std::vector<int64_t> observation_of_;
   std::vector<int32_t> point_of_;
@@ -63,21 +63,22 @@ class ProblemSubset {
 };
 
 // Drops every observation that is the only one of a point or a frame that is
-// not fixed, until none is left: that point or frame can be moved until the
-// residual is zero, and so the observation bounds nothing. Takes and returns
-// ascending indices. O(observations given + points + frames).
+// not fixed, until there are no such observations. Such a point or frame can be
+// moved until the residual is zero, so the observation contributes nothing to a
+// bound. Takes and returns ascending indices. O(observations given + points +
+// frames).
 std::vector<int64_t> PruneUnconstrained(
     const KnownRotationProblem& problem,
     const std::vector<int64_t>& observations);
 
-// Some observations of a problem whose points ranks share, and their points,
-// gathered on the first rank. The index of an observation "in the whole" counts
-// through the problems of rank 0, 1, ... one after another.
+// Where ranks share the points: a subset of the observations, with their
+// points, gathered on the first rank. The index of an observation "in the
+// whole" counts through the problems of rank 0, 1, ... one after another.
 //
 // Every rank makes one, and all call Collect and Scatter together.
 class GatheredPart {
  public:
-  // `observations` of this rank's `problem`, ascending.
+  // `observations` are those of this rank's `problem` to gather, ascending.
   GatheredPart(const KnownRotationProblem& problem,
                const std::vector<int64_t>& observations, Ranks* ranks);
 
@@ -87,23 +88,24 @@ class GatheredPart {
   // Per observation of problem(), its index in the whole; ascending.
   const std::vector<int64_t>& in_whole() const { return in_whole_; }
 
-  // On the first rank, its part of the ranks' estimates.
+  // Returns, on the first rank, the estimate of problem() from the estimates of
+  // all ranks.
   Estimate Collect(const Estimate& estimate) const;
-  // Gives all frames and these points their positions in the first rank's
-  // estimate.
+  // The inverse: sets all frames and the gathered points of every rank's
+  // estimate to their positions in the first rank's `part`.
   void Scatter(const Estimate& part, Estimate* estimate) const;
 
  private:
   Ranks& ranks_;
-  std::vector<int32_t> points_;      // of this rank, gathered
+  std::vector<int32_t> points_;      // gathered points of this rank
   std::vector<int64_t> num_points_;  // per rank
   KnownRotationProblem problem_;
   std::vector<int64_t> in_whole_;
 };
 
 // Connected components of the graph whose nodes are frames and points and whose
-// edges are observations. Each may be moved on its own without changing the
-// cost.
+// edges are observations. Each can be moved on its own without changing the
+// cost, unless something in it is fixed.
 struct Components {
   int32_t count = 0;
   std::vector<int32_t> of_frame;  // -1: the frame has no observation
@@ -111,8 +113,8 @@ struct Components {
 };
 
 // Components are numbered in the order of their first frames. Where ranks share
-// the points, they are those of the whole problem. O(observations) up to the
-// inverse Ackermann function.
+// the points, the components are those of the whole problem. O(observations) up
+// to the inverse Ackermann function.
 Components FindComponents(const KnownRotationProblem& problem,
                           const Context& context = {});
 
@@ -121,8 +123,8 @@ Components FindComponents(const KnownRotationProblem& problem,
 std::vector<std::vector<int64_t>> SplitIntoComponents(
     const KnownRotationProblem& problem);
 
-// The same for some observations (ascending), by components of the graph that
-// has these edges only. O(observations given + points + frames).
+// The same for the given observations (ascending), by components of the graph
+// with these edges only. O(observations given + points + frames).
 std::vector<std::vector<int64_t>> SplitIntoComponents(
     const KnownRotationProblem& problem, std::vector<int64_t> observations);
 

@@ -11,31 +11,31 @@
 namespace krot::internal {
 namespace {
 
-// Of SelectBalanced. A strict one drops observations that a proof may need, a
-// lax one keeps what does not balance. Tried on models with outliers together,
-// never one by one.
+// Tolerances of SelectBalanced. A strict one drops observations that a proof
+// may need; a lax one keeps observations that are far from stationary.
 constexpr double kBalanceTolerances[] = {1e-3, 1e-2, 3e-2, 1e-1, 3e-1};
-// How often misfits are dropped and the rest is tried again, each time at the
-// cost of a repair.
+// At most this often misfits are dropped and the rest is tried again. Each try
+// costs a repair.
 constexpr int kMaxDrops = 20;
-// What frames can spare: less makes a larger certificate, more may need too
-// large changes of what is left. Misfits are not dropped there: with some the
-// rest proves next to nothing, and iterations are cheaper (docs/history/
-// scale.md).
+// Shares of SelectForFrames in TryAll. A smaller share makes a larger
+// certificate; with a larger one, the rest may have to change too much. TryAll
+// does not drop misfits: if there are some, the rest proves next to nothing,
+// and more iterations are cheaper (docs/history/scale.md).
 constexpr double kSparedShares[] = {1e-2, 0};
-// Of the sub-problems: far below any gap that is asked for, as what is left of
-// it is missing from the bound.
+// Relative gap to which sub-problems are solved. Their bound falls short by as
+// much, so it is far below any gap that users ask for.
 constexpr double kSmallestGap = 1e-9;
 constexpr int kMaxIterations = 100;
-// Larger ones are only worth their time if they prove enough: they are given
-// up as soon as they cannot.
+// The solve of a sub-problem with more unknowns is given up as soon as its
+// optimum turns out to be below the sufficient bound.
 constexpr int64_t kLargeUnknowns = 1500;
-// What a smaller support may cost of the bound, relative: far below any gap.
+// Bounds that differ by less than this, relative, count as equal. It is far
+// below any gap.
 constexpr double kEqualBounds = 1e-7;
-// How often a sub-problem is cut down to what sets its maximum.
+// At most this often a sub-problem is reduced to what sets its maximum.
 constexpr int kMaxReductions = 4;
-// The defect that a certificate states allows for another machine's
-// arithmetic, which may find a little more than was found here.
+// A certificate states a larger defect than was found here, because the
+// arithmetic of another machine may find a slightly larger one.
 constexpr double kDefectFactor = 2;
 constexpr double kSmallestDefect = 1e-12;
 
@@ -46,7 +46,7 @@ std::vector<Multiplier> Pick(const std::vector<Multiplier>& multipliers,
   return picked;
 }
 
-// Equal bounds are told by the smaller support.
+// Of equal bounds, the one with the smaller support is better.
 bool IsBetter(const Certificate& a, const Certificate& b) {
   const double margin = kEqualBounds * b.lower_bound;
   if (a.observations.size() < b.observations.size()) {
@@ -146,7 +146,7 @@ void CertificateSearch::SolveAndReduce(const ProblemSubset& part,
   options.smallest_gap = kSmallestGap;
   options.max_iterations = kMaxIterations;
   if (NumUnknowns(part.problem()) > kLargeUnknowns) {
-    // Its optimum is below every cost it reaches.
+    // The optimum is at most the cost of any iterate.
     options.stop = [this](const ConicIterate& iterate) {
       return iterate.cost < options_.sufficient_bound;
     };
@@ -202,17 +202,19 @@ std::vector<int64_t> CertificateSearch::Offer(
 
 namespace {
 
-// Smaller multipliers, by the largest, are left out at first: a smaller
-// support is easier to balance, but may lack what decides.
+// Shares of SelectLarge: multipliers below this, relative to the largest, are
+// left out. A smaller support is easier to repair, but may lack an observation
+// that the bound needs.
 constexpr double kSharesOfLargest[] = {1e-3, 1e-5, 0};
-// The same beside the supports by scores.
+// The same for the tries after those with supports by scores.
 constexpr double kSharesBesideScores[] = {1e-3, 1e-5};
-// Of SelectSupport, the cheapest first: a strict one gives a small support,
-// which may lack what decides. Multipliers that matter span eight decades.
+// Thresholds of SelectSupport, the cheapest first. A strict one gives a small
+// support, which may lack an observation that the bound needs. Multipliers that
+// matter span eight decades.
 constexpr double kThresholds[] = {1e2, 1, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6};
-// What exceeds this one sets the maximum, or nearly so. Where that has many
-// unknowns it is not to be found among what comes close: a solve of a part
-// takes as long as a repair of all, and shows less.
+// Observations with a score above this certainly set the maximum, or nearly so.
+// If these have many unknowns, parts are not solved: that takes as long as a
+// repair of all multipliers, and proves less.
 constexpr double kSurelyInSupport = 1;
 constexpr int64_t kManyUnknowns = 5000;
 
@@ -225,6 +227,7 @@ void CheckInput(const KnownRotationProblem& problem,
   CheckAtLeast(1, options.max_unknowns, "options.max_unknowns");
 }
 
+// Whether many observations, all over the problem, set the maximum.
 bool IsSpread(const KnownRotationProblem& problem,
               const std::vector<double>& scores) {
   const std::vector<int64_t> support =
@@ -261,7 +264,8 @@ std::optional<Certificate> MakeCertificate(
   try_supports(/*solve=*/!is_spread);
   if (is_spread && !search.IsEnough()) search.TryAll(estimate, multipliers);
   if (is_spread || search.IsEnough()) return search.best();
-  // Scores do not tell an observation whose depth vanishes at the optimum.
+  // Scores do not show observations whose depth vanishes at the optimum, so
+  // those with large multipliers are tried, too.
   const double delta = SuggestedBound(problem, estimate, multipliers);
   for (const double share : kSharesBesideScores) {
     search.TryBalanced(delta, multipliers, SelectLarge(multipliers, share));

@@ -15,7 +15,7 @@
 
 namespace krot::internal {
 
-// How much observation i looks like one that sets the maximum gamma:
+// Scores that are large for observations that set the maximum gamma:
 //
 //   (lambda_i w_i / sum_j lambda_j w_j) / (1 - r_i / gamma).
 //
@@ -27,8 +27,8 @@ std::vector<double> SupportScores(const KnownRotationProblem& problem,
                                   double gamma,
                                   const std::vector<Multiplier>& multipliers);
 
-// The observations whose score exceeds `threshold`, without those that bound
-// nothing (PruneUnconstrained). Ascending.
+// The observations whose score exceeds `threshold`, without those that
+// contribute nothing to a bound (PruneUnconstrained). Ascending.
 std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
                                    const std::vector<double>& scores,
                                    double threshold);
@@ -37,18 +37,19 @@ std::vector<int64_t> SelectSupport(const KnownRotationProblem& problem,
 std::vector<int64_t> SelectLarge(const std::vector<Multiplier>& multipliers,
                                  double share);
 
-// All observations of the points that are left when points leave, those with
-// the smallest lambdas first, where no frame that moves loses more than `share`
-// of its own. What balances with all of them nearly does with these.
+// Drops points, those with the smallest sums of lambda first, as long as no
+// frame that is not fixed loses more than `share` of its own sum of lambda.
+// Returns all observations of the points that are left. If (1) of
+// certificate_check.h nearly holds for all observations, it still nearly does.
 std::vector<int64_t> SelectForFrames(const KnownRotationProblem& problem,
                                      const std::vector<Multiplier>& multipliers,
                                      double share);
 
-// The largest part of the `candidates`, ascending, in which the forces of the
-// multipliers at `delta` pixels (force_checker.h) balance at every point and
-// frame that is not fixed, up to `tolerance` > 0 of the largest delta lambda
-// there: what does not is dropped, until everything does, and without those
-// that bound nothing.
+// The largest subset of the `candidates`, ascending, for which the dual
+// residual at every point and frame that is not fixed (the sum of gradients,
+// force_checker.h, at `delta` pixels) is below `tolerance` > 0 times the
+// largest delta lambda there. Observations at other points and frames, and
+// those that contribute nothing to a bound, are dropped until none is left.
 std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     double delta,
                                     const std::vector<Multiplier>& multipliers,
@@ -56,56 +57,58 @@ std::vector<int64_t> SelectBalanced(const KnownRotationProblem& problem,
                                     double tolerance);
 
 // The bound that multipliers would prove, pixels, if (1) of certificate_check.h
-// held: the estimate times (1).
+// held. It follows from multiplying (1) by the estimate.
 double SuggestedBound(const KnownRotationProblem& problem,
                       const Estimate& estimate,
                       const std::vector<Multiplier>& multipliers);
 
 struct CertificateOptions {
-  // The first certificate that proves as much will do, pixels.
+  // The search ends with the first certificate that proves this bound, pixels.
   double sufficient_bound = std::numeric_limits<double>::infinity();
   // Supports with more unknowns are not tried; >= 1.
   int max_unknowns = 15000;
 };
 
-// A lower bound on every estimate's cost with its proof, from an interior
+// A lower bound on every estimate's cost with its proof, made from an interior
 // point's iterate: positive depths, residuals below gamma, one multiplier per
-// observation. Their sum need not prove anything; they only tell which
-// observations may set the maximum.
+// observation. The multipliers need not prove anything by themselves; they show
+// which observations may set the maximum.
 //
-// For several thresholds of SupportScores it repairs the multipliers of the
-// observations above (of each of their connected components, as each is a
-// bound), then those that balance of them (SelectBalanced), then those of
-// their own sub-problem, solved, without what does not set its maximum. It
-// keeps the highest bound that CheckCertificate accepts. None if there is no
-// such. p = 1, 2 or infinity. Allocates as much as a few sub-problems.
+// For several thresholds of SupportScores it takes the observations above, and
+// each of their connected components by itself, as each gives a bound. It
+// repairs their multipliers; then only those that are nearly stationary
+// (SelectBalanced); then those of a solve of the sub-problem, which is reduced
+// to what sets its maximum. It keeps the highest bound that CheckCertificate
+// accepts; none if there is none. p = 1, 2 or infinity. Allocates as much as a
+// few sub-problems.
 std::optional<Certificate> MakeCertificate(
     const KnownRotationProblem& problem, Norm norm, const Estimate& estimate,
     double gamma, const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options, const Context& context);
 
-// The same from the multipliers with which FindFeasible ends where no estimate
-// has all its residuals below `bound`, pixels: a certificate near that bound
-// from what balances of them (SelectBalanced), for several tolerances.
+// The same from the multipliers with which FindFeasible ends if no estimate has
+// all its residuals below `bound`, pixels. The certificate's bound is near
+// `bound`; it is made of multipliers that are nearly stationary
+// (SelectBalanced), for several tolerances.
 std::optional<Certificate> MakeInfeasibilityCertificate(
     const KnownRotationProblem& problem, Norm norm, double bound,
     const std::vector<Multiplier>& multipliers,
     const CertificateOptions& options, const Context& context);
 
-// A part's certificate as one of the whole.
+// A certificate of a part, with the observation indices of the whole problem.
 Certificate InWhole(const ProblemSubset& part, Certificate certificate);
 
-// Looks for certificates among given observations, connected, and keeps the
-// best that the check accepts:
+// Looks for certificates and keeps the best one that the check accepts. It
+// tries several sets of multipliers:
 //
-//   as they are   repairs the multipliers in hand               Offer
-//   balanced      of those, what balances, without misfits      TryBalanced
-//   solved        those of the sub-problem's own optimum, then  SolveAndReduce
-//                 of what sets the maximum of that, and so on
-//   all           of all observations, where what sets the      TryAll
-//                 maximum is too much to be found
+//   Offer           repairs the given ones
+//   TryBalanced     repairs only those that are nearly stationary, without
+//                   misfits
+//   SolveAndReduce  those at the optimum of the observations' own problem; then
+//                   of the problem that sets its maximum, and so on
+//   TryAll          those of all observations, where too many set the maximum
 //
-// Every way ends in Offer, which alone writes the best, and none goes on once
+// All of them end in Offer, which keeps the best, and none goes on once
 // IsEnough().
 class CertificateSearch {
  public:
@@ -113,20 +116,22 @@ class CertificateSearch {
                     const CertificateOptions& options, const Context& context)
       : problem_(problem), norm_(norm), options_(options), context_(context) {}
 
-  // Tries the multipliers of these observations, connected, as they are; then
-  // what balances of them. With a threshold of SelectSupport, then those of
-  // their sub-problem, solved from `estimate` of the whole; then that of what
-  // sets its maximum, and so on.
+  // Tries the multipliers of these observations, which must be connected, as
+  // they are; then only those that are nearly stationary. With a threshold (of
+  // SelectSupport) it then solves the observations' own problem, starting from
+  // `estimate` of the whole, and after that the problem of the observations
+  // that set its maximum, and so on.
   void Try(const std::vector<int64_t>& observations, const Estimate& estimate,
            const std::vector<Multiplier>& multipliers,
            std::optional<double> threshold_to_solve);
 
-  // Tries the multipliers of all observations at once, but for what the frames
-  // can spare.
+  // Tries the multipliers of all observations, without points that frames can
+  // spare (SelectForFrames).
   void TryAll(const Estimate& estimate,
               const std::vector<Multiplier>& multipliers);
 
-  // Tries what balances of these multipliers at `delta`, pixels.
+  // Tries those of the candidates' multipliers that are nearly stationary at
+  // `delta`, pixels (SelectBalanced).
   void TryBalanced(double delta, const std::vector<Multiplier>& multipliers,
                    const std::vector<int64_t>& candidates);
 
@@ -146,14 +151,15 @@ class CertificateSearch {
 
   void SolveAndReduce(const ProblemSubset& part, const Estimate& whole,
                       double threshold, int num_reductions);
-  // Offers each connected component that is not too large; returns the
-  // observations of those that are worth another try, without their misfits.
+  // Offers each connected component that is not too large. Returns the
+  // observations of components that have misfits, without these, as they are
+  // worth another try.
   std::vector<int64_t> OfferComponents(
       const std::vector<int64_t>& observations,
       const std::vector<Multiplier>& multipliers, int64_t max_unknowns,
       const DeltaOf& delta_of);
-  // Repairs the part's multipliers, and keeps what comes of them if it is
-  // better than the best so far. Returns the misfits of the part.
+  // Repairs the part's multipliers, and keeps the result if it is the best so
+  // far and the check accepts it. Returns the misfits of the part.
   std::vector<int64_t> Offer(const ProblemSubset& part, double delta,
                              const std::vector<Multiplier>& multipliers);
 
@@ -164,7 +170,7 @@ class CertificateSearch {
   Certificate best_;
 };
 
-// Of the problem.
+// The number of unknowns of a problem, without those of one frame.
 int64_t NumUnknowns(const KnownRotationProblem& problem);
 
 }  // namespace krot::internal

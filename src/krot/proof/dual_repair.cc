@@ -19,8 +19,9 @@ Eigen::Matrix<Scalar, 3, 1> Stack(const Multiplier& multiplier) {
 
 }  // namespace
 
-// What the frames are called in the equations, which begin with frame 1: what
-// is fixed is frame 0 or, if nothing is, the first frame. Marks the points.
+// The index of each frame in the equations. Frame 0 has no equations: it stands
+// for all fixed frames or, if nothing is fixed, for the first frame. Also marks
+// the fixed points in empty_.
 std::vector<int32_t> DualSystem::OmitFrames(
     const KnownRotationProblem& problem) {
   const bool has_fixed = HasFixed(problem);
@@ -136,28 +137,34 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-// By how much (2) stays below zero, relative to what it sums up: well above
-// roundings, well below any gap.
+// The margin of (2) below zero, relative to the size of its terms: well above
+// rounding, well below any gap.
 constexpr double kConstantMargin = 1e-8;
-// The bound that is claimed leaves this for the last roundings, relative.
+// The claimed bound is lower by this, relative, to allow for the last
+// roundings.
 constexpr double kBoundMargin = 4e-13;
-// Lengthening y costs the bound in first order, turning it in second: lengths
-// count this much at least, or as much as there is left up to lambda.
+// Lengthening y lowers the bound in first order, turning it in second order. So
+// the unit of changes along y is the room that is left up to lambda, but at
+// least this, relative to lambda.
 constexpr double kLengthWeight = 1e-3;
-// Of a lambda, relative: a misfit would have to change by more.
+// If a lambda would have to change by more than this, relative, the observation
+// is a misfit.
 constexpr double kMaxLambdaChange = 0.5;
-// The first solve leaves its own rounding, the second that of Miss().
+// After the first solve its own rounding is left, after the second only that of
+// Miss().
 constexpr int kNumRefinements = 2;
-// Each costs two solves with the one factor.
+// The limit of alternating projections; each costs two solves with the same
+// factor.
 constexpr int kMaxSteps = 20;
-// Steps end where the next promises less than this, of the bound.
+// Projections end when a step raises the bound by less than this, relative.
 constexpr double kSmallestGain = 1e-9;
 
-// Directions, by rows, in which the dual ball is round (p = 2: along y and
-// across it) or ends at the coordinates +-1 (otherwise), and those coordinates.
+// Coordinates that suit the dual ball |eta|_dual <= 1. For p = 2 the directions
+// (rows) are along y and across it; otherwise the ball is the square of
+// coordinates within [-1, 1].
 struct DualFrame {
   Matrix2d directions;
-  Vector2d coordinates;  // of y / lambda; 0 across it
+  Vector2d coordinates;  // of y / lambda
 };
 
 DualFrame MakeDualFrame(const Vector2d& eta, Norm norm) {
@@ -177,7 +184,7 @@ DualFrame MakeDualFrame(const Vector2d& eta, Norm norm) {
   return frame;
 }
 
-// Alternating projections, in the one metric that Factorize fixes:
+// Alternating projections, in the metric that Factorize fixes:
 //
 //   Factorize --> Balance --> Misfits --none--> Divided, kept if the best
 //                    ^           |                 |
@@ -185,8 +192,8 @@ DualFrame MakeDualFrame(const Vector2d& eta, Norm norm) {
 //                    |                             |
 //                    +---------- Shorten <--------yes
 //
-// After Balance (1) and (2) hold, but maybe not |y_i|_dual <= lambda_i; after
-// Shorten it is the other way about; what is Divided has both.
+// After Balance (1) and (2) hold, but perhaps not |y_i|_dual <= lambda_i; after
+// Shorten it is the other way round; after Divided both hold.
 class Repair {
  public:
   Repair(const KnownRotationProblem& problem, Norm norm, double delta,
@@ -230,7 +237,7 @@ bool Repair::Factorize() {
   return solver_.Factorize(system_.Changes(axes_));
 }
 
-// The least change that satisfies (1) and (2), to rounding.
+// Makes the least change after which (1) and (2) hold, to rounding.
 void Repair::Balance() {
   for (int n = 0; n < kNumRefinements; ++n) {
     const VectorXd step = solver_.Solve(-system_.Miss(now_));

@@ -18,31 +18,33 @@
 
 namespace krot::internal {
 
-// QR by Householder's reflections of matrices of blocks that share columns,
+// QR factorisation by Householder reflections of a matrix whose blocks share
+// columns,
 //
 //   A = [ P_0            F_0 ]        P_k, F_k have the same rows; P_k may
 //       [      P_1       F_1 ]        have no columns, F_k is mostly zeros
 //       [           .     :  ]
 //
-// each P_k for itself, and then what they leave of the shared columns:
+// First each P_k is factorised by itself, then what is left of the shared
+// columns:
 //
 //   Q_k' [P_k  F_k] = [ R_k  G_k ]        H_0
 //                     [  0   H_k ]        H_1  = Q R
 //                                          :
 //
-// As accurate as of the dense matrix, and with only the shared columns the cost
-// grows by the square.
+// It is as accurate as for a dense matrix, but the cost grows only with the
+// square of the number of shared columns.
 class BlockAngularQr {
  public:
   explicit BlockAngularQr(int64_t num_shared_columns);
 
-  // The next block: P_k, and of F_k the columns (ascending) that are not zero.
-  // P_k has as many rows as columns at least.
+  // Adds the next block: P_k, and the nonzero columns of F_k with their
+  // indices, ascending. P_k must have at least as many rows as columns.
   void Append(const Eigen::MatrixXd& own, std::vector<int64_t> columns,
               const Eigen::MatrixXd& shared);
 
-  // Once all blocks are there. False unless the columns of A are independent,
-  // beyond rounding.
+  // Call it after all blocks were added. False unless the columns of A are
+  // independent beyond rounding.
   bool Factorize();
 
   // The x of least norm with A'x = rhs, which is ordered like the columns of A:
@@ -55,7 +57,7 @@ class BlockAngularQr {
   struct Block {
     Qr qr;  // of P_k
     std::vector<int64_t> columns;
-    Eigen::MatrixXd shared;  // [G_k; H_k] of these
+    Eigen::MatrixXd shared;  // [G_k; H_k] in these columns
     int64_t num_own() const { return qr.cols(); }
     int64_t num_rest() const { return qr.rows() - qr.cols(); }
   };
@@ -68,15 +70,15 @@ class BlockAngularQr {
 };
 
 // Under-determined equations M x = rhs with the structure of the known rotation
-// problem: three equations per point that is not fixed, three per frame but
-// frame 0, and perhaps one more that concerns everything. An observation has
-// three unknowns (those that no equation mentions stay 0), which meet the
-// equations of its point and, with the opposite sign, of its frame.
+// problem: three equations per point that is not fixed, three per frame except
+// frame 0, and perhaps a last one that involves everything. An observation has
+// three unknowns (they are 0 if they are in no equation), which appear in the
+// equations of its point and, with the opposite sign, in those of its frame.
 struct LeastNormProblem {
   struct Columns {
     int32_t point = 0;
     int32_t frame = 0;
-    // By unknown (row) and equation of the point (column).
+    // Coefficients: a row per unknown, a column per equation of the point.
     Eigen::Matrix3d rows = Eigen::Matrix3d::Zero();
     Eigen::Vector3d last_row = Eigen::Vector3d::Zero();
   };
@@ -96,13 +98,13 @@ struct LeastNormProblem {
   int64_t num_rows() const {
     return 3 * (num_free_points() + num_frames - 1) + has_last_row;
   }
-  // The first equation of each point, without meaning for fixed ones; those of
-  // frames 1, 2, ... follow.
+  // The index of each point's first equation, meaningless for fixed points. The
+  // equations of frames 1, 2, ... follow after those of points.
   std::vector<int64_t> EquationsOfPoints() const;
 };
 
-// Their solutions of least norm, x = M' (M M')^-1 rhs. What is factorised is
-// M', an observation's three unknowns per row of blocks:
+// Finds solutions of least norm of such equations, x = M' (M M')^-1 rhs. It
+// factorises M'; a row of blocks has the three unknowns of an observation:
 //
 //              points          frames but 0    last
 //            0    1    2       1    2    3
@@ -112,15 +114,16 @@ struct LeastNormProblem {
 //   obs 3  [      P         |           -P   | l ]
 //   obs 4  [           P    | -P             | l ]
 //
-// By Householder's reflections (BlockAngularQr), where that is affordable,
-// as their multipliers span many decades; beyond `max_dense_rows` by
-// eliminating points, which leaves the normal equations of the frames, and of
-// the last column its part outside of the span of all others.
+// Up to `max_dense_rows` it uses Householder reflections (BlockAngularQr), as
+// the multipliers span many decades. Beyond that it eliminates the points,
+// which leaves the normal equations of the frames; the last column is replaced
+// by its part outside the span of all others.
 //
-// Factorize once and then, if it succeeded, Solve as often as needed.
+// Usage: Factorize once and then, if it succeeded, Solve as often as necessary.
 class LeastNormSolver {
  public:
-  // The cost of the dense way grows with the rows and the frames' square.
+  // The cost of the dense solution is proportional to the number of rows and
+  // to the square of the number of frames.
   explicit LeastNormSolver(int num_threads, int64_t max_dense_rows = 1500)
       : num_threads_(num_threads), max_dense_rows_(max_dense_rows) {}
 
@@ -139,9 +142,9 @@ class LeastNormSolver {
   const int num_threads_;
   const int64_t max_dense_rows_;
   LeastNormProblem problem_;
-  // Dense: of the transposed equations.
+  // The dense solution: a factorisation of M'.
   std::optional<BlockAngularQr> qr_;
-  // By points.
+  // The solution by eliminating points.
   BlockStructure structure_;
   std::unique_ptr<CentredLeastSquares<3>> by_points_;
   Eigen::VectorXd last_row_;  // without its part in the span of the others
@@ -152,32 +155,35 @@ class LeastNormSolver {
 // multipliers y_i, lambda_i, for one delta. Internal to the making of
 // certificates.
 //
-// The rows are those of the points and frames that move, without those of the
-// first frame if nothing is fixed (the problem must be connected). Where a
-// frame sees points through several projection centres, or several positions
-// are fixed, one more row holds the constants (b; d), counted from the centre
-// of the frame's first view and from one of the positions (FixedConstants).
-// Observation i fills, in the equations of
+// There are three equations for every point and frame that is not fixed,
+// without those of the first frame if nothing is fixed (the problem must be
+// connected). Where a frame sees points through several projection centres, or
+// several positions are fixed, one more equation is for the constants (b; d).
+// Their origins are the centre of the frame's first view and one of the fixed
+// positions (FixedConstants). Observation i has these coefficients in the
+// equations of
 //
 //   its point        P_i' (y_i; lambda_i) + ... = 0      P_i = E_i R_sr R_rw
 //   its frame       -P_i' (y_i; lambda_i) - ... = 0      if that is not 0
 //   the constants    k_i' (y_i; lambda_i) + ... <= 0     k_i = (b; delta d)
 //
-// with E_i = (J_i (I2 | -u_i); delta e3'). To be used so: Changes once, to be
-// factorised; Miss of the multipliers in hand, to be solved for a change of
-// them, as often as they are refined.
+// where E_i has the rows v of the observation's E, then delta times its row w.
+// Usage: factorise Changes once; then, as often as the multipliers are refined,
+// solve for the change that removes their Miss.
 class DualSystem {
  public:
-  // (2) is asked to stay as far below zero as it is for these multipliers, at
-  // least by `margin`, relative to what it sums up.
+  // The left-hand side of (2) is to stay as it is for these multipliers, but to
+  // be below zero at least by `margin`, relative to the size of its terms.
   DualSystem(const KnownRotationProblem& problem, double delta,
              const std::vector<Multiplier>& multipliers, double margin);
 
-  // What the equations miss for these, evaluated in extended precision.
+  // The residual of the equations for these multipliers, evaluated in extended
+  // precision.
   Eigen::VectorXd Miss(const std::vector<Multiplier>& multipliers) const;
 
-  // The equations for changes of the multipliers of the constructor, in units
-  // of lambda_i: of y_i by axes[i]' x_1,2, and of both y_i and lambda_i by x_3.
+  // The equations for relative changes of the constructor's multipliers: x_1,2
+  // change y_i by lambda_i axes[i]' x_1,2, and x_3 scales both y_i and lambda_i
+  // by 1 + x_3.
   LeastNormProblem Changes(const std::vector<Eigen::Matrix2d>& axes) const;
 
  private:
@@ -185,15 +191,16 @@ class DualSystem {
   using Matrix3r = Eigen::Matrix<Real, 3, 3>;
   using Vector3r = Eigen::Matrix<Real, 3, 1>;
   using VectorXr = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-  // (A; delta c) by the point and the frame's centre, both in the world, and
-  // (b; delta d). Up to the rounding of R_cw the first two add up to 0.
+  // (A; delta c) with respect to the point and to the frame's centre, both in
+  // the world, and (b; delta d). The first two add up to 0, up to the rounding
+  // of R_cw.
   struct Block {
     Matrix3r point;
     Matrix3r frame;
     Vector3r constants = Vector3r::Zero();
     int32_t point_index = 0;
-    int64_t point_equation = -1;  // its first; -1: fixed
-    int32_t frame_index = 0;      // 0: omitted
+    int64_t point_equation = -1;  // the first of the point; -1 if it is fixed
+    int32_t frame_index = 0;      // 0: without equations
   };
 
   std::vector<int32_t> OmitFrames(const KnownRotationProblem& problem);
@@ -201,31 +208,31 @@ class DualSystem {
   const std::vector<Multiplier> multipliers_;
   LeastNormProblem empty_;  // without columns
   std::vector<Block> blocks_;
-  Real constants_ = 0;  // the left-hand side of (2) that is asked for
+  Real constants_ = 0;  // the wanted left-hand side of (2)
 };
 
 struct RepairOptions {
   int num_threads = 1;
-  // It ends with the first multipliers that prove as much, pixels.
+  // The repair ends with the first multipliers that prove this bound, pixels.
   double sufficient_bound = std::numeric_limits<double>::infinity();
 };
 
-// Makes multipliers that satisfy the identities (1) and (2) of
-// certificate_check.h approximately for `delta` > 0, pixels, satisfy them to
-// rounding. It goes to and fro between the least change, relative and in a
-// metric in which lengthening y_i / lambda_i costs more than turning it, that
-// restores (1) and (2), and the nearest multipliers with |y_i|_dual <=
-// lambda_i. Where the two do not meet, y is divided by the largest
-// |y_i|_dual / lambda_i, and what is proved is delta by as much smaller.
+// Takes multipliers that satisfy (1) and (2) of certificate_check.h
+// approximately, for `delta` > 0 pixels, and makes them satisfy (1) and (2) to
+// rounding. It alternates between two projections: the least relative change
+// that restores (1) and (2), in a metric in which lengthening y_i / lambda_i
+// costs more than turning it; and the nearest multipliers with |y_i|_dual <=
+// lambda_i. If the two do not meet, y is divided by the largest
+// |y_i|_dual / lambda_i, and so is delta, the bound that is proved.
 //
 // Requires one connected problem and one multiplier per observation, all
 // lambda > 0. See LeastNormSolver for the cost.
 struct RepairedMultipliers {
-  // Its observations are those of the problem; its defect is 0, nothing is
-  // verified. None if the equations cannot be solved, or if there are misfits.
+  // With all observations of the problem. It is not verified; its defect is 0.
+  // None if the equations cannot be solved, or if there are misfits.
   std::optional<Certificate> certificate;
-  // The observations whose lambda would have to change by more than half: the
-  // others may balance without them. Ascending.
+  // The observations whose lambda would have to change by more than half. The
+  // others may satisfy (1) without them. Ascending.
   std::vector<int64_t> misfits;
 };
 

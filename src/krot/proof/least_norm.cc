@@ -10,7 +10,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Whether each column leaves more than rounding beside those before it.
+// Whether each column is independent, beyond rounding, of those before it.
 bool AreIndependent(const Eigen::HouseholderQR<MatrixXd>& qr,
                     const VectorXd& squared_lengths) {
   const VectorXd left = qr.matrixQR().diagonal().cwiseAbs();
@@ -105,8 +105,8 @@ VectorXd BlockAngularQr::SolveLeastNorm(const VectorXd& rhs) const {
 
 namespace {
 
-// A last row that keeps less than this of its length (squared) follows from
-// the others.
+// If less than this share of the squared length of the last row is outside the
+// span of the others, it depends on them.
 constexpr double kSmallestLastRow = 1e-20;
 
 }  // namespace
@@ -135,7 +135,7 @@ VectorXd LeastNormSolver::Solve(const VectorXd& rhs) const {
   return by_points_ ? SolveByPoints(rhs) : qr_->SolveLeastNorm(rhs);
 }
 
-// The rows of a point's observations, of the transposed equations.
+// Appends the rows of M' of a point's observations.
 void LeastNormSolver::AppendPoint(size_t begin, size_t end) {
   std::vector<int32_t> frames;
   for (size_t i = begin; i < end; ++i) {
@@ -186,7 +186,8 @@ bool LeastNormSolver::FactorizeDense() {
   return num_points == problem_.num_free_points() && qr_->Factorize();
 }
 
-// With A = M', its points' columns orthogonalised: A (A'A)^-1 rhs.
+// Factorises A'A for A = M', by eliminating the columns of points, so that
+// SolveByPoints can compute A (A'A)^-1 rhs.
 bool LeastNormSolver::FactorizeByPoints() {
   structure_ = {};
   structure_.point_begin.assign(1, 0);

@@ -13,10 +13,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Of some observations at a point or frame.
+// The dual residual at a point or frame, from some of its observations.
 struct ForceSum {
-  Vector3d sum = Vector3d::Zero();  // of the forces
-  double largest = 0;               // delta lambda
+  Vector3d sum = Vector3d::Zero();  // of the gradients
+  double largest = 0;               // the largest delta lambda
 
   bool IsWithin(double tolerance) const {
     return sum.norm() < tolerance * largest;

@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// The first frame of each rank, and the end: all ranks get about as many
-// observations.
+// The first frame of each rank, and the end, such that all ranks get about the
+// same number of observations.
 std::vector<int32_t> CutFrames(const KnownRotationProblem& problem,
                                Ranks* ranks) {
   std::vector<int64_t> counts;
@@ -35,19 +35,19 @@ std::vector<int32_t> CutFrames(const KnownRotationProblem& problem,
   return begin;
 }
 
-// Points are many and small, frames few and large. More points at a time would
-// not fit into a core's cache. With fewer, a larger share are last ones, beside
-// which lanes are idle.
+// The number of points that a thread solves at a time. More would not fit into
+// a core's cache. With fewer, lanes are idle more often, at the end of each
+// chunk.
 constexpr int64_t kPointsPerChunk = 512;
 
 // The observations of a frame are far apart in memory, and so are their points.
-// They are fetched so many observations ahead: without that, sweeps take 6 to
+// They are prefetched by this many observations: without that, sweeps take 6 to
 // 30 % longer.
 constexpr int64_t kObservationsAhead = 32;
 constexpr int64_t kPointsAhead = 8;
 
-// Fetches memory into the cache, by lines of 64 bytes. It has to be inlined:
-// GCC drops calls of functions that do nothing else.
+// Fetches memory into the cache, by lines of 64 bytes. It must be inlined, as
+// GCC removes calls of functions that only prefetch.
 [[gnu::always_inline]] inline void Prefetch(const void* memory, int64_t size) {
   const char* begin = static_cast<const char*>(memory);
   for (int64_t i = 0; i < size; i += 64) __builtin_prefetch(begin + i);
@@ -123,7 +123,7 @@ BlockSweep::BlockSweep(const KnownRotationProblem& problem,
   for (const View& view : problem.views) {
     is_reference_.push_back(IsReference(view));
   }
-  WorkerOf(0);  // throws for wrong options already here
+  WorkerOf(0);  // so that wrong options throw here already
 }
 
 BlockSweep::Worker* BlockSweep::WorkerOf(int worker) {
@@ -220,8 +220,8 @@ double BlockSweep::IntersectPoints(int64_t begin, int64_t end, int worker,
 }
 
 // Lists the points that are to move, those with few observations first. Fixed
-// points and points below the goal's level stay; returns the largest cost of
-// these, for which no rows have to be built.
+// points and points below the goal's level do not move; returns the largest
+// cost of these.
 double BlockSweep::ChoosePoints(int64_t begin, int64_t end,
                                 const Estimate& estimate,
                                 std::vector<int32_t>* points) const {

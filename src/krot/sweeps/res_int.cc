@@ -11,30 +11,30 @@
 namespace krot::internal {
 namespace {
 
-// How far coarse sweeps take a block: see res_int.h. With a tolerance of 1e-2
-// throughout, alternation ended at a higher cost (docs/history/journal.md,
+// The goal of blocks in coarse sweeps; see res_int.h. With a tolerance of 1e-2
+// throughout, alternation would end at a higher cost (docs/history/journal.md,
 // "Res-Int, the first ten sweeps").
 constexpr double kCoarseShareOfGain = 0.1;
 constexpr double kFinestCoarse = 1e-3;
 constexpr double kCoarsest = 1e-2;
 constexpr double kCoarseLevel = 0.5;
 
-// `gain`: by how much the last sweep lowered the cost, relative.
+// `gain` is the relative decrease of the cost by the last sweep.
 DescentGoal CoarseGoal(double gain, double cost) {
   return {std::clamp(kCoarseShareOfGain * gain, kFinestCoarse, kCoarsest),
           kCoarseLevel * cost};
 }
 
-// An extrapolation after which a depth is not positive is halved so many times.
+// An extrapolation that makes a depth not positive is halved at most this many
+// times.
 constexpr int kMaxHalvings = 4;
 
-// Nesterov's momentum with restarts [Nesterov 1983; O'Donoghue, Candes 2015],
-// around a method that improves an estimate: every sweep starts a little
-// further along the last improvement. A sweep that ends above the best cost
-// is thrown away, so the best cost never rises.
+// Nesterov's momentum with restarts [Nesterov 1983; O'Donoghue, Candes 2015]:
+// every sweep starts a little further along the last improvement. A sweep that
+// ends above the best cost is discarded, so the best cost never rises.
 //
-// Alternation converges slowly along the directions in which points and
-// frames must move together; momentum is what follows them.
+// Alternation is slow along directions in which points and frames must move
+// together; momentum goes faster along these.
 class Momentum {
  public:
   // Starts at `start`, of cost `cost`; keeps a reference to `problem`.
@@ -62,8 +62,8 @@ class Momentum {
     return best_;
   }
 
-  // Takes the result of the sweep from NextStart() unless it is worse. One of
-  // equal cost is taken, because it may have moved other blocks.
+  // Takes the result of the sweep from NextStart() unless it is worse. A result
+  // of equal cost is taken, because blocks below the maximum may have improved.
   void Accept(const Estimate& reached, double cost) {
     const bool improves = cost < best_cost_;
     improvements_ = improves ? improvements_ + 1 : 0;
@@ -115,7 +115,7 @@ ResIntSummary SolveResInt(const KnownRotationProblem& problem,
   BlockSweep blocks(problem, options.fast_descent, options.norm, context);
   Momentum momentum(problem, context, *estimate, summary.cost_initial);
   bool is_coarse = !literal && options.update_frames;
-  double gain = 1;      // of the last sweep, relative; at first as if large
+  double gain = 1;      // of the last sweep, relative; 1 before the first
   int idle_sweeps = 0;  // in a row
   for (int sweep = 1; sweep <= options.max_sweeps; ++sweep) {
     const bool is_last = sweep == options.max_sweeps;

@@ -13,10 +13,11 @@
 
 namespace krot::internal {
 
-// The frames that this rank resects, of a problem whose points ranks share:
-// they are consecutive, and every rank has about as many of their observations.
-// The observations are held a second time, in the order of the whole problem,
-// so that a frame's sub-problem has the same rows as in one process.
+// Where ranks share the points: the frames that this rank resects, as a problem
+// of their own. They are consecutive, and the observations of each rank's
+// frames are about equally many. Their observations are stored a second time,
+// in the order of the whole problem, so that a frame's sub-problem has the same
+// rows as in one process.
 //
 // Every rank makes one, and all call its functions together.
 class FrameShare {
@@ -27,11 +28,11 @@ class FrameShare {
   // points of these observations.
   const KnownRotationProblem& problem() const { return problem_; }
 
-  // An estimate of problem(). Every rank sends 24 bytes for each of its points
-  // and each rank whose frames see it.
+  // Returns the estimate of problem(), made of all ranks' estimates. For each
+  // of its points a rank sends 24 bytes to each rank whose frames see it.
   Estimate Receive(const Estimate& estimate) const;
 
-  // Gives the translations of this rank's frames to all ranks.
+  // Sends the translations of this rank's frames to all ranks.
   void Publish(const Estimate& share, Estimate* estimate) const;
 
  private:
@@ -42,19 +43,19 @@ class FrameShare {
   std::vector<std::vector<int32_t>> seen_by_;
 };
 
-// The two half-sweeps of [Zhang18, Alg. 1]. Blocks are independent of each
-// other and spread over threads; the result does not depend on how many. Points
-// are solved side by side, in the order of their numbers of observations. Each
-// thread keeps its descents, so that sweeps do not allocate once warm.
-// After a cancellation the remaining blocks are skipped. What the problem fixes
-// does not move.
+// The two half-sweeps of [Zhang18, Alg. 1]. Blocks are points and frames; they
+// are independent of each other and spread over threads. The result does not
+// depend on the number of threads. Points are solved side by side, those with
+// few observations first. Each thread keeps its descents, so that sweeps do not
+// allocate once warm. After a cancellation the remaining blocks are skipped.
+// Fixed points and frames do not move.
 //
 // Where ranks share the points, each takes its own points and a share of the
 // frames; all ranks call both functions together.
 //
-// Both return the cost that is reached, pixels: up to rounding that of Cost().
-// It is infinite if a block starts at a depth that is not positive; the
-// estimate is useless then.
+// Both return the cost that is reached, pixels, which is Cost() up to rounding.
+// It is infinite if a block starts at a depth that is not positive; then the
+// estimate is useless.
 class BlockSweep {
  public:
   // Keeps a reference to `problem`.
@@ -62,7 +63,7 @@ class BlockSweep {
              const FastDescentOptions& options, Norm norm,
              const Context& context);
 
-  // How far blocks go from now on. At first they go to their optima.
+  // Sets how far blocks go from now on. Initially they go to their optima.
   void SetGoal(const DescentGoal& goal) { goal_ = goal; }
 
   // Line 3: every point's own optimum, the frames fixed: (Int_k) for all k.
@@ -100,15 +101,15 @@ class BlockSweep {
   Norm norm_;
   const Context context_;
   DescentGoal goal_;
-  // One per thread, made at its first use: of the threads that were asked for,
-  // the system may provide only a few.
+  // One per thread, made at its first use, because the system may provide fewer
+  // threads than were asked for.
   std::vector<std::unique_ptr<Worker>> workers_;
   std::vector<AffineMap> cameras_;  // per view, while points move
   std::vector<char> is_reference_;  // per view
   // The warm starts of all blocks.
   std::vector<ActiveResiduals> point_active_;
   std::vector<ActiveResiduals> frame_active_;
-  // Where ranks share the points; made when frames move for the first time.
+  // Used where ranks share the points; made when frames first move.
   std::unique_ptr<FrameShare> frame_share_;
   std::unique_ptr<BlockSweep> frame_blocks_;
 };
@@ -117,14 +118,15 @@ class BlockSweep {
 // point's own maximum residual with the frames fixed, then every frame's with
 // the points fixed. With `paper` settings of the descent the sweeps are the
 // paper's. With `fast` settings they have momentum, and are coarse at first: a
-// block whose maximum is below half of the cost stays where it is, and any
-// other stops once a step promises less than a tenth of the last sweep's
-// relative gain, kept between 1e-3 and 1e-2. When coarse sweeps no longer help,
-// and in the last of `max_sweeps`, every block goes to its optimum.
+// block whose maximum is below half of the cost does not move, and any other
+// stops once a step promises less than a tolerance, relative, which is a tenth
+// of the last sweep's relative gain, limited to [1e-3, 1e-2]. When coarse
+// sweeps no longer help, and in the last of `max_sweeps`, every block goes to
+// its optimum.
 //
-// The result is a fixed point of such sweeps at best. That need not be the
-// optimum, whatever the paper says (docs/method/problem.md, "How alternation
-// gets stuck").
+// At best the result is a fixed point of such sweeps. Unlike the paper says,
+// that need not be the optimum (docs/method/problem.md, "How alternation gets
+// stuck").
 
 struct Sweep {
   double cost = 0;     // the lowest so far, up to rounding; pixels
@@ -133,17 +135,17 @@ struct Sweep {
 
 struct ResIntOptions {
   Norm norm;
-  // Literally as in the paper, or faster ways to the same sub-problem optima.
+  // As in the paper, or faster methods for the same sub-problems.
   FastDescentOptions fast_descent;
   int max_sweeps = 1000;  // >= 0
   // Stop when sweeps lower the cost by less than this, relative; >= 0.
   double sweep_tolerance = 1e-6;
-  // Stop after so many such sweeps in a row; >= 1. A sweep with momentum may
-  // fail where the next one, without, does not. Paper settings stop after the
-  // first.
+  // Stop after this many such sweeps in a row; >= 1. A sweep with momentum may
+  // fail where the next one, without momentum, does not. Paper settings stop
+  // after the first.
   int patience = 3;
   bool update_frames = true;  // false: points only (triangulation)
-  // After every sweep, counted from 1; may be empty.
+  // Called after every sweep, counted from 1; may be empty.
   std::function<void(int sweep, const Sweep&)> callback;
 };
 

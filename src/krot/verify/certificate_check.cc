@@ -10,8 +10,8 @@
 
 #include "krot/verify/force_checker.h"
 
-// Of exact multipliers beside the certificate's (force_checker.h),
-// |y_i|_dual / lambda_i is at most rho for all i: (lambda_i, y_i / rho) is dual
+// There are exact multipliers near the certificate's (force_checker.h) with
+// |y_i|_dual / lambda_i at most rho for all i. So (lambda_i, y_i / rho) is dual
 // feasible and proves delta / rho.
 
 namespace krot::internal {
@@ -20,7 +20,7 @@ namespace {
 using Real = long double;
 using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 
-constexpr double kMaxExcess = 1e-12;  // of |y|_dual over lambda
+constexpr double kMaxExcess = 1e-12;  // of |y|_dual above lambda, relative
 
 }  // namespace
 
@@ -92,7 +92,7 @@ std::optional<std::string> RefuseRotations(
 
 namespace {
 
-// rho, or why there is none.
+// Returns rho, or none and the reason.
 std::optional<double> ProveRho(ForceChecker* checker, std::string* refusal) {
   if (auto wrong = checker->Balance()) {
     *refusal = *wrong;

@@ -14,12 +14,12 @@ namespace {
 using Real = ForceChecker::Real;
 using Vector3 = ForceChecker::Vector3;
 
-// Half of it is the cast's of the last sum to double, and the rest enough for
-// its terms in long double.
+// Covers the rounding of the extent, relative: half of it is for the cast to
+// double, the rest is enough for the sum in long double.
 constexpr Real kCastError = std::numeric_limits<double>::epsilon();
 
-// Whether forces that balance wherever something moves need not balance where
-// they are left over: each component has something fixed.
+// Whether each component of the support has something fixed. Then gradients
+// that cancel at all that is not fixed need not cancel in total.
 bool HoldsFixed(const KnownRotationProblem& problem,
                 const Certificate& certificate) {
   std::vector<int64_t> support;
@@ -58,8 +58,8 @@ ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
     return Refused(
         Sentence("balance takes y to ", *rho, " times the length of lambda"));
   }
-  // kappa bounds the positions' distances from the origin; its error covers
-  // what the cast makes of it.
+  // kappa bounds positions relative to the origin of the constants, so that
+  // origin is added; the error of kappa covers its cast, too.
   const ForceChecker::Constants constants = checker.SumConstants();
   Real extent = constants.value + constants.error;
   for (const Pull& pull : certificate.pulls) {
@@ -78,7 +78,7 @@ ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
 double BalancingPull(const KnownRotationProblem& problem,
                      const ExtentCertificate& certificate, const Pull& keeper) {
   const bool is_view = keeper.kind == Pull::Kind::kView;
-  // What moves with the keeper.
+  // The frame of the view, or the point: what moves as one with the keeper.
   const auto node = [&](int32_t view, int32_t point) {
     return is_view ? problem.views[view].frame : point;
   };

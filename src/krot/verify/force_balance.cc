@@ -41,9 +41,10 @@ Real ForceError(size_t count) {
 }
 
 // With e_k the rows of E, those of E^-T are e_1 x e_2, e_2 x e_0 and e_0 x e_1
-// over det E = e_0'(e_1 x e_2). Their roundings are less than 4 of kRoundoff
-// each of the product of the rows' lengths; as |det E| <= |e_0||e_1 x e_2| and
-// so on, what is taken from it makes up for those of a product, too.
+// over det E = e_0'(e_1 x e_2). The rounding error of each is less than
+// 4 kRoundoff times the product of the lengths of its rows. As |det E| <=
+// |e_0||e_1 x e_2| and so on, lowering |det E| covers the errors of the cross
+// products, too.
 std::optional<Compliance> MakeCompliance(const Observation& observation) {
   const Matrix3 E = observation.E.cast<Real>();
   const auto length = [&](int i, int j) {
@@ -59,7 +60,7 @@ std::optional<Compliance> MakeCompliance(const Observation& observation) {
 
 namespace {
 
-// Points are nodes 0, 1, ...; frames come after them.
+// An edge of the forest. Nodes are first the points, then the frames.
 struct Branch {
   int32_t node;
   int32_t parent;
@@ -91,7 +92,8 @@ class StrongestForest {
   const std::vector<Real>& strength_;
   std::vector<bool> is_reached_;
   std::vector<Branch> branches_;
-  // By strength, then the first observation; with the two ends of the branch.
+  // Strength, negative observation index (so that of equal strengths the first
+  // observation wins), and the parent and node of the branch.
   using Candidate = std::tuple<Real, int64_t, int32_t, int32_t>;
   std::priority_queue<Candidate> candidates_;
 };
@@ -121,7 +123,7 @@ void StrongestForest::Reach(int32_t node) {
   });
 }
 
-// From all that is reached.
+// Grows the forest from all nodes that are reached.
 void StrongestForest::Spread() {
   while (!candidates_.empty()) {
     const auto [strength, negative, parent, node] = candidates_.top();
@@ -181,7 +183,7 @@ FixedConstants::FixedConstants(const KnownRotationProblem& problem)
   for (const Observation& observation : problem.observations) {
     const View& view = problem.views[observation.view];
     if (!problem.IsFixedFrame(view.frame)) continue;
-    const Part minus_origin = OfFrame(view);  // in the camera, of O = 0
+    const Part minus_origin = OfFrame(view);  // for O = 0: in the camera
     origin_frame_ = view.frame;
     origin_ = -(view.cam_from_world_rotation.transpose().cast<Real>() *
                 minus_origin.x_cam);

@@ -48,14 +48,14 @@ using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Vector2 = ForceChecker::Vector2;
 using Vector3 = ForceChecker::Vector3;
 
-constexpr Real kRootTwo = 1.4142135623730951L;  // above it
-// Smaller multipliers, relative, might underflow.
+constexpr Real kRootTwo = 1.4142135623730951L;  // rounded up
+// Multipliers below this, relative to the largest, might underflow.
 constexpr double kSmallestShare = 1e-100;
-// No lambda may have to change by more, relative.
+// No lambda may have to change by this or more, relative.
 constexpr Real kLargestChange = 0.5L;
 
-// The forces at a point or frame, and the sum of the absolute values of what
-// they sum up.
+// The sum of forces at a point or frame, and the sum of the absolute values of
+// their terms.
 struct NodeBalance {
   Vector3 sum = Vector3::Zero();
   Real terms = 0;
@@ -103,7 +103,7 @@ std::optional<std::string> ForceChecker::ScaleMultipliers() {
   return RefuseRotations(part_.problem());
 }
 
-// What the whole calls a view or point is called otherwise in the support.
+// Checks the pulls and replaces their indices by those of the support.
 std::optional<std::string> ForceChecker::PlacePulls() {
   for (Pull& pull : pulls_) {
     if (!pull.direction.allFinite()) return "a pull is no finite number";
@@ -121,7 +121,7 @@ std::optional<std::string> ForceChecker::PlacePulls() {
   return std::nullopt;
 }
 
-// Of sums over the support.
+// A bound on the relative error of sums over the support and the pulls.
 Real ForceChecker::ErrorOfSums() const {
   return ForceError(forces_.size() + pulls_.size());
 }
@@ -203,10 +203,10 @@ ForceChecker::Offset ForceChecker::FromFirstView(int32_t view,
       t.cwiseAbs().sum() + t_first.cwiseAbs().sum()};
 }
 
-// Rotations known to kRotationError make at most 5 of it, times its size, of an
-// offset, and 2 more of what they turn a pull to; a correction is less than
-// half of the force's terms (BoundRho). So 16 of it covers an offset's error in
-// all of them, and all roundings.
+// If rotations are known to kRotationError, an offset has an error of at most 5
+// times that, times its size, and a rotated pull of 2 times that; a correction
+// is less than half of the force's terms (BoundRho). So 16 times kRotationError
+// covers the error of the offsets in all products, and all rounding.
 ForceChecker::Constants ForceChecker::SumConstants() const {
   const KnownRotationProblem& problem = part_.problem();
   const FixedConstants fixed(problem);
@@ -253,8 +253,8 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
   return constants;
 }
 
-// A vector of some length has the longest dual norm along the diagonal, for
-// p = infinity: sqrt(2) of it.
+// The dual norm of a vector is at most its length, except for p = infinity:
+// then it is at most sqrt(2) times the length, reached along the diagonal.
 std::optional<double> ForceChecker::BoundRho(std::string* refusal) const {
   const Real per_length = std::isinf(norm_.p) ? kRootTwo : 1;
   Real rho = 0;

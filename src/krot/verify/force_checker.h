@@ -14,33 +14,35 @@
 
 namespace krot::internal {
 
-// The force of one observation's multipliers on its point and its frame, in its
-// camera: E'(delta lambda; y), in long double.
+// The gradient of one observation, called force in this folder: what it adds to
+// the dual residual of its point and of its frame. It is E'(delta lambda; y),
+// in camera coordinates and long double (docs/method/proof.md, "That exact
+// multipliers exist").
 struct ObservationForce {
   using Real = long double;
   using Vector2 = Eigen::Matrix<Real, 2, 1>;
   using Vector3 = Eigen::Matrix<Real, 3, 1>;
 
   Vector3 sum;
-  Vector3 terms;  // of absolute values: what it sums up before cancellation
+  Vector3 terms;  // the sum of the absolute values of its terms
 };
 
 ObservationForce MakeForce(const Observation& observation,
                            const ObservationForce::Vector2& y,
                            ObservationForce::Real delta_lambda);
 
-// Of a sum of `count` terms, each of which has gone through at most 12
-// roundings, relative to the sum of absolute values.
+// A bound on the rounding error of a sum of `count` terms, each of which has
+// gone through at most 12 roundings, relative to the sum of absolute values.
 ObservationForce::Real RoundingError(size_t count);
 
-// Of a sum of `count` forces that rotations known to kRotationError per entry
-// have turned into the world: how far it is from the truth, at most, relative
-// to the sum of the absolute values of all their `terms`. A length: a matrix
-// of entries e makes a vector of terms that add up to 1 at most sqrt(3) e long.
+// A bound on the length of the error of a sum of `count` forces in the world,
+// whose rotations are known to kRotationError per entry, relative to the sum of
+// all their `terms`. (If all entries of a matrix are at most e, it maps a
+// vector whose absolute values add up to 1 to one of length at most sqrt(3) e.)
 ObservationForce::Real ForceError(size_t count);
 
-// How much the multipliers may change for a unit of a force's change: what the
-// rows of E^-T are long, at least.
+// Upper bounds on how much the multipliers change if a force changes by a
+// vector of length 1: the lengths of rows of E^-T.
 struct Compliance {
   ObservationForce::Real y = 0;             // rows 1 and 2 together
   ObservationForce::Real delta_lambda = 0;  // row 0
@@ -49,47 +51,48 @@ struct Compliance {
 // None if E might be singular, or has entries that are not finite.
 std::optional<Compliance> MakeCompliance(const Observation& observation);
 
-// A factor that covers the roundings of sums of non-negative bounds, in long
-// double, and their cast to double.
+// A factor that covers the rounding of sums of non-negative bounds in long
+// double, and of their cast to double.
 inline constexpr long double kOutward = 1 + 1e-9L;
 
-// The identity (1) of certificate_check.h says that forces balance. With unit
-// vectors of the world, an observation pulls its point and its frame alike by
-// f_i = R_cw' E_i'(y_i; delta lambda_i), and (1) is sum f_i = 0 at every point
-// and at every frame that moves; what is fixed takes any force. E_i, R_cw are
-// invertible: any change of f_i is one of the observation's multipliers.
+// (1) of certificate_check.h says that forces balance, which means that they
+// add up to zero. In world coordinates an observation has the same force at its
+// point and at its frame, f_i = R_cw' E_i'(delta lambda_i; y_i), and (1) is
+// sum f_i = 0 at every point and every frame that is not fixed. As E_i and R_cw
+// are invertible, any change of f_i is one of the observation's multipliers.
 
-// How far the forces at each point and frame are from balance, at most: the
-// lengths of their sums.
+// Upper bounds on the dual residual at each point and frame: the length of the
+// sum of forces.
 struct Imbalance {
   std::vector<long double> of_point;
   std::vector<long double> of_frame;
 };
 
-// Per observation, how much its force has to change, at most, for all to
-// balance: the imbalances are sent along the forest of observations that
-// maximises the smallest `strength` on every way, towards what is fixed or, in
-// a connected component without, the strongest. No others change. Exact but for
-// roundings, for which the results are large enough. All strengths must be
-// positive. O(observations log observations).
+// Per observation, an upper bound on how much its force has to change so that
+// all forces balance. Only observations of a spanning forest change: the one
+// that maximises the smallest `strength` on every path. Along it the imbalances
+// are passed on towards what is fixed or, in a connected component without
+// anything fixed, towards its strongest observation. The results are large
+// enough to cover their rounding. All strengths must be positive.
+// O(observations log observations).
 std::vector<long double> BoundCorrections(
     const KnownRotationProblem& problem,
     const std::vector<long double>& strength, const Imbalance& imbalance);
 
-// What x_cam = R_cw s + R_sr t + t_sr has of constants where frames or points
-// are fixed, with the world's origin O moved to one of these positions: the
-// centre of the first view of the first fixed frame, or else the first fixed
-// point. Forces that balance wherever something moves have the same sum of
-// constants from every origin (docs/method/positions.md, "What is fixed"), and
-// from this one they vanish where all that is fixed coincides. The frame at the
-// origin counts like one that moves.
+// The constant parts of x_cam = R_cw s + R_sr t + t_sr where frames or points
+// are fixed. The world's origin O is moved to one of the fixed positions: the
+// centre of the first observation's view whose frame is fixed, or else the
+// first fixed point. If forces balance at all that is not fixed, the sum of
+// constants is the same for every origin (docs/method/positions.md, "What is
+// fixed"); for this one the constants vanish if all fixed positions coincide.
+// The frame at the origin is treated like one that is not fixed.
 class FixedConstants {
  public:
   using Real = long double;
   using Vector3 = Eigen::Matrix<Real, 3, 1>;
 
-  // A part of x_cam, and the sum of absolute values that its error is in
-  // proportion to.
+  // A part of x_cam, and the sum of absolute values to which its error is
+  // proportional.
   struct Part {
     Vector3 x_cam = Vector3::Zero();
     Real size = 0;
@@ -101,13 +104,14 @@ class FixedConstants {
   const Vector3& origin() const { return origin_; }  // O
   Real origin_size() const { return origin_size_; }
 
-  // Whether OfFrame, and not the place of its views in it, is all there is.
+  // Whether the constant of the frame's views is OfFrame. Otherwise it is only
+  // their offset within the frame.
   bool IsAwayFromOrigin(int32_t frame) const {
     return problem_.IsFixedFrame(frame) && frame != origin_frame_;
   }
   // R_sr t_f + t_sr + R_cw O; requires that the view's frame is fixed.
   Part OfFrame(const View& view) const;
-  // R_cw (s_k - O); nothing if the point moves.
+  // R_cw (s_k - O); zero if the point is not fixed.
   Part OfPoint(const View& view, int32_t point) const;
 
  private:
@@ -117,38 +121,40 @@ class FixedConstants {
   Real origin_size_ = 0;
 };
 
-// What pulls from outside at the centre of a view or at a point, world
-// coordinates. Forces balance with it that add up to the pull at the view's
-// frame, and to its negative at the point.
+// A linear objective p'x, where x is the centre of a view or a point, in world
+// coordinates. With a pull, forces balance if they add up to p at the view's
+// frame, or to -p at the point.
 struct Pull {
   enum class Kind { kView, kPoint };
   Kind kind = Kind::kView;
   int32_t index = 0;  // of the view, or of the point
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // p
 };
 
-// The position x at which it pulls, and p'x.
+// The position x of a pull, and p'x.
 Eigen::Vector3d PositionOf(const KnownRotationProblem& problem,
                            const Estimate& estimate, const Pull& pull);
 double Along(const KnownRotationProblem& problem, const Estimate& estimate,
              const Pull& pull);
 
-// Whether it pulls at what does not move.
+// Whether the position of a pull is fixed.
 bool IsFixedPosition(const KnownRotationProblem& problem, const Pull& pull);
 
-// The same pull in a part of the problem; none if that does not hold it.
+// The same pull in a part of the problem; none if its view or point is not in
+// that.
 std::optional<Pull> InPart(const ProblemSubset& part, const Pull& pull);
 
-// What is proved of multipliers, whatever they are to prove: that others exist
-// beside them whose forces balance exactly, with pulls if there are any, how
-// far away those are at most, and what the constants of the rows add up to.
+// The common part of checking certificates. It proves that multipliers exist
+// near the given ones whose forces balance exactly, with pulls if there are
+// any; how far away they are at most; and what the constants of the rows add up
+// to.
 //
-// Forces balance but for g; changing those of a spanning forest balances them
-// exactly. The change F_i of a force is one of (delta lambda_i; y_i) by
-// E_i^-T F_i.
+// Given forces balance except for a small residual. Changing those of a
+// spanning forest balances them exactly. A change F_i of a force means that
+// (delta lambda_i; y_i) change by E_i^-T F_i.
 //
-// Of what RefuseNumbers lets pass: Balance first and, unless it refuses, the
-// others.
+// Usage: RefuseNumbers must have accepted the input. Call Balance first and,
+// unless it refuses, the others.
 class ForceChecker {
  public:
   using Real = ObservationForce::Real;
@@ -159,16 +165,18 @@ class ForceChecker {
   ForceChecker(const KnownRotationProblem& problem, Norm norm,
                const Certificate& certificate, std::vector<Pull> pulls = {});
 
-  // The first thing that is wrong, or none.
+  // Bounds the changes that balance all forces. Returns the reason of a
+  // refusal, or none.
   std::optional<std::string> Balance();
 
-  // sum_i f_i'o_i, o_i being the constant part of x_cam, with `error` for what
-  // rounding and the exact multipliers may add. The world's origin is what
-  // FixedConstants says; that of every other frame is the projection centre of
-  // the first of its views that the support sees: t_f + R_sr^-1 t_sr of that
-  // view is the unknown as well as t_f is. So if each frame has one centre, the
-  // constants are gone; the others are force times offset of the centre. A pull
-  // at another view than its frame's first adds the pull times its offset.
+  // sum_i f_i'o_i, where o_i is the constant part of x_cam; `error` bounds what
+  // rounding and the change to exact multipliers may add. The origin of the
+  // world is that of FixedConstants. The origin of every other frame is the
+  // projection centre of its first view that the support sees: the unknown is
+  // t_f + R_sr^-1 t_sr of that view instead of t_f. So constants vanish where a
+  // frame has one centre; otherwise they are force times offset of the centre.
+  // A pull at another view than its frame's first adds the pull times its
+  // offset.
   struct Constants {
     Real value = 0;
     Real error = 0;
@@ -177,11 +185,11 @@ class ForceChecker {
   };
   Constants SumConstants() const;
 
-  // rho, the largest |y_i|_dual / lambda_i of the exact multipliers at most;
-  // none, and why, if one might have to change by half.
+  // rho, an upper bound on |y_i|_dual / lambda_i of the exact multipliers.
+  // None, with the reason, if a lambda might have to change by half.
   std::optional<double> BoundRho(std::string* refusal) const;
 
-  // Of the certificate's observations.
+  // One per observation of the certificate.
   std::vector<MultiplierChange> Changes() const;
 
  private:
@@ -190,22 +198,23 @@ class ForceChecker {
   Imbalance BoundImbalance() const;
   void FindCorrections();
   Real ErrorOfSums() const;
-  // Of a view's centre from that of the first view of its frame, in its camera.
+  // The offset of a view's centre from that of its frame's first view, in its
+  // camera's coordinates.
   struct Offset {
     Vector3 x_cam = Vector3::Zero();
     Real size = 0;
   };
   Offset FromFirstView(int32_t view, int32_t first) const;
-  // Of the support, per frame.
+  // Per frame, its first view in the support.
   std::vector<std::optional<int32_t>> FirstViews() const;
 
   const KnownRotationProblem& whole_;
   const Norm norm_;
   const Certificate& certificate_;
-  std::vector<Pull> pulls_;  // of part_, once placed
+  std::vector<Pull> pulls_;  // with indices of part_ after PlacePulls
 
   const ProblemSubset part_;  // the support
-  int exponent_ = 0;          // of the scale
+  int exponent_ = 0;          // multipliers are scaled by 2^-exponent_
   std::vector<Real> lambda_;  // of part_, scaled to a maximum in [1/2, 1)
   std::vector<Vector2> y_;
   std::vector<ObservationForce> forces_;
