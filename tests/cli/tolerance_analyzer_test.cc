@@ -23,6 +23,12 @@ using Json = nlohmann::json;
 class ToleranceAnalyzer : public ::testing::Test {
  protected:
   ToleranceAnalyzer() : model_(SynthesizeScene(Scene()).model) {
+    // An id that no int holds.
+    constexpr ImageId kLarge = 3000000000;
+    const ImageId id = std::exchange(model_.images[2].id, kLarge);
+    for (TrackElement& element : model_.track_elements) {
+      if (element.image_id == id) element.image_id = kLarge;
+    }
     Save(model_, folder_ / "input");
     max_error_ = std::to_string(1.2 * Summarize(PixelErrors(model_)).max);
   }

@@ -169,9 +169,11 @@ TEST(Database, TakesKeypointsFromTheModelWhosePhotosWereUndistortedSince) {
   {
     DatabaseWriter writer(folder / "database.db");
     WriteImages(&writer);
+    writer.AddImage(6, "c.jpg", {{10, 20}});
   }
   Model model = ThreeImages();
   model.images[0].points2D = {{2, 3, 7}, {28, 4, 7}, {5, 66, 7}};
+  model.images[2].points2D = {{11, 21, 7}};  // nothing to correlate
   const Database database = ReadDatabase(folder / "database.db", model);
   EXPECT_EQ(database.keypoints[0][2], Eigen::Vector2d(5, 66));
   EXPECT_EQ(database.keypoints[1], kKeypoints);

@@ -35,6 +35,8 @@ TEST(FormatBytes, ChoosesTheUnit) {
   EXPECT_EQ(FormatBytes(0), "0 B");
   EXPECT_EQ(FormatBytes(999), "999 B");
   EXPECT_EQ(FormatBytes(1500), "1.5 kB");
+  EXPECT_EQ(FormatBytes(999949), "999.9 kB");
+  EXPECT_EQ(FormatBytes(999950), "1.0 MB");
   EXPECT_EQ(FormatBytes(2000000000000), "2.0 TB");
   EXPECT_EQ(FormatBytes(5000000000000000), "5000.0 TB");
 }

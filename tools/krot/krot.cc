@@ -250,8 +250,9 @@ int Main(const std::vector<std::string>& arguments) {
 
 int main(int argc, char** argv) try {
   krot::internal::SilenceCeres();
-  return krot::internal::Main(krot::internal::ProgramArguments(argc, argv));
+  krot::internal::EndProcess(
+      krot::internal::Main(krot::internal::ProgramArguments(argc, argv)));
 } catch (const std::bad_alloc&) {
-  return krot::internal::Fail("krot", "out of memory",
-                              krot::internal::kExitInternal);
+  krot::internal::EndProcess(krot::internal::Fail(
+      "krot", "out of memory", krot::internal::kExitInternal));
 }

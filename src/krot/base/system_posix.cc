@@ -261,6 +261,11 @@ int64_t FreeOfAddressSpace() {
 
 }  // namespace
 
+void EndProcess(int exit_code) {
+  if (FreeOfAddressSpace() != kUnlimited) std::_Exit(exit_code);
+  std::exit(exit_code);
+}
+
 int64_t FreeMemoryBytes() {
   return std::max<int64_t>(
       0, std::min({FreeOfMachine(), OfControlGroup(), FreeOfAddressSpace()}));

@@ -86,7 +86,8 @@ double Correlation(const std::vector<Eigen::Vector2d>& keypoints,
     ab += a * b;
     bb += b * b;
   }
-  return ab / std::sqrt(aa * bb);
+  // Coordinates that are all the same do not contradict anything.
+  return aa * bb > 0 ? ab / std::sqrt(aa * bb) : 1;
 }
 
 // Whether an image's 2D points are these keypoints one by one, although the

@@ -1,5 +1,6 @@
 #include "krot/options/command_options.h"
 
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -93,11 +94,12 @@ std::vector<int32_t> FindImages(const std::string& option,
   std::vector<int32_t> found;
   for (const std::string& name : SplitAtCommas(list)) {
     const auto named = by_name.find(name);
-    int id = 0;
+    uint64_t id = 0;
     std::optional<int32_t> image;
     if (named != by_name.end()) {
       image = named->second;
-    } else if (ParseInteger(name, &id) && id >= 0) {
+    } else if (ParseInteger(name, &id) &&
+               id <= std::numeric_limits<ImageId>::max()) {
       image = by_id.Find(static_cast<ImageId>(id));
     }
     if (!image) Refuse(option, name, "images of the model, by name or id");

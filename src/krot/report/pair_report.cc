@@ -295,7 +295,8 @@ class PairView {
     for (size_t i = 0; i < model_.images.size(); ++i) {
       const Camera& camera = model_.cameras[geometries_[i].camera];
       const auto side = [&](uint64_t pixels) {
-        return std::lround(scales_[i] * static_cast<double>(pixels));
+        return std::max(
+            1L, std::lround(scales_[i] * static_cast<double>(pixels)));
       };
       images.push_back({{"width", side(camera.width)},
                         {"height", side(camera.height)},

@@ -75,7 +75,8 @@ std::string FormatBytes(int64_t bytes) {
   static const char* const kUnits[] = {"B", "kB", "MB", "GB", "TB"};
   double value = static_cast<double>(bytes);
   int unit = 0;
-  while (value >= 1000 && unit < 4) {
+  // Of 999.95 and more one decimal would be 1000.0.
+  while (value >= (unit == 0 ? 1000 : 999.95) && unit < 4) {
     value /= 1000;
     ++unit;
   }
