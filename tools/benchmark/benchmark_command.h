@@ -5,8 +5,8 @@
 
 namespace krot::internal {
 
-// The commands of `krot_benchmark`, one .cc file each. They return an exit
-// code or throw what krot_benchmark.cc turns into one.
+// The commands of `krot_benchmark`, one .cc file each. They return an exit code
+// or throw an exception that krot_benchmark.cc turns into one.
 int RunTriangulationBenchmark(const std::vector<std::string>& arguments);
 int RunBlocksBenchmark(const std::vector<std::string>& arguments);
 int RunKnownRotationBenchmark(const std::vector<std::string>& arguments);

@@ -6,7 +6,7 @@
 
 namespace krot::internal {
 
-// A model as the benchmarks meet it: its name, the last part of its path, and
+// A model for the benchmarks: its name, which is the last part of its path, and
 // its problem with the model's own start.
 struct BenchmarkModel {
   std::string name;
@@ -14,8 +14,8 @@ struct BenchmarkModel {
   BuiltProblem built;
 };
 
-// Reads, validates and builds. Throws ModelError, or CommandError
-// (kExitNothingToSolve) where there are no observations to optimise.
+// Reads and validates a model, and builds its problem. Throws ModelError, or
+// CommandError (kExitNothingToSolve) if there are no observations to optimise.
 BenchmarkModel ReadBenchmarkModel(const std::string& path,
                                   int min_track_length = 2);
 

@@ -9,7 +9,7 @@
 
 namespace krot::internal {
 
-// What every benchmark takes.
+// Options that every benchmark has.
 struct BenchmarkOptions {
   std::vector<std::string> input_paths;  // models
   int repeats = 5;

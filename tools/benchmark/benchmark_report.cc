@@ -40,7 +40,7 @@ void CheckReportPaths(const BenchmarkOptions& options) {
 
 void PublishReport(const BenchmarkReport& report,
                    const BenchmarkOptions& options) {
-  const Machine machine = ThisMachine();  // under this benchmark's own load
+  const Machine machine = ThisMachine();  // its load includes this benchmark
   PrintTable(options.log, Print(report, machine, options));
   if (!options.report_path.empty()) {
     Json tables = Json::array();

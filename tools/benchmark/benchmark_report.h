@@ -11,15 +11,15 @@
 
 namespace krot::internal {
 
-// What one benchmark found.
+// The results of one benchmark.
 struct BenchmarkReport {
   std::string command;
   std::vector<ResultTable> tables;
   std::optional<LogPlot> plot;
 };
 
-// Throws WriteError if what `options` asks for could not be written. To be
-// called before anything is measured.
+// Throws WriteError if a file that `options` asks for cannot be written. Call
+// it before anything is measured.
 void CheckReportPaths(const BenchmarkOptions& options);
 
 // Prints the tables and the machine; writes the report and the plot if asked

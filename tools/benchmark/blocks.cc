@@ -1,6 +1,6 @@
-// krot_benchmark blocks: single sub-problems of a sweep over real models,
-// points and frames, from a cold start: `fast` settings, points side by side as
-// sweeps solve them, against `paper` ones.
+// krot_benchmark blocks: compares `fast` with `paper` settings on single
+// sub-problems of a sweep over real models, both points and frames, from a cold
+// start. With `fast` settings points are solved side by side, as in sweeps.
 
 #include <algorithm>
 #include <string>
@@ -24,8 +24,8 @@ struct BlocksOptions {
   int max_frames = 30;
 };
 
-// What both kinds of settings take for blocks of one kind, and how far `fast`
-// ends above `paper` at most, relative.
+// The times of both settings for blocks of one kind, and the largest excess of
+// the cost of `fast` over that of `paper`, relative.
 struct Duel {
   int64_t num_blocks = 0;
   double fast = 0;   // seconds per block
@@ -33,8 +33,8 @@ struct Duel {
   double excess = 0;
 };
 
-// At most `max_count` of `count` blocks, evenly spread. `residuals` gives those
-// of one; a block that two rays do not determine is passed over.
+// At most `max_count` of `count` blocks, evenly spread. `residuals(k)` returns
+// the residuals of block k. Blocks that MakeBlock rejects are left out.
 template <typename Residuals>
 std::vector<Subproblem> Blocks(int32_t count, int32_t max_count,
                                const std::vector<Eigen::Vector3d>& starts,
@@ -48,7 +48,7 @@ std::vector<Subproblem> Blocks(int32_t count, int32_t max_count,
   return blocks;
 }
 
-// The solvers are `fast` and `paper`, in this order.
+// Measures both settings; the solvers are `fast` and `paper`, in this order.
 Duel Fight(const std::vector<Subproblem>& blocks,
            const std::vector<std::unique_ptr<SubproblemSolver>>& solvers,
            int repeats) {

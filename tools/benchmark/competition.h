@@ -8,7 +8,7 @@
 
 namespace krot::internal {
 
-// How one solver did on a list of sub-problems, beside all the others.
+// The results of one solver on a list of sub-problems, compared with others.
 struct Standing {
   std::string name;
   double seconds = 0;  // per instance: median over rounds of the mean
@@ -18,14 +18,15 @@ struct Standing {
   double mean_excess = 0;
 };
 
-// Below this, pixels, costs are compared absolutely: many a track of two or
-// three rays can be met exactly.
+// Below this, pixels, costs are compared absolutely, because the optimum of a
+// track of two or three rays is often about 0.
 inline constexpr double kSmallCost = 1e-3;
 
-// A cost this little above the lowest, relative, is the same optimum.
+// Costs within this of the lowest, relative, count as the same optimum.
 inline constexpr double kSameOptimum = 1e-5;
 
-// Every solver on every instance, `repeats` rounds in turn.
+// Runs every solver on every instance, in `repeats` rounds, in each of which
+// the solvers take turns.
 std::vector<Standing> Compete(
     const std::vector<Subproblem>& instances, Norm norm,
     const std::vector<std::unique_ptr<SubproblemSolver>>& solvers, int repeats);

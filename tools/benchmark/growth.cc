@@ -22,7 +22,7 @@ void RunKrot(const KrotRun& run, std::vector<std::string> arguments) {
                                         std::to_string(result.exit_code));
 }
 
-// What a loaded model occupies, its lists' contents alone.
+// The memory of a loaded model: the contents of its lists only.
 int64_t ModelBytes(const std::string& path) {
   const Model model = ReadModel(path, DetectModelFormat(path));
   size_t bytes = model.points3D.size() * sizeof(Point3D) +

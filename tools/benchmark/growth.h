@@ -9,7 +9,7 @@ namespace krot::internal {
 
 // A street: frames one after the other, random tracks.
 struct Street {
-  int64_t observations = 0;  // about so many
+  int64_t observations = 0;  // approximately
   int64_t frames = 0;
   int64_t track_length = 10;  // mean
 };
@@ -24,7 +24,7 @@ struct Growth {
   double write = 0;
   double total = 0;
   int64_t steps = 0;    // sweeps, or iterations of the joint solver
-  bool is_cut = false;  // by the limit of sweeps
+  bool is_cut = false;  // ended by the limit of sweeps
   double seconds_of_steps = 0;
   int64_t peak_bytes = 0;
   int64_t model_bytes = 0;
@@ -35,7 +35,7 @@ struct Growth {
   double Count() const { return static_cast<double>(num_observations); }
 };
 
-// How `krot` is run.
+// The executable `krot` and its options.
 struct KrotRun {
   std::string krot_path;
   int num_threads = 1;    // >= 1
@@ -43,13 +43,13 @@ struct KrotRun {
   uint64_t random_seed = 0;
 };
 
-// Writes a street with a noise of one pixel and a start off the truth by a
-// percent to the folder `model`. Throws CommandError where krot fails.
+// Writes a street to the folder `model`, with a noise of one pixel and a start
+// that is off the truth by one per cent. Throws CommandError if krot fails.
 void SynthesizeStreet(const KrotRun& run, const Street& street,
                       const std::string& model);
 
-// `krot solver` on that, from file to file, by `method`; what it writes goes to
-// `folder`. Likewise.
+// Measures `krot solver` on that model by `method`, from file to file; its
+// output goes to `folder`. Throws CommandError if krot fails.
 Growth MeasureStreet(const KrotRun& run, const std::string& method,
                      const Street& street, const std::string& model,
                      const ScratchFolder& folder);

@@ -1,5 +1,6 @@
-// krot_benchmark joint: `krot solver` to a certified gap against COLMAP's
-// `bundle_adjuster`, start to exit, on the same models in the same run.
+// krot_benchmark joint: compares the time of `krot solver`, to a certified gap,
+// with that of COLMAP's `bundle_adjuster`, from start to exit, on the same
+// models in the same run.
 
 #include <algorithm>
 #include <fstream>
@@ -29,7 +30,7 @@ struct JointBenchmarkOptions {
   int num_threads = -1;
 };
 
-// What krot's report says of its last run; errors are true ones, pixels.
+// The contents of krot's report of its last run; errors are true ones, pixels.
 struct Proof {
   double cost_before = 0;
   double cost = 0;
@@ -53,7 +54,7 @@ Proof ReadProof(const std::string& report_path, double relative_gap) {
   if (json.at("certified").get<bool>()) {
     proof.lower_bound = json.at("lower_bound");
     proof.relative_gap = json.at("relative_gap");
-    if (json.at("finish").is_object()) {  // which gives up some of it
+    if (json.at("finish").is_object()) {  // the gap is that before the finish
       const double lowest = json.at("finish").at("lowest_cost");
       proof.relative_gap = (lowest - *proof.lower_bound) / lowest;
     }
@@ -64,7 +65,7 @@ Proof ReadProof(const std::string& report_path, double relative_gap) {
   return proof;
 }
 
-// No further round of a model begins later than this.
+// No further round of a model begins after this many seconds.
 constexpr double kEnoughSeconds = 10;
 
 Cell CellOr(const std::optional<double>& value, Cell (*cell)(double)) {

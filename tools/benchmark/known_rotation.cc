@@ -1,5 +1,5 @@
-// krot_benchmark known_rotation: Table 2 of [Zhang18] on models and on
-// synthetic ones of its sizes.
+// krot_benchmark known_rotation: Table 2 of [Zhang18], on given models and on
+// synthetic ones of the same sizes.
 
 #include <algorithm>
 #include <iterator>
@@ -39,7 +39,7 @@ struct Outcome {
 
 using Solvers = std::vector<std::unique_ptr<KnownRotationSolver>>;
 
-// The runs of one solver end early once they have taken this long together.
+// A solver is not run again once its runs have taken this long in total.
 constexpr double kEnoughSeconds = 20;
 
 void Run(const BenchmarkModel& model, const CancelFlag* cancel,
@@ -123,7 +123,7 @@ class Contest {
     PlotLastRow();
   }
 
-  // May be called once; `notes` go below the times.
+  // May be called only once; `notes` are put below the times.
   BenchmarkReport TakeReport(const std::vector<std::string>& notes) {
     BenchmarkReport report;
     report.command = "known_rotation";
@@ -163,7 +163,8 @@ class Contest {
     return outcomes;
   }
 
-  // Where the solvers have finished; of each method that on most threads.
+  // Adds the last row to the plot, for solvers that have finished; for each
+  // method only the variant with the most threads.
   void PlotLastRow() {
     const std::vector<Cell>& row = seconds_.rows.back();
     const size_t first = row.size() - solvers_.size();
@@ -187,7 +188,7 @@ class Contest {
 
   const KnownRotationOptions options_;
   Solvers solvers_;
-  size_t num_unlimited_ = 0;  // the first so many have all the time
+  size_t num_unlimited_ = 0;  // number of first solvers without a time limit
   ResultTable seconds_;
   ResultTable costs_;
   LogPlot plot_;  // of the synthetic models

@@ -1,4 +1,4 @@
-// krot_benchmark COMMAND [options]: the command table, and what becomes of
+// krot_benchmark COMMAND [options]: the table of commands, and the handling of
 // exceptions.
 
 #include <algorithm>
@@ -65,7 +65,7 @@ int RunCommand(const std::vector<std::string>& arguments) {
                     " is no command (krot_benchmark help lists them)");
 }
 
-// One line on stderr, whatever the message holds.
+// Writes one line to stderr, even if the message has several.
 int Fail(std::string message, int exit_code) {
   std::replace(message.begin(), message.end(), '\n', ' ');
   std::cerr << "krot_benchmark: " << message << std::endl;

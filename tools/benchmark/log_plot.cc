@@ -12,11 +12,11 @@ bool IsShown(const std::pair<double, double>& point) {
          point.first > 0 && point.second > 0;
 }
 
-// Of gnuplot's, which then come again: with dashes, so that no two lines look
-// the same.
+// gnuplot repeats its colours after this many lines. Further lines are dashed,
+// so that no two lines look the same.
 constexpr int64_t kNumColors = 8;
 
-// As a string of gnuplot's, taken literally.
+// A string literal for gnuplot, in which nothing is interpreted.
 std::string Quoted(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) quoted += c == '\'' ? "''" : std::string(1, c);

@@ -19,8 +19,9 @@ struct LogPlot {
   std::vector<PlotSeries> series;
 };
 
-// A script for gnuplot that holds the data and prints an SVG image. Points
-// that are not positive and finite are left out, and lines without any.
+// A script for gnuplot that contains the data and prints an SVG image. Points
+// that are not positive and finite are left out, and so are lines without any
+// points.
 std::string ToGnuplot(const LogPlot& plot);
 
 }  // namespace krot::internal

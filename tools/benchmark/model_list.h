@@ -8,9 +8,9 @@
 
 namespace krot::internal {
 
-// Calls `measure` with every input path. A model that it throws for is left
-// out of the results: named on stderr and in the sentences returned, for below
-// the table. If that leaves nothing, throws what the last one threw.
+// Calls `measure` with every input path. If that throws, the model is left out
+// of the results: it is named on stderr and in the sentences returned, which
+// are notes below the table. If no model is left, rethrows the last exception.
 std::vector<std::string> MeasureModels(
     const BenchmarkOptions& options,
     const std::function<void(const std::string& path)>& measure);

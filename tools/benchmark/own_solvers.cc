@@ -31,7 +31,7 @@ class OwnSolver : public SubproblemSolver {
   FastDescent descent_;
 };
 
-// As sweeps solve points: many at a time, the short ones first.
+// Solves as sweeps solve points: many at a time, the short ones first.
 class SideBySideSolver : public SubproblemSolver {
  public:
   explicit SideBySideSolver(Norm norm) : descent_(FastDescentOptions{}, norm) {}

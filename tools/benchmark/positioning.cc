@@ -1,5 +1,5 @@
-// krot_benchmark positioning: a model's positions from its rotations and tracks
-// by the rival's way, for raw_tracks.py.
+// krot_benchmark positioning: finds a model's positions from its rotations and
+// tracks by the rival's method, for raw_tracks.py.
 
 #include <string>
 #include <vector>

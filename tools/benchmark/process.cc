@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr int kNotFound = 127;
 
-// In the child: never returns.
+// Called in the child process; replaces it by the program and never returns.
 [[noreturn]] void Become(const std::vector<char*>& arguments) {
   const int null = open("/dev/null", O_RDWR);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {

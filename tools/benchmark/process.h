@@ -7,17 +7,17 @@
 namespace krot::internal {
 
 struct ProcessResult {
-  int exit_code = 0;   // -n if signal n ended it; 127 if it was not found
+  int exit_code = 0;   // -n if ended by signal n; 127 if it was not found
   double seconds = 0;  // wall clock, start to exit
 };
 
-// Runs a program, found as a shell would, with nothing on its stdin and its
-// output thrown away. Programs that could open a window are told not to
+// Runs a program, which is searched as a shell would, with an empty stdin and
+// its output discarded. Qt programs do not open windows
 // (QT_QPA_PLATFORM=offscreen). Throws std::runtime_error if no process can be
-// made.
+// created.
 ProcessResult RunProcess(const std::vector<std::string>& arguments);
 
-// A new folder for temporary files; it and all in it go with the object.
+// A new folder for temporary files; the destructor removes it with all files.
 class ScratchFolder {
  public:
   ScratchFolder();
@@ -33,7 +33,7 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-// The executable `name` in the folder of the running one.
+// The executable `name` in the folder of the running executable.
 std::string SiblingExecutable(const std::string& name);
 
 }  // namespace krot::internal

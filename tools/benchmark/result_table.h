@@ -7,7 +7,7 @@
 
 namespace krot::internal {
 
-// One value of a table: as JSON, and as a reader sees it.
+// One value of a table: as JSON, and as text for readers.
 struct Cell {
   nlohmann::ordered_json value;
   std::string text;
@@ -16,20 +16,20 @@ struct Cell {
 Cell TextCell(const std::string& text);
 Cell CountCell(int64_t count);
 Cell RealCell(double value, int decimals);
-// With three significant digits, never in exponential notation: times and
-// ratios of any size. "-" if not finite.
+// For times and ratios of any size: three significant digits, never in
+// exponential notation. "-" if not finite.
 Cell SizedCell(double value);
 Cell ScientificCell(double value);
 Cell MissingCell(const std::string& why = "n/a");  // null
 
-// What a benchmark measured, one row per case.
+// The measurements of a benchmark, one row per case.
 struct ResultTable {
   std::string name;     // a key: "figure4"
   std::string caption;  // one sentence, without full stop
   std::vector<std::string> columns;
   std::vector<std::vector<Cell>> rows;  // as many cells as columns
   std::vector<std::string> notes;       // sentences below the table
-  bool is_detail = false;               // Markdown folds it up
+  bool is_detail = false;               // collapsed in Markdown
 };
 
 std::string ToText(const ResultTable& table);

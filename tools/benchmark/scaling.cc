@@ -1,5 +1,5 @@
-// krot_benchmark scaling: what `krot solver` costs per observation, from file
-// to file, as models grow: in observations, in frames, in length of tracks.
+// krot_benchmark scaling: the cost of `krot solver` per observation, from file
+// to file, as models grow in observations, frames, and length of tracks.
 
 #include <algorithm>
 #include <string>
@@ -21,7 +21,8 @@ constexpr int64_t kObservationsPerFrame = 1000;
 constexpr int64_t kSizes[] = {10000, 100000, kMillion, 2 * kMillion,
                               10 * kMillion};
 constexpr int kSmallest = 10000;
-// While frames or tracks vary, where the largest model is not smaller.
+// The number of observations while frames or tracks vary, unless the largest
+// model is smaller.
 constexpr int64_t kFixedObservations = 200000;
 constexpr int64_t kFrames[] = {25, 100, 400, 1600};
 constexpr int64_t kTrackLengths[] = {3, 6, 12, 24, 48};
@@ -32,12 +33,12 @@ struct ScalingOptions {
   std::string krot_path;
   int max_observations = 1000000;
   int max_joint_observations = 2000000;
-  bool vary = true;  // frames and tracks as well
+  bool vary = true;  // also vary frames and tracks
   int max_sweeps = 1000;
   int num_threads = -1;
 };
 
-// By sweeps and, up to max_joint_observations, by the joint solver.
+// Measures sweeps and, up to max_joint_observations, the joint solver.
 void Measure(const ScalingOptions& options, const Street& street,
              std::vector<Growth>* growths) {
   LogLine(options.common.log, 1,
@@ -55,8 +56,8 @@ void Measure(const ScalingOptions& options, const Street& street,
   growths->push_back(MeasureStreet(run, "joint", street, model, folder));
 }
 
-// The time per step by that of the same method on `reference`; missing where
-// that was not measured.
+// The time per step, divided by that of the same method on `reference`; missing
+// if that was not measured.
 Cell RatioTo(const Street& reference, const Growth& growth,
              const std::vector<Growth>& all) {
   for (const Growth& other : all) {

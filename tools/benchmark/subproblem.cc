@@ -27,7 +27,8 @@ Residual FromRow(const double row[kResidualRow]) {
   return residual;
 }
 
-// The rows of v = 0, scaled so that A x + b is the distance from the ray.
+// The equations v = 0, scaled so that |A x + b| is the distance of x from the
+// ray.
 void NormalizeRay(const Residual& residual,
                   Eigen::Ref<Eigen::Matrix<double, 2, 3>> A,
                   Eigen::Ref<Vector2d> b) {
@@ -37,7 +38,7 @@ void NormalizeRay(const Residual& residual,
   b = L.triangularView<Eigen::Lower>().solve(residual.b);
 }
 
-// x -> x / unit leaves every residual as it is.
+// Changes the unit of length, x -> x / unit; the residuals' values stay.
 void Rescale(double unit, Subproblem* problem) {
   for (Residual& residual : problem->residuals) {
     residual.b /= unit;

@@ -11,9 +11,9 @@
 
 namespace krot::internal {
 
-// A problem (1) of [Zhang18] with a start of positive depths, in a unit of
-// length in which the start's mean depth is 1: thresholds in units of x then
-// mean the same for all.
+// A problem (1) of [Zhang18] with a start of positive depths. The unit of
+// length is the mean depth of the start, so that thresholds in units of x mean
+// the same for all problems.
 struct Subproblem {
   std::vector<Residual> residuals;
   Eigen::Vector3d start = Eigen::Vector3d::Zero();
@@ -22,36 +22,36 @@ struct Subproblem {
   double Cost(const Eigen::Vector3d& x, Norm norm) const;
 };
 
-// The point in the middle of the shortest line between the rays of two
-// residuals, v = 0 [Hartley, Schaffalitzky 2004]; none if they are parallel to
-// half a degree: where they meet then is chance.
+// The mid-point of the shortest line between the rays (v = 0) of two residuals
+// [Hartley, Schaffalitzky 2004]. None if the rays are parallel to within half a
+// degree, as noise then determines where they meet.
 std::optional<Eigen::Vector3d> MidPoint(const Residual& a, const Residual& b);
 
-// The triangulation of `residuals`, which starts, as in [Zhang18, Sec. 4.1], at
-// the mid-point of two that are drawn at random; pairs are drawn until all
-// depths there are positive. None after fifty.
+// The triangulation of `residuals`. It starts, as in [Zhang18, Sec. 4.1], at
+// the mid-point of a random pair; pairs are drawn until all depths there are
+// positive. None if fifty pairs fail.
 std::optional<Subproblem> MakeTriangulation(std::vector<Residual> residuals,
                                             Random* random);
 
-// Point k of a problem as its frames stand: (Int_k).
+// The residuals of point k of a problem with the frames fixed: (Int_k).
 std::vector<Residual> IntersectionResiduals(const KnownRotationProblem& problem,
                                             const Estimate& estimate,
                                             int32_t point);
 
-// Frame f of a problem as its points stand: (Res_f).
+// The residuals of frame f of a problem with the points fixed: (Res_f).
 std::vector<Residual> ResectionResiduals(const KnownRotationProblem& problem,
                                          const Estimate& estimate,
                                          int32_t frame);
 
-// A block of a sweep, point or frame, which starts where it stands. None where
-// a depth is not positive there, or where no ray makes half a degree with the
-// first: the optimum would be anywhere.
+// A block of a sweep, a point or a frame, that starts from its present
+// position. None if a depth is not positive there, or if all rays are within
+// half a degree of the first: then the optimum is not determined.
 std::optional<Subproblem> MakeBlock(std::vector<Residual> residuals,
                                     const Eigen::Vector3d& start);
 
-// `num_cameras` at random, looking roughly at a random point among them, which
-// they observe with Gaussian noise of `sigma` pixels per axis, focal length
-// 1000 pixels: an instance of [Zhang18, Fig. 4].
+// An instance of [Zhang18, Fig. 4]: `num_cameras` random cameras that look
+// roughly at a random point among them and observe it with Gaussian noise of
+// `sigma` pixels per axis. The focal length is 1000 pixels.
 std::vector<Residual> RandomTriangulation(int num_cameras, double sigma,
                                           Random* random);
 

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The rows of a table; none if it is missing.
+// The rows of a table; empty if the table is missing.
 std::vector<Json> Rows(const Reports& reports, const std::string& report,
                        const std::string& table) {
   const auto found = reports.find(report);
@@ -42,7 +42,7 @@ std::vector<double> Numbers(const std::vector<Json>& rows,
 
 std::string Text(double value) { return SizedCell(value).text; }
 
-// "55.7 (10.2 to 84.0)": the median first.
+// "55.7 (10.2 to 84.0)": the median and the range.
 std::string Spread(std::vector<double> values) {
   if (values.empty()) return "not measured";
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -50,7 +50,7 @@ std::string Spread(std::vector<double> values) {
   return Text(MedianOf(std::move(values))) + range;
 }
 
-// "tower 0.22, UWO 0.2": a column, row by row.
+// "tower 0.22, UWO 0.2": the model and the value of a column, for all rows.
 std::string List(const std::vector<Json>& rows, const std::string& column) {
   std::string text;
   for (const Json& row : rows) {
@@ -62,8 +62,8 @@ std::string List(const std::vector<Json>& rows, const std::string& column) {
   return text.empty() ? "not measured" : text;
 }
 
-// The fastest rival's time by that of `fast`, over all sizes: of those that
-// reach the optimum, as the table of ratios says.
+// For all sizes, the time of the fastest rival that reaches the optimum (by the
+// table of ratios), divided by the time of `fast`.
 std::vector<double> Leads(const std::vector<Json>& rows) {
   std::vector<double> leads;
   for (const Json& row : rows) {
@@ -89,7 +89,7 @@ std::vector<Json> Growth(const Reports& reports, const std::string& method) {
   return rows;
 }
 
-// A column of the largest model of a method, and how large that is.
+// The value of a column for the largest model of a method, and its size.
 std::string OfLargest(const Reports& reports, const std::string& method,
                       const std::string& column) {
   const std::vector<Json> rows = Growth(reports, method);
@@ -109,7 +109,7 @@ std::string GainOfThreads(const std::vector<Json>& sweeps) {
   return "not measured";
 }
 
-// By model; KROT's time by COLMAP's.
+// The ratio of KROT's time to COLMAP's: median and range over the models.
 std::string MedianRatio(const std::vector<Json>& rows) {
   return Spread(Numbers(rows, "ratio"));
 }

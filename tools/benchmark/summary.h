@@ -7,12 +7,12 @@
 
 namespace krot::internal {
 
-// The reports that run_all.sh leaves, parsed, by the names of their files:
+// The reports that run_all.sh writes, parsed, by the names of their files:
 // "triangulation", "blocks", ...
 using Reports = std::map<std::string, nlohmann::ordered_json>;
 
-// What was asked of KROT's speed and what the reports say to that, one row per
-// question; "not measured" where the report, or the row of it, is missing.
+// The requirements on KROT's speed and what was measured, one row for each;
+// "not measured" if the report or its row is missing.
 ResultTable Summarize(const Reports& reports);
 
 }  // namespace krot::internal

@@ -1,4 +1,4 @@
-// krot_benchmark summary: what was asked and what run_all.sh measured.
+// krot_benchmark summary: the requirements, and what run_all.sh measured.
 
 #include <filesystem>
 #include <fstream>

@@ -1,6 +1,6 @@
-// krot_benchmark sweep: what a sweep costs per observation, with `paper` and
-// with `fast` settings, how far that is from one pass over the data, and what
-// more threads gain.
+// krot_benchmark sweep: the cost of a sweep per observation, with `paper` and
+// with `fast` settings, compared with one pass over the data, and the speed-up
+// by more threads.
 
 #include <algorithm>
 #include <functional>
@@ -30,13 +30,13 @@ struct SweepOptions {
   int max_paper_observations = 400000;
 };
 
-// Microseconds per observation and sweep, by round.
+// Microseconds per observation and sweep, one number per round.
 struct SweepTimes {
   std::vector<double> paper;    // one thread; one round, or none
   std::vector<double> fast;     // one thread
   std::vector<double> threads;  // fast, all threads
   std::vector<double> floor;    // one pass over the residuals, one thread
-  double paper_cost = 0;        // pixels, after as many sweeps
+  double paper_cost = 0;        // pixels, after the same number of sweeps
   double fast_cost = 0;
 };
 
@@ -64,7 +64,8 @@ double MicrosecondsPerPass(const BenchmarkModel& model) {
   for (int pass = 0; pass < kPasses; ++pass) {
     sum += Cost(model.built.problem, model.built.start, Norm::L2(), 1);
   }
-  const double seconds = sum > 0 ? timer.Seconds() : 0;  // sum is not idle
+  // Uses `sum`, so that the compiler does not remove the loop.
+  const double seconds = sum > 0 ? timer.Seconds() : 0;
   return 1e6 * seconds / kPasses /
          static_cast<double>(model.built.problem.observations.size());
 }

@@ -22,9 +22,9 @@ inline constexpr ModelSize kPaperSizes[] = {
 inline constexpr int kNumPaperSizes = 6;
 
 // A synthetic model of about that size (its tracks are random), named
-// "synthetic House (S)": a street, as what is photographed in so many images is
-// seen by few of them at a time; an orbit up to 20 frames. Pinhole cameras,
-// noise of 1 pixel, a start off the truth by a percent of the viewing distance.
+// "synthetic House (S)". Up to 20 frames it is an orbit, with more a street: in
+// a large scene few images see the same points. It has pinhole cameras, noise
+// of 1 pixel, and a start off the truth by 1 % of the viewing distance.
 BenchmarkModel SyntheticModel(const ModelSize& size, uint64_t seed);
 
 }  // namespace krot::internal

@@ -8,8 +8,8 @@
 
 namespace krot::internal {
 
-// Raises a flag once `seconds` have passed, for a solver that looks at one
-// between its steps.
+// Sets a flag once `seconds` have passed, for solvers that check it between
+// their steps.
 class TimeLimit {
  public:
   explicit TimeLimit(double seconds);

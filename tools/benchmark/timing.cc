@@ -8,7 +8,7 @@
 namespace krot::internal {
 namespace {
 
-// Of this thread, on a processor.
+// The processor time of this thread.
 double ThreadSeconds() {
   timespec time;
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -22,7 +22,7 @@ double SecondsOf(const std::function<void()>& run, int64_t calls) {
   return (ThreadSeconds() - start) / static_cast<double>(calls);
 }
 
-// How many calls take `min_seconds`; the run is warm afterwards.
+// The number of calls that take about `min_seconds`. Also warms up the run.
 int64_t CallsFor(const std::function<void()>& run, double min_seconds) {
   if (!(min_seconds > 0)) return 1;
   const double once = std::max(SecondsOf(run, 1), 1e-9);

@@ -9,12 +9,12 @@ namespace krot::internal {
 // least one value.
 double MedianOf(std::vector<double> values);
 
-// Median seconds of this thread's processor time of one call of each of `runs`,
-// out of `repeats` rounds in which every one is called in turn, so that what
-// disturbs the machine for a while disturbs all of them alike; processor time,
-// so that others on the machine count for little. What takes less than
-// `min_seconds` is called in a loop that takes at least as long. One round goes
-// ahead unmeasured where there is such a loop.
+// For each of `runs`, the median over `repeats` rounds of the seconds of this
+// thread's processor time that one call takes. In a round all are called in
+// turn, so that a temporary disturbance of the machine affects all of them.
+// Processor time is measured so that other processes matter little. A run that
+// takes less than `min_seconds` is called in a loop that takes about that long;
+// to find the number of calls, it is first called once without being measured.
 std::vector<double> TimeInterleaved(
     const std::vector<std::function<void()>>& runs, int repeats,
     double min_seconds);

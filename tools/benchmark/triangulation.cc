@@ -1,5 +1,5 @@
-// krot_benchmark triangulation: Figure 4 and Table 1 of [Zhang18], with every
-// rival, on the same instances in the same run.
+// krot_benchmark triangulation: Figure 4 and Table 1 of [Zhang18], with all
+// rivals on the same instances in the same run.
 
 #include <algorithm>
 #include <string>
@@ -52,9 +52,9 @@ Case SyntheticCase(int num_cameras, Random* random) {
   return result;
 }
 
-// At most `max_points` of the model's points, evenly spread over the file;
-// those without two rays that meet, at half a degree or more and in front of
-// all cameras, are passed over.
+// At most `max_points` of the model's points, evenly spread over the file.
+// Points are left out if no two of their rays, at half a degree or more, meet
+// in front of all cameras.
 Case ModelCase(const std::string& path, int max_points, Random* random) {
   const BenchmarkModel model = ReadBenchmarkModel(path);
   const BuiltProblem& built = model.built;
@@ -75,7 +75,7 @@ Case ModelCase(const std::string& path, int max_points, Random* random) {
   return result;
 }
 
-// Microseconds per instance; a solver that misses the optimum is marked.
+// Microseconds per instance; solvers that miss the optimum are marked.
 std::vector<Cell> StandingCells(const std::vector<Standing>& standings) {
   std::vector<Cell> cells;
   for (const Standing& standing : standings) {
@@ -113,7 +113,8 @@ const char kMissNote[] =
     "* ends more than 1e-5 above the lowest cost, relative, on some instance "
     "(last table): its time is not that of the optimum.";
 
-// The others' times by the first one's; none for what is not the optimum.
+// The times divided by that of the first solver; missing for solvers that miss
+// the optimum.
 void AddRatioRow(const std::vector<Standing>& standings,
                  const std::string& name, ResultTable* table) {
   std::vector<Cell> row = {TextCell(name)};

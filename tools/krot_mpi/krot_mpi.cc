@@ -32,7 +32,7 @@ constexpr char kUsage[] =
     "  krot_mpi solver -h\n"
     "  krot_mpi --version\n";
 
-// What all ranks have sent to others.
+// A sentence on how much all ranks have sent to others.
 std::string TrafficWords(MpiRanks* ranks) {
   const std::vector<int64_t> sent =
       ranks->Gather(std::vector<int64_t>{ranks->bytes_sent()});
@@ -94,8 +94,8 @@ int Run(const std::vector<std::string>& arguments, MpiRanks* ranks) {
                     " is no command of krot_mpi: solver is");
 }
 
-// One line on stderr. What all ranks find wrong the first one says: it ends the
-// others before they speak.
+// Writes one line to stderr and ends all ranks. If all ranks fail for the same
+// reason, only the first one writes: the others wait, and are ended before.
 [[noreturn]] void Fail(std::string message, int exit_code, MpiRanks* ranks) {
   constexpr auto kPrecedence = std::chrono::seconds(1);
   if (!ranks->IsFirst()) std::this_thread::sleep_for(kPrecedence);

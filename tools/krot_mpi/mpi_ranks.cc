@@ -9,10 +9,10 @@
 namespace krot::internal {
 namespace {
 
-// MPI counts in int.
+// Larger data are sent in several messages, as MPI counts bytes by an int.
 constexpr size_t kBytesPerMessage = size_t{1} << 30;
 
-// body(begin, size) for every message of so many bytes.
+// Calls body(begin, size) for every message that `bytes` bytes take.
 template <typename Body>
 void ForMessages(size_t bytes, const Body& body) {
   for (size_t begin = 0; begin < bytes; begin += kBytesPerMessage) {

@@ -8,8 +8,8 @@
 
 namespace krot::internal {
 
-// The processes that mpirun started. MPI is initialised as long as it lives;
-// one at a time.
+// The processes that mpirun started. The constructor initialises MPI and the
+// destructor ends it, so only one object may exist in a process.
 class MpiRanks : public Ranks {
  public:
   MpiRanks(int* argc, char*** argv);
@@ -21,7 +21,7 @@ class MpiRanks : public Ranks {
   int count() const override { return count_; }
   std::vector<std::string> Exchange(std::vector<std::string> bytes) override;
 
-  // To other ranks, so far.
+  // The number of bytes that this rank has sent to others so far.
   int64_t bytes_sent() const { return bytes_sent_; }
 
   // Ends all ranks.

@@ -12,7 +12,7 @@
 namespace krot::internal {
 namespace {
 
-// What a solve changes of a point.
+// The fields of a point that a solve changes.
 struct SolvedPoint {
   Eigen::Vector3d xyz;
   double error;
@@ -47,7 +47,7 @@ void SharedModel::NameInWhole(const Model& share, SolveSummary* summary) const {
   std::unordered_set<Point3DId> ids;
   for (const Point3D& point : share.points3D) ids.insert(point.id);
   const auto images = ImageIndices(share);
-  std::vector<uint32_t> names(support.size(), 0);  // where others name them
+  std::vector<uint32_t> names(support.size(), 0);  // 0 if of another rank
   for (size_t n = 0; n < support.size(); ++n) {
     if (ids.count(support[n].point3D_id) == 0) continue;
     names[n] =
@@ -80,7 +80,7 @@ bool SharedModel::Join(Model* model, Model* solved,
   if (summary->certificate) {
     summary->certificate->model_sha256 = ModelSha256(*model);
   }
-  if (paths_.html_path.empty()) {  // nothing else asks for the input
+  if (paths_.html_path.empty()) {  // only an HTML page needs the input
     *solved = std::move(*model);
   } else {
     *solved = *model;

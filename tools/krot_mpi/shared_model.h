@@ -7,29 +7,33 @@
 
 namespace krot::internal {
 
-// A model that ranks solve together: every one reads it and keeps its share;
-// the first one reads it again when it is solved, and takes in what the others
-// have made of theirs. Between the two no rank has all observations.
+// A model that ranks solve together. Every rank reads it and keeps its share;
+// during the solve no rank has all observations. After the solve the first rank
+// reads the model again and receives the results of all ranks.
 class SharedModel {
  public:
   // Keeps references.
   SharedModel(const ModelPaths& paths, Ranks* ranks)
       : paths_(paths), ranks_(*ranks) {}
 
+  // Returns this rank's share of the points.
   Model Take(const Model& whole);
 
-  // On the first rank: `*solved` becomes the whole as it is solved, `*model` as
-  // it was read if a page is to show it, and the summary speaks of it. Whether
-  // this is the first. Every rank must call it.
+  // Joins the shares after the solve; every rank must call it. On the first
+  // rank `*solved` becomes the whole solved model, and the summary refers to
+  // that. If an HTML page is to be written, `*model` becomes the whole model as
+  // it was read; otherwise it must not be used. Returns whether this is the
+  // first rank.
   bool Join(Model* model, Model* solved, SolveSummary* summary) const;
 
  private:
-  // 2D points of the support, which are named as in the shares.
+  // Replaces indices of 2D points of the support, which count within shares, by
+  // those of the whole model.
   void NameInWhole(const Model& share, SolveSummary* summary) const;
 
   const ModelPaths& paths_;
   Ranks& ranks_;
-  std::vector<std::vector<uint32_t>> point2D_of_;  // of ModelShare
+  std::vector<std::vector<uint32_t>> point2D_of_;  // see ModelShare
 };
 
 }  // namespace krot::internal

@@ -58,7 +58,7 @@ class CertifiedSolve {
   // What the certificate proves, pixels; without one, the known bound.
   double lower_bound() const { return lower_bound_; }
   const std::optional<Certificate>& certificate() const { return certificate_; }
-  // Of the interior point's last run, or the known ones if there was none.
+  // From the interior point's last run, or the known ones if there was none.
   const std::vector<Multiplier>& multipliers() const { return multipliers_; }
   // An estimate of the optimum from the last run's gap, pixels; no bound.
   double likely_optimum() const { return (1 - gap_) * cost_; }

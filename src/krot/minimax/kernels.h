@@ -156,7 +156,7 @@ inline constexpr double kLaneBehind = 6;
 // Not for lanes: the minimiser is far away, or it takes too many steps.
 inline constexpr double kLaneGivesUp = 7;
 
-// As DescentGoal.
+// DescentGoal (newton_descent.h) and the limit of iterations.
 struct LaneGoal {
   double tolerance;
   double level;

@@ -148,9 +148,9 @@ Descent::Proposal Descent::Propose() {
   return {step, promise, share, !(promise > tolerance * cost_)};
 }
 
-// A promise may be small only because kappa is large. If kappa was not raised
-// by failed trials at this x, sets it to its smallest value; that counts as an
-// iteration. Returns whether it did.
+// A promise may be small only because kappa is large. If there were no lessons
+// at this x, sets kappa to its smallest value; that counts as an iteration.
+// Returns whether it did.
 bool Descent::LowerKappaAtOnce() {
   if (!(kappa_ > smallest_kappa_ && lessons_ == 0)) return false;
   model_.RaiseMultipliers();

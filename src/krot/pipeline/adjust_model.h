@@ -10,9 +10,9 @@
 
 namespace krot::internal {
 
-// From a COLMAP model to a COLMAP model with a smaller sum of squared
-// reprojection errors, below a cap if asked for: what `krot bundle_adjuster`
-// does between reading and writing.
+// Bundle adjustment of a COLMAP model: lowers the sum of squared reprojection
+// errors, with all errors below a cap if asked for. `krot bundle_adjuster`
+// calls it between reading and writing.
 
 struct AdjustModelOptions {
   // With adjustment.max_error, a model with an error that is not below it is

@@ -30,8 +30,8 @@ constexpr double kKeptPromise = 1e-5;
 // rows' cost is at most this share of the true one, the rows no longer describe
 // the true errors and are taken anew.
 constexpr double kFarFromRows = 0.5;
-// How far the cost of rows may exceed the true cost at the estimate where they
-// are taken, relative. More than this is not rounding.
+// If the cost of rows exceeds the true cost at the estimate where they are
+// taken by more than this, relative, rounding has made them useless.
 constexpr double kRowsRounding = 1e-3;
 // Where positions are known, rows are solved to this share of the gap asked
 // for.
@@ -124,7 +124,7 @@ class Rounds {
   // Whether the sweeps of this round alone have brought the cost near enough to
   // the bound of an earlier round.
   bool is_bound_near_ = false;
-  // Of the last round without trust regions, for a warm start of the next one.
+  // From the last round without trust regions, to warm-start the next one.
   KnownMultipliers known_multipliers_;
 };
 

@@ -44,7 +44,7 @@ struct FinishOptions {
   std::function<void(const BoundedIterate&)> callback;
 };
 
-// Of a finish by least squares.
+// The result of a finish by least squares.
 struct FinishSummary {
   double cap = 0;          // pixels
   double lowest_cost = 0;  // the largest error before it, pixels
@@ -112,9 +112,8 @@ LooseParts SettleEstimate(const Model& model, const BuiltProblem& built,
 // two models with the same images and points. O(images + points).
 void MeasureMoves(const Model& before, const Model& after, LooseParts* loose);
 
-// From a COLMAP model to a COLMAP model with a smaller largest reprojection
-// error: what `krot solver` and `krot point_triangulator` do between reading
-// and writing.
+// The solve of a COLMAP model: lowers its largest reprojection error. `krot
+// solver` and `krot point_triangulator` call it between reading and writing.
 
 // A solve of the linear rows, and the step that was taken towards its solution.
 struct Round {
@@ -225,8 +224,8 @@ struct SolveSummary {
   // one; everything above describes the model before it.
   std::optional<PolishSummary> polish;
 
-  // What a process that holds the model is likely to need at its peak; see
-  // stages.h.
+  // The expected peak memory of a process that holds the model; see
+  // EstimateSolveMemory in stages.h.
   int64_t needed_bytes = 0;
 
   double seconds_build = 0;  // wall clock
@@ -237,7 +236,7 @@ struct SolveSummary {
 struct SolveModelOptions {
   SolveMethod method = SolveMethod::kAuto;
   SolveInit init = SolveInit::kModel;
-  double init_max_error = 100;        // of a start found; pixels; > 0
+  double init_max_error = 100;        // of a start; pixels; > 0
   bool describe_certificate = false;  // fill SolveSummary::certificate
   BuildProblemOptions problem;
   // If given, pixels: the radii of problem.positions are multiplied by the

@@ -227,7 +227,7 @@ void CheckInput(const KnownRotationProblem& problem,
   CheckAtLeast(1, options.max_unknowns, "options.max_unknowns");
 }
 
-// Whether many observations, all over the problem, set the maximum.
+// Whether the observations that certainly set the maximum have many unknowns.
 bool IsSpread(const KnownRotationProblem& problem,
               const std::vector<double>& scores) {
   const std::vector<int64_t> support =

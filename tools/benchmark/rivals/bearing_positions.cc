@@ -31,14 +31,14 @@ struct BearingError {
   Vector3d bearing;
 };
 
-// In the world, of unit length.
+// The bearing in the world, of unit length.
 Vector3d BearingOf(const View& view, const Observation& o) {
   Vector3d ray = o.E.row(1).cross(o.E.row(2)).transpose();
   if (o.E.row(0).dot(ray) < 0) ray = -ray;
   return (view.cam_from_world_rotation.transpose() * ray).normalized();
 }
 
-// Scales are eliminated first, then points.
+// Sets an elimination order: first scales, then points.
 void Order(const std::vector<double*>& centres,
            const std::vector<double*>& points,
            const std::vector<double*>& scales,

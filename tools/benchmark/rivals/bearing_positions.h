@@ -12,9 +12,9 @@ namespace krot::internal {
 //
 //   min sum_i rho(|b_i - d_i (s - C)|^2),   d_i >= 0,
 //
-// with b_i the observation's bearing in the world, d_i a scale of its own, and
-// rho Huber's at 0.1; centres and points start at random in a cube. Ceres,
-// Levenberg-Marquardt.
+// with b_i the observation's bearing in the world, d_i its scale, and rho
+// Huber's loss at 0.1. Centres and points start at random in a cube. Solved by
+// Levenberg-Marquardt (Ceres).
 struct BearingPositionsOptions {
   uint64_t random_seed = 0;
   int max_num_iterations = 100;

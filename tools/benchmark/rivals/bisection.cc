@@ -30,7 +30,7 @@ class Bisection : public SubproblemSolver {
         lower = gamma;
         continue;
       }
-      // The cost of what shows feasibility is a better bound than gamma.
+      // The cost of the feasible x is a better upper bound than gamma.
       x = y.template head<3>();
       upper = problem.Cost(x, Program::norm());
     }

@@ -12,14 +12,14 @@
 
 namespace krot::internal {
 
-// What the rivals of [Zhang18] that need convex optimisation call in every
-// step, in the place of the packages that their authors used:
+// The convex solver that some rivals of [Zhang18] call in every step, instead
+// of the packages that their authors used. It solves
 //
 //   minimise the last of the unknowns, tau,
 //   subject to s_i = G_i y + h_i in the cone K_i for all i,
 //
 // by a primal-dual interior point (Nesterov-Todd scaling, Mehrotra's
-// predictor and corrector) on the normal equations, which `Program` keeps:
+// predictor and corrector) on the normal equations, which `Program` stores:
 //
 //   using Cone, Unknowns;                     y: a fixed or dynamic vector
 //   int num_cones() const;
@@ -32,19 +32,19 @@ namespace krot::internal {
 //   bool Factorize();
 //   void Solve(Unknowns* rhs) const;
 struct ConeProgramOptions {
-  // Ends once tau is below this, which makes the program a feasibility test:
+  // Ends once tau is below this, so that it can be used as a feasibility test.
   double stop_below = -std::numeric_limits<double>::infinity();
-  // or once the dual shows that it cannot fall below this.
+  // Ends once the dual shows that tau cannot fall below this.
   double stop_above = std::numeric_limits<double>::infinity();
   double gap = 1e-9;  // tau minus its dual bound, absolute; > 0
   int max_iterations = 60;
-  const CancelFlag* cancel = nullptr;  // may be null; looked at every iteration
+  const CancelFlag* cancel = nullptr;  // may be null; read in every iteration
 };
 
 struct ConeProgramSummary {
   double tau = 0;  // attained
-  // What tau cannot fall below, up to the tolerance; -infinity until the dual
-  // is feasible to that.
+  // A lower bound on tau, up to the dual tolerance; -infinity until the dual is
+  // feasible to that.
   double tau_bound = -std::numeric_limits<double>::infinity();
   int iterations = 0;
 };
@@ -56,7 +56,7 @@ class ConeProgramSolver {
   using Vector = typename Cone::Vector;
   using Unknowns = typename Program::Unknowns;
 
-  // From *y, whose slacks must be inside their cones.
+  // Starts from *y, whose slacks must be inside their cones.
   ConeProgramSummary Minimize(Program* program,
                               const ConeProgramOptions& options, Unknowns* y) {
     program_ = program;
@@ -93,7 +93,7 @@ class ConeProgramSolver {
 
   int size() const { return program_->num_cones(); }
 
-  // z_i = mu s_i^-1, of such a length that the last row of the dual holds.
+  // z_i = mu s_i^-1, with the mu for which the last row of the dual holds.
   void Start(const Unknowns& y) {
     s_.resize(size());
     z_.resize(size());
@@ -149,7 +149,7 @@ class ConeProgramSolver {
     }
   }
 
-  // One predictor and corrector; false if rounding ends the progress.
+  // One predictor and corrector; false if rounding prevents further progress.
   bool Step(double gap, const Unknowns& dual_residual, Unknowns* y) {
     program_->ClearNormal();
     rho_.resize(size());
@@ -179,7 +179,8 @@ class ConeProgramSolver {
     }
     FindDirection(rho_, dual_residual, &dy);
     MaxSteps(1 / 0.99, &primal, &dual);
-    // One length for both until the dual is feasible: tau could run away.
+    // Both steps have the same length until the dual is feasible, as otherwise
+    // tau could diverge.
     if (dual_residual.template lpNorm<Eigen::Infinity>() > kDualTolerance) {
       primal = dual = std::min(primal, dual);
     }

@@ -68,7 +68,8 @@ class Dai : public SubproblemSolver {
     }
   }
 
-  // The t for which the sum of all lambda_i (t - f_i) is that of the centre.
+  // The t for which the sum of all lambda_i (t - f_i) is that of the centre,
+  // mu times the number of constraints.
   double Relaxation(double mu) const {
     double t = static_cast<double>(constraints_.size()) * mu;
     double largest = 0;
@@ -87,8 +88,8 @@ class Dai : public SubproblemSolver {
     return sum.norm();
   }
 
-  // The Newton step of (x, t) and lambda towards the centre; returns that of x
-  // and takes that of lambda as far as it stays positive.
+  // The Newton step of (x, t) and lambda towards the centre. Returns the step
+  // of x, and takes that of lambda as far as all stay positive.
   Vector3d Step(double t, double mu) {
     Eigen::Matrix4d M = Eigen::Matrix4d::Zero();
     Vector4d rhs(0, 0, 0, -1);
@@ -114,8 +115,8 @@ class Dai : public SubproblemSolver {
     return step.head<3>();
   }
 
-  // The first of 1, 1/2, 1/4 ... that stays inside the relaxed region; 0 if
-  // none does.
+  // The first of 1, 1/2, 1/4 ... with a cost below `limit`, which is inside the
+  // relaxed region; 0 if there is none.
   static double StepSize(const Subproblem& problem, const Vector3d& x,
                          const Vector3d& direction, double limit) {
     for (double step = 1; step > kShortestStep; step /= 2) {

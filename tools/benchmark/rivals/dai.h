@@ -7,10 +7,10 @@
 namespace krot::internal {
 
 // The Newton-like descent of Dai et al. [2012; 6 of Zhang18]: instead of
-// solving F(gamma) of parametric_program.h for one gamma after another, one
-// primal-dual Newton step is taken for each, and gamma becomes the cost where
-// it ends. That point lies on the boundary of the new feasible region; a
-// relaxation t of all constraints makes it an interior one:
+// solving F(gamma) of parametric_program.h for one gamma after another, it
+// takes one primal-dual Newton step for each, and gamma becomes the cost at its
+// end. That point is on the boundary of the new feasible region; a relaxation t
+// of all constraints makes it an interior point:
 //
 //   f_i(x) = (||v_i|| - gamma w_i) / w_i(x_k) <= t,
 //   sum_i lambda_i grad f_i = 0,  sum_i lambda_i = 1,  lambda_i (t - f_i) = mu.

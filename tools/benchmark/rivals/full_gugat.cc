@@ -9,8 +9,8 @@
 namespace krot::internal {
 namespace {
 
-// Where the interval is narrower, or a step gains less, relative: the gap that
-// `krot solver` proves.
+// Ends when the interval is narrower, or a step gains less, than this,
+// relative. It is the gap that `krot solver` proves.
 constexpr double kTolerance = 1e-4;
 
 class FullGugat : public KnownRotationSolver {
@@ -54,7 +54,7 @@ class FullGugat : public KnownRotationSolver {
     return Cost(problem, estimate, Norm::L2(), /*num_threads=*/1);
   }
 
-  // sum_i lambda_i w_i: see gugat.h.
+  // Minus the slope of F, sum_i lambda_i w_i; see gugat.h.
   double Slope(const JointProgram& program, const Eigen::VectorXd& y) const {
     double slope = 0;
     for (int i = 0; i < program.num_observations(); ++i) {

@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 
 constexpr int kMaxIterations = 4000;
 constexpr double kPenaltyGrowth = 1.02;
-// Where the copies agree with the errors to this, relative to the cost.
+// Ends when the copies agree with the errors to this, relative to the cost.
 constexpr double kTolerance = 1e-4;
 
 class FullProximalSplitting : public KnownRotationSolver {

@@ -6,8 +6,9 @@
 
 namespace krot::internal {
 
-// Least squares over all translations and points, rotations fixed, by Ceres at
-// its default tolerances: what bundle adjustment does with what is free here.
+// Least squares over all translations and points with rotations fixed, by Ceres
+// with its default tolerances: bundle adjustment restricted to the unknowns of
+// the known rotation problem.
 std::unique_ptr<KnownRotationSolver> MakeLeastSquares(int num_threads);
 
 // Proximal splitting (proximal_splitting.h) of the whole problem. Its least

@@ -9,8 +9,8 @@
 namespace krot::internal {
 namespace {
 
-// Where rounding keeps a step from telling whether gamma can be reached, it
-// would go to and fro between two for good.
+// The limit of steps. If rounding hides whether gamma can be reached, steps
+// would alternate between two values for ever.
 constexpr int kMaxSteps = 100;
 
 template <typename Cone>
@@ -49,7 +49,8 @@ class Gugat : public SubproblemSolver {
  private:
   using Program = ParametricProgram<Cone>;
 
-  // sum_i lambda_i w_i, lambda_i the multiplier of gamma w_i.
+  // Minus the slope of F: sum_i lambda_i w_i, where lambda_i is the multiplier
+  // of gamma w_i.
   double Slope(const Subproblem& problem, const Eigen::Vector3d& x) const {
     double slope = 0;
     for (size_t i = 0; i < problem.residuals.size(); ++i) {

@@ -12,7 +12,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr double kMaxDepthGrowth = 10;
-// Of the diagonal: holds what no observation does.
+// Regularisation, relative to the diagonal, for unknowns that no observation
+// determines.
 constexpr double kRegularization = 1e-14;
 
 }  // namespace
@@ -97,7 +98,7 @@ JointProgram::Vector JointProgram::Slack(int i, const Unknowns& y) const {
   return Change(i, y) + blocks_[i].constant;
 }
 
-// In the unit of omega_i, which Change leaves out.
+// In units of omega_i.
 double JointProgram::Depth(int i, const Unknowns& y) const {
   return (Slack(i, y)[0] - y[y.size() - 1]) / gamma_;
 }

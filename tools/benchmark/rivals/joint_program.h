@@ -10,12 +10,12 @@
 
 namespace krot::internal {
 
-// parametric_program.h for the whole problem, p = 2, with omega_i the depths at
-// the start: y holds all points, all translations but the first, which stays,
-// and tau. The last cone bounds the first observation's depth, and thereby the
-// free scale. The normal equations are sparse, and factorised by a sparse
-// Cholesky method with an ordering of its own, as general cone solvers do.
-// A Program of cone_program_solver.h.
+// The programme of parametric_program.h for the whole problem, p = 2, with
+// omega_i the depths at the start. y has all points, all translations except
+// the first, which is fixed, and tau. The last cone bounds the first
+// observation's depth, and so the free scale. The normal equations are
+// factorised by a sparse Cholesky method with its own ordering, as in general
+// cone solvers. A Program of cone_program_solver.h.
 class JointProgram {
  public:
   using Cone = SecondOrderCone;
@@ -24,10 +24,11 @@ class JointProgram {
 
   explicit JointProgram(const KnownRotationProblem& problem);
 
-  // At gamma around x, where all depths must be positive.
+  // Sets the programme for gamma around x, where all depths must be positive.
   void Set(const Estimate& x, double gamma);
 
-  // x with a tau above what it needs; and back.
+  // A start inside all cones: x, with tau above the smallest possible one.
+  // ToEstimate is the inverse.
   Unknowns StartAt(double margin) const;
   Estimate ToEstimate(const Unknowns& y) const;
 
@@ -45,11 +46,11 @@ class JointProgram {
   int num_observations() const { return num_cones() - 1; }
 
  private:
-  // G_i: columns of the point, the translation and tau; h_i. The translation
-  // of the frame that stays has no columns.
+  // G_i, with columns for the point, the translation and tau, and h_i. The
+  // translation of the fixed frame has no columns.
   struct Block {
     int point;  // first of its three unknowns
-    int frame;  // likewise; -1: none
+    int frame;  // likewise; -1 if it is fixed
     Eigen::Matrix3d by_point;
     Eigen::Matrix3d by_frame;
     Vector by_tau;

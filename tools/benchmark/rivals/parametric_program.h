@@ -28,7 +28,7 @@ class ParametricProgram {
 
   enum class Weights { kOne, kDepths };
 
-  // At gamma around x, where all depths must be positive.
+  // Sets the programme for gamma around x, where all depths must be positive.
 
   void Set(const Subproblem& problem, const Eigen::Vector3d& x, double gamma,
            Weights weights) {
@@ -50,7 +50,7 @@ class ParametricProgram {
     SetBound(growth, &G_[count], &h_[count]);
   }
 
-  // Inside all cones: x with a tau above what it needs.
+  // A start inside all cones: x, with tau above the smallest possible one.
   Unknowns StartAt(const Eigen::Vector3d& x, double margin) const {
     Unknowns y;
     y << x, max_tau_ + margin;

@@ -30,7 +30,7 @@ struct LinePiece {
   double w;
   double z;
 
-  double Slope() const { return q * w - p * z; }  // its sign
+  double Slope() const { return q * w - p * z; }  // has the slope's sign
 };
 
 // The smallest alpha above `from` where `b` becomes larger than `a`.
@@ -71,7 +71,7 @@ class PolyhedronCollapse : public SubproblemSolver {
         cost = cost_next;
       }
       if (gains) continue;
-      active *= 0.1;  // these faces are too far to be lain on
+      active *= 0.1;  // some of these faces are too far away
       if (active < kNarrowestActive) break;
     }
     return x;
@@ -90,8 +90,9 @@ class PolyhedronCollapse : public SubproblemSolver {
     }
   }
 
-  // Minus the point of least norm of the active gradients' hull: the direction
-  // in which those that bear it fall at equal rates.
+  // Minus the point of least norm of the convex hull of the active gradients:
+  // along this direction the pieces with a weight in that point fall at equal
+  // rates.
   Vector3d Inwards(const Vector3d& x, double cost, double active) {
     gradients_.clear();
     for (const Face& face : faces_) {
@@ -105,8 +106,8 @@ class PolyhedronCollapse : public SubproblemSolver {
                          &scratch_);
   }
 
-  // Along the line from piece to piece, always the largest, until the next one
-  // rises.
+  // Follows the largest piece along the line, from piece to piece, until the
+  // largest one rises.
   double FindStep(const Vector3d& x, const Vector3d& direction) {
     line_.clear();
     for (const Face& face : faces_) {

@@ -13,14 +13,14 @@ using RowMajor23 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 
 constexpr int kMaxDenseFrames = 50;
 
-// Of the translation and the point of one observation.
+// The error of one observation as a function of its translation and point.
 class ProjectionError : public ceres::SizedCostFunction<2, 3, 3> {
  public:
   ProjectionError(const View& view, const Observation& observation,
                   const Vector2d* target)
       : view_(view), observation_(observation), target_(target) {}
 
-  // False behind the camera.
+  // Returns false if the point is behind the camera.
   bool Evaluate(const double* const* parameters, double* residuals,
                 double** jacobians) const override {
     const Eigen::Map<const Vector3d> t(parameters[0]);

@@ -8,16 +8,16 @@
 
 namespace krot::internal {
 
-// A Ceres problem of the residual vectors r_i = v_i / w_i in pixels, or of
-// r_i - targets[i], over all translations and points, the first translation
-// held. Its parameters are `estimate`'s own numbers; what the pointers lead to
-// must outlive it.
+// Builds a Ceres problem of the residual vectors r_i = v_i / w_i in pixels, or
+// of r_i - targets[i], over all translations and points; the first translation
+// is held constant. Its parameter blocks are the numbers in `estimate`. All
+// arguments must outlive it.
 void BuildLeastSquares(const KnownRotationProblem& problem,
                        const std::vector<Eigen::Vector2d>* targets,
                        Estimate* estimate, ceres::Problem* least_squares);
 
-// Eliminates the points first, and the frames by dense or sparse factorisation,
-// as COLMAP's own bundle adjustment chooses.
+// Options that eliminate the points first, and then the frames by dense or
+// sparse factorisation, as COLMAP's bundle adjustment does.
 ceres::Solver::Options LeastSquaresOptions(const KnownRotationProblem& problem,
                                            int num_threads, Estimate* estimate);
 

@@ -10,9 +10,10 @@ namespace krot::internal {
 //
 //   argmin over z   max_i ||z_i||_2 + rho/2 sum_i ||z_i - a_i||^2.
 //
-// Every a_i is shortened to the length t for which
-// sum_i max(0, ||a_i|| - t) = 1 / rho, found by bisection [Eriksson, Isaksson
-// 2014]; all are zero where that sum is smaller at t = 0. rho > 0.
+// Every a_i longer than t is shortened to t, where t satisfies
+// sum_i max(0, ||a_i|| - t) = 1 / rho and is found by bisection [Eriksson,
+// Isaksson 2014]. If the sum is smaller than that at t = 0, all become zero.
+// rho > 0.
 void ApplyMaxNormProx(double rho, std::vector<Eigen::Vector2d>* a);
 
 }  // namespace krot::internal

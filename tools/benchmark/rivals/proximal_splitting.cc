@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 constexpr int kMaxIterations = 4000;
 constexpr double kPenaltyGrowth = 1.01;
 
-// r_i(x) - target_i, stacked: a function of TinySolver.
+// The stacked r_i(x) - target_i, as a function for TinySolver.
 class Residuals {
  public:
   using Scalar = double;
@@ -27,7 +27,7 @@ class Residuals {
 
   int NumResiduals() const { return 2 * static_cast<int>(targets_.size()); }
 
-  // False behind a camera.
+  // Returns false if the point is behind a camera.
   bool operator()(const double* parameters, double* residuals,
                   double* jacobian) const {
     const Eigen::Map<const Vector3d> x(parameters);
@@ -101,7 +101,7 @@ class ProximalSplitting : public SubproblemSolver {
 
   void LeastSquaresStep(const Subproblem& problem,
                         const std::vector<Vector2d>& targets, Vector3d* x) {
-    solver_.options.max_num_iterations = 2;  // it counts its first look
+    solver_.options.max_num_iterations = 2;  // the first only evaluates
     solver_.Solve(Residuals(problem, targets), x);
   }
 

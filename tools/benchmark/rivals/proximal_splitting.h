@@ -6,8 +6,8 @@
 
 namespace krot::internal {
 
-// Proximal splitting [Eriksson, Isaksson 2014; 11 of Zhang18]: copies z_i of
-// the residual vectors and multipliers u_i of their equality,
+// Proximal splitting [Eriksson, Isaksson 2014; 11 of Zhang18], with copies z_i
+// of the residual vectors and multipliers u_i of the constraints r_i = z_i:
 //
 //   x <- one step of least squares on  sum_i ||r_i(x) - z_i + u_i||^2,
 //   z <- proximal operator of the largest norm at r(x) + u,
