@@ -148,6 +148,11 @@ TEST(AllDepthsPositive, IsWhereTheCostIsFinite) {
     ASSERT_EQ(Cost(scene.problem, behind, Norm::L2(), 1), kInfinity);
     EXPECT_FALSE(AllDepthsPositive(scene.problem, behind, 2));
   }
+  // As of rays that go backwards: the row's depth counts, not the camera's z.
+  RandomScene turned = scene;
+  turned.problem.observations[3].E *= -1;
+  ASSERT_EQ(Cost(turned.problem, turned.estimate, Norm::L2(), 1), kInfinity);
+  EXPECT_FALSE(AllDepthsPositive(turned.problem, turned.estimate, 2));
 }
 
 TEST(Cost, OfNoObservationsIsZero) {

@@ -73,10 +73,9 @@ bool AllDepthsPositive(const KnownRotationProblem& problem,
   ParallelForEach(
       static_cast<int64_t>(problem.observations.size()), num_threads,
       [&](int64_t i) {
-        const Observation& observation = problem.observations[i];
-        const AffineMap& camera = cameras[observation.view];
-        const Eigen::Vector3d& point = estimate.points[observation.point];
-        if (!(camera.row(2).head<3>().dot(point) + camera(2, 3) > 0)) {
+        const Observation& o = problem.observations[i];
+        if (!(ViewPoint(cameras[o.view], o, estimate.points[o.point]).depth >
+              0)) {
           all_positive = false;
         }
       });

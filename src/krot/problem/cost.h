@@ -65,9 +65,7 @@ inline double ResidualOf(const ViewedPoint& viewed, Norm norm) {
   return residual < kInfinity ? residual : kInfinity;
 }
 
-// Whether every point has z > 0 in every camera that sees it. For rows whose
-// depth w is z, as those of perspective lenses, the cost is finite only then. A
-// third of the work of Cost.
+// Whether every observation has a depth w > 0: the cost is finite only then.
 bool AllDepthsPositive(const KnownRotationProblem& problem,
                        const Estimate& estimate, int num_threads);
 
