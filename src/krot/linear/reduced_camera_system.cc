@@ -25,6 +25,8 @@ constexpr int kNumParts = 4;
 constexpr double kSparseOperation = 15;
 // Reading a number of a matrix that is multiplied by a vector costs this.
 constexpr double kNumberRead = 60;
+// Forming the matrix costs this for each block that a point contributes to.
+constexpr double kBlockFormed = 3000;
 // The number of systems solved with one factor of an interior point, including
 // refinements.
 constexpr double kSolves = 12;
@@ -70,12 +72,18 @@ ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
     pattern_ = FullPattern(num_free);
     return;
   }
-  std::vector<int64_t> num_observations = {structure.num_observations()};
-  if (ranks != nullptr) {
-    ranks->Reduce([](int64_t a, int64_t b) { return a + b; },
-                  &num_observations);
+  std::vector<double> counts(2, 0);  // whole numbers, so exact
+  for (int64_t k = 0; k < structure.num_points(); ++k) {
+    const auto m = static_cast<double>(structure.point_begin[k + 1] -
+                                       structure.point_begin[k]);
+    counts[0] += m;
+    counts[1] += m * (m + 1) / 2;
   }
-  num_observations_ = static_cast<double>(num_observations[0]);
+  if (ranks != nullptr) {
+    ranks->Reduce([](double a, double b) { return a + b; }, &counts);
+  }
+  num_observations_ = counts[0];
+  num_contributions_ = counts[1];
   pattern_ = PairsThatSharePoints(structure, ranks);
   kind_ = CheapestKind();
   if (kind_ == Kind::kImplicit) {
@@ -100,6 +108,10 @@ double ReducedCameraSystem::ImplicitCost(int num_iterations) const {
   return num_iterations * kNumberRead * 9 * num_observations_;
 }
 
+double ReducedCameraSystem::CostFormed(double cost) const {
+  return cost + kBlockFormed * num_contributions_;
+}
+
 // The size of a sparse factor is determined only where it may be the cheapest.
 // For rough solutions a sparse factor is preferred to conjugate gradients: it
 // is small for long chains of frames, where these, without a factor, take many
@@ -118,8 +130,10 @@ ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
       return Kind::kSparse;
     }
   }
-  if (dense <= iterative) return Kind::kDense;
-  return is_rough ? Kind::kImplicit : Kind::kIterative;
+  if (is_rough) {
+    return iterative < CostFormed(dense) ? Kind::kImplicit : Kind::kDense;
+  }
+  return iterative < dense ? Kind::kIterative : Kind::kDense;
 }
 
 void ReducedCameraSystem::SetZero() {
@@ -298,7 +312,8 @@ Eigen::VectorXd ReducedCameraSystem::Solve(
   Eigen::VectorXd x = rhs;
   if (num_columns_ == 0) return x;
   if (kind_ == Kind::kImplicit) {
-    const int limit = static_cast<int>(DenseCost() / ImplicitCost(1));
+    const int limit =
+        static_cast<int>(CostFormed(DenseCost()) / ImplicitCost(1));
     if (!iterative_.Solve(rhs, tolerance, &x, limit, other_blocks)) {
       GoOnDensely();
     }

@@ -179,6 +179,7 @@ class ReducedCameraSystem {
   double DenseCost() const;
   double IterativeCost(int num_iterations) const;
   double ImplicitCost(int num_iterations) const;
+  double CostFormed(double cost) const;  // with that of forming the matrix
   Kind CheapestKind();
   Block BlockOf(int part, int32_t a, int32_t b);
   template <typename Visit>
@@ -191,6 +192,7 @@ class ReducedCameraSystem {
 
   const Use use_;
   double num_observations_ = 0;
+  double num_contributions_ = 0;  // of points to blocks
   Kind kind_ = Kind::kDense;
   int num_threads_ = 1;
   int64_t num_columns_ = 0;
