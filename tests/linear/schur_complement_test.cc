@@ -152,13 +152,13 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesTheNormalEquationsAsDenseQrDoes) {
 
 // With points that one frame alone sees, or twice.
 TYPED_TEST(CentredLeastSquaresTest, SolvesRoughlyWithoutFormingTheSystem) {
-  using System = CentredLeastSquares<TypeParam::value>;
+  using Solver = typename TestFixture::System;
   this->structure_ = MakeRandomStructure(900, 1);
-  System exact(this->structure_, {2});
-  System rough(this->structure_, {2}, System::Use::kRoughSolutions);
-  System one_thread(this->structure_, {1}, System::Use::kRoughSolutions);
+  Solver exact(this->structure_, {2});
+  Solver rough(this->structure_, {2}, Solver::Use::kSolverSolutions);
+  Solver one_thread(this->structure_, {1}, Solver::Use::kSolverSolutions);
   this->Fill(0, &exact);
-  for (System* system : {&exact, &rough, &one_thread}) {
+  for (Solver* system : {&exact, &rough, &one_thread}) {
     std::copy_n(exact.rows(0),
                 3 * TypeParam::value * this->structure_.num_observations(),
                 system->rows(0));
