@@ -155,8 +155,8 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesRoughlyWithoutFormingTheSystem) {
   using Solver = typename TestFixture::System;
   this->structure_ = MakeRandomStructure(900, 1);
   Solver exact(this->structure_, {2});
-  Solver rough(this->structure_, {2}, Solver::Use::kSolverSolutions);
-  Solver one_thread(this->structure_, {1}, Solver::Use::kSolverSolutions);
+  Solver rough(this->structure_, {2}, Solver::Use::kRoughSolutions);
+  Solver one_thread(this->structure_, {1}, Solver::Use::kRoughSolutions);
   this->Fill(0, &exact);
   for (Solver* system : {&exact, &rough, &one_thread}) {
     std::copy_n(exact.rows(0),
