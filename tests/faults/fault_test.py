@@ -93,7 +93,7 @@ def test_kind(injector, kind, limit, dice):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("krot")
-    parser.add_argument("--library", required=True)
+    parser.add_argument("--library", type=pathlib.Path, required=True)
     parser.add_argument("--limit", type=int, default=0)
     parser.add_argument("--memory", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
@@ -107,7 +107,7 @@ def main():
             continue
         with tempfile.TemporaryDirectory(prefix="krot-faults-") as folder:
             place = harness.Place(options.krot, command, pathlib.Path(folder))
-            injector = Injector(place, options.library)
+            injector = Injector(place, str(options.library.resolve(strict=True)))
             for kind in KINDS:
                 if options.kind and kind != options.kind:
                     continue
@@ -126,6 +126,8 @@ def main():
     for kind, (injected, refused, signals, wrong) in totals.items():
         print(f"| `{kind}` | {injected} | {refused} | "
               f"{injected - refused - signals} | {signals} | {wrong} |")
+    if not any(injected for injected, *_ in totals.values()):
+        sys.exit("no fault was injected")
     return 1 if any(total[-1] for total in totals.values()) else 0
 
 
