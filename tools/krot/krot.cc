@@ -250,9 +250,9 @@ int Main(const std::vector<std::string>& arguments) {
 
 int main(int argc, char** argv) try {
   krot::internal::SilenceCeres();
-  krot::internal::EndProcess(
+  return krot::internal::EndIfMemoryIsLimited(
       krot::internal::Main(krot::internal::ProgramArguments(argc, argv)));
 } catch (const std::bad_alloc&) {
-  krot::internal::EndProcess(krot::internal::Fail(
+  return krot::internal::EndIfMemoryIsLimited(krot::internal::Fail(
       "krot", "out of memory", krot::internal::kExitInternal));
 }

@@ -88,10 +88,11 @@ int ProcessId();
 void OnEndRequest(void (*handler)(), bool once);
 // Calls `function` in every child process after a fork.
 void OnFork(void (*function)());
-// Ends the process, whose streams must be flushed. Where its address space is
-// limited, functions that run at exit are left out: OpenBLAS, if it is
-// installed, waits there for its threads, which wait for memory without end.
-[[noreturn]] void EndProcess(int exit_code);
+// Where the address space of the process is limited, ends it, without functions
+// that run at exit: there OpenBLAS, if it is installed, waits for its threads,
+// which wait for memory without end. Elsewhere returns the exit code. Streams
+// must be flushed.
+int EndIfMemoryIsLimited(int exit_code);
 // Writes the text to stderr unchanged; may be called in a signal handler. False
 // if it fails.
 bool WriteToStderr(std::string_view text);

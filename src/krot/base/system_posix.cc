@@ -261,9 +261,9 @@ int64_t FreeOfAddressSpace() {
 
 }  // namespace
 
-void EndProcess(int exit_code) {
+int EndIfMemoryIsLimited(int exit_code) {
   if (FreeOfAddressSpace() != kUnlimited) std::_Exit(exit_code);
-  std::exit(exit_code);
+  return exit_code;
 }
 
 int64_t FreeMemoryBytes() {

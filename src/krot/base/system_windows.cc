@@ -247,7 +247,7 @@ void OnFork(void (*)()) {}  // there is no fork
 
 bool WriteToStderr(std::string_view text) { return WriteAll(kStderr, text); }
 
-void EndProcess(int exit_code) { std::exit(exit_code); }
+int EndIfMemoryIsLimited(int exit_code) { return exit_code; }
 
 int64_t FreeMemoryBytes() {
   MEMORYSTATUSEX status = {};
