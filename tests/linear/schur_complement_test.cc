@@ -9,6 +9,7 @@
 
 #include "tests/linear/random_blocks.h"
 #include "tests/oracle/dense_algebra.h"
+#include "tests/testing/thread_ranks.h"
 
 namespace krot::internal {
 namespace {
@@ -174,6 +175,41 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesRoughlyWithoutFormingTheSystem) {
     one_thread.Solve(nullptr, r.data(), tolerance, &same, nullptr);
     EXPECT_EQ(x.frames, same.frames);
   }
+}
+
+TEST(CentredLeastSquares, OfRanksHasTheBitsOfOneProcessThatFormsNoSystem) {
+  const BlockStructure whole = MakeRandomStructure(900, 1);
+  std::mt19937 generator(2);
+  std::normal_distribution<double> normal;
+  std::vector<double> rows(9 * whole.num_observations());
+  for (double& entry : rows) entry = normal(generator);
+  const auto solve = [&](int64_t begin, int64_t end, Ranks* ranks) {
+    const int64_t first = whole.point_begin[begin];
+    BlockStructure own = whole;
+    own.frame_of = {whole.frame_of.begin() + first,
+                    whole.frame_of.begin() + whole.point_begin[end]};
+    own.point_begin = {whole.point_begin.begin() + begin,
+                       whole.point_begin.begin() + end + 1};
+    for (int64_t& n : own.point_begin) n -= first;
+    Context context;
+    context.ranks = ranks;
+    CentredLeastSquares<3> system(own, context,
+                                  ReducedCameraSystem::Use::kRoughSolutions);
+    std::copy_n(&rows[9 * first], 9 * own.num_observations(), system.rows(0));
+    EXPECT_TRUE(system.Factorize());
+    BlockVector x;
+    system.Solve(nullptr, &rows[3 * first], 1e-3, &x, nullptr);
+    return x.frames;
+  };
+  const std::vector<Eigen::Vector3d> expected =
+      solve(0, whole.num_points(), nullptr);
+  constexpr int kRanks = 3;
+  ThreadRanks::Run(kRanks, [&](Ranks* ranks) {
+    const int64_t points = whole.num_points();
+    EXPECT_EQ(solve(points * ranks->rank() / kRanks,
+                    points * (ranks->rank() + 1) / kRanks, ranks),
+              expected);
+  });
 }
 
 TYPED_TEST(CentredLeastSquaresTest, SolvesForRowsGradedOverEightDecades) {
