@@ -97,6 +97,9 @@ runs 1 "is no command" solve
 runs 1 "add --overwrite 1" solver --input_path model --output_path MODEL
 runs 5 "is a file, expected a folder" solver --input_path model \
   --output_path proof.json
+ln -s . link
+runs 1 "must not be --html_path" solver --input_path model --output_path never \
+  --report_path new --html_path link/new
 cp -r model cut && truncate -s 100 cut/images.bin
 runs 2 "images.bin" solver --input_path cut --output_path never
 [[ ! -e never ]] || fails "an output was begun"

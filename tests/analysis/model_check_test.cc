@@ -477,8 +477,25 @@ TEST(CheckModel, CallsAnImageWeaklyHeldWhoseObservationsAreInOneCorner) {
   EXPECT_FALSE(check.IsAnythingWrong());
 }
 
+TEST(CheckModel, DoesNotCallTwoImagesWeaklyHeldWhoseDistanceIsTheUnit) {
+  const ModelCheck check = CheckModel(Scene(2, 2, 2), {}, {});
+  EXPECT_EQ(check.NumImages(ImageVerdict::kFine), 2);
+}
+
+// The image has no 2D points that see nothing.
+Model WithTracksForAllOf(size_t image, Model model) {
+  std::vector<Point2D> kept;
+  for (TrackElement& element : model.track_elements) {
+    if (element.image_id != model.images[image].id) continue;
+    kept.push_back(model.images[image].points2D[element.point2D_idx]);
+    element.point2D_idx = static_cast<uint32_t>(kept.size() - 1);
+  }
+  model.images[image].points2D = std::move(kept);
+  return model;
+}
+
 // Less than half of them contradict, but more than three times the noise would
-// have, and what agrees does not hold the image.
+// have, and what agrees does not hold the image, whether it lost tracks or not.
 TEST(CheckModel, CallsAnImageWrongThatIsWeaklyHeldAndContradicted) {
   SceneOptions options;
   options.num_frames = 10;
@@ -487,21 +504,24 @@ TEST(CheckModel, CallsAnImageWrongThatIsWeaklyHeldAndContradicted) {
   options.pixel_noise = 1;
   const Model scene = SynthesizeScene(options).ground_truth;
   for (const int percent : {0, 10, 45}) {
-    Model model = WithObservationsInOneCorner(7, 120, scene);
-    const ImageId id = model.images[7].id;
-    int num = 0;
-    for (size_t e = 0; e < model.track_elements.size(); ++e) {
-      if (model.track_elements[e].image_id != id) continue;
-      if (++num * percent % 100 < percent) Pixel(&model, e).y += 40;
+    for (const bool keeps_few : {true, false}) {
+      Model model = WithObservationsInOneCorner(7, 120, scene);
+      if (!keeps_few) model = WithTracksForAllOf(7, std::move(model));
+      const ImageId id = model.images[7].id;
+      int num = 0;
+      for (size_t e = 0; e < model.track_elements.size(); ++e) {
+        if (model.track_elements[e].image_id != id) continue;
+        if (++num * percent % 100 < percent) Pixel(&model, e).y += 40;
+      }
+      const ModelCheck check = CheckModel(model, {}, {});
+      if (percent < 45) {
+        EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty()) << percent;
+        continue;
+      }
+      EXPECT_THAT(Images(check, ImageVerdict::kWrong), ElementsAre(id));
+      EXPECT_EQ(check.images[7].fault, ImageFault::kUnsupported);
+      EXPECT_GT(check.images[7].num_tested, 2 * check.images[7].num_wrong);
     }
-    const ModelCheck check = CheckModel(model, {}, {});
-    if (percent < 45) {
-      EXPECT_THAT(Images(check, ImageVerdict::kWrong), IsEmpty()) << percent;
-      continue;
-    }
-    EXPECT_THAT(Images(check, ImageVerdict::kWrong), ElementsAre(id));
-    EXPECT_EQ(check.images[7].fault, ImageFault::kUnsupported);
-    EXPECT_GT(check.images[7].num_tested, 2 * check.images[7].num_wrong);
   }
 }
 

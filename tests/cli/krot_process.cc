@@ -38,6 +38,8 @@ KrotProcess::KrotProcess(const std::vector<std::string>& arguments,
   if (max_memory_bytes > 0) {
     const rlimit limit = {max_memory_bytes, max_memory_bytes};
     if (setrlimit(RLIMIT_AS, &limit) != 0) _exit(125);
+    // Each of its threads would ask for more than there is, again and again.
+    setenv("OPENBLAS_NUM_THREADS", "1", 1);
   }
   execv(argv[0], argv.data());
   _exit(127);

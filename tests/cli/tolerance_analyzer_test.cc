@@ -29,6 +29,11 @@ class ToleranceAnalyzer : public ::testing::Test {
     for (TrackElement& element : model_.track_elements) {
       if (element.image_id == id) element.image_id = kLarge;
     }
+    for (Frame& frame : model_.frames) {
+      for (FrameData& data : frame.data) {
+        if (data.data_id == id) data.data_id = kLarge;
+      }
+    }
     Save(model_, folder_ / "input");
     max_error_ = std::to_string(1.2 * Summarize(PixelErrors(model_)).max);
   }

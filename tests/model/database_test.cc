@@ -211,6 +211,12 @@ TEST(Database, IsRefusedWithOneSentenceIfItIsNone) {
   WriteBytes(path, "version https://git-lfs.github.com/spec/v1\noid sha256:4d");
   EXPECT_THAT(DatabaseError(path, ThreeImages()),
               HasSubstr("is a Git LFS pointer"));
+  fs::remove(path);
+  DatabaseWriter writer(path);
+  WriteImages(&writer);
+  writer.Execute("ALTER TABLE two_view_geometries RENAME TO inlier_matches");
+  EXPECT_THAT(DatabaseError(path, ThreeImages()),
+              HasSubstr("found the matches of COLMAP's first versions"));
 }
 
 TEST(Database, IsRefusedWithOneSentenceIfItContradictsItself) {

@@ -7,6 +7,7 @@ import contextlib
 import io
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -343,6 +344,18 @@ class ColmapInstaller(unittest.TestCase):
                           in everything(copy).items()},
                          {path: data for path, (data, _)
                           in everything(self.colmap).items()})
+
+    def test_every_header_of_krot_that_the_patches_include_exists(self):
+        sources = PATCHES.parent / "src"
+        included = set()
+        for path in [*PATCHES.rglob("*.patch"), *PATCHES.rglob("*.cc"),
+                     *PATCHES.rglob("*.h")]:
+            included.update(re.findall(r'^\+?#include [<"](krot/[^>"]+)',
+                                       path.read_text("utf-8"), re.MULTILINE))
+        self.assertGreater(len(included), 5)
+        self.assertEqual([name for name in sorted(included)
+                          if not (sources / name).exists()
+                          and name != "krot/version.h"], [])
 
 
 if __name__ == "__main__":

@@ -21,8 +21,6 @@
 #include <krot/outliers/outlier_filter.h>
 #include <krot/outliers/filter_steps.h>
 #include <krot/report/reports.h>
-#include <krot/report/reports.h>
-#include <krot/report/reports.h>
 
 namespace colmap {
 namespace {
