@@ -171,7 +171,8 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesRoughlyWithoutFormingTheSystem) {
   exact.Solve(nullptr, r.data(), &x, expected.data());
   for (const double tolerance : {1e-2, 1e-8}) {
     rough.Solve(nullptr, r.data(), tolerance, &x, image.data());
-    EXPECT_LT((image - expected).norm(), 2 * tolerance * expected.norm());
+    // The tolerance is that of an estimate of this norm.
+    EXPECT_LT((image - expected).norm(), 5 * tolerance * expected.norm());
     one_thread.Solve(nullptr, r.data(), tolerance, &same, nullptr);
     EXPECT_EQ(x.frames, same.frames);
   }

@@ -50,7 +50,7 @@ void AddCheckerOptions(CheckerCommand* command, OptionParser* parser) {
                         "how many matches any baselines explain");
   parser->AddChoice("fail_on", &command->fail_on, {"never", "wrong"},
                     "When to end with code 9, for scripts: wrong: if an image "
-                    "or an observation is wrong");
+                    "or an observation is wrong, or the model not adjusted");
   parser->AddInteger("num_worst", &command->num_worst, AtLeast(0),
                      "How many images of each verdict, observations and tracks "
                      "to list");
@@ -206,8 +206,10 @@ int Run(const CheckerCommand& command, const OptionParser& parser) {
   RecordEnd(total_timer, num_threads, &report.run);
   WriteViews(command, report, write_options, model, cured, database);
   PrintTable(log, CheckTable(report, command.num_worst));
+  const ModelCheck& check = report.check;
+  const bool is_unknown = check.sigma_px && !check.is_adjusted;
   const bool fails =
-      command.fail_on == "wrong" && report.check.IsAnythingWrong();
+      command.fail_on == "wrong" && (check.IsAnythingWrong() || is_unknown);
   return fails ? kExitWrong : kExitDone;
 }
 

@@ -111,6 +111,16 @@ void TakeColors(const std::string& image_path, const LogOptions& log,
   }
 }
 
+std::string WhyNoPoint(const MatchTracksSummary& summary) {
+  if (summary.num_two_views > 0 &&
+      summary.num_two_views == summary.num_components) {
+    return "no match is confirmed by a third image, nor by a track of the "
+           "model, which --clear_points 1 leaves out";
+  }
+  return "no matches of images that have poses agree with these; krot "
+         "model_checker --database_path says what is wrong";
+}
+
 int RunOnMatches(const SolveCommand& command, const MatchesCommand& matches) {
   const Timer total_timer;
   const LogOptions& log = command.common.log;
@@ -131,10 +141,8 @@ int RunOnMatches(const SolveCommand& command, const MatchesCommand& matches) {
       TriangulateMatches(model, database, options, command.context);
   report.seconds_triangulate = timer.Seconds();
   if (result.model.points3D.empty()) {
-    throw CommandError(
-        kExitNothingToSolve,
-        "nothing to triangulate: no matches of images that have poses agree "
-        "with these; krot model_checker --database_path says what is wrong");
+    throw CommandError(kExitNothingToSolve,
+                       "nothing to triangulate: " + WhyNoPoint(result.summary));
   }
   DeferInterrupts();
   if (!matches.image_path.empty()) {

@@ -191,10 +191,10 @@ class Checker {
     return worst;
   }
 
-  // Calls images wrong that neither tracks nor matches hold. Those with few
-  // agreeing observations bend nothing, so all go at once. If there are none,
-  // the most weakly held one goes of those that are contradicted more than
-  // noise explains. False if nothing goes.
+  // Calls images wrong that neither tracks nor matches hold. Those that lost
+  // tracks and keep few observations bend nothing: all go at once. If there are
+  // none, the most weakly held one goes of those that are contradicted more
+  // than noise explains. False if nothing goes.
   bool CallUnsupported() {
     const double spread =
         MedianOfSound([&](size_t n) { return sums_[n].CenterSpread(); });
@@ -202,13 +202,13 @@ class Checker {
     int32_t weakest = -1;
     for (int32_t n = 0; n < static_cast<int32_t>(sums_.size()); ++n) {
       const ImageCheck& image = check_.images[n];
-      if (IsWrong(n) || RelativeKept(n) >= 1 ||
+      if (IsWrong(n) ||
           (check_.pairs && check_.pairs->images[n].kept_matches > 0) ||
           sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
         continue;
       }
       if (image.num_tested - image.num_wrong < kFewestAgree) {
-        few.push_back(n);
+        if (RelativeKept(n) < 1) few.push_back(n);
       } else if (ContradictionExponent(n) > LeastExponent(n) &&
                  (weakest < 0 ||
                   sums_[n].CenterSpread() > sums_[weakest].CenterSpread())) {
@@ -359,7 +359,7 @@ class Checker {
           kDegreesPerRadian * *check_.sigma_px * sums_[n].TurnSpread();
       sigmas.push_back(image.center_sigma);
     }
-    if (sigmas.empty()) return;
+    if (sigmas.size() <= 2) return;  // two images: their distance is the unit
     const double median = LowerMedian(std::move(sigmas));
     for (ImageCheck& image : check_.images) {
       if (image.verdict == ImageVerdict::kWrong) continue;

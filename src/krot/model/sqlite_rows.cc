@@ -76,6 +76,14 @@ std::string VfsWithoutLocks() {
   return "";
 }
 
+// Calls again what memory was short for, as SQLite says of some damage, too
+// (SqliteDatabase::Require).
+template <typename Call>
+int CallTwice(const Call& call) {
+  const int status = call();
+  return status == SQLITE_NOMEM ? call() : status;
+}
+
 }  // namespace
 
 SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
@@ -99,20 +107,27 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path)
                     !std::filesystem::exists(path_ + "-shm", error)));
   std::string uri = UriOf(path_) + "?mode=ro";
   if (is_unlocked_) uri += has_log ? "&vfs=" + without_locks : "&immutable=1";
-  sqlite3* database = nullptr;
-  const int status = sqlite3_open_v2(
-      uri.c_str(), &database, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
-  database_.reset(database);
-  Require(status);
+  Require(CallTwice([&] {
+    sqlite3* opened = nullptr;
+    const int status = sqlite3_open_v2(
+        uri.c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI, nullptr);
+    database_.reset(opened);
+    return status;
+  }));
+  sqlite3* const database = database_.get();
+  const auto execute = [&](const char* sql) {
+    Require(CallTwice([&] {
+      return sqlite3_exec(database, sql, nullptr, nullptr, nullptr);
+    }));
+  };
   sqlite3_busy_timeout(database, 5000);  // milliseconds
   sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   if (is_unlocked_) {  // keeps the index of the log in memory
-    Require(sqlite3_exec(database, "PRAGMA locking_mode = EXCLUSIVE", nullptr,
-                         nullptr, nullptr));
+    execute("PRAGMA locking_mode = EXCLUSIVE");
   }
   // Everything that follows reads the same state of the database.
-  Require(sqlite3_exec(database, "BEGIN", nullptr, nullptr, nullptr));
+  execute("BEGIN");
   for (const FileState& file : before_) bytes_left_ += file.size;
 }
 
@@ -182,9 +197,17 @@ SqliteRows::SqliteRows(SqliteDatabase* database, const std::string& table,
     : database_(*database),
       table_(table),
       statement_(nullptr, &sqlite3_finalize) {
-  Prepare("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '" +
-          table + "'");
-  if (!Next()) {
+  const auto has_table = [&](const std::string& name) {
+    Prepare("SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '" +
+            name + "'");
+    return Next();
+  };
+  if (!has_table(table)) {
+    if (table == "two_view_geometries" && has_table("inlier_matches")) {
+      database_.Fail(
+          "found the matches of COLMAP's first versions, expected the table "
+          "two_view_geometries; colmap database_creator converts a copy");
+    }
     database_.Fail("found no table " + table +
                    ", expected COLMAP's tables images, keypoints and "
                    "two_view_geometries; is this COLMAP's database?");
@@ -195,11 +218,9 @@ SqliteRows::SqliteRows(SqliteDatabase* database, const std::string& table,
 void SqliteRows::Prepare(const std::string& sql) {
   sqlite3_stmt* statement = nullptr;
   sqlite3* database = database_.database_.get();
-  const auto prepare = [&] {
+  const int status = CallTwice([&] {
     return sqlite3_prepare_v2(database, sql.c_str(), -1, &statement, nullptr);
-  };
-  int status = prepare();
-  if (status == SQLITE_NOMEM) status = prepare();
+  });
   if (status == SQLITE_ERROR) {
     database_.Fail("the table " + table_ + " is not COLMAP's (" +
                    sqlite3_errmsg(database) +

@@ -10,6 +10,10 @@
 namespace krot::internal {
 namespace {
 
+bool IsNotAdjusted(const ModelCheck& check) {
+  return check.sigma_px && !check.is_adjusted;
+}
+
 std::string NoiseWords(const ModelCheck& check) {
   return check.sigma_px
              ? "noise of " + FormatNumber(*check.sigma_px, 3) + " px per axis" +
@@ -122,10 +126,6 @@ std::string TrackTable(const ModelCheck& check, size_t max_rows) {
   return "\nTracks that are two points: " +
          Thousands(static_cast<int64_t>(check.tracks.size())) + "\n" +
          table.ToString();
-}
-
-bool IsNotAdjusted(const ModelCheck& check) {
-  return check.sigma_px && !check.is_adjusted;
 }
 
 std::string RobustAdjustment(const std::string& model, double scale_px) {
@@ -309,9 +309,12 @@ std::string ForAdjusted(const CheckReport& report) {
 }  // namespace
 
 std::string CheckSentence(const CheckReport& report) {
-  return (IsNotAdjusted(report.check)
-              ? "The model is not adjusted, so adjust it first. As it stands: "
-              : "") +
+  if (!IsNotAdjusted(report.check)) return ForAdjusted(report);
+  if (!report.check.IsAnythingWrong()) {
+    return "The model is not adjusted, so nothing can be said yet: adjust it, "
+           "and check it again.";
+  }
+  return "The model is not adjusted, so adjust it first. As it stands: " +
          ForAdjusted(report);
 }
 

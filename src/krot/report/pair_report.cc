@@ -97,7 +97,7 @@ std::string WrongPairTable(const PairCheck& check, size_t max_rows) {
                   std::to_string(wrong[n]->num_matches),
                   std::to_string(wrong[n]->num_agreeing)});
   }
-  return "\nPairs of right images with wrong matches: " +
+  return "\nContradictory pairs of images that are not wrong: " +
          std::to_string(wrong.size()) + "\n" + table.ToString();
 }
 
@@ -179,8 +179,8 @@ std::string PairSentence(const PairCheck& check) {
     sentence += "no image is wrong";
   }
   if (num_pairs > 0) {
-    sentence += ", and " + Counted(num_pairs, "pair") + " of right images " +
-                (num_pairs == 1 ? "has" : "have") + " wrong matches";
+    sentence += ", and no image is to blame for " + Counted(num_pairs, "pair") +
+                ", whose matches are wrong, or a lens is";
   }
   if (num_groups > 0) {
     sentence += "; " + std::to_string(num_groups) +
@@ -295,8 +295,8 @@ class PairView {
     for (size_t i = 0; i < model_.images.size(); ++i) {
       const Camera& camera = model_.cameras[geometries_[i].camera];
       const auto side = [&](uint64_t pixels) {
-        return std::max(
-            1L, std::lround(scales_[i] * static_cast<double>(pixels)));
+        return std::max(1L,
+                        std::lround(scales_[i] * static_cast<double>(pixels)));
       };
       images.push_back({{"width", side(camera.width)},
                         {"height", side(camera.height)},

@@ -253,6 +253,13 @@ ToleranceProblem::ToleranceProblem(const Model& model, BuiltProblem* built,
   }
   has_row_ =
       TakeOuterRows(model, *built, norm, bound, context.num_threads, &problem);
+  // Rays beyond a lens's fold may project near a pixel, too, but rows hold the
+  // ray of the pixel.
+  for (size_t i = 0; i < has_row_.size(); ++i) {
+    const ViewedPoint viewed =
+        ViewPoint(problem, problem.observations[i], centre);
+    if (!(ResidualOf(viewed, norm) < bound)) has_row_[i] = 0;
+  }
   num_rowless_ = std::count(has_row_.begin(), has_row_.end(), char{0});
   is_far_ = FindFarPoints(problem, norm, bound, context);
   num_far_points_ = std::count(is_far_.begin(), is_far_.end(), char{1});
