@@ -58,16 +58,15 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
     table.AddRow(
         {"image", "observations", "checked", "more than noise", "why"});
   } else {
-    table.AddRow({"image", "observations", "checked", "centre +-",
-                  "median image's x", "turn +-, degrees"});
+    table.AddRow({"image", "observations", "checked", "more than noise",
+                  "centre +-", "median image's x", "turn +-, degrees"});
   }
   for (size_t n = 0; n < std::min(images.size(), max_rows); ++n) {
     const ImageCheck& image = *images[n];
-    std::vector<std::string> row = {image.name,
-                                    std::to_string(image.num_observations),
-                                    std::to_string(image.num_tested)};
+    std::vector<std::string> row = {
+        image.name, std::to_string(image.num_observations),
+        std::to_string(image.num_tested), std::to_string(image.num_wrong)};
     if (is_wrong) {
-      row.push_back(std::to_string(image.num_wrong));
       row.push_back(ReasonOf(check, image));
     } else {
       row.push_back(SigmaText(image.center_sigma));
@@ -218,7 +217,11 @@ std::string NextSteps(const CheckReport& report) {
 std::string ReasonOf(const ModelCheck& check, const ImageCheck& image) {
   if (image.verdict == ImageVerdict::kWeaklyHeld) {
     return "its centre may move more than ten times as far as the median "
-           "image's";
+           "image's" +
+           (image.num_wrong > image.num_tested / 10
+                ? ", and " + std::to_string(image.num_wrong) +
+                      " of its observations contradict: it may be misplaced"
+                : "");
   }
   switch (image.fault) {
     case ImageFault::kMatches:
