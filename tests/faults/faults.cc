@@ -107,11 +107,11 @@ void Log(const char* word, const char* value) {
 // Whether this call must fail; errno is set then.
 bool Strikes(int call, const char* name) {
   if (!is_armed.load(std::memory_order_relaxed)) return false;
-  ++num_of_call[__builtin_ctz(static_cast<unsigned>(call))];
   if ((chosen->always_fail & call) != 0) {
     errno = EINVAL;
     return true;
   }
+  ++num_of_call[__builtin_ctz(static_cast<unsigned>(call))];
   if ((chosen->calls & call) == 0) return false;
   const long n = ++num_calls;
   if (n != struck_call && !(is_sticky && n > struck_call)) return false;
