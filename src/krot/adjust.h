@@ -43,6 +43,14 @@ struct BundleAdjustmentOptions {
   // sensors through which it sees keep their poses in the rig.
   FixedParts fixed;
 
+  // Places of cameras and points that are known from elsewhere (GPS, a survey)
+  // take part as observations: a region's semi-axes are three standard
+  // deviations. What takes no part or cannot move has none. Not with a cap.
+  std::vector<KnownPosition> positions;
+  // The noise of a pixel coordinate, against which the positions weigh; > 0;
+  // pixels. None: the model's sigma_px (krot/check.h), or 1 if it has none.
+  std::optional<double> sigma_px;
+
   // Points with fewer usable observations take no part unless they are fixed;
   // at least 1. COLMAP's default is 0, which lets a point with a single ray
   // move along that ray.
@@ -104,9 +112,12 @@ struct BundleAdjustmentSummary {
   int64_t num_no_pose = 0;
   int64_t num_behind = 0;
   int64_t num_short_track = 0;
-  int64_t num_parameters = 0;  // that moved, gauge included
+  int64_t num_parameters = 0;      // that moved, gauge included
+  int64_t num_positions = 0;       // known ones that took part
+  std::optional<double> sigma_px;  // pixel noise, against which they weighed
 
-  // Half the sum of the robust squared errors, pixels^2.
+  // Half the sum of the robust squared errors, and of the known positions' in
+  // pixels, pixels^2.
   double cost_initial = 0;
   double cost_final = 0;
   int num_iterations = 0;

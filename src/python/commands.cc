@@ -68,7 +68,9 @@ void Follow(const Progress& progress, SolveModelOptions* options) {
 
 Outcome RunSolve(const ConstModelPointer& model, TolerantSolveOptions options,
                  Context context, const Progress& progress,
-                 const std::string& command, const RunRecord& run) {
+                 const std::string& command, const RunRecord& run,
+                 const std::optional<PositionFrame>& position_frame = {},
+                 bool writes_own_frame = false) {
   const Timer timer;
   Follow(progress, &options.solve);
   options.solve.describe_certificate = true;
@@ -84,6 +86,8 @@ Outcome RunSolve(const ConstModelPointer& model, TolerantSolveOptions options,
   report.method = MethodName(result.summary.method);
   report.summary = std::move(result.summary);
   report.outliers = std::move(result.outliers);
+  report.position_frame = position_frame;
+  if (writes_own_frame) result.model = InPositionFrame(result.model, &report);
   Outcome outcome{std::make_shared<Model>(std::move(result.model)),
                   SolveJson(report), std::nullopt};
   if (report.summary.certificate) {
@@ -107,9 +111,11 @@ Outcome SolveCommand(const ModelPointer& model, const Progress& progress,
   RunRecord run;
   const ConstModelPointer input = known.WithRotations(model, &run);
   options.solve.problem.fixed = known.Fixed(*input);
-  options.solve.problem.positions = known.Positions(*input);
+  KnownPositions positions = known.Positions(*input);
+  options.solve.problem.positions = std::move(positions.positions);
   options.has_other_rotations = run.rotations.has_value();
-  return RunSolve(input, options, context, progress, "solver", run);
+  return RunSolve(input, options, context, progress, "solver", run,
+                  positions.frame, known.writes_own_frame());
 }
 
 Outcome TriangulateCommand(const ModelPointer& model, const Progress& progress,
@@ -191,16 +197,26 @@ Outcome AdjustCommand(const ModelPointer& model, const Progress& progress,
   AdjustmentOptions given;
   OptionTable table = TableOf("pykrot.bundle_adjust");
   given.AddTo(&table);
+  KnownFiles known;
+  known.AddFixedTo(&table);
+  known.AddPositionsTo(&table);
   AssignKeywords(keywords, &table);
   AdjustModelOptions options = given.Resolve(table);
+  Model input = *model;
+  const Survey survey(known.Positions(input), known.writes_own_frame(), &input);
+  options.adjustment.fixed = known.Fixed(input);
+  options.adjustment.positions = survey.positions();
   Follow(progress, &options.start);
   AdjustModelResult result;
   RunInterruptibly([&](const CancelFlag& cancel) {
-    result = AdjustModel(*model, options, {given.num_threads(), &cancel});
+    result = AdjustModel(input, options, {given.num_threads(), &cancel});
   });
   AdjustmentReport report;
   RecordEnd(timer, given.num_threads(), &report.run);
   report.summary = std::move(result.summary);
+  report.positions = survey.ComparePositions(result.model);
+  report.position_frame = survey.frame();
+  report.is_in_position_frame = survey.is_in_own_frame();
   std::string json = AdjustmentJson(report, result.model);
   return {std::make_shared<Model>(std::move(result.model)), std::move(json),
           std::nullopt};

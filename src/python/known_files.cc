@@ -35,14 +35,20 @@ void KnownFiles::AddFixedTo(OptionTable* table) {
 }
 
 void KnownFiles::AddPositionsTo(OptionTable* table) {
-  AddFile("positions_path", &positions_path_, table);
-  AddFile("point_positions_path", &point_positions_path_, table);
+  AddFile("positions_path", &positions_.of_cameras, table);
+  AddFile("point_positions_path", &positions_.of_points, table);
   table->Add({"Problem.position_radius", "", "a number > 0", "", false,
               [this](const std::string& text) {
-                position_radius_.emplace();
-                return ParseReal(text, &*position_radius_) &&
-                       *position_radius_ > 0;
+                positions_.radius.emplace();
+                return ParseReal(text, &*positions_.radius) &&
+                       *positions_.radius > 0;
               }});
+  table->Add({"positions_frame", "", "one of {model, own}", "model", false,
+              [this](const std::string& text) {
+                positions_.have_own_frame = text == "own";
+                return text == "own" || text == "model";
+              }});
+  table->AddChoice("output_frame", &output_frame_, {"model", "own"}, "");
 }
 
 void KnownFiles::AddDatabaseTo(OptionTable* table) {
@@ -76,18 +82,17 @@ FixedParts KnownFiles::Fixed(const Model& model) const {
   return fixed;
 }
 
-std::vector<KnownPosition> KnownFiles::Positions(const Model& model) const {
-  std::vector<KnownPosition> positions;
-  if (!positions_path_.empty()) {
-    positions = ReadPositions(ReadFileBytes(positions_path_), model,
-                              {position_radius_, &Warn});
+KnownPositions KnownFiles::Positions(const Model& model) const {
+  if (writes_own_frame() && !positions_.have_own_frame) {
+    throw OptionError(
+        "output_frame has no effect without positions_frame='own'");
   }
-  if (!point_positions_path_.empty()) {
-    const std::vector<KnownPosition> of_points = ReadPointPositions(
-        ReadFileBytes(point_positions_path_), model, {position_radius_, &Warn});
-    positions.insert(positions.end(), of_points.begin(), of_points.end());
+  KnownPositions known = ReadKnownPositions(positions_, model, &Warn);
+  if (!known.frame) return known;
+  for (const WrongPosition& wrong : known.frame->wrong) {
+    Warn(WrongPositionSentence(wrong));
   }
-  return positions;
+  return known;
 }
 
 }  // namespace krot::internal

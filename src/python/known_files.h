@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "krot/analysis/position_frame.h"
 #include "krot/database.h"
 #include "krot/model.h"
 #include "krot/model/model_io.h"
@@ -27,7 +28,9 @@ class KnownFiles {
   std::shared_ptr<const Model> WithRotations(
       const std::shared_ptr<Model>& model, RunRecord* run) const;
   FixedParts Fixed(const Model& model) const;
-  std::vector<KnownPosition> Positions(const Model& model) const;
+  // Warns of positions that contradict the others, in their own frame.
+  KnownPositions Positions(const Model& model) const;
+  bool writes_own_frame() const { return output_frame_ == "own"; }
   // None if no database is given.
   std::optional<Database> Matches(const Model& model) const;
 
@@ -35,9 +38,8 @@ class KnownFiles {
   std::string rotations_path_;
   std::string fixed_images_path_;
   std::string fixed_points_path_;
-  std::string positions_path_;
-  std::string point_positions_path_;
-  std::optional<double> position_radius_;
+  PositionFiles positions_;
+  std::string output_frame_ = "model";
   std::string database_path_;
 };
 

@@ -12,7 +12,9 @@
 #include <ceres/solver.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 
+#include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
@@ -84,9 +86,28 @@ struct FixedRotationResidual {
   }
 };
 
-double IndependentFixedRotationCost(const Model& model,
-                                    ceres::LossFunction* loss,
-                                    const FixedParts& fixed = {}) {
+// A third of the radius of a ball is one standard deviation, like `sigma_px`.
+struct FixedRotationPosition {
+  Eigen::Matrix3d R;  // the identity for a point
+  double sign;        // centre = -R't, point = x
+  Eigen::Vector3d position;
+  double px_per_unit;
+
+  template <typename T>
+  bool operator()(const T* unknown, T* residual) const {
+    for (int i = 0; i < 3; ++i) {
+      residual[i] =
+          px_per_unit * (sign * (R(0, i) * unknown[0] + R(1, i) * unknown[1] +
+                                 R(2, i) * unknown[2]) -
+                         position[i]);
+    }
+    return true;
+  }
+};
+
+double IndependentFixedRotationCost(
+    const Model& model, ceres::LossFunction* loss, const FixedParts& fixed = {},
+    const std::vector<KnownPosition>& positions = {}, double sigma_px = 1) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const auto image_indices = ImageIndices(model);
   std::vector<Eigen::Vector3d> translations, points;
@@ -112,7 +133,22 @@ double IndependentFixedRotationCost(const Model& model,
           loss, translations[n].data(), points[k].data());
     }
   }
-  problem.SetParameterBlockConstant(translations[0].data());
+  for (const KnownPosition& known : positions) {
+    const bool is_point = known.of == KnownPosition::Of::kPoint3D;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<FixedRotationPosition, 3, 3>(
+            new FixedRotationPosition{
+                is_point ? Eigen::Matrix3d::Identity()
+                         : geometries[known.index].cam_from_world.rotation,
+                is_point ? 1.0 : -1.0, known.region.centre,
+                3 * sigma_px / known.region.semi_axes[0]}),
+        nullptr,
+        is_point ? points[known.index].data()
+                 : translations[known.index].data());
+  }
+  if (positions.empty()) {
+    problem.SetParameterBlockConstant(translations[0].data());
+  }
   for (size_t n = 0; n < translations.size(); ++n) {
     if (!fixed.HasFrame(geometries[n].frame)) continue;
     problem.SetParameterBlockConstant(translations[n].data());
@@ -164,6 +200,79 @@ TEST(AdjustBundle, WithFixedPartsEndsWhereAnIndependentProblemDoes) {
       IndependentFixedRotationCost(model, nullptr, options.fixed);
   EXPECT_NEAR(CostOf(result.model), expected, 1e-8 * expected);
   EXPECT_GT(expected, 1.001 * IndependentFixedRotationCost(model, nullptr));
+}
+
+// Positions that the images contradict, so that both give way.
+TEST(AdjustBundle, WithKnownPositionsEndsWhereAnIndependentProblemDoes) {
+  const Model model = SynthesizeScene(SmallOptions()).model;
+  BundleAdjustmentOptions options = RotationsFixed();
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  for (const int32_t n : {0, 2, 5}) {
+    options.positions.push_back(
+        {KnownPosition::Of::kImage, n,
+         BallAround(Center(images[n].cam_from_world) +
+                        Eigen::Vector3d(0.01 * n, 0.02, 0),
+                    0.03)});
+  }
+  options.positions.push_back(
+      {KnownPosition::Of::kPoint3D, 7,
+       BallAround(model.points3D[7].xyz - Eigen::Vector3d(0, 0, 0.01), 0.01)});
+  options.sigma_px = 0.7;
+  const BundleAdjustmentResult result =
+      AdjustBundle(model, options, kAdjustAlone);
+  EXPECT_EQ(result.summary.num_positions, 4);
+  const double expected = IndependentFixedRotationCost(
+      model, nullptr, {}, options.positions, *options.sigma_px);
+  EXPECT_NEAR(result.summary.cost_final, expected, 1e-8 * expected);
+  EXPECT_LT(CostOf(result.model), 0.999 * expected);
+}
+
+// What is exact stays exact, with images in rigs and rotations that move, and
+// comes to the frame of the positions.
+TEST(AdjustBundle, TakesTheModelToKnownPositions) {
+  SceneOptions scene = SmallOptions();
+  scene.sensors_per_rig = 2;
+  scene.pixel_noise = 0;
+  const Model truth = SynthesizeScene(scene).ground_truth;
+  const Similarity moved = {
+      1.02,
+      Eigen::AngleAxisd(0.03, Eigen::Vector3d::UnitX()).matrix(),
+      {0.02, 0.01, -0.03}};
+  const Model start = TransformModel(truth, moved);
+  BundleAdjustmentOptions options = Exact();
+  options.sigma_px = 1;
+  const std::vector<ImageGeometry> images = ImageGeometries(truth);
+  for (size_t n = 0; n < images.size(); ++n) {
+    options.positions.push_back(
+        {KnownPosition::Of::kImage, static_cast<int32_t>(n),
+         BallAround(Center(images[n].cam_from_world), 1e-3)});
+  }
+  const Model result = AdjustBundle(start, options, kAdjustAlone).model;
+  const std::vector<ImageGeometry> after = ImageGeometries(result);
+  for (size_t n = 0; n < images.size(); ++n) {
+    EXPECT_LT(
+        (Center(after[n].cam_from_world) - Center(images[n].cam_from_world))
+            .norm(),
+        1e-6);
+  }
+  EXPECT_LT(Summarize(PixelErrors(result, 1)).max, 1e-4);
+}
+
+TEST(AdjustBundle, LeavesOutPositionsOfWhatCannotMove) {
+  const Model model = SynthesizeScene(SmallOptions()).model;
+  BundleAdjustmentOptions options = Exact();
+  options.fixed = SomeFixed(model);
+  options.sigma_px = 1;
+  const auto of_point = [](int32_t k) {
+    return KnownPosition{KnownPosition::Of::kPoint3D, k,
+                         BallAround(Eigen::Vector3d::Zero(), 1)};
+  };
+  options.positions = {of_point(1), of_point(2), of_point(3)};
+  EXPECT_EQ(AdjustBundle(model, options, kAdjustAlone).summary.num_positions,
+            1);
+  options.positions.push_back(of_point(3));
+  EXPECT_THROW(AdjustBundle(model, options, kAdjustAlone),
+               std::invalid_argument);
 }
 
 TEST(AdjustBundle, LeavesTheBitsOfWhatIsFixedAndMovesTheRest) {

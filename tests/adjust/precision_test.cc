@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <functional>
+#include <random>
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
@@ -11,6 +12,7 @@
 #include "krot/adjust/precision_system.h"
 #include "krot/geometry.h"
 #include "krot/model/rigs.h"
+#include "krot/pipeline/adjust_model.h"
 #include "krot/synthetic/scene.h"
 
 // The oracle knows no derivative, eliminates nothing and has no formula of a
@@ -46,9 +48,17 @@ using Functional = std::function<VectorXd(const AdjustmentBlocks&)>;
 
 VectorXd StackedErrors(const AdjustmentBlocks& blocks) {
   const auto errors = ProjectErrors(blocks, 1e300, 1);
-  VectorXd stacked(2 * static_cast<Index>(errors->size()));
+  const auto num_coordinates = 2 * static_cast<Index>(errors->size());
+  VectorXd stacked(num_coordinates +
+                   3 * static_cast<Index>(blocks.positions.size()));
   for (size_t i = 0; i < errors->size(); ++i) {
     stacked.segment<2>(static_cast<Index>(2 * i)) = (*errors)[i].r;
+  }
+  for (size_t n = 0; n < blocks.positions.size(); ++n) {
+    const PositionObservation& position = blocks.positions[n];
+    stacked.segment<3>(num_coordinates + static_cast<Index>(3 * n)) =
+        position.px_from_world *
+        (PlaceOf(position, blocks) - position.position);
   }
   return stacked;
 }
@@ -154,6 +164,7 @@ struct DenseOracle {
               AdjustmentDatum datum)
       : blocks(MakeAdjustmentBlocks(model, 2, options.fixed)),
         columns(options, blocks) {
+    AddPositions(model, options.positions, 1, columns, &blocks);
     const MatrixXd J = Differentiate(columns, blocks, StackedErrors);
     const VectorXd norms = J.colwise().norm();
     std::vector<Index> moving;
@@ -225,9 +236,10 @@ struct DenseOracle {
 AdjustmentPrecision PrecisionOf(const Model& model,
                                 const BundleAdjustmentOptions& options,
                                 AdjustmentDatum datum) {
-  const AdjustmentBlocks blocks =
+  AdjustmentBlocks blocks =
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
   const AdjustmentColumns columns(options, blocks);
+  AddPositions(model, options.positions, 1, columns, &blocks);
   return FindPrecision(model, options, columns, blocks, datum, {});
 }
 
@@ -253,7 +265,9 @@ void ExpectByDefinition(const Model& model,
       sum += precision.observations[i].redundancy[c];
     }
   }
-  EXPECT_NEAR(sum, static_cast<double>(oracle.redundancy), 1e-6 * sum);
+  EXPECT_NEAR(sum,
+              oracle.R.diagonal().head(2 * precision.observations.size()).sum(),
+              1e-6 * sum);
   for (const PointPrecision& point : precision.points) {
     const Index first = 3 * point.point;
     ExpectNear(point.sigma.cwiseAbs2(), oracle.C.diagonal().segment<3>(first));
@@ -306,6 +320,59 @@ TEST(Precision, IsByItsDefinitionWherePartsAreFixed) {
       PrecisionOf(model, options, AdjustmentDatum::kPoints);
   EXPECT_EQ(precision.datum_defect, 0);
   EXPECT_TRUE(precision.points[0].sigma.isZero(0));
+}
+
+// Of a camera, through its rig, and of a point: an ellipsoid askew and a ball,
+// each a little off.
+std::vector<KnownPosition> SomePositions(const Model& model, int num_images,
+                                         int num_points) {
+  std::vector<KnownPosition> positions;
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  for (int n = 0; n < num_images; ++n) {
+    const int32_t image = 2 * n + 1;
+    const Vector3d off(0.001, 0.002 * n, -0.001);
+    positions.push_back(
+        {KnownPosition::Of::kImage,
+         image,
+         {Center(images[image].cam_from_world) + off,
+          {0.01, 0.02, 0.03},
+          Eigen::Quaterniond(Eigen::AngleAxisd(1, off.normalized()))}});
+  }
+  for (int32_t k = 0; k < num_points; ++k) {
+    positions.push_back(
+        {KnownPosition::Of::kPoint3D, k,
+         BallAround(model.points3D[k].xyz + Vector3d(0, 0.001, 0), 0.02)});
+  }
+  return positions;
+}
+
+TEST(Precision, IsByItsDefinitionWherePositionsAreKnown) {
+  const Model in_rigs = PreciseScene(2);
+  const Model alone = PreciseScene(2, 1);
+  BundleAdjustmentOptions options;
+  for (const auto& [num_images, num_points] :
+       {std::pair(2, 2), std::pair(0, 3), std::pair(2, 1)}) {
+    for (const Model* model : {&in_rigs, &alone}) {
+      options.positions = SomePositions(*model, num_images, num_points);
+      ExpectByDefinition(*model, options, AdjustmentDatum::kCameras);
+      EXPECT_EQ(
+          PrecisionOf(*model, options, AdjustmentDatum::kCameras).datum_defect,
+          0);
+    }
+  }
+}
+
+TEST(Precision, CountsTheGaugeThatKnownPositionsLeave) {
+  const Model model = PreciseScene(2, 1);
+  const auto defect = [&](int num_images, int num_points) {
+    BundleAdjustmentOptions options;
+    options.positions = SomePositions(model, num_images, num_points);
+    return PrecisionOf(model, options, AdjustmentDatum::kCameras).datum_defect;
+  };
+  EXPECT_EQ(defect(0, 0), 7);
+  EXPECT_EQ(defect(0, 1), 4);  // turns about the point, and the scale
+  EXPECT_EQ(defect(1, 1), 1);  // turns about the line
+  EXPECT_EQ(defect(1, 2), 0);
 }
 
 TEST(Precision, CountsTheGaugeThatFixedPartsLeave) {
@@ -441,6 +508,57 @@ TEST(Precision, CoversTheTruthAsOftenAsItSays) {
   // chi^2 with so many degrees of freedom.
   EXPECT_NEAR(squares / (kNoise * kNoise), redundancy,
               4 * std::sqrt(2 * redundancy));
+}
+
+// 30 scenes whose start is off, in the frame of positions with noise: errors of
+// centres beyond 1.96 standard deviations are 5 %, which takes the noise of the
+// pixels to be found, too.
+TEST(Precision, CoversTheTruthWherePositionsAreKnown) {
+  constexpr int kScenes = 30;
+  constexpr double kSigma = 0.003;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0, kSigma);
+  int64_t num_tried = 0, within = 0;
+  double sigma0 = 0;
+  for (int seed = 0; seed < kScenes; ++seed) {
+    SceneOptions options;
+    options.num_frames = 12;
+    options.num_points = 150;
+    options.track_length = 5;
+    options.pixel_noise = 0.7;
+    options.start_translation_noise = 0.002;
+    options.start_point_noise = 0.002;
+    options.random_seed = seed;
+    const SyntheticScene scene = SynthesizeScene(options);
+    const std::vector<ImageGeometry> truth =
+        ImageGeometries(scene.ground_truth);
+    AdjustModelOptions adjust;
+    adjust.finds_precision = true;
+    for (size_t n = 0; n < truth.size(); ++n) {
+      const Vector3d off(noise(random), noise(random), noise(random));
+      adjust.adjustment.positions.push_back(
+          {KnownPosition::Of::kImage, static_cast<int32_t>(n),
+           BallAround(Center(truth[n].cam_from_world) + off, 3 * kSigma)});
+    }
+    const AdjustModelResult result = AdjustModel(scene.model, adjust, {1});
+    const std::vector<ImageGeometry> after = ImageGeometries(result.model);
+    sigma0 += result.summary.precision->sigma0_px / kScenes;
+    for (const ImagePrecision& image : result.summary.precision->images) {
+      const Vector3d error = Center(after[image.image].cam_from_world) -
+                             Center(truth[image.image].cam_from_world);
+      ASSERT_TRUE(image.covariance);
+      for (int c = 0; c < 3; ++c) {
+        within += std::abs(error[c]) <
+                  1.96 * std::sqrt((*image.covariance)(3 + c, 3 + c));
+        ++num_tried;
+      }
+    }
+  }
+  EXPECT_NEAR(sigma0, 0.7, 0.02);
+  const double share =
+      static_cast<double>(within) / static_cast<double>(num_tried);
+  EXPECT_GT(share, 0.92);
+  EXPECT_LT(share, 0.98);
 }
 
 }  // namespace

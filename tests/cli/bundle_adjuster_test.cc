@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "krot/geometry.h"
 #include "krot/model.h"
+#include "krot/model/rigs.h"
 #include "tests/cli/colmap.h"
 #include "tests/cli/krot_process.h"
 #include "tests/cli/scenes.h"
@@ -148,6 +150,68 @@ TEST_F(BundleAdjuster, ComparesCheckPointsWithTheirSurvey) {
   EXPECT_NEAR(points["points"][7]["difference"][2], -0.3, 0.06);
   EXPECT_GT(points["rms"], 0.3 / std::sqrt(40.0) / 2);
   EXPECT_LT(points["rms"], 0.3 / std::sqrt(40.0));
+}
+
+// GPS in a frame of its own, 3 times as large, with standard deviations of
+// 0.02, one of them wrong by 5: the model comes to that frame, and check points
+// are compared there.
+TEST_F(BundleAdjuster, TakesKnownPositionsAsObservations) {
+  const Model model = Load(folder_ / "input");
+  const auto surveyed = [](const Eigen::Vector3d& x) {
+    return Eigen::Vector3d(100 - 3 * x.y(), 3 * x.x() - 50, 3 * x.z());
+  };
+  std::ofstream gps(folder_ / "gps.txt"), check(folder_ / "check.txt");
+  gps.precision(17);
+  check.precision(17);
+  const std::vector<ImageGeometry> images = ImageGeometries(model);
+  for (size_t n = 0; n < images.size(); ++n) {
+    const double error = n == 1 ? 5 : 0.01 * static_cast<double>(n % 3);
+    gps << model.images[n].name << ' '
+        << (surveyed(Center(images[n].cam_from_world)) +
+            Eigen::Vector3d(error, 0, 0))
+               .transpose()
+        << " 0.06\n";
+  }
+  for (size_t k = 0; k < 2; ++k) {  // too few to fit to
+    check << model.points3D[k].id << ' '
+          << surveyed(model.points3D[k].xyz).transpose() << '\n';
+  }
+  gps.close();
+  check.close();
+  for (const std::string frame : {"own", "model"}) {
+    const KrotResult result =
+        Adjust({"--positions_path", folder_ / "gps.txt", "--positions_frame",
+                "own", "--output_frame", frame, "--check_points_path",
+                folder_ / "check.txt"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, ::testing::HasSubstr("the position of " +
+                                                 model.images[1].name));
+    EXPECT_THAT(result.out, ::testing::HasSubstr("known positions took part"));
+    const Json report = Report();
+    const Json& positions = report["positions"];
+    ASSERT_EQ(positions["points"].size(), images.size() - 1);
+    EXPECT_LT(positions["rms"], 0.05);
+    EXPECT_GT(positions["sigma_px"], 0);
+    EXPECT_NEAR(positions["frame"]["scale"], 3, 0.1);
+    EXPECT_EQ(positions["frame"]["is_written"], frame == "own");
+    EXPECT_EQ(report["precision"]["datum_defect"], 0);
+    EXPECT_LT(report["check_points"]["rms"], 0.3);
+    const Model output = Load(folder_ / "output");
+    const Eigen::Vector3d written =
+        Center(ImageGeometries(output)[0].cam_from_world);
+    const Eigen::Vector3d before = Center(images[0].cam_from_world);
+    EXPECT_LT((written - (frame == "own" ? surveyed(before) : before)).norm(),
+              0.1);
+  }
+}
+
+TEST_F(BundleAdjuster, RefusesKnownPositionsWithACap) {
+  std::ofstream(folder_ / "gps.txt") << "a.jpg 1 2 3 1\n";
+  const KrotResult result = Adjust({"--positions_path", folder_ / "gps.txt",
+                                    "--BundleAdjustment.max_error", "5"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, ::testing::HasSubstr("--positions_path"));
+  EXPECT_THAT(result.err, ::testing::HasSubstr("with a cap"));
 }
 
 TEST_F(BundleAdjuster, RefusesCheckPointsThatAreTooFew) {

@@ -96,6 +96,29 @@ def test_keeps_cameras_within_a_radius_of_their_positions(scene, tmp_path):
     assert distances.max() <= (1 + 1e-6) * radius
 
 
+def test_takes_positions_in_a_frame_of_their_own(scene, tmp_path):
+    model = pykrot.Model.read(scene)
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    places = 3 * model.centers @ turn.T + [100, -50, 0]
+    places[1] += [5, 0, 0]
+    positions = tmp_path / "gps.txt"
+    positions.write_text("".join(
+        f"{name} {x!r} {y!r} {z!r} 0.1\n"
+        for name, (x, y, z) in zip(model.image_names, places.tolist())))
+    wrong = model.image_names[1]
+    for function in (pykrot.solve, pykrot.bundle_adjust):
+        with pytest.warns(UserWarning, match=f"the position of {wrong}"):
+            result = function(model, positions_path=str(positions),
+                              positions_frame="own", output_frame="own")
+        frame = result.report["positions"]["frame"]
+        assert [one["name"] for one in frame["wrong"]] == [wrong]
+        assert frame["scale"] == pytest.approx(3, rel=0.05)
+        distances = np.linalg.norm(result.model.centers - places, axis=1)
+        assert np.delete(distances, 1).max() < 0.2
+    with pytest.raises(pykrot.OptionError):
+        pykrot.solve(model, output_frame="own")
+
+
 def test_the_sample_ends_where_the_command_ends(tmp_path):
     run_krot("solver", "--input_path", SAMPLE, "--output_path",
              tmp_path / "command", "--output_type", "BIN")

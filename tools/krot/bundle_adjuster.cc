@@ -13,6 +13,7 @@
 #include "tools/krot/command.h"
 #include "tools/krot/common_options.h"
 #include "tools/krot/interrupt.h"
+#include "tools/krot/metres.h"
 #include "tools/krot/model_files.h"
 #include "tools/krot/report_files.h"
 #include "tools/krot/run_log.h"
@@ -71,16 +72,18 @@ AdjustModelResult Adjust(const Model& model, AdjustModelOptions options,
 }
 
 // The surveyed points of the model; empty without a file. Throws ModelError if
-// there are too few to compare with.
+// there are too few to compare with: without known positions, a similarity is
+// fitted to them.
 std::vector<KnownPosition> ReadCheckPoints(const std::string& path,
                                            const Model& model,
+                                           bool has_positions,
                                            const LogOptions& log) {
   if (path.empty()) return {};
   LogInput(path);
   // The radius of the check points is not used.
   std::vector<KnownPosition> points =
       ReadPointPositions(ReadFileBytes(path), model, {1.0, WarnOn(log)});
-  if (!CompareWithSurvey(model, points)) {
+  if (!has_positions && !CompareWithSurvey(model, points)) {
     throw ModelError(path + ": found " + std::to_string(points.size()) +
                      " check points of the model, expected three or more that "
                      "are not on a line");
@@ -96,10 +99,13 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
   AdjustmentReport report;
   report.run.seed = common.random_seed;
 
-  const Model model = ReadInput(paths, common.log, &report.run);
+  Model model = ReadInput(paths, common.log, &report.run);
+  const Survey survey(ReadKnownPositions(paths, model, common.log),
+                      paths.output_frame == "own", &model);
+  options.adjustment.positions = survey.positions();
 
-  const std::vector<KnownPosition> check_points =
-      ReadCheckPoints(check_points_path, model, common.log);
+  const std::vector<KnownPosition> check_points = ReadCheckPoints(
+      check_points_path, model, !survey.positions().empty(), common.log);
   options.finds_precision =
       !paths.report_path.empty() || !paths.html_path.empty();
   options.adjustment.fixed = ReadFixedParts(paths, model, common.log);
@@ -109,7 +115,10 @@ int Run(const ModelPaths& paths, const std::string& check_points_path,
       Adjust(model, std::move(options), context, common.log);
   DeferInterrupts();
   report.summary = std::move(result.summary);
-  report.check_points = CompareWithSurvey(result.model, check_points);
+  report.positions = survey.ComparePositions(result.model);
+  report.check_points = survey.CompareCheckPoints(result.model, check_points);
+  report.position_frame = survey.frame();
+  report.is_in_position_frame = survey.is_in_own_frame();
 
   BeginPhase(common.log, "writing " + paths.output_path);
   const Timer write_timer;
@@ -146,6 +155,7 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
                 "Where the report goes: as text if its name ends in .txt, else "
                 "as JSON");
   AddFixedPaths(&paths, &parser);
+  AddPositionsPath(&paths, &parser);
   std::string check_points_path;
   parser.AddPath("check_points_path", &check_points_path, false, "a file",
                  "Surveyed 3D points, lines of ID X Y Z, that have no say: the "
@@ -157,6 +167,14 @@ int RunBundleAdjuster(const std::vector<std::string>& arguments) {
   if (!parser.Parse(arguments)) {
     PrintTable(common.log, parser.Help());
     return kExitDone;
+  }
+  CheckPositionsPath(paths, parser);
+  for (const char* name : {"positions_path", "point_positions_path"}) {
+    if (!parser.IsGiven("BundleAdjustment.max_error") &&
+        !parser.IsGiven("BundleAdjustment.max_error_factor")) {
+      break;
+    }
+    parser.Refuse(name, "with a cap");
   }
   return Run(paths, check_points_path, common, options.Resolve(parser),
              options.num_threads());

@@ -5,7 +5,6 @@
 #include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model/model_io.h"
-#include "krot/model/pose_priors.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/run_log.h"
 
@@ -31,29 +30,15 @@ std::optional<DistanceReport> MeasureFile(
 
 KnownPositions ReadKnownPositions(const ModelPaths& paths, const Model& model,
                                   const LogOptions& log) {
-  PositionsOptions options{paths.position_radius, WarnOn(log)};
-  options.has_own_frame = paths.positions_frame == "own";
-  KnownPositions known;
-  if (!paths.positions_path.empty()) {
-    LogInput(paths.positions_path);
-    const FileBytes file = ReadFileBytes(paths.positions_path);
-    known.positions = options.has_own_frame && IsDatabase(file)
-                          ? ReadPosePriors(paths.positions_path, model, options)
-                          : ReadPositions(file, model, options);
+  for (const std::string* path :
+       {&paths.positions_path, &paths.point_positions_path}) {
+    if (!path->empty()) LogInput(*path);
   }
-  if (!paths.point_positions_path.empty()) {
-    LogInput(paths.point_positions_path);
-    const std::vector<KnownPosition> of_points = ReadPointPositions(
-        ReadFileBytes(paths.point_positions_path), model, options);
-    known.positions.insert(known.positions.end(), of_points.begin(),
-                           of_points.end());
-  }
-  if (!options.has_own_frame) return known;
-  known.frame = FindPositionFrame(model, known.positions,
-                                  paths.positions_path.empty()
-                                      ? paths.point_positions_path
-                                      : paths.positions_path);
-  known.positions = known.frame->positions;
+  KnownPositions known = ReadKnownPositions(
+      {paths.positions_path, paths.point_positions_path,
+       paths.positions_frame == "own", paths.position_radius},
+      model, WarnOn(log));
+  if (!known.frame) return known;
   LogLine(log, 1, PositionFrameSentence(*known.frame));
   for (const WrongPosition& wrong : known.frame->wrong) {
     LogLine(log, 0, "warning: " + WrongPositionSentence(wrong));
@@ -119,11 +104,11 @@ void MeasureSolved(const Model& solved, const LogOptions& log,
 
 std::optional<Model> InOutputFrame(const ModelPaths& paths, const Model& solved,
                                    SolveReport* report) {
-  Similarity moved_from_solved;
   if (paths.output_frame == "own" && report->position_frame) {
-    report->is_in_position_frame = true;
-    moved_from_solved = report->position_frame->own_from_model;
-  } else if (report->distances && report->distances->is_scale_taken) {
+    return InPositionFrame(solved, report);
+  }
+  Similarity moved_from_solved;
+  if (report->distances && report->distances->is_scale_taken) {
     moved_from_solved.scale = report->distances->models.back().scale->scale;
   } else {
     return std::nullopt;

@@ -39,11 +39,6 @@ void MeasureSolved(const Model& solved, const LogOptions& log,
 std::optional<Model> InOutputFrame(const ModelPaths& paths, const Model& solved,
                                    SolveReport* report);
 
-struct KnownPositions {
-  std::vector<KnownPosition> positions;  // in the model's frame
-  std::optional<PositionFrame> frame;    // the files' own frame, if any
-};
-
 // Reads the known positions of paths.*positions_path. If they are in their own
 // frame, says on stderr how it was found, and which positions are wrong. Throws
 // ModelError.

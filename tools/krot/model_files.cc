@@ -132,6 +132,17 @@ void AddPositionsPath(ModelPaths* paths, OptionParser* parser) {
                }});
 }
 
+void CheckPositionsPath(const ModelPaths& paths, const OptionParser& parser) {
+  if (paths.positions_path.empty() && paths.point_positions_path.empty()) {
+    for (const char* name : {"Problem.position_radius", "positions_frame"}) {
+      parser.Refuse(name, "without --positions_path or --point_positions_path");
+    }
+  }
+  if (paths.positions_frame != "own") {
+    parser.Refuse("output_frame", "without --positions_frame own");
+  }
+}
+
 void AddDistancesPath(std::string* path, OptionParser* parser) {
   parser->AddPath("distances_path", path, false, "a file",
                   "Known distances: lines of two images or two 3D points, and "

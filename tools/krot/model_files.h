@@ -43,8 +43,10 @@ void AddModelPaths(
 void AddRotationsPath(ModelPaths* paths, OptionParser* parser);
 // For commands that can keep images and points fixed.
 void AddFixedPaths(ModelPaths* paths, OptionParser* parser);
-// For commands that keep cameras within a radius of known positions.
+// For commands that take known positions of cameras and points.
 void AddPositionsPath(ModelPaths* paths, OptionParser* parser);
+// Throws OptionError for options of positions without positions.
+void CheckPositionsPath(const ModelPaths& paths, const OptionParser& parser);
 void AddDistancesPath(std::string* path, OptionParser* parser);
 // For commands whose estimate is of use before its end.
 void AddWriteOnInterrupt(ModelPaths* paths, OptionParser* parser);

@@ -92,9 +92,7 @@ int RunSolver(const std::vector<std::string>& arguments) {
   }
   ResolveSolverOptions(parser, &command.options.solve);
   ResolveDatabase(parser, &command);
-  if (command.paths.positions_frame != "own") {
-    parser.Refuse("output_frame", "without --positions_frame own");
-  }
+  CheckPositionsPath(command.paths, parser);
   ResolveCheckpoint(parser, &command.checkpoint);
   ExplainMethod(command);
   return RunSolveCommand(command);

@@ -25,23 +25,6 @@ void CheckImagePlane(const Camera& camera) {
                    "projects onto one");
 }
 
-// Where the sensors of each rig begin in AdjustmentBlocks::sensors.
-std::vector<int32_t> SensorOffsets(const Model& model) {
-  std::vector<int32_t> offsets;
-  int32_t offset = 0;
-  for (const Rig& rig : model.rigs) {
-    offsets.push_back(offset);
-    offset += static_cast<int32_t>(rig.sensors.size());
-  }
-  return offsets;
-}
-
-// Index in AdjustmentBlocks::sensors; -1 for the reference sensor.
-int32_t SensorBlock(const ImageGeometry& image,
-                    const std::vector<int32_t>& offsets) {
-  return image.sensor < 0 ? -1 : offsets[image.rig] + image.sensor;
-}
-
 bool IsUsable(const ImageGeometry& geometry, const Camera& camera,
               const Vector3d& xyz) {
   const Vector3d x_cam = geometry.cam_from_world * xyz;
@@ -110,6 +93,21 @@ void MarkFixed(const FixedParts& fixed, AdjustmentBlocks* blocks) {
 }
 
 }  // namespace
+
+std::vector<int32_t> SensorOffsets(const Model& model) {
+  std::vector<int32_t> offsets;
+  int32_t offset = 0;
+  for (const Rig& rig : model.rigs) {
+    offsets.push_back(offset);
+    offset += static_cast<int32_t>(rig.sensors.size());
+  }
+  return offsets;
+}
+
+int32_t SensorBlock(const ImageGeometry& image,
+                    const std::vector<int32_t>& offsets) {
+  return image.sensor < 0 ? -1 : offsets[image.rig] + image.sensor;
+}
 
 PoseBlock ToBlock(const Pose& pose) {
   const QuaternionWxyz q = ToWxyz(NormalizedQuaternion(pose.quaternion_wxyz));

@@ -36,6 +36,17 @@ struct AdjustmentObservation {
   uint64_t element = 0;  // in Model::track_elements
 };
 
+// A known position of a camera's centre or of a point: an observation of three
+// coordinates.
+struct PositionObservation {
+  int32_t frame = -1;   // in AdjustmentBlocks::frames; -1: of a point
+  int32_t sensor = -1;  // in sensors; -1: the rig's reference sensor
+  int32_t point = -1;   // in points; -1: of a camera
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  // Turns a difference in the world into one that has the noise of pixels.
+  Eigen::Matrix3d px_from_world = Eigen::Matrix3d::Identity();
+};
+
 // The unknowns of bundle adjustment as flat blocks of doubles, in the order of
 // the model's own records, and the observations that take part.
 struct AdjustmentBlocks {
@@ -48,6 +59,7 @@ struct AdjustmentBlocks {
   // is an unknown where the cap is lowered.
   double cap2 = std::numeric_limits<double>::infinity();
   std::vector<AdjustmentObservation> observations;  // point by point
+  std::vector<PositionObservation> positions;
   // Marks the blocks that must not move.
   std::vector<char> frame_is_fixed;
   std::vector<char> sensor_is_fixed;  // if a fixed frame sees through it
@@ -58,6 +70,12 @@ struct AdjustmentBlocks {
   int64_t num_behind = 0;
   int64_t num_short_track = 0;
 };
+
+// Where the sensors of each rig begin in AdjustmentBlocks::sensors, and which
+// of these is the image's; -1: the reference sensor.
+std::vector<int32_t> SensorOffsets(const Model& model);
+int32_t SensorBlock(const ImageGeometry& image,
+                    const std::vector<int32_t>& offsets);
 
 // Leaves out observations without a pose, behind their camera or without a
 // finite projection, and then all observations of points that have fewer than
@@ -113,6 +131,29 @@ struct AdjustmentColumns {
   void AddCap() { cap = num_blocks++; }
 };
 
+// Adds the known positions of what moves. Throws std::invalid_argument if a
+// point has two.
+void AddPositions(const Model& model,
+                  const std::vector<KnownPosition>& positions, double sigma_px,
+                  const AdjustmentColumns& columns, AdjustmentBlocks* blocks);
+
+// Where the blocks place what the position is of.
+Eigen::Vector3d PlaceOf(const PositionObservation& position,
+                        const AdjustmentBlocks& blocks);
+
+// Half the sum of the squared differences from all known positions, pixels^2.
+double HalfSquaredPositions(const AdjustmentBlocks& blocks);
+
+// The derivatives of a camera's rotation, about its own axes, and of its centre
+// by the blocks of columns that move it: 6 x 3 blocks.size().
+struct PoseJacobian {
+  std::vector<int32_t> blocks;
+  Eigen::MatrixXd J;
+};
+PoseJacobian DifferentiatePose(const AdjustmentColumns& columns,
+                               const AdjustmentBlocks& blocks, int32_t frame,
+                               int32_t sensor);
+
 // Sets the unknowns of `*to` to those of `from`, moved by `step` along a
 // direction of points and blocks. Unknowns that do not move keep their bits.
 // Both are blocks of the same model.
@@ -122,12 +163,12 @@ void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
 // A connected component: its frames, refined sensors and points, as indices of
 // AdjustmentBlocks. Only what takes part is in one.
 struct AdjustmentComponent {
-  std::vector<size_t> frames;
+  std::vector<size_t> frames;  // as the others, ascending
   std::vector<size_t> sensors;
   std::vector<size_t> points;
   // Whether a sensor that is not refined has a translation.
   bool has_fixed_scale = false;
-  bool is_held = false;  // something in it is fixed
+  bool is_held = false;  // something in it is fixed, or has a known position
 };
 
 // All components, in the order of their first frames. O(observations).

@@ -24,6 +24,9 @@ namespace {
 void CheckOptions(const BundleAdjustmentOptions& options) {
   CheckAtLeast(1, options.min_track_length, "min_track_length");
   CheckPositive(options.loss_scale, "loss_scale");
+  CheckPositive(options.sigma_px.value_or(1), "sigma_px");
+  CheckArgument(options.positions.empty() || options.sigma_px, "positions",
+                options.positions.size(), "none without sigma_px");
   CheckAtLeast(0, options.max_num_iterations, "max_num_iterations");
   CheckAtLeast(1, options.max_linear_solver_iterations,
                "max_linear_solver_iterations");
@@ -42,6 +45,8 @@ void CheckOptions(const BundleAdjustmentOptions& options) {
                 "false with a max_error");
   CheckArgument(options.loss == RobustLoss::kTrivial, "loss",
                 static_cast<int>(options.loss), "trivial with a cap");
+  CheckArgument(options.positions.empty(), "positions",
+                options.positions.size(), "none with a cap");
 }
 
 std::unique_ptr<ceres::LossFunction> MakeLoss(
@@ -98,24 +103,26 @@ void Count(const AdjustmentBlocks& blocks, const AdjustmentColumns& columns,
   summary->num_behind = blocks.num_behind;
   summary->num_short_track = blocks.num_short_track;
   summary->num_parameters = columns.num_unknowns;
+  summary->num_positions = static_cast<int64_t>(blocks.positions.size());
 }
 
-// Half the sum of the squared errors, with the loss if there is one. None if an
-// error is not finite or reaches the cap.
+// Half the sum of the squared errors, with the loss if there is one, and of the
+// known positions'. None if an error is not finite or reaches the cap.
 std::optional<double> RobustCost(const Context& context,
                                  const ceres::LossFunction* loss,
                                  const AdjustmentBlocks& blocks) {
   const auto errors =
       ProjectErrors(blocks, std::sqrt(blocks.cap2), context.num_threads);
   if (!errors) return std::nullopt;
-  if (loss == nullptr) return HalfSquaredNorm(*errors);
+  const double of_positions = HalfSquaredPositions(blocks);
+  if (loss == nullptr) return HalfSquaredNorm(*errors) + of_positions;
   double sum = 0;
   for (const ProjectedError& error : *errors) {
     double rho[3];
     loss->Evaluate(error.r.squaredNorm(), rho);
     sum += rho[0];
   }
-  return sum / 2;
+  return sum / 2 + of_positions;
 }
 
 // The options with a callback that also adds the iterations to the summary.
@@ -176,17 +183,21 @@ BundleAdjustmentResult AdjustBundle(
     std::optional<AdjustmentPrecision>* precision) {
   CheckOptions(options);
   const Timer timer;
-  const AdjustmentBlocks before =
+  AdjustmentBlocks before =
       MakeAdjustmentBlocks(model, options.min_track_length, options.fixed);
+  const AdjustmentColumns columns(options, before);
+  if (!options.positions.empty()) {
+    AddPositions(model, options.positions, *options.sigma_px, columns, &before);
+  }
   AdjustmentBlocks blocks = before;
 
   const std::unique_ptr<ceres::LossFunction> loss = MakeLoss(options);
   if (options.max_error) blocks.cap2 = *options.max_error * *options.max_error;
-  const AdjustmentColumns columns(options, blocks);
 
   BundleAdjustmentResult result;
   BundleAdjustmentSummary& summary = result.summary;
   summary.max_error = options.max_error;
+  summary.sigma_px = options.sigma_px;
   Count(blocks, columns, &summary);
   const std::optional<double> cost = RobustCost(context, loss.get(), blocks);
   if (summary.num_parameters == 0) {

@@ -6,9 +6,12 @@
 #include <utility>
 #include <vector>
 
+#include <ceres/autodiff_cost_function.h>
 #include <ceres/crs_matrix.h>
 #include <ceres/manifold.h>
+#include <ceres/normal_prior.h>
 #include <ceres/product_manifold.h>
+#include <ceres/rotation.h>
 #include <Eigen/Geometry>
 
 #include "krot/adjust/adjustment_blocks.h"
@@ -176,6 +179,57 @@ bool ReprojectionCost::Evaluate(double const* const* blocks, double* residuals,
   return residual.allFinite();
 }
 
+namespace {
+
+// The difference of a camera's centre from its known position, in pixels.
+// Blocks: rig_from_world and, with a sensor, sensor_from_rig.
+struct CenterCost {
+  PositionObservation position;
+
+  template <typename T>
+  bool operator()(const T* frame, const T* sensor, T* residual) const {
+    Eigen::Matrix<T, 3, 1> x = Eigen::Matrix<T, 3, 1>::Zero();
+    for (const T* pose : {sensor, frame}) {
+      if (pose == nullptr) continue;
+      const T inverse[4] = {pose[0], -pose[1], -pose[2], -pose[3]};
+      const T from[3] = {x[0] - pose[4], x[1] - pose[5], x[2] - pose[6]};
+      ceres::UnitQuaternionRotatePoint(inverse, from, x.data());
+    }
+    Eigen::Map<Eigen::Matrix<T, 3, 1>> r(residual);
+    r = position.px_from_world.cast<T>() * (x - position.position.cast<T>());
+    return true;
+  }
+  template <typename T>
+  bool operator()(const T* frame, T* residual) const {
+    return (*this)(frame, static_cast<const T*>(nullptr), residual);
+  }
+};
+
+// Positions weigh in full, whatever the loss.
+void AddPositionBlocks(AdjustmentBlocks* blocks, ceres::Problem* problem) {
+  for (const PositionObservation& position : blocks->positions) {
+    if (position.point >= 0) {
+      problem->AddResidualBlock(
+          new ceres::NormalPrior(position.px_from_world, position.position),
+          nullptr, blocks->points[position.point].data());
+      continue;
+    }
+    double* const frame = blocks->frames[position.frame].data();
+    auto* const cost = new CenterCost{position};
+    if (position.sensor < 0) {
+      problem->AddResidualBlock(
+          new ceres::AutoDiffCostFunction<CenterCost, 3, 7>(cost), nullptr,
+          frame);
+    } else {
+      problem->AddResidualBlock(
+          new ceres::AutoDiffCostFunction<CenterCost, 3, 7, 7>(cost), nullptr,
+          frame, blocks->sensors[position.sensor].data());
+    }
+  }
+}
+
+}  // namespace
+
 ceres::Problem::Options AdjustmentProblemOptions() {
   ceres::Problem::Options options;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -198,6 +252,7 @@ void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
                              observation.sensor >= 0, observation.pixel),
         loss, parameters);
   }
+  AddPositionBlocks(blocks, problem);
   for (size_t f = 0; f < blocks->frames.size(); ++f) {
     ParameterizePose(
         options.refine_rig_from_world && !blocks->frame_is_fixed[f],

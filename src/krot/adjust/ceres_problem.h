@@ -37,9 +37,10 @@ class ReprojectionCost final : public ceres::CostFunction {
   int camera_model_;
 };
 
-// Adds every observation of `blocks`, in their order, to a problem that does
-// not own the loss, and makes constant what the options do not refine. `loss`
-// may be null. The blocks are solved in place and must outlive the problem.
+// Adds every observation of `blocks`, in their order, and every known position
+// to a problem that does not own the loss, and makes constant what the options
+// do not refine. `loss` may be null. The blocks are solved in place and must
+// outlive the problem.
 void BuildAdjustmentProblem(const BundleAdjustmentOptions& options,
                             ceres::LossFunction* loss, AdjustmentBlocks* blocks,
                             ceres::Problem* problem);

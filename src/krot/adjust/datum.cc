@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -82,7 +83,8 @@ class Motion {
     }
   }
 
-  // The combinations of the 7 columns that move nothing that is held.
+  // The combinations of the 7 columns that move nothing that is held or has a
+  // known position.
   MatrixXd Free() const {
     MatrixXd gram = MatrixXd::Zero(7, 7);
     const auto hold = [&](const Similar& rows, bool is_length) {
@@ -93,6 +95,16 @@ class Motion {
     });
     for (const size_t k : component_.points) {
       if (!columns_.point_moves[k]) hold(OfPlace(blocks_.points[k]), true);
+    }
+    for (const PositionObservation& position : blocks_.positions) {
+      const bool is_point = position.point >= 0;
+      const std::vector<size_t>& parts =
+          is_point ? component_.points : component_.frames;
+      const auto part =
+          static_cast<size_t>(is_point ? position.point : position.frame);
+      if (std::binary_search(parts.begin(), parts.end(), part)) {
+        hold(OfPlace(PlaceOf(position, blocks_)), true);
+      }
     }
     if (component_.has_fixed_scale) gram(6, 6) += 1;
     if (gram.isZero(0)) return MatrixXd::Identity(7, 7);

@@ -72,9 +72,11 @@ class PrecisionOfAdjustment {
       covariance_.emplace(columns_, blocks_, gauges_, num_threads_);
       result_.num_undetermined = covariance_->num_undetermined();
     }
-    result_.redundancy = 2 * static_cast<int64_t>(blocks_.observations.size()) -
-                         result_.num_unknowns + result_.datum_defect +
-                         result_.num_undetermined;
+    result_.num_positions = static_cast<int64_t>(blocks_.positions.size());
+    result_.redundancy = 2 * static_cast<int64_t>(blocks_.observations.size()) +
+                         3 * result_.num_positions - result_.num_unknowns +
+                         result_.datum_defect + result_.num_undetermined;
+    squared_error_ += 2 * HalfSquaredPositions(blocks_);
     if (result_.redundancy > 0) {
       result_.sigma0_px =
           std::sqrt(squared_error_ / static_cast<double>(result_.redundancy));
@@ -183,41 +185,11 @@ class PrecisionOfAdjustment {
     }
   }
 
-  // With R = R_s R_f and c = c_f + R_f'c_s, both as in AdjustmentColumns::Pose.
   void DescribeImages() {
     for (size_t n = 0; n < parts_.size(); ++n) {
-      const ImageParts& part = parts_[n];
-      std::vector<int32_t> blocks;
-      std::vector<Eigen::Matrix<double, 6, 3>> J;
-      const auto add = [&](int32_t block, const Matrix3d& rotation,
-                           const Matrix3d& center) {
-        if (block == AdjustmentColumns::kHeld) return;
-        blocks.push_back(block);
-        J.emplace_back();
-        J.back() << rotation, center;
-      };
-      const Matrix3d R_frame = RotationOf(blocks_.frames[part.frame]);
-      Matrix3d R = R_frame;
-      Matrix3d lever = Matrix3d::Zero();
-      if (part.sensor >= 0) {
-        const PoseBlock& sensor = blocks_.sensors[part.sensor];
-        const Vector3d c = R_frame.transpose() *
-                           Center({RotationOf(sensor), TranslationOf(sensor)});
-        R = RotationOf(sensor) * R_frame;
-        lever = CrossMatrix(c);
-        const AdjustmentColumns::Pose& of_sensor =
-            columns_.sensors[part.sensor];
-        add(of_sensor.rotation, RotationOf(sensor), Matrix3d::Zero());
-        add(of_sensor.center, Matrix3d::Zero(), R_frame.transpose());
-      }
-      const AdjustmentColumns::Pose& of_frame = columns_.frames[part.frame];
-      add(of_frame.rotation, R, lever);
-      add(of_frame.center, Matrix3d::Zero(), Matrix3d::Identity());
-      MatrixXd stacked(6, 3 * static_cast<Index>(J.size()));
-      for (size_t b = 0; b < J.size(); ++b) {
-        stacked.middleCols<3>(static_cast<Index>(3 * b)) = J[b];
-      }
-      const auto covariance = CovarianceOf(stacked, blocks);
+      const PoseJacobian pose = DifferentiatePose(
+          columns_, blocks_, parts_[n].frame, parts_[n].sensor);
+      const auto covariance = CovarianceOf(pose.J, pose.blocks);
       if (covariance) result_.images[n].covariance = *covariance;
     }
   }

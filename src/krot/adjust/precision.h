@@ -17,9 +17,10 @@ namespace krot::internal {
 // say it [Foerstner, Wrobel, Photogrammetric Computer Vision, 2016, Ch. 4].
 //
 // With J the derivatives of all errors by all u unknowns, at the least squares
-// of n observations of two coordinates each:
+// of n observations of two coordinates each and of m known positions, whose
+// errors are in pixels, too:
 //
-//   redundancy  r = 2 n - rank J
+//   redundancy  r = 2 n + 3 m - rank J
 //   sigma0^2    = sum |error|^2 / r
 //   covariance  C = sigma0^2 S (J'J)^- S'
 //   R           = I - J (J'J)^- J', whose trace is r: what shows of noise
@@ -83,6 +84,7 @@ struct AdjustmentPrecision {
   AdjustmentDatum datum = AdjustmentDatum::kCameras;
   // Whether what was adjusted is the least squares, without a loss or a cap.
   bool is_least_squares = true;
+  int64_t num_positions = 0;  // known ones that took part
   int64_t num_unknowns = 0;
   int64_t datum_defect = 0;
   // Unknowns, beyond the datum, that no observation determines. Unknown without

@@ -55,6 +55,7 @@ BlockCovariance::BlockCovariance(const AdjustmentColumns& columns,
       size_(3 * Index{columns.num_blocks}),
       jacobians_(columns, blocks),
       begin_(blocks.points.size() + 1, 0),
+      position_of_(blocks.points.size(), nullptr),
       gauge_of_(blocks.points.size(), {-1, 0}) {
   for (const AdjustmentObservation& o : blocks.observations) {
     ++begin_[o.point + 1];
@@ -66,13 +67,16 @@ BlockCovariance::BlockCovariance(const AdjustmentColumns& columns,
                                          static_cast<Index>(n)};
     }
   }
+  for (const PositionObservation& position : blocks.positions) {
+    if (position.point >= 0) position_of_[position.point] = &position;
+  }
   jacobians_.Evaluate(blocks, num_threads);
-  Reduce();
+  Reduce(blocks);
   Invert();
   TakeDatum();
 }
 
-void BlockCovariance::Reduce() {
+void BlockCovariance::Reduce(const AdjustmentBlocks& blocks) {
   C_.setZero(size_, size_);
   scale_.setZero(size_);
   const auto num_points = static_cast<int64_t>(begin_.size()) - 1;
@@ -80,26 +84,39 @@ void BlockCovariance::Reduce() {
     if (begin_[k] == begin_[k + 1]) continue;
     const TrackRows rows = RowsOf(k);
     if (columns_.point_moves[k]) num_undetermined_ += rows.NumUndetermined();
-    const auto add = [&](int32_t a, int32_t b, const Matrix3d& block) {
-      C_.block<3, 3>(3 * Index{a}, 3 * Index{b}) += block;
-    };
     for (int64_t i = rows.begin(); i < rows.end(); ++i) {
       const int32_t* own = jacobians_.blocks(i);
       for (int a = 0; a < rows.num_blocks(i); ++a) {
         scale_.segment<3>(3 * Index{own[a]}) +=
             rows.F(i, a).colwise().squaredNorm().transpose();
         for (int b = 0; b < rows.num_blocks(i); ++b) {
-          add(own[a], own[b], rows.F(i, a).transpose() * rows.F(i, b));
+          AddToBlocks(own[a], own[b], rows.F(i, a).transpose() * rows.F(i, b));
         }
       }
     }
-    const std::vector<int32_t>& blocks = rows.blocks();
-    for (size_t a = 0; a < blocks.size(); ++a) {
+    const std::vector<int32_t>& of_track = rows.blocks();
+    for (size_t a = 0; a < of_track.size(); ++a) {
       const Matrix3d G_a = rows.G().middleCols<3>(static_cast<Index>(3 * a));
-      for (size_t b = 0; b < blocks.size(); ++b) {
-        add(blocks[a], blocks[b],
-            -G_a.transpose() *
-                rows.G().middleCols<3>(static_cast<Index>(3 * b)));
+      for (size_t b = 0; b < of_track.size(); ++b) {
+        AddToBlocks(of_track[a], of_track[b],
+                    -G_a.transpose() *
+                        rows.G().middleCols<3>(static_cast<Index>(3 * b)));
+      }
+    }
+  }
+  for (const PositionObservation& position : blocks.positions) {
+    if (position.point >= 0) continue;
+    const PoseJacobian pose =
+        DifferentiatePose(columns_, blocks, position.frame, position.sensor);
+    const MatrixXd J = position.px_from_world * pose.J.bottomRows<3>();
+    for (size_t a = 0; a < pose.blocks.size(); ++a) {
+      const Matrix3d J_a = J.middleCols<3>(static_cast<Index>(3 * a));
+      scale_.segment<3>(3 * Index{pose.blocks[a]}) +=
+          J_a.colwise().squaredNorm().transpose();
+      for (size_t b = 0; b < pose.blocks.size(); ++b) {
+        AddToBlocks(
+            pose.blocks[a], pose.blocks[b],
+            J_a.transpose() * J.middleCols<3>(static_cast<Index>(3 * b)));
       }
     }
   }

@@ -17,18 +17,18 @@
 
 namespace krot::internal {
 
-// The rows [A F] of one point's observations; the point is eliminated by
-// A = Q R, so that (A'A)^-1 = R^-1 R^-T.
+// The rows [A F] of one point's observations and, with F = 0, of its known
+// position; the point is eliminated by A = Q R, so that (A'A)^-1 = R^-1 R^-T.
 class TrackRows {
  public:
   using Index = Eigen::Index;
   using MatrixXd = Eigen::MatrixXd;
   using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
-  // Takes observations begin, ..., end - 1. Keeps a reference to the
-  // derivatives. A point that does not move has Q = 0.
+  // Takes observations begin, ..., end - 1; `position` may be null. Keeps a
+  // reference to the derivatives. A point that does not move has Q = 0.
   TrackRows(const ErrorJacobians& jacobians, bool moves, int64_t begin,
-            int64_t end)
+            int64_t end, const PositionObservation* position)
       : jacobians_(jacobians), begin_(begin), end_(end) {
     for (int64_t i = begin; i < end; ++i) {
       const int32_t* own = jacobians.blocks(i);
@@ -41,7 +41,14 @@ class TrackRows {
     }
     std::sort(blocks_.begin(), blocks_.end());
     blocks_.erase(std::unique(blocks_.begin(), blocks_.end()), blocks_.end());
-    R_ = Orthogonalize(2 * (end - begin), Q_.data());
+    if (position != nullptr) {
+      for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) {
+          Q_.push_back(position->px_from_world(r, c));
+        }
+      }
+    }
+    R_ = Orthogonalize(static_cast<int64_t>(Q_.size()) / 3, Q_.data());
     G_.setZero(3, 3 * static_cast<Index>(blocks_.size()));
     for (int64_t i = begin; i < end; ++i) {
       for (int n = 0; n < jacobians.num_blocks(i); ++n) {
@@ -102,7 +109,7 @@ class TrackRows {
   const ErrorJacobians& jacobians_;
   const int64_t begin_, end_;
   std::vector<int32_t> blocks_;
-  std::vector<double> Q_;  // 2 x 3 per observation, row by row
+  std::vector<double> Q_;  // 3 columns, row by row; 2 rows per observation
   UpperTriangle R_;
   MatrixXd G_;
 };
@@ -139,7 +146,7 @@ std::vector<ComponentGauge> FindGauges(const BundleAdjustmentOptions& options,
 // where what the gauge leaves free is held; then S C S' is in the datum.
 class BlockCovariance {
  public:
-  // Keeps references to `columns` and `gauges`.
+  // Keeps references to all but the observations of `blocks`.
   BlockCovariance(const AdjustmentColumns& columns,
                   const AdjustmentBlocks& blocks,
                   const std::vector<ComponentGauge>& gauges, int num_threads);
@@ -163,14 +170,18 @@ class BlockCovariance {
     Eigen::MatrixXd T;
   };
 
-  void Reduce();
+  void Reduce(const AdjustmentBlocks& blocks);
+  void AddToBlocks(int32_t a, int32_t b, const Eigen::Matrix3d& block) {
+    C_.block<3, 3>(3 * Eigen::Index{a}, 3 * Eigen::Index{b}) += block;
+  }
   void Invert();
   void TakeDatum();
   void HoldDetermined(const ComponentGauge& gauge, Eigen::MatrixXd* held_blocks,
                       Eigen::MatrixXd* held_points) const;
   bool IsDetermined(const TrackRows& rows) const;  // the point
   TrackRows RowsOf(int64_t k) const {
-    return {jacobians_, columns_.point_moves[k] != 0, begin_[k], begin_[k + 1]};
+    return {jacobians_, columns_.point_moves[k] != 0, begin_[k], begin_[k + 1],
+            position_of_[k]};
   }
   Eigen::MatrixXd TimesG(const TrackRows& rows) const;  // C G'
 
@@ -180,6 +191,7 @@ class BlockCovariance {
   const Eigen::Index size_;
   ErrorJacobians jacobians_;
   std::vector<int64_t> begin_;  // of points' observations; num_points + 1
+  std::vector<const PositionObservation*> position_of_;  // points; null: none
   // For each point its gauge, -1: none, and its place among the gauge's points.
   std::vector<std::pair<int, Eigen::Index>> gauge_of_;
   Eigen::VectorXd scale_;  // of unknowns: units in which diagonals are 1

@@ -130,20 +130,28 @@ std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
     }
   }
 
+  std::vector<bool> is_held(num_nodes, false);
+  for (size_t f = 0; f < num_frames; ++f) is_held[f] = blocks.frame_is_fixed[f];
+  for (size_t k = 0; k < blocks.points.size(); ++k) {
+    is_held[num_frames + num_sensors + k] = blocks.point_is_fixed[k];
+  }
+  for (const PositionObservation& position : blocks.positions) {
+    is_held[position.point >= 0 ? num_frames + num_sensors + position.point
+                                : position.frame] = true;
+  }
+
   std::map<size_t, AdjustmentComponent> components;
   for (size_t node = 0; node < num_nodes; ++node) {
     if (!is_used[node]) continue;
     AdjustmentComponent& component = components[nodes.Find(node)];
+    component.is_held = component.is_held || is_held[node];
     if (node < num_frames) {
       component.frames.push_back(node);
-      component.is_held = component.is_held || blocks.frame_is_fixed[node];
       component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
     } else if (node < num_frames + num_sensors) {
       component.sensors.push_back(node - num_frames);
     } else {
-      const size_t point = node - num_frames - num_sensors;
-      component.points.push_back(point);
-      component.is_held = component.is_held || blocks.point_is_fixed[point];
+      component.points.push_back(node - num_frames - num_sensors);
     }
   }
   std::vector<AdjustmentComponent> list;

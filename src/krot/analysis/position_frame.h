@@ -8,6 +8,7 @@
 
 #include "krot/geometry.h"
 #include "krot/model.h"
+#include "krot/model/model_io.h"
 
 namespace krot::internal {
 
@@ -21,6 +22,8 @@ struct WrongPosition {
   double distance = 0;  // from the model's place; units of the positions
   double radius = 0;    // the position's, in that direction
 };
+
+std::string NameOf(const Model& model, const KnownPosition& position);
 
 struct PositionFrame {
   Similarity own_from_model;
@@ -54,5 +57,26 @@ struct PositionFrame {
 PositionFrame FindPositionFrame(const Model& model,
                                 const std::vector<KnownPosition>& positions,
                                 const std::string& source);
+
+// The positions that agree, in their own frame and unit again.
+std::vector<KnownPosition> InOwnFrame(const PositionFrame& frame);
+
+// Files of known positions: docs/formats.md, "Positions".
+struct PositionFiles {
+  std::string of_cameras;  // "": none
+  std::string of_points;
+  bool have_own_frame = false;
+  std::optional<double> radius;  // of lines that have none
+};
+
+struct KnownPositions {
+  std::vector<KnownPosition> positions;  // in the model's frame
+  std::optional<PositionFrame> frame;    // the files' own frame, if any
+};
+
+// Throws ModelError.
+KnownPositions ReadKnownPositions(const PositionFiles& files,
+                                  const Model& model,
+                                  const FileNote& on_note = {});
 
 }  // namespace krot::internal

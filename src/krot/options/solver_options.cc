@@ -249,11 +249,8 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   }
   if (!table.IsGiven("positions_path") &&
       !table.IsGiven("point_positions_path")) {
-    for (const char* name :
-         {"Problem.inflate_positions", "Problem.position_radius",
-          "positions_frame"}) {
-      table.Refuse(name, "without --positions_path or --point_positions_path");
-    }
+    table.Refuse("Problem.inflate_positions",
+                 "without --positions_path or --point_positions_path");
   }
   if (!options.inflate_positions_to) {
     table.Refuse("factor_certificate_path",

@@ -1,11 +1,13 @@
 #include "krot/pipeline/adjust_model.h"
 
+#include <cmath>
 #include <limits>
 #include <sstream>
 #include <utility>
 #include <vector>
 
 #include "krot/base/check.h"
+#include "krot/check.h"
 #include "krot/model/derived_models.h"
 
 namespace krot::internal {
@@ -22,6 +24,21 @@ std::string PixelText(double error_px) {
   text.precision(6);
   text << error_px << " px";
   return text.str();
+}
+
+// Puts the course of earlier adjustments before that of the last one.
+void AddEarlier(BundleAdjustmentSummary earlier,
+                BundleAdjustmentSummary* last) {
+  if (earlier.iterations.empty()) return;
+  for (const BundleAdjustmentIteration& iteration : last->iterations) {
+    earlier.iterations.push_back(iteration);
+    earlier.iterations.back().iteration += earlier.num_iterations;
+    earlier.iterations.back().seconds += earlier.seconds;
+  }
+  last->iterations = std::move(earlier.iterations);
+  last->num_iterations += earlier.num_iterations;
+  last->seconds += earlier.seconds;
+  last->cost_initial = earlier.cost_initial;
 }
 
 // The model from which a bounded adjustment starts; none if no estimate below
@@ -62,6 +79,33 @@ std::optional<Model> BoundedStart(const Model& model,
   return std::move(start.model);
 }
 
+// Finds the noise beside which known positions weigh, adjustment->sigma_px:
+// that of the model that is adjusted with it. Returns this model, and the
+// course so far.
+Model WeighPositions(const Model& model, const Context& context,
+                     BundleAdjustmentOptions* adjustment,
+                     BundleAdjustmentSummary* course) {
+  constexpr int kMaxRounds = 5;
+  constexpr double kSame = 0.02;  // of sigma
+  const auto noise_of = [&](const Model& of) {
+    return EstimateNoise(of, {}, context).sigma_px.value_or(1);
+  };
+  adjustment->sigma_px = noise_of(model);
+  Model adjusted = model;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    BundleAdjustmentResult result =
+        AdjustBundle(adjusted, *adjustment, context);
+    adjusted = std::move(result.model);
+    AddEarlier(std::move(*course), &result.summary);
+    *course = std::move(result.summary);
+    if (context.IsCancelled()) break;
+    const double before = *adjustment->sigma_px;
+    adjustment->sigma_px = noise_of(adjusted);
+    if (std::abs(*adjustment->sigma_px - before) <= kSame * before) break;
+  }
+  return adjusted;
+}
+
 // AdjustModel in the coordinates of the model.
 AdjustModelResult AdjustInFrame(const Model& model,
                                 const AdjustModelOptions& options,
@@ -87,10 +131,15 @@ AdjustModelResult AdjustInFrame(const Model& model,
     }
     adjustment.max_error = summary.max_error;  // none if it is to be lowered
   }
+  BundleAdjustmentSummary earlier;
+  if (!adjustment.positions.empty() && !adjustment.sigma_px) {
+    start = WeighPositions(model, context, &adjustment, &earlier);
+  }
   BundleAdjustmentResult adjusted =
       AdjustBundle(start ? *start : model, adjustment, context, options.datum,
                    options.finds_precision ? &summary.precision : nullptr);
   summary.adjustment = std::move(adjusted.summary);
+  AddEarlier(std::move(earlier), &summary.adjustment);
   summary.max_error = summary.adjustment.max_error;
   result.model = std::move(adjusted.model);
   const std::vector<double> errors_px =
@@ -109,10 +158,13 @@ AdjustModelResult AdjustModel(const Model& model,
     CheckArgument(*options.max_error_factor > 1, "max_error_factor",
                   *options.max_error_factor, "> 1");
   }
-  return InLocalFrame(LocalFrame(model, options.adjustment.fixed), model,
-                      [&](const Model& local) {
-                        return AdjustInFrame(local, options, context);
-                      });
+  const BundleAdjustmentOptions& known = options.adjustment;
+  const LocalFrame frame(model, known.fixed, known.positions);
+  AdjustModelOptions local_options = options;
+  local_options.adjustment.positions = frame.ToLocal(known.positions);
+  return InLocalFrame(frame, model, [&](const Model& local) {
+    return AdjustInFrame(local, local_options, context);
+  });
 }
 
 }  // namespace krot::internal

@@ -1,5 +1,6 @@
 #include "krot/report/reports.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <sstream>
@@ -99,6 +100,30 @@ std::string CapSentence(const AdjustModelSummary& summary) {
   return text.str();
 }
 
+Json KnownPositionsJson(const AdjustmentReport& report) {
+  Json json = SurveyJson(report.positions, false);
+  if (json.is_null()) return json;
+  json["sigma_px"] = NumberOrNull(report.summary.adjustment.sigma_px);
+  json["frame"] =
+      PositionFrameJson(report.position_frame, report.is_in_position_frame);
+  return json;
+}
+
+// Says how well the known positions fit.
+std::string KnownPositionsSentence(const AdjustmentReport& report) {
+  const BundleAdjustmentSummary& summary = report.summary.adjustment;
+  const auto farthest = std::max_element(
+      report.positions->places.begin(), report.positions->places.end(),
+      [](const auto& a, const auto& b) { return a.deviations < b.deviations; });
+  return Counted(summary.num_positions, "known position") +
+         " took part, beside noise of " +
+         FormatNumber(summary.sigma_px.value_or(1), 3) +
+         " px per axis: the model is " + FormatLength(report.positions->rms) +
+         " off (RMS, in the positions' unit), farthest " + farthest->name +
+         ", by " + FormatNumber(farthest->deviations, 1) +
+         " standard deviations.";
+}
+
 }  // namespace
 
 std::string AdjustmentTerminationName(BundleAdjustmentTermination termination) {
@@ -166,6 +191,7 @@ std::string AdjustmentTable(const AdjustmentReport& report) {
   }
   text << ".\n";
   if (summary.max_error) text << CapSentence(summary) << '\n';
+  if (report.positions) text << KnownPositionsSentence(report) << '\n';
   if (summary.precision) text << PrecisionSentence(*summary.precision) << '\n';
   std::string adjusted;
   if (summary.start) {
@@ -214,7 +240,8 @@ std::string AdjustmentJson(const AdjustmentReport& report, const Model& model) {
         {"start", ErrorJson(summary.pixel_error_start)},
         {"after", ErrorJson(summary.pixel_error_after)}}},
       {"precision", precision},
-      {"check_points", CheckPointsJson(report.check_points)},
+      {"check_points", SurveyJson(report.check_points, true)},
+      {"positions", KnownPositionsJson(report)},
   };
   return ReportText(json, report.run,
                     {{"start", start_seconds}, {"adjust", adjustment.seconds}});

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "krot/compare.h"
 #include "krot/report/report_json.h"
 #include "krot/report/reports.h"
 #include "krot/report/text_table.h"
@@ -36,9 +37,17 @@ std::string WrongPositionSentence(const WrongPosition& wrong) {
          " off, its radius is " + Metres(wrong.radius) + ": left out";
 }
 
-Json PositionFrameJson(const SolveReport& report) {
-  if (!report.position_frame) return nullptr;
-  const PositionFrame& frame = *report.position_frame;
+Model InPositionFrame(const Model& solved, SolveReport* report) {
+  Model moved = TransformModel(solved, report->position_frame->own_from_model);
+  report->is_in_position_frame = true;
+  report->summary.pixel_error_after = Summarize(PixelErrors(moved));
+  return moved;
+}
+
+Json PositionFrameJson(const std::optional<PositionFrame>& position_frame,
+                       bool is_written) {
+  if (!position_frame) return nullptr;
+  const PositionFrame& frame = *position_frame;
   Json wrong = Json::array();
   for (const WrongPosition& position : frame.wrong) {
     wrong.push_back({{"name", position.name},
@@ -50,7 +59,7 @@ Json PositionFrameJson(const SolveReport& report) {
       {"scale", own_from_model.scale},
       {"quaternion_wxyz", ToWxyz(Eigen::Quaterniond(own_from_model.rotation))},
       {"translation", VectorJson(own_from_model.translation)},
-      {"is_written", report.is_in_position_frame},
+      {"is_written", is_written},
       {"num_compared", frame.num_compared},
       {"median_distance", frame.median_distance},
       {"tolerance", frame.tolerance},

@@ -4,11 +4,9 @@
 #include <string_view>
 #include <utility>
 
-#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
-#include "krot/report/reports.h"
 
 namespace krot::internal {
 namespace {
@@ -121,27 +119,6 @@ std::vector<std::string> ParamNames(int model_id) {
     list.push_back(name);
   }
   return list;
-}
-
-std::optional<CheckPoints> CompareWithSurvey(
-    const Model& model, const std::vector<KnownPosition>& surveyed) {
-  std::vector<PosePair> pairs;
-  for (const KnownPosition& position : surveyed) {
-    PosePair pair;
-    pair.center1 = position.region.centre;
-    pair.center2 = model.points3D[position.index].xyz;
-    pairs.push_back(pair);
-  }
-  const std::optional<Similarity> similarity = AlignCenters(pairs);
-  if (!similarity) return std::nullopt;
-  CheckPoints check;
-  check.scale = similarity->scale;
-  for (size_t n = 0; n < pairs.size(); ++n) {
-    check.points.push_back({model.points3D[surveyed[n].index].id,
-                            pairs[n].center1,
-                            *similarity * pairs[n].center2 - pairs[n].center1});
-  }
-  return check;
 }
 
 }  // namespace krot::internal

@@ -59,20 +59,19 @@ Json ObservationsJson(const std::vector<NamedObservation>& observations,
 
 }  // namespace
 
-nlohmann::ordered_json CheckPointsJson(
-    const std::optional<CheckPoints>& check) {
-  if (!check) return nullptr;
-  Json points = Json::array();
-  double sum = 0;
-  for (const CheckPoints::Point& point : check->points) {
-    points.push_back({{"point3D_id", point.point3D_id},
-                      {"surveyed", VectorJson(point.surveyed)},
-                      {"difference", VectorJson(point.difference)}});
-    sum += point.difference.squaredNorm();
+nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
+                                  bool are_points) {
+  if (!survey) return nullptr;
+  Json places = Json::array();
+  for (const SurveyComparison::Place& place : survey->places) {
+    Json json = are_points ? Json{{"point3D_id", place.point3D_id}}
+                           : Json{{"name", place.name}};
+    json["surveyed"] = VectorJson(place.surveyed);
+    json["difference"] = VectorJson(place.difference);
+    if (!are_points) json["deviations"] = place.deviations;
+    places.push_back(std::move(json));
   }
-  return {{"scale", check->scale},
-          {"rms", std::sqrt(sum / static_cast<double>(check->points.size()))},
-          {"points", points}};
+  return {{"scale", survey->scale}, {"rms", survey->rms}, {"points", places}};
 }
 
 nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,

@@ -19,7 +19,9 @@ const char* const kPoseNames[] = {"rx", "ry", "rz", "X", "Y", "Z"};
 
 std::string DatumSentence(const AdjustmentPrecision& precision) {
   if (precision.datum_defect == 0) {
-    return "Datum: what is held fixed; its standard deviations are 0.";
+    return precision.num_positions > 0
+               ? "Datum: the known positions."
+               : "Datum: what is held fixed; its standard deviations are 0.";
   }
   switch (precision.datum) {
     case AdjustmentDatum::kPoints:
@@ -270,31 +272,53 @@ std::string PointSections(const AdjustmentPrecision& precision,
   return text.str();
 }
 
-std::string CheckPointSection(const CheckPoints& check) {
+// `in_deviations`: with a column of the differences in standard deviations.
+std::string SurveySection(const SurveyComparison& survey, bool in_deviations) {
   std::vector<double> lengths;
   Vector3d squares = Vector3d::Zero();
-  for (const CheckPoints::Point& point : check.points) {
-    lengths.push_back(point.difference.norm());
-    squares += point.difference.cwiseAbs2();
+  for (const SurveyComparison::Place& place : survey.places) {
+    lengths.push_back(place.difference.norm());
+    squares += place.difference.cwiseAbs2();
   }
   const int decimals = DecimalsFor(std::move(lengths)) + 1;
   TextTable table;
-  table.AddRow({"point3D_id", "X", "Y", "Z", "dX", "dY", "dZ", "length"});
-  for (const CheckPoints::Point& point : check.points) {
-    std::vector<std::string> cells = {std::to_string(point.point3D_id)};
-    Append(Cells(point.surveyed, decimals), &cells);
-    Append(Cells(point.difference, decimals), &cells);
-    cells.push_back(FormatNumber(point.difference.norm(), decimals));
+  const auto add = [&](std::vector<std::string> cells,
+                       const std::string& deviations) {
+    if (in_deviations) cells.push_back(deviations);
     table.AddRow(std::move(cells));
+  };
+  add({"name", "X", "Y", "Z", "dX", "dY", "dZ", "length"}, "in sigma");
+  for (const SurveyComparison::Place& place : survey.places) {
+    std::vector<std::string> cells = {place.name};
+    Append(Cells(place.surveyed, decimals), &cells);
+    Append(Cells(place.difference, decimals), &cells);
+    cells.push_back(FormatNumber(place.difference.norm(), decimals));
+    add(std::move(cells), FormatNumber(place.deviations, 1));
   }
-  squares /= static_cast<double>(check.points.size());
+  squares /= static_cast<double>(survey.places.size());
   std::vector<std::string> cells = {"RMS", "", "", ""};
   Append(Cells(squares.cwiseSqrt(), decimals), &cells);
-  cells.push_back(FormatNumber(std::sqrt(squares.sum()), decimals));
-  table.AddRow(std::move(cells));
-  return "\nCheck points, in the survey's frame and unit, after the similarity "
-         "that fits them best (scale " +
-         FormatLength(check.scale) + ")\n" + table.ToString();
+  cells.push_back(FormatNumber(survey.rms, decimals));
+  add(std::move(cells), "");
+  return table.ToString();
+}
+
+std::string SurveySections(const AdjustmentReport& report) {
+  std::string text;
+  if (report.positions) {
+    text += "\nKnown positions, in their frame and unit\n" +
+            SurveySection(*report.positions, true);
+  }
+  if (report.check_points) {
+    const SurveyComparison& check = *report.check_points;
+    text += "\nCheck points, in the survey's frame and unit";
+    if (check.is_fitted) {
+      text += ", after the similarity that fits them best (scale " +
+              FormatLength(check.scale) + ")";
+    }
+    text += "\n" + SurveySection(check, false);
+  }
+  return text;
 }
 
 }  // namespace
@@ -303,7 +327,7 @@ std::string AdjustmentText(const AdjustmentReport& report, const Model& model) {
   const AdjustModelSummary& summary = report.summary;
   std::string text = "KROT " + report.run.version + ", bundle adjustment\n" +
                      AdjustmentTable(report);
-  if (report.check_points) text += CheckPointSection(*report.check_points);
+  text += SurveySections(report);
   if (!summary.precision) return text;
   const AdjustmentPrecision& precision = *summary.precision;
   const PrecisionFigures figures(precision, model);
@@ -335,7 +359,8 @@ std::string PrecisionSentence(const AdjustmentPrecision& precision) {
   return "sigma0 " + FormatNumber(precision.sigma0_px, 4) +
          " px a posteriori, redundancy " + Thousands(precision.redundancy) +
          ": " +
-         Thousands(2 * static_cast<int64_t>(precision.observations.size())) +
+         Thousands(2 * static_cast<int64_t>(precision.observations.size()) +
+                   3 * precision.num_positions) +
          " observed coordinates, " +
          Counted(precision.num_unknowns, "unknown") + ", datum defect " +
          std::to_string(precision.datum_defect) + ".";

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "krot/analysis/model_input.h"
+#include "krot/analysis/position_frame.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/model.h"
 #include "krot/model/known_distances.h"
@@ -51,7 +52,8 @@ Json NotHeldJson(const LooseParts& loose);
 
 // The known positions' own frame; null if they have none.
 struct SolveReport;
-Json PositionFrameJson(const SolveReport& report);
+Json PositionFrameJson(const std::optional<PositionFrame>& position_frame,
+                       bool is_written);
 
 // Null without a report; `names` are the keys under which the lengths in each
 // model are written, scene units.

@@ -23,34 +23,19 @@
 #include "krot/pipeline/adjust_model.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/report/sentences.h"
+#include "krot/report/survey.h"
 #include "krot/tolerance/tolerance_analysis.h"
 
 namespace krot::internal {
-
-// Surveyed points that did not take part, compared with those of a model.
-struct CheckPoints {
-  struct Point {
-    Point3DId point3D_id = 0;
-    Eigen::Vector3d surveyed = Eigen::Vector3d::Zero();
-    // The model's position minus the surveyed one, in the survey's frame and
-    // unit, after the similarity that fits the model best to the survey.
-    Eigen::Vector3d difference = Eigen::Vector3d::Zero();
-  };
-
-  double scale = 1;  // the survey's unit, for one unit of the model
-  std::vector<Point> points;
-};
-
-// Compares the model's points with the surveyed ones. None if there are fewer
-// than three, or if they are on a line.
-std::optional<CheckPoints> CompareWithSurvey(
-    const Model& model, const std::vector<KnownPosition>& surveyed);
 
 // What one run of `krot bundle_adjuster` did.
 struct AdjustmentReport {
   RunRecord run;
   AdjustModelSummary summary;
-  std::optional<CheckPoints> check_points;
+  std::optional<SurveyComparison> check_points;
+  std::optional<SurveyComparison> positions;    // that are known
+  std::optional<PositionFrame> position_frame;  // if they have their own
+  bool is_in_position_frame = false;            // what is written
 };
 
 // For the terminal: errors before and after, what took part, why it ended.
@@ -69,7 +54,8 @@ std::string AdjustmentText(const AdjustmentReport& report, const Model& model);
 nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
                                      const Model& model);
 // Null if there are none.
-nlohmann::ordered_json CheckPointsJson(const std::optional<CheckPoints>& check);
+nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
+                                  bool are_points);
 std::string PrecisionSentence(const AdjustmentPrecision& precision);
 
 // Says why there is no model below the cap, and which bound proves it, if one
@@ -285,6 +271,10 @@ std::string DistanceTable(const DistanceReport& report,
 // A sentence for each known distance that contradicts the others in the last
 // model.
 std::vector<std::string> ContradictedDistances(const DistanceReport& report);
+
+// The solved model in the positions' frame, which there is, and its errors in
+// the report.
+Model InPositionFrame(const Model& solved, SolveReport* report);
 
 // "57 of 60 positions agree with the model, to 0.631 m (median); ..."
 std::string PositionFrameSentence(const PositionFrame& frame);

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "krot/analysis/position_frame.h"
+#include "krot/geometry.h"
+#include "krot/model.h"
+
+namespace krot::internal {
+
+// Surveyed points and cameras, compared with those of a model.
+struct SurveyComparison {
+  struct Place {
+    std::string name;           // "a.jpg" or "3D point 12"
+    Point3DId point3D_id = {};  // of a point
+    Eigen::Vector3d surveyed = Eigen::Vector3d::Zero();
+    // The model's position minus the surveyed one.
+    Eigen::Vector3d difference = Eigen::Vector3d::Zero();
+    // The difference in the standard deviations of the surveyed position.
+    double deviations = 0;
+  };
+
+  bool is_fitted = false;  // to these positions
+  double scale = 1;        // the survey's unit, for one unit of the model
+  double rms = 0;          // length of the differences
+  std::vector<Place> places;
+};
+
+// In the survey's frame and unit, after `survey_from_model`, or without it
+// after the similarity that fits the model best to the survey; then none if
+// there are fewer than three positions, or if they are on a line. Images
+// without a pose are left out.
+std::optional<SurveyComparison> CompareWithSurvey(
+    const Model& model, const std::vector<KnownPosition>& surveyed,
+    const std::optional<Similarity>& survey_from_model = {});
+
+// The known positions of a bundle adjustment, and in which frame it is done.
+class Survey {
+ public:
+  // With `in_own_frame`, moves the model into the positions' frame if they have
+  // one.
+  Survey(KnownPositions known, bool in_own_frame, Model* model);
+
+  // In the frame of the model.
+  const std::vector<KnownPosition>& positions() const { return positions_; }
+  const std::optional<PositionFrame>& frame() const { return frame_; }
+  bool is_in_own_frame() const { return is_in_own_frame_; }
+
+  // The adjusted model beside the known positions; none without any.
+  std::optional<SurveyComparison> ComparePositions(const Model& adjusted) const;
+  // Beside check points: in the frame of the known positions or, without any,
+  // after the similarity that fits best.
+  std::optional<SurveyComparison> CompareCheckPoints(
+      const Model& adjusted,
+      const std::vector<KnownPosition>& check_points) const;
+
+ private:
+  std::vector<KnownPosition> positions_, surveyed_;
+  std::optional<PositionFrame> frame_;
+  bool is_in_own_frame_ = false;
+  Similarity survey_from_model_;
+};
+
+}  // namespace krot::internal
