@@ -15,12 +15,10 @@ constexpr double kMaxTangent = 5.67;  // tangent of 80 degrees
 
 std::optional<Eigen::Vector2d> RayOf(const Camera& camera,
                                      const Eigen::Vector2d& pixel) {
-  UndistortedObservation undistorted;
-  if (UndistortPixel(camera.model_id, camera.params.data(), pixel, std::nullopt,
-                     &undistorted) != UndistortStatus::kOk) {
-    return std::nullopt;
-  }
-  return undistorted.u;
+  const auto undistorted =
+      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+  if (!undistorted) return std::nullopt;
+  return undistorted->u;
 }
 
 // The largest ||u|| on the image's border, which bounds that of the interior.
