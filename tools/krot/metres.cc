@@ -5,7 +5,6 @@
 #include "krot/compare.h"
 #include "krot/context.h"
 #include "krot/model/model_io.h"
-#include "krot/model/pose_priors.h"
 #include "krot/report/text_table.h"
 #include "tools/krot/run_log.h"
 
