@@ -177,7 +177,7 @@ DescentTermination TerminationOf(double status) {
 }
 
 // Entry k of a row with the residual 0 / 1.
-double IdleEntry(int k) { return k == kLaneRow - 1 ? 1 : 0; }
+double IdleEntry(int k) { return k == kResidualRow - 1 ? 1 : 0; }
 
 }  // namespace
 
@@ -198,7 +198,9 @@ bool SideBySideDescent::IsBusy() const {
 void SideBySideDescent::Begin(int lane, int num_rows, const DescentGoal& goal,
                               Problem* problem) {
   lanes_[lane] = {problem, num_rows, num_rows};
-  if (!uses_lanes_ || num_rows == 0 || num_rows > kMaxResiduals) {
+  // A longer problem fills the lanes of a vector by itself, and eight of them
+  // would not fit into a cache.
+  if (!uses_lanes_ || num_rows == 0 || num_rows > 128) {
     MinimizeAlone(lane, goal);
     return;
   }
@@ -208,12 +210,23 @@ void SideBySideDescent::Begin(int lane, int num_rows, const DescentGoal& goal,
   const ActiveResiduals& active = *problem->active;
   double sum = 0;
   for (int a = 0; a < active.size; ++a) sum += active.multiplier[a];
+  bool is_warm = false;
   for (int a = 0; a < kCorners; ++a) {
-    const bool is_active = a < active.size;
-    descents_.index[a][lane] = is_active ? active.index[a] : 0;
-    descents_.multiplier[a][lane] = is_active ? active.multiplier[a] / sum : 0;
+    const double multiplier =
+        a < active.size ? active.multiplier[a] / sum : 0.0;
+    const bool is_corner = multiplier > 0;
+    descents_.index[a][lane] = is_corner ? active.index[a] : kNoPieceIndex;
+    descents_.weight[a][lane] = multiplier;
+    descents_.multiplier[a][lane] = multiplier;
+    is_warm |= is_corner;
   }
-  descents_.Begin(lane);
+  descents_.is_cold[lane] = is_warm ? 0 : 1;
+  descents_.raises[lane] = 0;
+  descents_.kappa[lane] = kFirstKappa;
+  descents_.iterations[lane] = 0;
+  descents_.lessons[lane] = 0;
+  descents_.cost_failed[lane] = std::numeric_limits<double>::infinity();
+  descents_.calls[lane] = 0;
 }
 
 // Adds residuals 0 / 1 to problems that have fewer than `num_rows`.
@@ -221,7 +234,8 @@ void SideBySideDescent::Fill(int num_rows) {
   for (int k = 0; k < kLanes; ++k) {
     int& i = lanes_[k].num_filled;
     for (; i < num_rows; ++i) {
-      for (int n = 0; n < kLaneRow; ++n) rows_[i].entry[n][k] = IdleEntry(n);
+      for (int n = 0; n < kResidualRow; ++n)
+        rows_[i].entry[n][k] = IdleEntry(n);
     }
   }
 }
@@ -279,8 +293,8 @@ void SideBySideDescent::MinimizeAlone(int lane, const DescentGoal& goal) {
   descents_.status[lane] = kLaneIdle;
   alone_.residuals().Clear();
   for (int i = 0; i < lanes_[lane].num_rows; ++i) {
-    double row[kLaneRow];
-    for (int n = 0; n < kLaneRow; ++n) row[n] = rows_[i].entry[n][lane];
+    double row[kResidualRow];
+    for (int n = 0; n < kResidualRow; ++n) row[n] = rows_[i].entry[n][lane];
     alone_.residuals().Add(row);
   }
   problem.summary = alone_.Minimize(goal, problem.active, problem.x);

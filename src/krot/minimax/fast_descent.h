@@ -99,15 +99,11 @@ class FastDescent {
 // result of a problem does not depend on the other problems or on their order.
 //
 // FastDescent solves problems that are difficult for lanes (an optimum far
-// away, many steps) or have more than kMaxResiduals, from their start. It
+// away, many steps) or have more than 128 residuals, from their start. It
 // solves all of them with `paper` settings, with other norms, and on machines
 // with short vectors (LaneKernels::lanes_pay).
 class SideBySideDescent {
  public:
-  // A longer problem fills the lanes of a vector by itself, and eight of them
-  // would not fit into a cache.
-  static constexpr int kMaxResiduals = 128;
-
   struct Problem {
     // The start, which becomes the optimum. Not null.
     Eigen::Vector3d* x = nullptr;
@@ -119,10 +115,10 @@ class SideBySideDescent {
   // Writes the residuals of one problem, as rows a_1, b_1, a_2, b_2, c, d.
   class RowWriter {
    public:
-    void Add(const double row[kLaneRow]) {
+    void Add(const double row[kResidualRow]) {
       if (count_ == static_cast<int>(rows_->size())) rows_->emplace_back();
       LaneRow& lanes = (*rows_)[count_++];
-      for (int k = 0; k < kLaneRow; ++k) lanes.entry[k][lane_] = row[k];
+      for (int k = 0; k < kResidualRow; ++k) lanes.entry[k][lane_] = row[k];
     }
 
    private:
