@@ -15,16 +15,10 @@ namespace krot::internal {
 
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
-  table->Add({"OutlierFilter.max_error",
-              "The bound for all errors; without it, what noise does not "
-              "explain is removed",
-              "a number > 0, pixels", "", false,
-              [options](const std::string& text) {
-                double value = 0;
-                if (!ParseReal(text, &value) || !(value > 0)) return false;
-                options->max_error = value;
-                return true;
-              }});
+  AddPixels("OutlierFilter.max_error",
+            "The bound for all errors; without it, what noise does not explain "
+            "is removed",
+            "", &options->max_error, table);
   table->AddNamed<OutlierMethod>(
       "OutlierFilter.method", &options->method,
       {{"conflicts", OutlierMethod::kConflicts},

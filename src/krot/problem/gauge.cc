@@ -16,6 +16,10 @@
 namespace krot::internal {
 namespace {
 
+// Centres closer than this, relative to the size of their coordinates and of
+// the component, coincide: rounding is a thousand times smaller.
+constexpr double kCoincident = 1e-12;
+
 // The views that have observations, in the order of their first observations.
 std::vector<int32_t> SeenViews(const KnownRotationProblem& problem,
                                const Context& context) {

@@ -60,10 +60,6 @@ void CheckIndices(const KnownRotationProblem& problem) {
 
 using Eigen::Vector3d;
 
-// Positions closer than this, relative to the size of their coordinates,
-// coincide.
-constexpr double kSamePosition = 1e-12;
-
 Vector3d CentreOf(const View& view, const Vector3d& translation) {
   return Center(
       {view.cam_from_world_rotation, view.cam_from_rig_rotation * translation +
@@ -160,7 +156,7 @@ double FixedExtent(const KnownRotationProblem& problem) {
   ForFixedPositions(problem, [&](const Vector3d& x) {
     extent = std::max(extent, (x - *origin).norm());
   });
-  return extent > kSamePosition * origin->norm() ? extent : 0;
+  return extent > 1e-12 * origin->norm() ? extent : 0;
 }
 
 bool IsScaleFree(const KnownRotationProblem& problem) {

@@ -48,12 +48,6 @@ using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Vector2 = ForceChecker::Vector2;
 using Vector3 = ForceChecker::Vector3;
 
-constexpr Real kRootTwo = 1.4142135623730951L;  // rounded up
-// Multipliers below this, relative to the largest, might underflow.
-constexpr double kSmallestShare = 1e-100;
-// No lambda may have to change by this or more, relative.
-constexpr Real kLargestChange = 0.5L;
-
 // The sum of forces at a point or frame, and the sum of the absolute values of
 // their terms.
 struct NodeBalance {
@@ -87,7 +81,7 @@ std::optional<std::string> ForceChecker::ScaleMultipliers() {
   }
   std::frexp(largest, &exponent_);
   for (const CertifiedObservation& o : certificate_.observations) {
-    if (o.lambda < kSmallestShare * largest) {
+    if (o.lambda < 1e-100 * largest) {  // it might underflow
       return "its multipliers differ by more than 100 decades";
     }
     const Observation& observation = whole_.observations[o.observation];
@@ -256,13 +250,14 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
 // The dual norm of a vector is at most its length, except for p = infinity:
 // then it is at most sqrt(2) times the length, reached along the diagonal.
 std::optional<double> ForceChecker::BoundRho(std::string* refusal) const {
-  const Real per_length = std::isinf(norm_.p) ? kRootTwo : 1;
+  const Real per_length =
+      std::isinf(norm_.p) ? 1.4142135623730951L : 1;  // rounded up
   Real rho = 0;
   for (size_t i = 0; i < lambda_.size(); ++i) {
     const Real correction = corrections_[i] / lambda_[i];
     const Real change =
         correction * compliances_[i].delta_lambda / certificate_.lower_bound;
-    if (!(change < kLargestChange)) {
+    if (!(change < 0.5L)) {
       *refusal = "its multipliers do not balance at a point or a frame";
       return std::nullopt;
     }
