@@ -91,19 +91,15 @@ Eigen::Matrix2d ProjectionJacobian(int model_id, const double* params,
 namespace {
 
 template <typename Model>
-constexpr bool kHasImagePlane = !std::is_same_v<Model, Equirectangular>;
+constexpr bool kHasImagePlane = !std::is_void_v<typename Model::Lens>;
 
 // Whether the chart of a unit vector with this z is the plane z = 1.
-template <typename Model>
+template <typename Lens>
 bool HasChartOnImagePlane(double z) {
-  if constexpr (!kHasImagePlane<Model>)
-    return false;
-  else if constexpr (std::is_same_v<typename Model::Lens, PerspectiveLens>)
-    return true;
-  else if constexpr (std::is_same_v<typename Model::Lens, DivisionLens>)
+  if constexpr (std::is_same_v<Lens, DivisionLens>) {
     return z > 0.17364817766693033;  // the cosine of 80 degrees
-  else
-    return false;
+  }
+  return std::is_same_v<Lens, PerspectiveLens>;
 }
 
 }  // namespace
@@ -131,7 +127,7 @@ std::optional<Chart> ChartAt(int model_id, const double* params,
           return std::nullopt;
         }
         Chart chart;
-        if (HasChartOnImagePlane<Model>(bearing.z())) {
+        if (HasChartOnImagePlane<typename Model::Lens>(bearing.z())) {
           chart.n = Eigen::Vector3d::UnitZ();
           chart.B.setIdentity();
         } else {
@@ -188,20 +184,18 @@ Eigen::Vector2d Project(const double* params, const Eigen::Vector3d& x_cam) {
 template <typename Model>
 bool RowOnImagePlane(const double* params, const Eigen::Vector2d& pixel,
                      const Eigen::Vector3d& x_hat, Eigen::Matrix3d* E) {
-  if constexpr (kHasImagePlane<Model>) {
-    if constexpr (std::is_same_v<typename Model::Lens, PerspectiveLens>) {
-      const Eigen::Vector2d u = x_hat.hnormalized();
-      if (!(x_hat.z() > 0 && std::isfinite(u.squaredNorm()))) return false;
-      Dual<double> x, y;
-      Model::Project(params, Dual<double>{u.x(), 1, 0},
-                     Dual<double>{u.y(), 0, 1}, &x, &y);
-      E->row(0) << 0, 0, 1;
-      E->row(1) << x.du, x.dv,
-          x.value - pixel.x() - (x.du * u.x() + x.dv * u.y());
-      E->row(2) << y.du, y.dv,
-          y.value - pixel.y() - (y.du * u.x() + y.dv * u.y());
-      return true;
-    }
+  if constexpr (std::is_same_v<typename Model::Lens, PerspectiveLens>) {
+    const Eigen::Vector2d u = x_hat.hnormalized();
+    if (!(x_hat.z() > 0 && std::isfinite(u.squaredNorm()))) return false;
+    Dual<double> x, y;
+    Model::Project(params, Dual<double>{u.x(), 1, 0}, Dual<double>{u.y(), 0, 1},
+                   &x, &y);
+    E->row(0) << 0, 0, 1;
+    E->row(1) << x.du, x.dv,
+        x.value - pixel.x() - (x.du * u.x() + x.dv * u.y());
+    E->row(2) << y.du, y.dv,
+        y.value - pixel.y() - (y.du * u.x() + y.dv * u.y());
+    return true;
   }
   return false;
 }

@@ -303,6 +303,7 @@ using Eucm = ImagePlaneModel<16, 2, EucmLens, NoDistortion>;
 //   pixel = (w (1/2 + azimuth / 2 pi), h (1/2 + elevation / pi)),
 // azimuth the angle of (Z, X), elevation that of (|(X, Z)|, Y).
 struct Equirectangular {
+  using Lens = void;
   static constexpr int kId = 17;
   static constexpr int kNumParams = 2;
 

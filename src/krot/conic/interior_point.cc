@@ -187,21 +187,6 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   InteriorPointSummary summary_;
 };
 
-template <typename Cone>
-InteriorPointSummary RunInCone(
-    const KnownRotationProblem& problem, const InteriorPointOptions& options,
-    const Context& context, const ConeProgram& program, const Estimate& start,
-    double scalar, Estimate* estimate, std::vector<Multiplier>* multipliers) {
-  ConicSolver<Cone> solver(problem, options, context, program, start, scalar);
-  const InteriorPointSummary summary = solver.Run();
-  if (program.kind != ConeProgram::Kind::kFeasibility ||
-      summary.termination == InteriorPointTermination::kFeasible) {
-    *estimate = solver.best();
-  }
-  *multipliers = solver.TakeMultipliers();
-  return summary;
-}
-
 InteriorPointSummary Run(const KnownRotationProblem& problem,
                          const InteriorPointOptions& options,
                          const Context& context, const ConeProgram& program,
@@ -211,10 +196,18 @@ InteriorPointSummary Run(const KnownRotationProblem& problem,
   CheckConic(options.norm);
   CheckAtLeast(1, options.max_iterations, "max_iterations");
   CheckPositive(options.smallest_gap, "smallest_gap");
-  const auto run = options.norm.p == 2 ? &RunInCone<SecondOrderCone>
-                                       : &RunInCone<FourHalfLines>;
-  return run(problem, options, context, program, start, scalar, estimate,
-             multipliers);
+  const auto run = [&](auto cone) {
+    ConicSolver<decltype(cone)> solver(problem, options, context, program,
+                                       start, scalar);
+    const InteriorPointSummary summary = solver.Run();
+    if (program.kind != ConeProgram::Kind::kFeasibility ||
+        summary.termination == InteriorPointTermination::kFeasible) {
+      *estimate = solver.best();
+    }
+    *multipliers = solver.TakeMultipliers();
+    return summary;
+  };
+  return options.norm.p == 2 ? run(SecondOrderCone()) : run(FourHalfLines());
 }
 
 }  // namespace

@@ -303,12 +303,6 @@ void CentredLeastSquares<kRows>::Solve(const BlockVector* g, const double* r,
 }
 
 template <int kRows>
-void CentredLeastSquares<kRows>::Solve(const BlockVector* g, const double* r,
-                                       BlockVector* x, double* image) {
-  Solve(g, r, SchurComplement::kTolerance, x, image);
-}
-
-template <int kRows>
 void CentredLeastSquares<kRows>::SolveRefined(const BlockVector* g,
                                               const double* r, BlockVector* x,
                                               double* image) {

@@ -60,7 +60,7 @@ double Evaluate(const std::vector<LineResidual>& line, double alpha,
 
 double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
                     const Eigen::Vector3d& direction, Norm norm,
-                    const StepSizeOptions& options,
+                    const FastDescentOptions& options,
                     std::vector<LineResidual>* scratch) {
   std::vector<LineResidual>& line = *scratch;
   line.clear();
@@ -90,20 +90,13 @@ double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
 }
 
 void CheckOptions(const FastDescentOptions& options) {
-  const auto check = [](bool ok, const char* name, double value,
-                        const char* requirement) {
-    CheckArgument(ok, name, value, requirement);
-  };
-  check(options.max_iterations >= 1, "max_iterations", options.max_iterations,
-        ">= 1");
-  check(options.stationarity_tolerance >= 0, "stationarity_tolerance",
-        options.stationarity_tolerance, ">= 0");
-  check(options.step_tolerance > 0, "step_tolerance", options.step_tolerance,
-        "> 0");
-  check(options.slope_probe > 0, "slope_probe", options.slope_probe, "> 0");
-  check(options.active_tolerance >= 0 && options.active_tolerance < 1,
-        "active_tolerance", options.active_tolerance, "in [0, 1)");
-  check(options.max_step > 0, "max_step", options.max_step, "> 0");
+  CheckAtLeast(1, options.max_iterations, "max_iterations");
+  CheckAtLeast(0, options.stationarity_tolerance, "stationarity_tolerance");
+  CheckPositive(options.step_tolerance, "step_tolerance");
+  CheckPositive(options.slope_probe, "slope_probe");
+  CheckArgument(options.active_tolerance >= 0 && options.active_tolerance < 1,
+                "active_tolerance", options.active_tolerance, "in [0, 1)");
+  CheckPositive(options.max_step, "max_step");
 }
 
 FastDescent::FastDescent(const FastDescentOptions& options, Norm norm)
@@ -137,8 +130,6 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
     summary.termination = DescentTermination::kBehind;
     return summary;
   }
-  const StepSizeOptions step_options{options_.step_tolerance,
-                                     options_.slope_probe, options_.max_step};
   summary.termination = DescentTermination::kMaxIterations;
   while (summary.iterations < options_.max_iterations) {
     FindDescentNormals(residuals_, *x, norm_, options_.active_tolerance,
@@ -151,7 +142,7 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
     }
     ++summary.iterations;
     const double step =
-        FindStepSize(residuals_, *x, *direction, norm_, step_options, &line_);
+        FindStepSize(residuals_, *x, *direction, norm_, options_, &line_);
     const Eigen::Vector3d x_next = *x + step * *direction;
     const double cost = residuals_.Evaluate(x_next, norm_);
     if (!(cost < summary.cost)) {

@@ -161,15 +161,9 @@ void OptionTable::AddReal(const std::string& name, double* value,
 void OptionTable::AddChoice(const std::string& name, std::string* value,
                             const std::vector<std::string>& choices,
                             const std::string& description) {
-  Add({name, description, "one of " + ChoiceText(choices), *value, false,
-       [value, choices](const std::string& text) {
-         const auto choice = std::find_if(
-             choices.begin(), choices.end(),
-             [&](const std::string& c) { return IsSameWord(c, text); });
-         if (choice != choices.end()) *value = *choice;
-         return choice != choices.end();
-       },
-       false, choices});
+  std::vector<std::pair<std::string, std::string>> named;
+  for (const std::string& choice : choices) named.emplace_back(choice, choice);
+  AddNamed(name, value, named, description);
 }
 
 void OptionTable::AddThreads(const std::string& name, int* value,

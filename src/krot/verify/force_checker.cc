@@ -183,7 +183,7 @@ std::vector<std::optional<int32_t>> ForceChecker::FirstViews() const {
   return first_views;
 }
 
-ForceChecker::Offset ForceChecker::FromFirstView(int32_t view,
+FixedConstants::Part ForceChecker::FromFirstView(int32_t view,
                                                  int32_t first) const {
   if (view == first) return {};
   const View& own = part_.problem().views[view];
@@ -214,18 +214,12 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
     const View& view = problem.views[observation.view];
     const FixedConstants::Part of_point =
         fixed.OfPoint(view, observation.point);
-    Vector3 offset = of_point.x_cam;
-    Real size = of_point.size;
-    if (fixed.IsAwayFromOrigin(view.frame)) {
-      const FixedConstants::Part of_frame = fixed.OfFrame(view);
-      offset += of_frame.x_cam;
-      size += of_frame.size;
-    } else {
-      const Offset in_frame =
-          FromFirstView(observation.view, *first_views[view.frame]);
-      offset += in_frame.x_cam;
-      size += in_frame.size;
-    }
+    const FixedConstants::Part of_frame =
+        fixed.IsAwayFromOrigin(view.frame)
+            ? fixed.OfFrame(view)
+            : FromFirstView(observation.view, *first_views[view.frame]);
+    const Vector3 offset = of_point.x_cam + of_frame.x_cam;
+    const Real size = of_point.size + of_frame.size;
     constants.value += forces_[i].sum.dot(offset);
     constants.error += forces_[i].terms.sum() * relative_error * size +
                        corrections_[i] * offset.cwiseAbs().sum();
@@ -234,7 +228,8 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
   for (const Pull& pull : pulls_) {
     if (pull.kind != Pull::Kind::kView) continue;
     const View& view = problem.views[pull.index];
-    const Offset in_frame = FromFirstView(pull.index, *first_views[view.frame]);
+    const FixedConstants::Part in_frame =
+        FromFirstView(pull.index, *first_views[view.frame]);
     const Vector3 direction =
         scale * (view.cam_from_world_rotation.cast<Real>() *
                  pull.direction.cast<Real>());

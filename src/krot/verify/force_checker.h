@@ -190,11 +190,7 @@ class ForceChecker {
   Real ErrorOfSums() const;
   // The offset of a view's centre from that of its frame's first view, in its
   // camera's coordinates.
-  struct Offset {
-    Vector3 x_cam = Vector3::Zero();
-    Real size = 0;
-  };
-  Offset FromFirstView(int32_t view, int32_t first) const;
+  FixedConstants::Part FromFirstView(int32_t view, int32_t first) const;
   // Per frame, its first view in the support.
   std::vector<std::optional<int32_t>> FirstViews() const;
 
