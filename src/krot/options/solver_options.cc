@@ -249,8 +249,9 @@ void CheckPairs(const SolveModelOptions& options, const OptionTable& table) {
   }
   if (!table.IsGiven("positions_path") &&
       !table.IsGiven("point_positions_path")) {
-    for (const char* name : {"Problem.inflate_positions",
-                             "Problem.position_radius", "positions_frame"}) {
+    for (const char* name :
+         {"Problem.inflate_positions", "Problem.position_radius",
+          "positions_frame"}) {
       table.Refuse(name, "without --positions_path or --point_positions_path");
     }
   }

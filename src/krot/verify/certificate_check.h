@@ -131,9 +131,8 @@ inline constexpr double kRotationError = 2e-15;
 inline constexpr double kUnitRoundoff =
     std::numeric_limits<double>::epsilon() / 2;
 
-// Checks of the input before anything is proved. Each
-// returns the reason of a refusal, one sentence without its full stop, or
-// nothing.
+// Checks of the input before anything is proved. Each returns the reason of a
+// refusal, one sentence without its full stop, or nothing.
 
 // Requires finite numbers, a known norm, observations of the problem in
 // ascending order, and |y|_dual <= lambda for each.
