@@ -26,7 +26,7 @@ std::vector<SourceLine> SourceLines(const std::string& folder);
 std::vector<SourceLine> CodeLines(const std::string& folder);
 
 // The folder of src/krot that a file in it belongs to: "model" for
-// src/krot/model/validate.h, and "" for what stands in src/krot itself.
+// src/krot/model/rigs.h, and "" for what stands in src/krot itself.
 std::string LibraryFolder(const std::filesystem::path& file);
 
 // All files that are under version control or would be: every text file of the

@@ -53,9 +53,7 @@ TEST(CameraModels, WithoutImagePlaneAreRefusedByNameOfTheArgument) {
     EXPECT_THAT(error.what(), testing::StartsWith("model_id = 17, must be"));
   }
   EXPECT_THROW(ProjectionJacobian(18, params, {0, 0}), std::invalid_argument);
-  UndistortedObservation result;
-  EXPECT_THROW(UndistortPixel(-1, params, {0, 0}, {}, &result),
-               std::invalid_argument);
+  EXPECT_THROW(UndistortPixel(-1, params, {0, 0}), std::invalid_argument);
 }
 
 TEST(VisitCameraModel, CallsTheVisitorWithTheModelOfTheId) {

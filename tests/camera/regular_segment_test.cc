@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/LU>
 
-#include "krot/camera/distortion.h"
+#include "krot/camera/models.h"
 
 namespace krot::internal {
 namespace {

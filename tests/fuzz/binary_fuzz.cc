@@ -3,7 +3,7 @@
 #include <iterator>
 
 #include "krot/context.h"
-#include "krot/model/binary_io.h"
+#include "krot/model/formats.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot::internal {

@@ -8,7 +8,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/model_digest.h"
 #include "krot/model.h"
-#include "krot/model/binary_io.h"
+#include "krot/model/formats.h"
 #include "krot/model/model_checks.h"
 #include "krot/model/rigs.h"
 #include "tests/fuzz/fuzz.h"

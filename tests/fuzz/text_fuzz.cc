@@ -4,7 +4,7 @@
 
 #include "krot/base/write_file.h"
 #include "krot/context.h"
-#include "krot/model/text_io.h"
+#include "krot/model/formats.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace krot::internal {

@@ -144,7 +144,8 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesTheNormalEquationsAsDenseQrDoes) {
         EXPECT_LE((this->Stack(x) - expected).norm(), 1e-11L * expected.norm());
         EXPECT_LE((image.cast<long double>() - A * expected).norm(),
                   1e-11L * (A * expected).norm());
-        system.Solve(has_g ? &g : nullptr, has_r ? r.data() : nullptr, &x);
+        system.Solve(has_g ? &g : nullptr, has_r ? r.data() : nullptr,
+                     SchurComplement::kTolerance, &x, nullptr);
         EXPECT_LE((this->Stack(x) - expected).norm(), 1e-9L * expected.norm());
       }
     }
@@ -168,7 +169,8 @@ TYPED_TEST(CentredLeastSquaresTest, SolvesRoughlyWithoutFormingTheSystem) {
   const Eigen::VectorXd r = this->RandomRows();
   Eigen::VectorXd expected(r.size()), image(r.size());
   BlockVector x, same;
-  exact.Solve(nullptr, r.data(), &x, expected.data());
+  exact.Solve(nullptr, r.data(), SchurComplement::kTolerance, &x,
+              expected.data());
   for (const double tolerance : {1e-2, 1e-8}) {
     rough.Solve(nullptr, r.data(), tolerance, &x, image.data());
     // The tolerance is that of an estimate of this norm.

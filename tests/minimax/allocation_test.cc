@@ -92,7 +92,7 @@ TEST(Allocation, ProblemsSideBySideMakeNoneOnceWarm) {
   }
   const auto add_rows = [&](int n, SideBySideDescent::RowWriter* writer) {
     for (const Residual& residual : problems[n].residuals) {
-      double row[kLaneRow];
+      double row[kResidualRow];
       RowOf(residual, row);
       writer->Add(row);
     }

@@ -31,8 +31,8 @@ TEST(ResidualKernel, GradientsAreThoseOfThePieces) {
     for (int i = 0; i < count; ++i) {
       ResidualPiece piece;
       ResidualPieces(problem.residuals[i], x, Norm::L2(), /*share=*/1, &piece);
-      const GradientBlock& block = blocks[i / kResidualLanes];
-      const int lane = i % kResidualLanes;
+      const GradientBlock& block = blocks[i / kLanes];
+      const int lane = i % kLanes;
       EXPECT_NEAR(block.value[lane], piece.value, 1e-12 * piece.value);
       EXPECT_NEAR(block.depth[lane], problem.residuals[i].Depth(x), 1e-12);
       for (int k = 0; k < 3; ++k) {
@@ -65,7 +65,7 @@ TEST(ResidualKernel, AResidualThatIsZeroHasGradientZero) {
 TEST(ResidualKernel, ADepthShareKeepsAllDepthsAboveTheLowest) {
   ProblemGenerator generator(23);
   ResidualSet set;
-  const double lowest = 0.1;
+  const double lowest = 1 - kLargestFall;
   for (const int count : kCounts) {
     const ResidualProblem problem = generator.Triangulation(count, 5);
     Fill(problem, &set);
@@ -73,7 +73,7 @@ TEST(ResidualKernel, ADepthShareKeepsAllDepthsAboveTheLowest) {
     for (const double length : {0.1, 1.0, 10.0, 1000.0}) {
       const Vector3d d = length * generator.Normal3();
       const double share = best_residual_kernels.depth_share(
-          set.blocks(), set.num_blocks(), x.data(), d.data(), lowest);
+          set.blocks(), set.num_blocks(), x.data(), d.data());
       double least = 1;  // depth at the end of the share, relative to its start
       for (const Residual& residual : problem.residuals) {
         least =

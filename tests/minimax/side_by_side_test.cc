@@ -44,7 +44,7 @@ void SolveSideBySide(const DescentGoal& goal, SideBySideDescent* descent,
       goal,
       [&](int n, SideBySideDescent::RowWriter* writer) {
         for (const Residual& residual : (*tasks)[n].problem.residuals) {
-          double row[kLaneRow];
+          double row[kResidualRow];
           RowOf(residual, row);
           writer->Add(row);
         }

@@ -26,7 +26,7 @@ TEST(StepSize, MinimisesTheLargestResidualAlongTheLine) {
       const Vector3d direction = RandomDirection(&generator);
       std::vector<LineResidual> scratch;
       const double alpha =
-          FindStepSize(set, x, direction, norm, StepSizeOptions{}, &scratch);
+          FindStepSize(set, x, direction, norm, FastDescentOptions{}, &scratch);
       const double reached = problem.Cost(x + alpha * direction, norm);
       // A slope of at most 1e3 px per unit over the tolerance of 1e-6.
       for (const double other : {0.0, 0.5 * alpha, 0.9 * alpha, alpha - 1e-4,
@@ -47,7 +47,7 @@ TEST(StepSize, StaysWhereAllDepthsArePositive) {
     Fill(problem, &set);
     const Vector3d x = generator.Start(problem, 1);
     const Vector3d direction = RandomDirection(&generator);
-    StepSizeOptions options;
+    FastDescentOptions options;
     options.max_step = 1e3;
     std::vector<LineResidual> scratch;
     const double alpha =
@@ -69,7 +69,7 @@ TEST(StepSize, IsBoundedWhereTheLineIsNot) {
     ray.c << 0, 0, 1;
     set.Add(ray);
   }
-  StepSizeOptions options;
+  FastDescentOptions options;
   options.max_step = 10;
   std::vector<LineResidual> scratch;
   const double alpha = FindStepSize(set, Vector3d(0, 0, 5), Vector3d::UnitZ(),
@@ -87,7 +87,7 @@ TEST(StepSize, FindsTheZeroOfOneResidual) {
   set.Add(ray);
   std::vector<LineResidual> scratch;
   const double alpha = FindStepSize(set, Vector3d(0, 0, 5), Vector3d::UnitX(),
-                                    Norm::L2(), StepSizeOptions{}, &scratch);
+                                    Norm::L2(), FastDescentOptions{}, &scratch);
   EXPECT_NEAR(alpha, 0.01, 1e-6);
 }
 

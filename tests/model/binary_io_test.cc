@@ -1,4 +1,4 @@
-#include "krot/model/binary_io.h"
+#include "krot/model/formats.h"
 
 #include <cstring>
 #include <string>

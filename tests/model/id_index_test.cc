@@ -1,4 +1,4 @@
-#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
 
 #include <limits>
 #include <optional>

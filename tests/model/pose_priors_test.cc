@@ -1,4 +1,4 @@
-#include "krot/model/pose_priors.h"
+#include "krot/model/model_io.h"
 
 #include <cmath>
 #include <cstdio>

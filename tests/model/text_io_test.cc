@@ -1,4 +1,4 @@
-#include "krot/model/text_io.h"
+#include "krot/model/formats.h"
 
 #include <cmath>
 #include <limits>

@@ -18,7 +18,6 @@
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"

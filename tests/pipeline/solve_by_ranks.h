@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "krot/base/checkpoint.h"
-#include "krot/model/binary_io.h"
 #include "krot/model/derived_models.h"
+#include "krot/model/formats.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/synthetic/scene.h"
 #include "tests/testing/thread_ranks.h"

@@ -35,9 +35,8 @@ TEST_F(ObservationRows, OfAnIntersectionAreAffineInThePoint) {
   for (const Observation& observation : scene_.problem.observations) {
     const View& view = scene_.problem.views[observation.view];
     double row[kResidualRow];
-    IntersectionRow(
-        CamFromWorld(view, scene_.estimate.translations[view.frame]),
-        observation, row);
+    AffineRow(CamFromWorld(view, scene_.estimate.translations[view.frame]),
+              observation, row);
     ExpectSame(Evaluate(row, scene_.estimate.points[observation.point]),
                observation);
   }

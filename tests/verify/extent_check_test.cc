@@ -1,4 +1,4 @@
-#include "krot/verify/extent_check.h"
+#include "krot/verify/certificate_check.h"
 
 #include <cmath>
 #include <functional>

@@ -23,8 +23,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 VERIFY = ROOT / "src" / "krot" / "verify"
 # What judges, as opposed to what makes certificates.
-CHECKER = ("certificate_check.cc", "extent_check.cc",
-           "force_balance.cc", "force_checker.cc")
+CHECKER = ("certificate_check.cc", "force_balance.cc", "force_checker.cc")
 EQUIVALENT = pathlib.Path(__file__).with_name("equivalent_mutants.txt")
 TIMEOUT = 60  # seconds of a test: what takes longer hangs, and is noticed
 

@@ -56,7 +56,7 @@ class SideBySideSolver : public SubproblemSolver {
         DescentGoal{},
         [&](int n, SideBySideDescent::RowWriter* writer) {
           for (const Residual& residual : problems[order[n]].residuals) {
-            double row[kLaneRow];
+            double row[kResidualRow];
             RowOf(residual, row);
             writer->Add(row);
           }

@@ -105,8 +105,8 @@ std::vector<Residual> IntersectionResiduals(const KnownRotationProblem& problem,
     const Observation& observation = problem.observations[i];
     const View& view = problem.views[observation.view];
     double row[kResidualRow];
-    IntersectionRow(CamFromWorld(view, estimate.translations[view.frame]),
-                    observation, row);
+    AffineRow(CamFromWorld(view, estimate.translations[view.frame]),
+              observation, row);
     residuals.push_back(FromRow(row));
   }
   return residuals;

@@ -10,7 +10,7 @@
 #include <boost/program_options.hpp>
 
 #include "krot/context.h"
-#include "krot/model/text_io.h"
+#include "krot/model/formats.h"
 #include "krot/options/option_table.h"
 
 namespace krot::internal {

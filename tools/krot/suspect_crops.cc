@@ -13,7 +13,6 @@
 
 #include "krot/camera/camera_model.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 #include "krot/report/html_page.h"
 #include "krot/report/pair_report.h"
 #include "krot/report/text_table.h"

@@ -4,7 +4,7 @@
 
 #include <Eigen/LU>
 
-#include "krot/linear/dense_inverse.h"
+#include "krot/linear/blocks.h"
 
 namespace krot::internal {
 namespace {

@@ -33,16 +33,12 @@ inline PixelRay operator*(const Eigen::Matrix3d& rotation,
 // the axis projects to the pixel, and for cameras without an image plane.
 inline std::optional<PixelRay> RayOf(const Camera& camera,
                                      const Eigen::Vector2d& pixel) {
-  const CameraModelInfo* info = FindCameraModel(camera.model_id);
-  UndistortedObservation undistorted;
-  if (info == nullptr || !info->has_image_plane ||
-      UndistortPixel(camera.model_id, camera.params.data(), pixel, std::nullopt,
-                     &undistorted) != UndistortStatus::kOk) {
-    return std::nullopt;
-  }
+  const auto undistorted =
+      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+  if (!undistorted) return std::nullopt;
   PixelRay ray;
-  ray.ray = undistorted.u.homogeneous();
-  ray.by_pixel << undistorted.J.inverse(), 0, 0;
+  ray.ray = undistorted->u.homogeneous();
+  ray.by_pixel << undistorted->J.inverse(), 0, 0;
   return ray;
 }
 

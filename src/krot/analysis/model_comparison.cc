@@ -8,7 +8,6 @@
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 
 namespace krot::internal {
 namespace {

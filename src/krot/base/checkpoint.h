@@ -49,10 +49,7 @@ class StepValues {
   // A value that is the same on every rank.
   template <typename T>
   void Value(T* value) {
-    struct Boxed {  // because a vector of bool does not hold plain values
-      T value;
-    };
-    std::vector<Boxed> boxed = {{*value}};
+    std::vector<Boxed<T>> boxed = {{*value}};
     Values(&boxed);
     if (is_read_) *value = boxed.at(0).value;
   }

@@ -27,6 +27,12 @@ class Timer {
   Clock::time_point start_ = Clock::now();
 };
 
+// One value in a vector, as a vector of bool does not hold plain values.
+template <typename T>
+struct Boxed {
+  T value;
+};
+
 // Processes that solve one problem together. Each has all frames and a share of
 // the points, with their observations; the shares of rank 0, 1, ..., one after
 // another, are the whole problem in its order. All ranks take the same steps,
@@ -85,10 +91,7 @@ class Ranks {
   }
   template <typename T>
   void Broadcast(T* value, int from = 0) {
-    struct Boxed {  // because a vector of bool does not hold plain values
-      T value;
-    };
-    std::vector<Boxed> boxed = {{*value}};
+    std::vector<Boxed<T>> boxed = {{*value}};
     Broadcast(&boxed, from);
     *value = boxed[0].value;
   }

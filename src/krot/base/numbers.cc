@@ -47,10 +47,9 @@ std::optional<double> ParseRealByC(std::string_view text) {
 std::string ShortestTextByC(double value) {
   if (std::isnan(value)) return std::signbit(value) ? "-nan" : "nan";
   if (std::isinf(value)) return value < 0 ? "-inf" : "inf";
-  constexpr int kMaxDecimals = std::numeric_limits<double>::max_digits10 - 1;
   int decimals = 0;
   std::string scientific = Print("%.*e", decimals, value);
-  while (decimals < kMaxDecimals &&
+  while (decimals + 1 < std::numeric_limits<double>::max_digits10 &&
          std::strtod(scientific.c_str(), nullptr) != value) {
     scientific = Print("%.*e", ++decimals, value);
   }
@@ -65,8 +64,7 @@ namespace {
 // The bits of doubles that are not negative, read as integers, have the order
 // of their values. So the bits of the median are found from the highest on,
 // eight at a time, by counting how many values have each continuation.
-constexpr int kBits = 8;
-constexpr int kNumDigits = 1 << kBits;
+constexpr int kNumDigits = 1 << 8;
 
 uint64_t BitsOf(double value) {
   uint64_t bits = 0;
@@ -88,21 +86,21 @@ std::vector<double> GroupMedians(const std::vector<double>& values,
   std::vector<uint64_t> found(num_groups, 0);  // the bits found so far
   // Values below the median among those with these bits.
   std::vector<int64_t> num_before(num_groups, -1);
-  for (int shift = 64 - kBits; shift >= 0; shift -= kBits) {
+  for (int shift = 64 - 8; shift >= 0; shift -= 8) {
     std::vector<int64_t> counts(static_cast<size_t>(num_groups) * kNumDigits);
     for (size_t n = 0; n < values.size(); ++n) {
       const int32_t group = group_of[n];
       if (group < 0 || !std::isfinite(values[n]) || values[n] < 0) continue;
       // This gives -0 the bits of 0.
       const uint64_t digits = BitsOf(std::abs(values[n])) >> shift;
-      if (digits >> kBits != found[group]) continue;
+      if (digits >> 8 != found[group]) continue;
       ++counts[group * kNumDigits + (digits & (kNumDigits - 1))];
     }
     ReduceRanks(context, std::plus<int64_t>(), &counts);
     for (int32_t group = 0; group < num_groups; ++group) {
       const int64_t* count = &counts[group * kNumDigits];
       int64_t& before = num_before[group];
-      if (shift == 64 - kBits) {
+      if (shift == 64 - 8) {
         before =
             (std::accumulate(count, count + kNumDigits, int64_t{0}) - 1) / 2;
       }
@@ -110,7 +108,7 @@ std::vector<double> GroupMedians(const std::vector<double>& values,
       while (digit + 1 < kNumDigits && before >= count[digit]) {
         before -= count[digit++];
       }
-      found[group] = found[group] << kBits | digit;
+      found[group] = found[group] << 8 | digit;
     }
   }
   std::vector<double> medians;

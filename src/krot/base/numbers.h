@@ -17,7 +17,6 @@
 namespace krot::internal {
 
 inline constexpr double kPi = 3.14159265358979323846;
-inline constexpr double kHalfPi = kPi / 2;
 inline constexpr double kDegreesPerRadian = 180 / kPi;
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();

@@ -27,17 +27,13 @@ namespace fs = std::filesystem;
 std::error_code LastError() { return {errno, std::generic_category()}; }
 
 int Open(const fs::path& file, FileDescriptor::Use use) {
-  constexpr mode_t kMode = 0666;
-  switch (use) {
-    case FileDescriptor::Use::kRead:
-      return ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-    case FileDescriptor::Use::kReplace:
-      return ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
-                    kMode);
-    case FileDescriptor::Use::kUpdate:
-      return ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
+  int flags = O_RDONLY;
+  if (use == FileDescriptor::Use::kReplace) {
+    flags = O_WRONLY | O_CREAT | O_TRUNC;
+  } else if (use == FileDescriptor::Use::kUpdate) {
+    flags = O_RDWR | O_CREAT;
   }
-  return -1;
+  return ::open(file.c_str(), flags | O_CLOEXEC, mode_t{0666});
 }
 
 // A file system without fsync answers EINVAL; that is no failure.

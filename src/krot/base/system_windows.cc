@@ -66,18 +66,14 @@ std::error_code LastSystemError() {
 }
 
 int Open(const fs::path& file, FileDescriptor::Use use) {
-  constexpr int kAlways = _O_BINARY | _O_NOINHERIT;
-  constexpr int kMode = _S_IREAD | _S_IWRITE;
-  switch (use) {
-    case FileDescriptor::Use::kRead:
-      return ::_wopen(file.c_str(), _O_RDONLY | kAlways);
-    case FileDescriptor::Use::kReplace:
-      return ::_wopen(file.c_str(), _O_WRONLY | _O_CREAT | _O_TRUNC | kAlways,
-                      kMode);
-    case FileDescriptor::Use::kUpdate:
-      return ::_wopen(file.c_str(), _O_RDWR | _O_CREAT | kAlways, kMode);
+  int flags = _O_RDONLY;
+  if (use == FileDescriptor::Use::kReplace) {
+    flags = _O_WRONLY | _O_CREAT | _O_TRUNC;
+  } else if (use == FileDescriptor::Use::kUpdate) {
+    flags = _O_RDWR | _O_CREAT;
   }
-  return -1;
+  return ::_wopen(file.c_str(), flags | _O_BINARY | _O_NOINHERIT,
+                  _S_IREAD | _S_IWRITE);
 }
 
 // One system call cannot take more bytes than this.
@@ -284,11 +280,11 @@ bool IsStderrTerminal() {
 }
 
 bool CanRewriteLines() {
-  constexpr DWORD kSequences = 0x0004;  // ENABLE_VIRTUAL_TERMINAL_PROCESSING
+  const DWORD sequences = 0x0004;  // ENABLE_VIRTUAL_TERMINAL_PROCESSING
   DWORD mode = 0;
   return ::GetConsoleMode(StderrHandle(), &mode) != 0 &&
-         ((mode & kSequences) != 0 ||
-          ::SetConsoleMode(StderrHandle(), mode | kSequences) != 0);
+         ((mode & sequences) != 0 ||
+          ::SetConsoleMode(StderrHandle(), mode | sequences) != 0);
 }
 
 std::optional<int> TerminalColumns() {

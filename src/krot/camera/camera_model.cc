@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 #include <Eigen/Geometry>
@@ -89,37 +88,33 @@ Eigen::Matrix2d ProjectionJacobian(int model_id, const double* params,
   });
 }
 
-UndistortStatus UndistortPixel(int model_id, const double* params,
-                               const Eigen::Vector2d& pixel,
-                               const std::optional<Eigen::Vector2d>& u_start,
-                               UndistortedObservation* result) {
-  return VisitCameraModel(model_id, [&](auto model) {
-    return Undistort<decltype(model)>(params, pixel, u_start, result);
-  });
-}
-
 namespace {
 
-constexpr double kCosOf80Degrees = 0.17364817766693033;
+template <typename Model>
+constexpr bool kHasImagePlane = !std::is_void_v<typename Model::Lens>;
 
 // Whether the chart of a unit vector with this z is the plane z = 1.
-bool IsOnImagePlane(PerspectiveLens, double) { return true; }
-bool IsOnImagePlane(DivisionLens, double z) { return z > kCosOf80Degrees; }
 template <typename Lens>
-bool IsOnImagePlane(Lens, double) {
-  return false;
-}
-
-template <typename Model>
-bool HasChartOnImagePlane(const Eigen::Vector3d& bearing) {
-  return IsOnImagePlane(typename Model::Lens{}, bearing.z());
-}
-template <>
-bool HasChartOnImagePlane<Equirectangular>(const Eigen::Vector3d&) {
-  return false;
+bool HasChartOnImagePlane(double z) {
+  if constexpr (std::is_same_v<Lens, DivisionLens>) {
+    return z > 0.17364817766693033;  // the cosine of 80 degrees
+  }
+  return std::is_same_v<Lens, PerspectiveLens>;
 }
 
 }  // namespace
+
+std::optional<UndistortedObservation> UndistortPixel(
+    int model_id, const double* params, const Eigen::Vector2d& pixel) {
+  return VisitEveryCameraModel(
+      model_id, [&](auto model) -> std::optional<UndistortedObservation> {
+        using Model = decltype(model);
+        if constexpr (kHasImagePlane<Model>) {
+          return Undistort<Model>(params, pixel);
+        }
+        return std::nullopt;
+      });
+}
 
 std::optional<Chart> ChartAt(int model_id, const double* params,
                              const Eigen::Vector3d& x_cam) {
@@ -132,7 +127,7 @@ std::optional<Chart> ChartAt(int model_id, const double* params,
           return std::nullopt;
         }
         Chart chart;
-        if (HasChartOnImagePlane<Model>(bearing)) {
+        if (HasChartOnImagePlane<typename Model::Lens>(bearing.z())) {
           chart.n = Eigen::Vector3d::UnitZ();
           chart.B.setIdentity();
         } else {
@@ -162,9 +157,6 @@ Eigen::Matrix2d ChartJacobian(int model_id, const double* params,
 
 namespace {
 
-template <typename Model>
-constexpr bool kHasImagePlane = !std::is_same_v<Model, Equirectangular>;
-
 std::optional<Eigen::Vector2d> IfFinite(const Eigen::Vector2d& v) {
   if (!v.allFinite()) return std::nullopt;
   return v;
@@ -172,8 +164,7 @@ std::optional<Eigen::Vector2d> IfFinite(const Eigen::Vector2d& v) {
 
 template <typename Model>
 Eigen::Vector2d Project(const double* params, const Eigen::Vector3d& x_cam) {
-  Eigen::Vector2d pixel =
-      Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Vector2d pixel = Eigen::Vector2d::Constant(kNaN);
   if (!x_cam.allFinite() || x_cam.isZero(0)) return pixel;
   if constexpr (kHasImagePlane<Model>) {
     const Eigen::Vector2d u = x_cam.hnormalized();
@@ -193,59 +184,61 @@ Eigen::Vector2d Project(const double* params, const Eigen::Vector3d& x_cam) {
 template <typename Model>
 bool RowOnImagePlane(const double* params, const Eigen::Vector2d& pixel,
                      const Eigen::Vector3d& x_hat, Eigen::Matrix3d* E) {
-  if constexpr (kHasImagePlane<Model>) {
-    if constexpr (std::is_same_v<typename Model::Lens, PerspectiveLens>) {
-      const Eigen::Vector2d u = x_hat.hnormalized();
-      if (!(x_hat.z() > 0 && std::isfinite(u.squaredNorm()))) return false;
-      Dual<double> x, y;
-      Model::Project(params, Dual<double>{u.x(), 1, 0},
-                     Dual<double>{u.y(), 0, 1}, &x, &y);
-      E->row(0) << 0, 0, 1;
-      E->row(1) << x.du, x.dv,
-          x.value - pixel.x() - (x.du * u.x() + x.dv * u.y());
-      E->row(2) << y.du, y.dv,
-          y.value - pixel.y() - (y.du * u.x() + y.dv * u.y());
-      return true;
-    }
+  if constexpr (std::is_same_v<typename Model::Lens, PerspectiveLens>) {
+    const Eigen::Vector2d u = x_hat.hnormalized();
+    if (!(x_hat.z() > 0 && std::isfinite(u.squaredNorm()))) return false;
+    Dual<double> x, y;
+    Model::Project(params, Dual<double>{u.x(), 1, 0}, Dual<double>{u.y(), 0, 1},
+                   &x, &y);
+    E->row(0) << 0, 0, 1;
+    E->row(1) << x.du, x.dv,
+        x.value - pixel.x() - (x.du * u.x() + x.dv * u.y());
+    E->row(2) << y.du, y.dv,
+        y.value - pixel.y() - (y.du * u.x() + y.dv * u.y());
+    return true;
   }
   return false;
 }
 
+// PixelBearing, of any length.
 template <typename Model>
-Eigen::Vector3d BearingOf(const double* params, const Eigen::Vector2d& pixel,
-                          const std::optional<Eigen::Vector3d>& x_start,
-                          bool* found) {
+std::optional<Eigen::Vector3d> BearingOf(
+    const double* params, const Eigen::Vector2d& pixel,
+    const std::optional<Eigen::Vector3d>& x_start) {
   using Lens = typename Model::Lens;
+  if (!(Model::FocalX(params) * Model::FocalY(params) > 0)) return std::nullopt;
   const double* lens = Model::LensParams(params);
-  Eigen::Vector3d X;
-  const auto accept = [&](const Eigen::Vector2d& q) {
-    const bool reproduced =
-        q.allFinite() &&
-        Lens::ToPoint(lens, q.x(), q.y(), &X.x(), &X.y(), &X.z()) &&
-        (Project<Model>(params, X) - pixel).norm() <= kMaxUndistortionErrorPx;
-    return reproduced ? UndistortStatus::kOk : UndistortStatus::kNotConverged;
-  };
   std::optional<Eigen::Vector2d> q_start;
   if (x_start && Lens::Sees(lens, x_start->x(), x_start->y(), x_start->z())) {
     q_start.emplace();
     Lens::FromPoint(lens, x_start->x(), x_start->y(), x_start->z(),
                     &q_start->x(), &q_start->y());
   }
-  *found = Model::FocalX(params) * Model::FocalY(params) > 0 &&
-           SearchLensPlane<Model>(params, pixel, q_start, accept) ==
-               UndistortStatus::kOk;
-  return X;
+  std::optional<Eigen::Vector3d> bearing;
+  SearchLensPlane<Model>(params, pixel, q_start, [&](const Eigen::Vector2d& q) {
+    Eigen::Vector3d X;
+    const bool reproduced =
+        q.allFinite() &&
+        Lens::ToPoint(lens, q.x(), q.y(), &X.x(), &X.y(), &X.z()) &&
+        (Project<Model>(params, X) - pixel).norm() <= kMaxUndistortionErrorPx;
+    if (reproduced) bearing = X;
+    return reproduced;
+  });
+  return bearing;
 }
 
 template <>
-Eigen::Vector3d BearingOf<Equirectangular>(
+std::optional<Eigen::Vector3d> BearingOf<Equirectangular>(
     const double* params, const Eigen::Vector2d& pixel,
-    const std::optional<Eigen::Vector3d>&, bool* found) {
+    const std::optional<Eigen::Vector3d>&) {
   const double azimuth = 2 * kPi * (pixel.x() / params[0] - 0.5);
   const double elevation = kPi * (pixel.y() / params[1] - 0.5);
-  *found = std::abs(elevation) <= kHalfPi && std::isfinite(azimuth);
-  return {std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
-          std::cos(elevation) * std::cos(azimuth)};
+  if (!(std::abs(elevation) <= kPi / 2 && std::isfinite(azimuth))) {
+    return std::nullopt;
+  }
+  return Eigen::Vector3d(std::cos(elevation) * std::sin(azimuth),
+                         std::sin(elevation),
+                         std::cos(elevation) * std::cos(azimuth));
 }
 
 }  // namespace
@@ -297,12 +290,11 @@ std::optional<Eigen::Matrix3d> RowAtProjection(int model_id,
 std::optional<Eigen::Vector3d> PixelBearing(
     int model_id, const double* params, const Eigen::Vector2d& pixel,
     const std::optional<Eigen::Vector3d>& x_start) {
-  bool found = false;
-  const Eigen::Vector3d X = VisitEveryCameraModel(model_id, [&](auto model) {
-    return BearingOf<decltype(model)>(params, pixel, x_start, &found);
+  const auto X = VisitEveryCameraModel(model_id, [&](auto model) {
+    return BearingOf<decltype(model)>(params, pixel, x_start);
   });
-  if (!found || !X.allFinite()) return std::nullopt;
-  return X.stableNormalized();
+  if (!X || !X->allFinite()) return std::nullopt;
+  return X->stableNormalized();
 }
 
 }  // namespace krot::internal

@@ -23,11 +23,10 @@ struct Interval {
 // covers an error of `ulps` units in the last place and the rounding in this
 // function.
 inline Interval RoundOutwards(double lo, double hi, int ulps = 1) {
-  constexpr double kFourUnits = 4 * std::numeric_limits<double>::epsilon() / 2;
-  constexpr double kTiny = std::numeric_limits<double>::min();
-  const double width = ulps * kFourUnits;
-  return {lo - (std::abs(lo) * width + kTiny),
-          hi + (std::abs(hi) * width + kTiny)};
+  using Limits = std::numeric_limits<double>;
+  const double width = ulps * (2 * Limits::epsilon());
+  return {lo - (std::abs(lo) * width + Limits::min()),
+          hi + (std::abs(hi) * width + Limits::min())};
 }
 
 inline Interval operator-(const Interval& a) { return {-a.hi, -a.lo}; }
@@ -117,9 +116,8 @@ inline Interval cos(const Interval& a) {
 // The angle of (x, y). NaN if the box meets the half line x <= 0, y = 0, where
 // the angle jumps.
 inline Interval atan2(const Interval& y, const Interval& x) {
-  constexpr double kHalf = 1.5707963267948966;
   if (x.lo > 0) return atan(y / x);
-  const Interval half_pi = RoundOutwards(kHalf, kHalf);
+  const Interval half_pi = RoundOutwards(kPi / 2, kPi / 2);
   if (y.lo > 0) return half_pi - atan(x / y);
   if (y.hi < 0) return -half_pi - atan(x / y);
   return {kNaN, kNaN};

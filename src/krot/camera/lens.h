@@ -110,7 +110,7 @@ struct EquidistantLens {
 
   static bool ToRay(const double*, double a, double b, double* u, double* v) {
     const double theta = std::hypot(a, b);
-    if (theta >= kHalfPi) return false;
+    if (theta >= kPi / 2) return false;
     const double scale = TanOverAngle(theta);
     *u = a * scale;
     *v = b * scale;
@@ -180,7 +180,7 @@ struct FovLens {
       scale = SmallOmegaScale(omega * omega, radius);
     } else {
       const double angle = radius * omega;
-      if (std::abs(angle) >= kHalfPi) return false;
+      if (std::abs(angle) >= kPi / 2) return false;
       scale = TanOverAngle(angle) * omega / (2 * std::tan(omega / 2));
     }
     *u = a * scale;

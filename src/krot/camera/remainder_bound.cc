@@ -94,14 +94,6 @@ std::unique_ptr<ErrorMap> MakeErrorMap(int model_id, const double* params,
 
 namespace {
 
-// Half the sides of the parallelogram, in units of level_px of the linearised
-// lens. The first one is taken with |f| > gamma on the whole boundary.
-constexpr std::array<double, 4> kReaches = {1.125, 1.5, 2.5, 4};
-
-// The smallest n'u for the unit vector u of the pixel's ray, with the n of
-// x_hat's chart: it limits how far the two are apart.
-constexpr double kSmallestDepth = 0.1;
-
 // More than the relative error of a few operations on doubles.
 constexpr double kRounding = 1e-14;
 
@@ -128,8 +120,9 @@ std::optional<Region> FindRegion(int model_id, const double* params,
   const auto bearing = PixelBearing(model_id, params, pixel, x_hat);
   const auto chart = ChartAt(model_id, params, x_hat);
   if (!E || !bearing || !chart) return std::nullopt;
+  // The pixel's ray must not be too far from x_hat.
   const double depth = chart->n.dot(*bearing);
-  if (!(depth > kSmallestDepth * bearing->norm())) return std::nullopt;
+  if (!(depth > 0.1 * bearing->norm())) return std::nullopt;
   const Eigen::Vector3d X0 = *bearing / depth;
   const Eigen::Matrix2d J0 = ChartJacobian(model_id, params, *chart, X0);
   if (!(J0.determinant() > 0)) return std::nullopt;
@@ -145,7 +138,9 @@ std::optional<Region> FindRegion(int model_id, const double* params,
   if (!geometry.G.allFinite()) return std::nullopt;
   Region region;
   region.map = MakeErrorMap(model_id, params, geometry);
-  for (const double reach : kReaches) {
+  // Half the sides of the parallelogram, in units of level_px of the linearised
+  // lens. The first one is taken with |f| > gamma on the whole boundary.
+  for (const double reach : {1.125, 1.5, 2.5, 4.0}) {
     if (!BoundaryIsOutside(*region.map, p, reach)) continue;
     region.reach = reach;
     return region;

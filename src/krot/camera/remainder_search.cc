@@ -9,12 +9,6 @@
 namespace krot::internal {
 namespace {
 
-constexpr int kMaxCells = 4000;
-constexpr int kMaxBoundaryDepth = 8;
-constexpr double kRelativeSlack = 0.1;  // of max |m| - 1
-constexpr double kAbsoluteSlack = 1e-6;
-constexpr double kAlongSlack = 1e-7;
-
 struct Box {
   Interval q[2];
 };
@@ -141,26 +135,24 @@ std::pair<Box, Box> Halves(const Box& box) {
 template <typename Value>
 double Sample(const ErrorMap& map, double p, double d1, double d2,
               const Value& value) {
-  constexpr int kCorrections = 6;
   const double norm = IntervalNorm({d1, d1}, {d2, d2}, p).hi;
   const double wanted[2] = {d1 / norm, d2 / norm};
   double q[2] = {wanted[0], wanted[1]};
-  for (int j = 0;; ++j) {
-    const auto at = map.Values({q[0], q[0]}, {q[1], q[1]});
-    const double f[2] = {Middle(at.f[0]), Middle(at.f[1])};
-    if (j < kCorrections) {
-      for (int k = 0; k < 2; ++k) q[k] += wanted[k] - f[k];
-      continue;
-    }
-    const double size = IntervalNorm({f[0], f[0]}, {f[1], f[1]}, p).hi;
-    return size < 1.5 && size > 0.5 ? value(at, size) : -kInfinity;
+  const auto values = [&] { return map.Values({q[0], q[0]}, {q[1], q[1]}); };
+  for (int correction = 0; correction < 6; ++correction) {
+    const auto at = values();
+    for (int k = 0; k < 2; ++k) q[k] += wanted[k] - Middle(at.f[k]);
   }
+  const auto at = values();
+  const double f[2] = {Middle(at.f[0]), Middle(at.f[1])};
+  const double size = IntervalNorm({f[0], f[0]}, {f[1], f[1]}, p).hi;
+  return size < 1.5 && size > 0.5 ? value(at, size) : -kInfinity;
 }
 
 bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
                       int depth) {
   if (IsOutside(Enclose(map, segment), p)) return true;
-  if (depth == kMaxBoundaryDepth) return false;
+  if (depth == 8) return false;
   const auto [first, second] = Halves(segment);
   return SegmentIsOutside(map, p, first, depth + 1) &&
          SegmentIsOutside(map, p, second, depth + 1);
@@ -168,7 +160,7 @@ bool SegmentIsOutside(const ErrorMap& map, double p, const Box& segment,
 
 // Branch and bound: an upper bound over all points of the box |q|_inf <= reach
 // with |f| <= 1. `bound_on` returns an upper bound on a smaller box. Ends when
-// the bound is at most `target`.
+// the bound is at most `target`, or with the budget of 4000 cells.
 template <typename BoundOn>
 std::optional<double> Search(const ErrorMap& map, double p, double reach,
                              double target, const BoundOn& bound_on) {
@@ -186,8 +178,7 @@ std::optional<double> Search(const ErrorMap& map, double p, double reach,
 
   const Interval side = {-reach, reach};
   add({{side, side}});
-  while (!heap.empty() && heap.front().bound > target &&
-         num_cells < kMaxCells) {
+  while (!heap.empty() && heap.front().bound > target && num_cells < 4000) {
     const auto [first, second] = Halves(heap.front().box);
     std::pop_heap(heap.begin(), heap.end(), ComesLater);
     heap.pop_back();
@@ -226,15 +217,14 @@ std::optional<double> LargestLinearError(const ErrorMap& map, double p,
   constexpr int kDirections = 16;
   double sampled = 1;
   for (int i = 0; i < kDirections; ++i) {
-    const double angle = i * 2 * 3.14159265358979323846 / kDirections;
+    const double angle = i * 2 * kPi / kDirections;
     sampled = std::max(
         sampled, Sample(map, p, std::cos(angle), std::sin(angle),
                         [p](const auto& at, double size) {
                           return IntervalNorm(at.m[0], at.m[1], p).lo / size;
                         }));
   }
-  const double target =
-      sampled + std::max(kRelativeSlack * (sampled - 1), kAbsoluteSlack);
+  const double target = sampled + std::max(0.1 * (sampled - 1), 1e-6);
   return Search(map, p, reach, target, bound_on);
 }
 
@@ -256,7 +246,7 @@ std::optional<double> LargestAlong(const ErrorMap& map, double p, double reach,
       });
   // -y'm = -y'f + y'r. The first term is at most |f| <= 1, and the second is of
   // second order around x_hat.
-  return Search(map, p, reach, std::max(sampled + kAlongSlack, sufficient),
+  return Search(map, p, reach, std::max(sampled + 1e-7, sufficient),
                 [&](const Enclosure& enclosure) {
                   const double direct = along(enclosure.m).hi;
                   const double first = along(enclosure.f).hi;

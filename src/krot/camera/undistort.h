@@ -88,22 +88,19 @@ std::optional<Eigen::Vector2d> InvertDistortion(const double* k,
                                                 const Eigen::Vector2d& target,
                                                 Eigen::Vector2d q,
                                                 bool stay_regular) {
-  constexpr int kMaxIterations = 100;
   constexpr double kMinStepScale = 1e-6;
-  // The last step is one below this, relative: as convergence is quadratic, the
-  // error that it leaves is about the square of that.
-  constexpr double kLastStep = 1e-8;
-
   const auto distort = [k](const auto& a, const auto& b, auto* x, auto* y) {
     Distortion::Apply(k, a, b, x, y);
   };
   PlaneMap map = Differentiate(q, distort);
   if (!(map.derivative.determinant() > 0)) return std::nullopt;
 
-  for (int i = 0; i < kMaxIterations; ++i) {
+  for (int i = 0; i < 100; ++i) {
     const Eigen::Vector2d residual = target - map.value;
     const Eigen::Vector2d step = map.derivative.inverse() * residual;
-    if (!(step.norm() > kLastStep * (1 + q.norm()))) return q + step;
+    // As convergence is quadratic, the error that such a step leaves is about
+    // its square.
+    if (!(step.norm() > 1e-8 * (1 + q.norm()))) return q + step;
 
     double scale = 1;
     for (; scale > kMinStepScale; scale /= 2) {
@@ -124,55 +121,44 @@ std::optional<Eigen::Vector2d> InvertDistortion(const double* k,
 
 // Searches the point of the lens plane that belongs to a pixel, from several
 // starts: `start` first, if it is given and the model has a distortion. Calls
-// `accept` with each candidate, a root of the distortion before the first fold,
-// until that returns something other than kNotConverged.
-template <typename Model, typename Accept>
-UndistortStatus SearchLensPlane(const double* params,
-                                const Eigen::Vector2d& pixel,
-                                const std::optional<Eigen::Vector2d>& start,
-                                const Accept& accept) {
+// `ends_with` with each candidate, a root of the distortion before the first
+// fold, until that returns true.
+template <typename Model, typename EndsWith>
+void SearchLensPlane(const double* params, const Eigen::Vector2d& pixel,
+                     const std::optional<Eigen::Vector2d>& start,
+                     const EndsWith& ends_with) {
   using Distortion = typename Model::Distortion;
   const double* k = Model::DistortionParams(params);
   const Eigen::Vector2d distorted(
       (pixel.x() - Model::CenterX(params)) / Model::FocalX(params),
       (pixel.y() - Model::CenterY(params)) / Model::FocalY(params));
   if constexpr (Distortion::kNumParams == 0) {
-    return accept(distorted);
+    ends_with(distorted);
   } else {
-    const auto solve_from = [&](const Eigen::Vector2d& q, bool stay_regular) {
+    const auto ends_from = [&](const Eigen::Vector2d& q, bool stay_regular) {
       const auto solution =
           InvertDistortion<Distortion>(k, distorted, q, stay_regular);
-      if (!solution || !IsRegularSegment<Distortion>(k, *solution)) {
-        return UndistortStatus::kNotConverged;
-      }
-      return accept(*solution);
+      return solution && IsRegularSegment<Distortion>(k, *solution) &&
+             ends_with(*solution);
     };
-    if (start) {
-      const UndistortStatus status = solve_from(*start, false);
-      if (status != UndistortStatus::kNotConverged) return status;
-    }
-    const UndistortStatus status = solve_from(distorted, false);
-    if (status != UndistortStatus::kNotConverged) return status;
-    return solve_from(Eigen::Vector2d::Zero(), true);
+    if (start && ends_from(*start, false)) return;
+    if (ends_from(distorted, false)) return;
+    ends_from(Eigen::Vector2d::Zero(), true);
   }
 }
 
 constexpr double kMaxUndistortionErrorPx = 1e-8;
 
 template <typename Model>
-UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
-                          const std::optional<Eigen::Vector2d>& u_start,
-                          UndistortedObservation* result) {
-  using Lens = typename Model::Lens;
-  const double* lens = Model::LensParams(params);
-
-  // Sets *result from the lens plane's q; kNotConverged if its ray does not
-  // reproduce the pixel.
-  const auto accept = [&](const Eigen::Vector2d& q) {
-    if (!q.allFinite()) return UndistortStatus::kNotConverged;
+std::optional<UndistortedObservation> Undistort(const double* params,
+                                                const Eigen::Vector2d& pixel) {
+  std::optional<UndistortedObservation> result;
+  const auto ends_with = [&](const Eigen::Vector2d& q) {
+    if (!q.allFinite()) return false;
     Eigen::Vector2d u;
-    if (!Lens::ToRay(lens, q.x(), q.y(), &u.x(), &u.y())) {
-      return UndistortStatus::kOffAxis;
+    if (!Model::Lens::ToRay(Model::LensParams(params), q.x(), q.y(), &u.x(),
+                            &u.y())) {
+      return true;  // 90 degrees or more off the axis
     }
     const PlaneMap projection = Differentiate(
         u, [params](const auto& a, const auto& b, auto* x, auto* y) {
@@ -180,19 +166,13 @@ UndistortStatus Undistort(const double* params, const Eigen::Vector2d& pixel,
         });
     if (!((projection.value - pixel).norm() <= kMaxUndistortionErrorPx) ||
         !(projection.derivative.determinant() > 0)) {
-      return UndistortStatus::kNotConverged;
+      return false;
     }
-    *result = {u, projection.derivative};
-    return UndistortStatus::kOk;
+    result = {u, projection.derivative};
+    return true;
   };
-
-  std::optional<Eigen::Vector2d> q_start;
-  if (u_start && u_start->allFinite()) {
-    q_start.emplace();
-    Lens::FromRay(lens, u_start->x(), u_start->y(), &q_start->x(),
-                  &q_start->y());
-  }
-  return SearchLensPlane<Model>(params, pixel, q_start, accept);
+  SearchLensPlane<Model>(params, pixel, std::nullopt, ends_with);
+  return result;
 }
 
 }  // namespace krot::internal

@@ -12,18 +12,6 @@
 namespace krot::internal {
 namespace {
 
-// Linear programme: mu at the start, relative to ObjectiveLength.
-constexpr double kMuPerLength = 2;
-// Linear programme: the change that makes multipliers stationary is taken if
-// this many times the change stays in the cones. If even kSmallChange times
-// does, the system need not be factorised anew.
-constexpr double kStationaryRoom = 1.25;
-constexpr double kSmallChange = 1e3;
-// With known multipliers, the share of the centred ones at the start is the
-// start margin times the first factor, but at most the second.
-constexpr double kCentredPerMargin = 100. / 3;
-constexpr double kLargestCentredShare = 0.3;
-
 // One run of the interior point. Slacks are recomputed at every trial, as top =
 // g w is bilinear. In the other programmes top is linear, and slacks and
 // multipliers have their own step lengths.
@@ -121,7 +109,7 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
     });
     if (program_.IsLinear()) {
       if (!system_.Factorize(now_)) return;
-      const double mu = kMuPerLength * system_.ObjectiveLength();
+      const double mu = 2 * system_.ObjectiveLength();
       system_.loop().ForEach([&](int64_t i) { now_.z[i] *= mu; });
       return;
     }
@@ -139,8 +127,7 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   // proportional to the start margin, so that gamma and the multipliers are
   // about equally far from the end.
   void JoinKnownMultipliers(const std::vector<Multiplier>& known) {
-    const double share = std::min(kCentredPerMargin * options_.start_margin,
-                                  kLargestCentredShare);
+    const double share = std::min(100. / 3 * options_.start_margin, 0.3);
     const double sum = system_.loop().Sum(
         [&](int64_t i) { return known[i].lambda * now_.viewed[i].depth; });
     if (!(sum > 0)) return;
@@ -155,6 +142,7 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   // stationary by the least change in the scaling, if that stays well inside
   // the cones. A second change removes what rounding left.
   bool FactorizeStationary() {
+    constexpr double kSmallChange = 1e3;  // room for which the factor is kept
     if (!system_.Factorize(now_)) return false;
     for (int change = 0; change < 2; ++change) {
       system_.SolveForStationarity(now_.z);
@@ -162,7 +150,7 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
         return Cone::MaxStep(system_.lambda()[i], system_.direction().dz[i],
                              kSmallChange);
       });
-      const bool is_inside = room >= kStationaryRoom;
+      const bool is_inside = room >= 1.25;
       if (change == 0) is_stationary_ = is_inside;
       if (!is_inside) return true;
       system_.loop().ForEach(
@@ -199,21 +187,6 @@ class ConicSolver : public ConePath<NewtonSystem<Cone>> {
   InteriorPointSummary summary_;
 };
 
-template <typename Cone>
-InteriorPointSummary RunInCone(
-    const KnownRotationProblem& problem, const InteriorPointOptions& options,
-    const Context& context, const ConeProgram& program, const Estimate& start,
-    double scalar, Estimate* estimate, std::vector<Multiplier>* multipliers) {
-  ConicSolver<Cone> solver(problem, options, context, program, start, scalar);
-  const InteriorPointSummary summary = solver.Run();
-  if (program.kind != ConeProgram::Kind::kFeasibility ||
-      summary.termination == InteriorPointTermination::kFeasible) {
-    *estimate = solver.best();
-  }
-  *multipliers = solver.TakeMultipliers();
-  return summary;
-}
-
 InteriorPointSummary Run(const KnownRotationProblem& problem,
                          const InteriorPointOptions& options,
                          const Context& context, const ConeProgram& program,
@@ -223,10 +196,18 @@ InteriorPointSummary Run(const KnownRotationProblem& problem,
   CheckConic(options.norm);
   CheckAtLeast(1, options.max_iterations, "max_iterations");
   CheckPositive(options.smallest_gap, "smallest_gap");
-  const auto run = options.norm.p == 2 ? &RunInCone<SecondOrderCone>
-                                       : &RunInCone<FourHalfLines>;
-  return run(problem, options, context, program, start, scalar, estimate,
-             multipliers);
+  const auto run = [&](auto cone) {
+    ConicSolver<decltype(cone)> solver(problem, options, context, program,
+                                       start, scalar);
+    const InteriorPointSummary summary = solver.Run();
+    if (program.kind != ConeProgram::Kind::kFeasibility ||
+        summary.termination == InteriorPointTermination::kFeasible) {
+      *estimate = solver.best();
+    }
+    *multipliers = solver.TakeMultipliers();
+    return summary;
+  };
+  return options.norm.p == 2 ? run(SecondOrderCone()) : run(FourHalfLines());
 }
 
 }  // namespace

@@ -107,8 +107,8 @@ struct LinearObjective {
 // lowest h'x. The problem must be connected and something in it must be fixed.
 // After the first iterations the multipliers satisfy stationarity up to
 // rounding (A'z = h plus a multiple of e); then they prove what
-// krot/verify/extent_check.h says. The gap is relative to the distance, in h'x,
-// from the start to the bound that they prove.
+// krot/verify/certificate_check.h says. The gap is relative to the distance, in
+// h'x, from the start to the bound that they prove.
 InteriorPointSummary MinimizeLinear(const KnownRotationProblem& problem,
                                     const InteriorPointOptions& options,
                                     const Context& context, double bound,

@@ -140,13 +140,14 @@ class NewtonSystem {
     ViewAll(to);
   }
 
-  // Whether two iterates are near enough for the linearisation of top = g w.
+  // Whether two iterates are near enough for the gauge and for the
+  // linearisation of top = g w, which do not hold if a depth grows much. Only
+  // small depths may grow by any factor.
   bool IsPlausible(const State& from, const State& to, int64_t i) const {
     if (!program_.IsCost()) return true;
     const double depth = to.viewed[i].depth;
     return to.scalar > 0 && depth > 0 &&
-           depth <=
-               kMaxDepthGrowth * std::max(from.viewed[i].depth, small_depth_);
+           depth <= 3 * std::max(from.viewed[i].depth, small_depth_);
   }
 
   // Scales and factorises at an iterate; false if there is no factor.
@@ -244,12 +245,6 @@ class NewtonSystem {
 
  private:
   static constexpr int kDim = Cone::kDim;
-  // Depths below this share of the median depth are small: they may grow by any
-  // factor.
-  static constexpr double kSmallDepth = 0.1;
-  // No other depth may grow by more than this factor in a step: the gauge and
-  // the linearisation of top = g w do not hold over longer ways.
-  static constexpr double kMaxDepthGrowth = 3;
 
   // e = mean of c_i, in units of the median depth: e'dx is the change of the
   // mean depth. Apart from that unit e is the same in all iterations. Weights
@@ -266,7 +261,7 @@ class NewtonSystem {
     std::vector<double> depths;
     for (const ViewedPoint& v : viewed) depths.push_back(v.depth);
     const double median = Median(std::move(depths));
-    small_depth_ = kSmallDepth * median;
+    small_depth_ = 0.1 * median;
     const double per_depth = 1 / (static_cast<double>(loop_.count()) * median);
     gauge_ = GradientOf(problem_, structure_, [&](int64_t) -> Vector3d {
       return {per_depth, 0, 0};

@@ -66,8 +66,7 @@ inline constexpr double kActiveMultiplier = 1e-3;
 // try_step(length) is true; 0 if none is.
 template <typename TryStep>
 double Backtrack(double longest, const TryStep& try_step) {
-  constexpr double kLeastStep = 1e-8;
-  for (double step = longest; step >= kLeastStep; step *= 0.7) {
+  for (double step = longest; step >= 1e-8; step *= 0.7) {
     if (try_step(step)) return step;
   }
   return 0;
@@ -130,11 +129,6 @@ class ConePath {
     double Least() const { return std::min(primal, dual); }
   };
 
-  // The square of the smallest eigenvalue of every scaled pair stays above this
-  // share of mu. A larger share shortens steps; a smaller one makes the steps
-  // after it short.
-  static constexpr double kNeighbourhood = 1e-3;
-  static constexpr double kLeastSigma = 1e-6;
   // Fraction to the boundary of a step.
   static constexpr double kDamping = 0.98;
 
@@ -194,26 +188,23 @@ class ConePath {
       return (lambda + steps.primal * system_.direction().ds[i])
           .dot(lambda + steps.dual * system_.direction().dz[i]);
     });
-    return MehrotraSigma(MuOf(gap) / system_.mu(), kLeastSigma);
+    return MehrotraSigma(MuOf(gap) / system_.mu(), 1e-6);
   }
 
   // Centrality correctors; each is one solve with the same factor. A corrector
-  // aims at a step that is longer by kLonger: it corrects lambda o f so that
-  // there the products of the pairs are within a factor kRange of mu. It is
-  // undone if the step becomes shorter, and the last one if the step grows by
-  // less than kWorthwhile [Colombo, Gondzio 2008]. Two of them save a fifth of
-  // the joint iterations (docs/history/journal.md).
+  // aims at a step that is longer by 0.3: it corrects lambda o f so that there
+  // the products of the pairs are within a factor kRange of mu. It is undone if
+  // the step becomes shorter, and the last one if the step grows by next to
+  // nothing [Colombo, Gondzio 2008]. Two of them save a fifth of the joint
+  // iterations (docs/history/journal.md).
   void ImproveCentrality(double sigma) {
     if constexpr (System::kNumCorrectors > 0) {
-      constexpr double kLonger = 0.3;
       constexpr double kRange = 10;
-      constexpr double kWorthwhile = 0.03;
-      constexpr double kLongStep = 0.9;  // needs no corrector
       const double mu = sigma * system_.mu();
       for (int n = 0; n < System::kNumCorrectors; ++n) {
         const double before = MaxSteps(kDamping).Least();
-        if (before > kLongStep) return;
-        const double ahead = std::min(1.0, before + kLonger);
+        if (before > 0.9) return;  // a long step needs no corrector
+        const double ahead = std::min(1.0, before + 0.3);
         typename System::Direction direction = system_.direction();
         system_.Solve(
             [&](int64_t i) -> Vector {
@@ -230,13 +221,16 @@ class ConePath {
             sigma);
         const double gain = MaxSteps(kDamping).Least() - before;
         if (gain < 0) system_.Restore(std::move(direction));
-        if (gain < kWorthwhile) return;
+        if (gain < 0.03) return;
       }
     }
   }
 
+  // Whether the square of the smallest eigenvalue of every scaled pair is above
+  // a share of mu. A larger share would shorten steps; a smaller one would make
+  // the steps after it short.
   bool IsInside(const State& trial) const {
-    const double least = kNeighbourhood * MuOf(trial.gap);
+    const double least = 1e-3 * MuOf(trial.gap);
     return system_.loop().Min([&](int64_t i) {
       if (!system_.IsPlausible(now_, trial, i)) return -1.0;
       const Vector s = system_.Slack(trial, i);

@@ -13,15 +13,8 @@
 namespace krot::internal {
 namespace {
 
-// For the costs c_i, depths are at least this share of the median depth.
-constexpr double kSmallestDepthInCosts = 0.1;
 // From nothing, this is subtracted from all depths, relative to the mean depth.
 constexpr double kMinDepthFromNothing = 0.05;
-// The first mu, relative to the bound. It is lower for a start from an
-// estimate, where the multipliers are soon stationary.
-constexpr double kStartMuFromNothing = 0.5;
-constexpr double kStartMu = 0.15;
-constexpr int kNewtonSteps = 8;
 
 // The depths at the start, raised to at least a share of their median; empty if
 // most are not positive.
@@ -34,7 +27,7 @@ std::vector<double> DepthsForCosts(const KnownRotationProblem& problem,
   const double median = Median(depths);
   if (!(median > 0)) return {};
   for (double& depth : depths) {
-    depth = std::max(depth, kSmallestDepthInCosts * median);
+    depth = std::max(depth, 0.1 * median);
   }
   return depths;
 }
@@ -66,7 +59,9 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
         min_depth_(is_from_nothing ? kMinDepthFromNothing : 0),
         depths_(depths),
         costs_(CostsFor(options, depths)) {
-    Start(start, bound * (is_from_nothing ? kStartMuFromNothing : kStartMu));
+    // The first mu is lower for a start from an estimate, where the multipliers
+    // are soon stationary.
+    Start(start, bound * (is_from_nothing ? 0.5 : 0.15));
     if (!is_from_nothing) size_ = system_.Size(start);
   }
 
@@ -115,7 +110,7 @@ class SlackSolver : public ConePath<SlackSystem<BoundCone>> {
         std::max(0.0, NormOf(viewed.v, options_.norm) -
                           bound_ * (viewed.depth - min_depth_));
     double sigma = least + 0.5 * mu / cost;
-    for (int n = 0; n < kNewtonSteps; ++n) {
+    for (int n = 0; n < 8; ++n) {
       const typename BoundCone::Vector inverse = BoundCone::Divide(
           system_.BoundSlack(viewed, sigma), BoundCone::Identity());
       const double value =

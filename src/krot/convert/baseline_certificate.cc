@@ -71,16 +71,12 @@ struct WorldRay {
 std::optional<WorldRay> RayOfPixel(const Camera& camera,
                                    const Eigen::Matrix3d& world_from_cam,
                                    const Eigen::Vector2d& pixel) {
-  const CameraModelInfo* info = FindCameraModel(camera.model_id);
-  UndistortedObservation undistorted;
-  if (info == nullptr || !info->has_image_plane ||
-      UndistortPixel(camera.model_id, camera.params.data(), pixel, std::nullopt,
-                     &undistorted) != UndistortStatus::kOk) {
-    return std::nullopt;
-  }
-  const Eigen::Matrix2d inverse = undistorted.J.inverse();
+  const auto undistorted =
+      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+  if (!undistorted) return std::nullopt;
+  const Eigen::Matrix2d inverse = undistorted->J.inverse();
   WorldRay ray;
-  ray.ray = world_from_cam * undistorted.u.homogeneous();
+  ray.ray = world_from_cam * undistorted->u.homogeneous();
   for (int i = 0; i < 2; ++i) {
     ray.by_pixel[i] =
         world_from_cam * Vector3d(inverse(0, i), inverse(1, i), 0);

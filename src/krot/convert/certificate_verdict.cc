@@ -12,7 +12,6 @@
 #include "krot/convert/reprojection.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 #include "krot/problem/cost.h"
 
 namespace krot::internal {

@@ -16,13 +16,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A runaway moves by more than this times the median move. If many cameras move
-// a lot, as from a rough start, there are no runaways.
-constexpr double kTypicalMoves = 10;
-// The common move depends on which cameras keep their place, and the other way
-// round, so they are found in turn, this often at most.
-constexpr int kMaxRounds = 3;
-
 // Maps centres `after` to `before`.
 struct CommonMove {
   double scale = 1;
@@ -44,53 +37,40 @@ CommonMove MedianMove(const std::vector<CameraMove>& cameras, double scale) {
   return move;
 }
 
-// The move between the centroids of the cameras that count; if the scale is
-// free, it also makes the RMS distances from them equal.
-CommonMove MoveOf(const std::vector<CameraMove>& cameras,
-                  const std::vector<char>& counts, bool scale_is_free) {
+// Of the centres, before or after, of the cameras that count.
+struct Spread {
   double count = 0;
-  Vector3d before = Vector3d::Zero();
-  Vector3d after = Vector3d::Zero();
+  Vector3d centroid = Vector3d::Zero();
+  double square = 0;  // the sum of the squared distances from the centroid
+};
+
+Spread SpreadOf(const std::vector<CameraMove>& cameras,
+                const std::vector<char>& counts,
+                const Vector3d CameraMove::*centre) {
+  Spread spread;
   for (size_t n = 0; n < cameras.size(); ++n) {
     if (counts[n] == 0) continue;
-    count += 1;
-    before += cameras[n].before;
-    after += cameras[n].after;
+    spread.count += 1;
+    spread.centroid += cameras[n].*centre;
   }
-  before /= count;
-  after /= count;
-  double square_before = 0;
-  double square_after = 0;
+  spread.centroid /= spread.count;
   for (size_t n = 0; n < cameras.size(); ++n) {
     if (counts[n] == 0) continue;
-    square_before += (cameras[n].before - before).squaredNorm();
-    square_after += (cameras[n].after - after).squaredNorm();
+    spread.square += (cameras[n].*centre - spread.centroid).squaredNorm();
   }
-  CommonMove move;
-  if (scale_is_free && square_before > 0 && square_after > 0) {
-    move.scale = std::sqrt(square_before / square_after);
-  }
-  move.shift = before - move.scale * after;
-  return move;
+  return spread;
 }
 
-// The RMS distance of the cameras that count from their centroid, before.
-double Radius(const std::vector<CameraMove>& cameras,
-              const std::vector<char>& counts) {
-  double count = 0;
-  Vector3d sum = Vector3d::Zero();
-  for (size_t n = 0; n < cameras.size(); ++n) {
-    if (counts[n] == 0) continue;
-    count += 1;
-    sum += cameras[n].before;
+// The move between the centroids; if the scale is free, it also makes the RMS
+// distances from them equal.
+CommonMove MoveOf(const Spread& before, const Spread& after,
+                  bool scale_is_free) {
+  CommonMove move;
+  if (scale_is_free && before.square > 0 && after.square > 0) {
+    move.scale = std::sqrt(before.square / after.square);
   }
-  const Vector3d centroid = sum / count;
-  double square = 0;
-  for (size_t n = 0; n < cameras.size(); ++n) {
-    if (counts[n] == 0) continue;
-    square += (cameras[n].before - centroid).squaredNorm();
-  }
-  return std::sqrt(square / count);
+  move.shift = before.centroid - move.scale * after.centroid;
+  return move;
 }
 
 }  // namespace
@@ -127,19 +107,25 @@ std::vector<char> FindConsensus(const std::vector<CameraMove>& cameras,
   const double distance = LowerMedian(std::move(distances));
   CommonMove move =
       MedianMove(cameras, scale_is_free ? LowerMedian(std::move(scales)) : 1);
-  for (int round = 0; round < kMaxRounds; ++round) {
+  // The common move depends on which cameras keep their place, and the other
+  // way round, so they are found in turn.
+  Spread before = SpreadOf(cameras, keeps, &CameraMove::before);
+  for (int round = 0; round < 3; ++round) {
     std::vector<double> residuals;
     for (const CameraMove& camera : cameras) {
       residuals.push_back(move.Residual(camera));
     }
-    const double far = std::min(distance, Radius(cameras, keeps));
-    const double allowed =
-        std::max(far, kTypicalMoves * LowerMedian(residuals));
+    // If many cameras move a lot, as from a rough start, there are no runaways.
+    const double far =
+        std::min(distance, std::sqrt(before.square / before.count));
+    const double allowed = std::max(far, 10 * LowerMedian(residuals));
     std::vector<char> now;
     for (const double residual : residuals) now.push_back(residual <= allowed);
     if (round > 0 && now == keeps) break;
     keeps = std::move(now);
-    move = MoveOf(cameras, keeps, scale_is_free);
+    before = SpreadOf(cameras, keeps, &CameraMove::before);
+    move = MoveOf(before, SpreadOf(cameras, keeps, &CameraMove::after),
+                  scale_is_free);
   }
   return keeps;
 }
@@ -150,21 +136,9 @@ namespace krot {
 
 using namespace internal;
 
-namespace {
-
-using Eigen::Quaterniond;
-
 using Eigen::Matrix3d;
+using Eigen::Quaterniond;
 using Eigen::Vector3d;
-
-// The nearest rotation is unique if the sum of the two smallest singular
-// values, with the sign of the last one, exceeds this times the largest.
-constexpr double kNotUnique = 1e-9;
-// The squared norm of a normalised quaternion is 1 up to this: the rounding of
-// four squares and a division, half a unit in the last place each.
-constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
-
-}  // namespace
 
 RigidTransform operator*(const RigidTransform& a_from_b,
                          const RigidTransform& b_from_c) {
@@ -192,7 +166,11 @@ Matrix3d Ellipsoid::UnitFromWorld() const {
 
 Quaterniond NormalizedQuaternion(const QuaternionWxyz& wxyz) {
   const Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
-  return std::abs(q.squaredNorm() - 1) <= kRounding ? q : q.normalized();
+  // The squared norm of a normalised quaternion is 1 up to the rounding of four
+  // squares and a division, half a unit in the last place each.
+  const bool is_normalized = std::abs(q.squaredNorm() - 1) <=
+                             4 * std::numeric_limits<double>::epsilon();
+  return is_normalized ? q : q.normalized();
 }
 
 QuaternionWxyz ToWxyz(const Quaterniond& q) {
@@ -207,7 +185,7 @@ bool HasRotation(const QuaternionWxyz& wxyz) {
 
 Matrix3d RotationOf(const QuaternionWxyz& wxyz) {
   if (!HasRotation(wxyz)) {
-    return Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    return Matrix3d::Constant(kNaN);
   }
   return NormalizedQuaternion(wxyz).toRotationMatrix();
 }
@@ -219,8 +197,8 @@ std::optional<Matrix3d> NearestRotation(const Matrix3d& M) {
   const Matrix3d& V = svd.matrixV();
   const double sign = (U * V.transpose()).determinant() < 0 ? -1 : 1;
   const Vector3d& values = svd.singularValues();
-  if (!(values[1] + sign * values[2] > kNotUnique * values[0])) {
-    return std::nullopt;
+  if (!(values[1] + sign * values[2] > 1e-9 * values[0])) {
+    return std::nullopt;  // it is not unique
   }
   return U * Vector3d(1, 1, sign).asDiagonal() * V.transpose();
 }

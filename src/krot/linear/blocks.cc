@@ -165,10 +165,6 @@ SparseFactorSize FindSparseFactorSize(const BlockPattern& pattern) {
 
 namespace {
 
-// If less than this share of a column's norm is left after orthogonalisation,
-// the column counts as a combination of the ones before it.
-constexpr double kRankTolerance = 1e-13;
-
 // column -= q q'column; returns q'column. Done twice, Gram-Schmidt is as
 // orthogonal as Householder's reflections [Giraud, Langou, Rozloznik 2005].
 double Subtract(const double* q, int64_t n, double* column) {
@@ -194,7 +190,9 @@ UpperTriangle Orthogonalize(int64_t n, double* rows) {
       for (int b = 0; b < c; ++b) R[b][c] += Subtract(rows + b, n, rows + c);
     }
     const double norm = ColumnNorm(rows + c, n);
-    const bool is_free = !(norm > kRankTolerance * norm_before);
+    // If next to nothing is left of a column, it is a combination of the ones
+    // before it.
+    const bool is_free = !(norm > 1e-13 * norm_before);
     R[c][c] = is_free ? std::numeric_limits<double>::infinity() : norm;
     const double scale = is_free ? 0 : 1 / norm;
     for (int64_t i = 0; i < n; ++i) rows[3 * i + c] *= scale;

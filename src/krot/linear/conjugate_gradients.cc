@@ -16,25 +16,16 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 using Eigen::VectorXf;
 
-// The share of blocks that a column of the factor keeps, relative to the number
-// that A has below the diagonal. More blocks would cost more time than they
-// save in iterations (docs/history/scale.md).
-constexpr double kKept = 0.5;
 // The first shift if no factor exists without one. It is multiplied by
 // kShiftGrowth up to a shift of kShiftGrowth.
 constexpr float kFirstShift = 1e-5F;
 constexpr float kShiftGrowth = 10;
-// The smallest pivot, squared: of the incomplete factor, where diagonals are
-// about 1, and of the blocks that are whitened, relative to their trace.
-constexpr float kLeastPivot = 1e-7F;
-constexpr double kLeastWhitenedPivot = 1e-14;
-// Products are summed in this many parts.
-constexpr int64_t kNumChunks = 4;
 
 // The number of blocks that a column of the factor keeps, with the diagonal
-// block, if A's has `num_blocks`.
+// block, if A's has `num_blocks`: half of those below the diagonal. More would
+// cost more time than they save in iterations (docs/history/scale.md).
 int64_t NumKept(int64_t num_blocks) {
-  return 1 + std::llround(kKept * static_cast<double>(num_blocks - 1));
+  return 1 + std::llround(0.5 * static_cast<double>(num_blocks - 1));
 }
 
 }  // namespace
@@ -75,7 +66,8 @@ bool IncompleteCholesky::TryShift(const BlockPattern& pattern,
     waiting_[j] = {};
     for (const Block& block : column_) place_[block.row] = -1;
     Matrix3f inverse;
-    if (!InvertCholesky(column_[0].value, kLeastPivot, &inverse)) return false;
+    // Diagonals are about 1.
+    if (!InvertCholesky(column_[0].value, 1e-7F, &inverse)) return false;
     column_[0].value = inverse;
     for (size_t n = 1; n < column_.size(); ++n) {
       column_[n].value = (column_[n].value * inverse.transpose()).eval();
@@ -165,7 +157,7 @@ void ConjugateGradients::Whiten() {
   W_.assign(pattern_->num_columns(), Matrix3d::Zero());
   for (int32_t j = 0; j < pattern_->num_columns(); ++j) {
     const Matrix3d& diagonal = blocks_[pattern_->begin[j]];
-    const double least_pivot = kLeastWhitenedPivot * diagonal.trace();
+    const double least_pivot = 1e-14 * diagonal.trace();
     if (least_pivot > 0) InvertCholesky(diagonal, least_pivot, &W_[j]);
   }
   for (int32_t j = 0; j < pattern_->num_columns(); ++j) {
@@ -185,8 +177,7 @@ VectorXd ConjugateGradients::Precondition(const VectorXd& residual) const {
 }
 
 VectorXd ConjugateGradients::MultiplyBlocks(const VectorXd& x) const {
-  const int64_t columns_per_chunk =
-      NumChunks(pattern_->num_columns(), kNumChunks);
+  const int64_t columns_per_chunk = NumChunks(pattern_->num_columns(), 4);
   std::vector<VectorXd> parts(
       NumChunks(pattern_->num_columns(), columns_per_chunk),
       VectorXd::Zero(x.size()));

@@ -9,12 +9,6 @@
 namespace krot::internal {
 namespace {
 
-// Regularisation, relative to the diagonal: it begins with the first and grows
-// at most to the second. Callers remove its error by iterative refinement.
-constexpr double kRegularization = 1e-14;
-constexpr double kLargestRegularization = 1e-7;
-// Up to this many frames, a dense factor is fastest for all patterns.
-constexpr int64_t kAlwaysDenseFrames = 500;
 // The sum over points is taken in this many parts.
 constexpr int kNumParts = 4;
 
@@ -25,16 +19,9 @@ constexpr int kNumParts = 4;
 constexpr double kSparseOperation = 15;
 // Reading a number of a matrix that is multiplied by a vector costs this.
 constexpr double kNumberRead = 60;
-// Forming the matrix costs this for each block that a point contributes to.
-constexpr double kBlockFormed = 3000;
 // The number of systems solved with one factor of an interior point, including
 // refinements.
 constexpr double kSolves = 12;
-// The expected number of iterations of a solve by conjugate gradients. It grows
-// from 30 to 200 and more on the way to an optimum.
-constexpr int kLikelyIterations = 100;
-// The same for all rough solutions of a matrix together.
-constexpr int kRoughIterations = 60;
 
 // The cost of a sparse factor without fill, a lower bound. A column of c blocks
 // takes 27 c^2 operations, and their sum is least if all columns are alike.
@@ -68,7 +55,7 @@ ReducedCameraSystem::ReducedCameraSystem(const BlockStructure& structure,
   }
   num_columns_ = 3 * int64_t{num_free};
   parts_.resize(kNumParts);
-  if (num_free <= kAlwaysDenseFrames) {
+  if (num_free <= 500) {  // a dense factor is fastest for all patterns
     pattern_ = FullPattern(num_free);
     return;
   }
@@ -109,7 +96,7 @@ double ReducedCameraSystem::ImplicitCost(int num_iterations) const {
 }
 
 double ReducedCameraSystem::CostFormed(double cost) const {
-  return cost + kBlockFormed * num_contributions_;
+  return cost + 3000 * num_contributions_;
 }
 
 // The size of a sparse factor is determined only where it may be the cheapest.
@@ -119,8 +106,10 @@ double ReducedCameraSystem::CostFormed(double cost) const {
 ReducedCameraSystem::Kind ReducedCameraSystem::CheapestKind() {
   const bool is_rough = use_ == Use::kRoughSolutions;
   const double dense = DenseCost();
-  const double iterative = is_rough ? ImplicitCost(kRoughIterations)
-                                    : IterativeCost(kLikelyIterations);
+  // The expected numbers of iterations: of all rough solutions of a matrix
+  // together, or of one solution, where it grows from 30 to 200 and more on the
+  // way to an optimum.
+  const double iterative = is_rough ? ImplicitCost(60) : IterativeCost(100);
   const double cost = is_rough ? dense : std::min(dense, iterative);
   if (LeastSparseCost(pattern_) < cost) {
     const SparseFactorSize factor = FindSparseFactorSize(pattern_);
@@ -271,9 +260,11 @@ bool ReducedCameraSystem::FactorizeSparsely(double regularization) {
   return sparse_.info() == Eigen::Success;
 }
 
+// The regularisation is relative to the diagonal. Callers remove its error by
+// iterative refinement.
 bool ReducedCameraSystem::FactorizeDirectly() {
-  for (double regularization = kRegularization;
-       regularization < kLargestRegularization; regularization *= 100) {
+  for (double regularization = 1e-14; regularization < 1e-7;
+       regularization *= 100) {
     if (kind_ == Kind::kDense ? FactorizeDensely(regularization)
                               : FactorizeSparsely(regularization)) {
       return true;

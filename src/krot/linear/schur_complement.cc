@@ -14,13 +14,6 @@ using Block =
 template <int kRows>
 using Rows = Eigen::Map<const Eigen::Matrix<double, kRows, 1>>;
 
-// Beyond this |Q_f|^2 of a frame, B_f'B_f and G_f'G_f all but cancel.
-constexpr double kHighLeverage = 0.5;
-// The number of parts of loops over points that do not sum.
-constexpr int kFineParts = 64;
-// With fewer observations, one thread is used: waking another takes longer than
-// its share of the work.
-constexpr int64_t kFewObservations = 4000;
 // Relative tolerance of the frames' solution before a refinement, which squares
 // it.
 constexpr double kToleranceBeforeRefinement = 1e-4;
@@ -30,13 +23,13 @@ constexpr double kToleranceBeforeRefinement = 1e-4;
 SchurComplement::SchurComplement(const BlockStructure& structure,
                                  const Context& context, Use use)
     : structure_(structure),
-      num_threads_(structure.num_observations() < kFewObservations
-                       ? 1
-                       : context.num_threads),
+      // Waking another thread takes longer than its share of a small system.
+      num_threads_(structure.num_observations() < 4000 ? 1
+                                                       : context.num_threads),
       ranks_(context.ranks),
       reduced_(structure, ranks_, use),
       parts_(structure.point_begin, reduced_.num_parts(), ranks_),
-      fine_parts_(structure.point_begin, kFineParts) {}
+      fine_parts_(structure.point_begin, 64) {}
 
 bool SchurComplement::Factorize() {
   if (ranks_ == nullptr) return reduced_.Factorize(num_threads_);
@@ -171,7 +164,7 @@ void CentredLeastSquares<kRows>::FindSightings(int64_t k,
     }
     s.frames.push_back(frame);
     s.H.push_back(H);
-    s.is_high.push_back(leverage > kHighLeverage);
+    s.is_high.push_back(leverage > 0.5);
     if (s.is_high.back()) s.high.push_back(f);
   }
 }
@@ -307,12 +300,6 @@ void CentredLeastSquares<kRows>::Solve(const BlockVector* g, const double* r,
           (s - x->frames[structure_.frame_of[i]]);
     }
   });
-}
-
-template <int kRows>
-void CentredLeastSquares<kRows>::Solve(const BlockVector* g, const double* r,
-                                       BlockVector* x, double* image) {
-  Solve(g, r, SchurComplement::kTolerance, x, image);
 }
 
 template <int kRows>

@@ -151,11 +151,9 @@ class CentredLeastSquares {
   // False if the reduced camera system has no factor even when regularised.
   bool Factorize();
 
-  // x = H^-1 (g + A'r). r has kRows numbers per observation; g and r may be
-  // null for 0. If `image` is not null it becomes A x; it may be r.
-  void Solve(const BlockVector* g, const double* r, BlockVector* x,
-             double* image = nullptr);
-  // The same to a relative error of `tolerance` in the energy norm.
+  // x = H^-1 (g + A'r), to a relative error of `tolerance` in the energy norm.
+  // r has kRows numbers per observation; g and r may be null for 0. If `image`
+  // is not null it becomes A x; it may be r.
   void Solve(const BlockVector* g, const double* r, double tolerance,
              BlockVector* x, double* image);
   // The same with a step of iterative refinement, which removes the effect of

@@ -19,11 +19,6 @@ using Eigen::Vector3d;
 // Pieces whose gradients are closer than this to the affine hull of others,
 // relative to the largest gradient, count as affinely dependent on them.
 constexpr double kDependence = 1e-10;
-// Pieces above the level by less than this, relative, do not violate it.
-constexpr double kRounding = 1e-15;
-// The limit of changes of the active set. It ends cycles, which only rounding
-// could cause: ordinary inputs need about 2 changes per final piece.
-constexpr int kMaxChanges = 200;
 
 // The active pieces of a solution, with the affine hull of their gradients,
 // g_0 + range(D). D = Q U by Gram-Schmidt, where Q has orthogonal columns and U
@@ -216,7 +211,7 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
       best = i;
     }
   }
-  const double tolerance = kRounding * (values + scale);
+  const double tolerance = 1e-15 * (values + scale);
   ActiveSet active(pieces, std::sqrt(scale), solution);
   if (solution->size == 0) {
     solution->size = 1;
@@ -226,7 +221,9 @@ void SolveSimplexQp(const LinearPiece* pieces, int count,
     active.Minimize();
   }
   active.SetStepAndLevel();
-  for (int change = 0; change < kMaxChanges; ++change) {
+  // The limit ends cycles, which only rounding could cause: ordinary inputs
+  // need about 2 changes per final piece.
+  for (int change = 0; change < 200; ++change) {
     int highest = -1;
     double level = solution->level + tolerance;
     for (int i = 0; i < count; ++i) {
@@ -267,15 +264,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// A point that is outside a ball by less than this, relative to the radius,
-// counts as being on it.
-constexpr double kRadiusRounding = 1e-12;
-
+// Up to rounding.
 bool Holds(const Ball& ball, const Vector3d* points, int count) {
   for (int i = 0; i < count; ++i) {
     if (!((points[i] - ball.center).norm() <=
-          ball.radius * (1 + kRadiusRounding) +
-              std::numeric_limits<double>::min())) {
+          ball.radius * (1 + 1e-12) + std::numeric_limits<double>::min())) {
       return false;
     }
   }

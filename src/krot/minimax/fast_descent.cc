@@ -60,7 +60,7 @@ double Evaluate(const std::vector<LineResidual>& line, double alpha,
 
 double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
                     const Eigen::Vector3d& direction, Norm norm,
-                    const StepSizeOptions& options,
+                    const FastDescentOptions& options,
                     std::vector<LineResidual>* scratch) {
   std::vector<LineResidual>& line = *scratch;
   line.clear();
@@ -90,20 +90,13 @@ double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
 }
 
 void CheckOptions(const FastDescentOptions& options) {
-  const auto check = [](bool ok, const char* name, double value,
-                        const char* requirement) {
-    CheckArgument(ok, name, value, requirement);
-  };
-  check(options.max_iterations >= 1, "max_iterations", options.max_iterations,
-        ">= 1");
-  check(options.stationarity_tolerance >= 0, "stationarity_tolerance",
-        options.stationarity_tolerance, ">= 0");
-  check(options.step_tolerance > 0, "step_tolerance", options.step_tolerance,
-        "> 0");
-  check(options.slope_probe > 0, "slope_probe", options.slope_probe, "> 0");
-  check(options.active_tolerance >= 0 && options.active_tolerance < 1,
-        "active_tolerance", options.active_tolerance, "in [0, 1)");
-  check(options.max_step > 0, "max_step", options.max_step, "> 0");
+  CheckAtLeast(1, options.max_iterations, "max_iterations");
+  CheckAtLeast(0, options.stationarity_tolerance, "stationarity_tolerance");
+  CheckPositive(options.step_tolerance, "step_tolerance");
+  CheckPositive(options.slope_probe, "slope_probe");
+  CheckArgument(options.active_tolerance >= 0 && options.active_tolerance < 1,
+                "active_tolerance", options.active_tolerance, "in [0, 1)");
+  CheckPositive(options.max_step, "max_step");
 }
 
 FastDescent::FastDescent(const FastDescentOptions& options, Norm norm)
@@ -137,8 +130,6 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
     summary.termination = DescentTermination::kBehind;
     return summary;
   }
-  const StepSizeOptions step_options{options_.step_tolerance,
-                                     options_.slope_probe, options_.max_step};
   summary.termination = DescentTermination::kMaxIterations;
   while (summary.iterations < options_.max_iterations) {
     FindDescentNormals(residuals_, *x, norm_, options_.active_tolerance,
@@ -151,7 +142,7 @@ DescentSummary FastDescent::MinimizeAsInPaper(Eigen::Vector3d* x) {
     }
     ++summary.iterations;
     const double step =
-        FindStepSize(residuals_, *x, *direction, norm_, step_options, &line_);
+        FindStepSize(residuals_, *x, *direction, norm_, options_, &line_);
     const Eigen::Vector3d x_next = *x + step * *direction;
     const double cost = residuals_.Evaluate(x_next, norm_);
     if (!(cost < summary.cost)) {
@@ -177,7 +168,7 @@ DescentTermination TerminationOf(double status) {
 }
 
 // Entry k of a row with the residual 0 / 1.
-double IdleEntry(int k) { return k == kLaneRow - 1 ? 1 : 0; }
+double IdleEntry(int k) { return k == kResidualRow - 1 ? 1 : 0; }
 
 }  // namespace
 
@@ -198,7 +189,9 @@ bool SideBySideDescent::IsBusy() const {
 void SideBySideDescent::Begin(int lane, int num_rows, const DescentGoal& goal,
                               Problem* problem) {
   lanes_[lane] = {problem, num_rows, num_rows};
-  if (!uses_lanes_ || num_rows == 0 || num_rows > kMaxResiduals) {
+  // A longer problem fills the lanes of a vector by itself, and eight of them
+  // would not fit into a cache.
+  if (!uses_lanes_ || num_rows == 0 || num_rows > 128) {
     MinimizeAlone(lane, goal);
     return;
   }
@@ -208,12 +201,23 @@ void SideBySideDescent::Begin(int lane, int num_rows, const DescentGoal& goal,
   const ActiveResiduals& active = *problem->active;
   double sum = 0;
   for (int a = 0; a < active.size; ++a) sum += active.multiplier[a];
+  bool is_warm = false;
   for (int a = 0; a < kCorners; ++a) {
-    const bool is_active = a < active.size;
-    descents_.index[a][lane] = is_active ? active.index[a] : 0;
-    descents_.multiplier[a][lane] = is_active ? active.multiplier[a] / sum : 0;
+    const double multiplier =
+        a < active.size ? active.multiplier[a] / sum : 0.0;
+    const bool is_corner = multiplier > 0;
+    descents_.index[a][lane] = is_corner ? active.index[a] : kNoPieceIndex;
+    descents_.weight[a][lane] = multiplier;
+    descents_.multiplier[a][lane] = multiplier;
+    is_warm |= is_corner;
   }
-  descents_.Begin(lane);
+  descents_.is_cold[lane] = is_warm ? 0 : 1;
+  descents_.raises[lane] = 0;
+  descents_.kappa[lane] = kFirstKappa;
+  descents_.iterations[lane] = 0;
+  descents_.lessons[lane] = 0;
+  descents_.cost_failed[lane] = std::numeric_limits<double>::infinity();
+  descents_.calls[lane] = 0;
 }
 
 // Adds residuals 0 / 1 to problems that have fewer than `num_rows`.
@@ -221,7 +225,8 @@ void SideBySideDescent::Fill(int num_rows) {
   for (int k = 0; k < kLanes; ++k) {
     int& i = lanes_[k].num_filled;
     for (; i < num_rows; ++i) {
-      for (int n = 0; n < kLaneRow; ++n) rows_[i].entry[n][k] = IdleEntry(n);
+      for (int n = 0; n < kResidualRow; ++n)
+        rows_[i].entry[n][k] = IdleEntry(n);
     }
   }
 }
@@ -279,8 +284,8 @@ void SideBySideDescent::MinimizeAlone(int lane, const DescentGoal& goal) {
   descents_.status[lane] = kLaneIdle;
   alone_.residuals().Clear();
   for (int i = 0; i < lanes_[lane].num_rows; ++i) {
-    double row[kLaneRow];
-    for (int n = 0; n < kLaneRow; ++n) row[n] = rows_[i].entry[n][lane];
+    double row[kResidualRow];
+    for (int n = 0; n < kResidualRow; ++n) row[n] = rows_[i].entry[n][lane];
     alone_.residuals().Add(row);
   }
   problem.summary = alone_.Minimize(goal, problem.active, problem.x);

@@ -43,19 +43,13 @@ struct LineResidual {
   double z = 0;
 };
 
-struct StepSizeOptions {
-  double step_tolerance = 1e-6;  // eps_1 > 0, units of x
-  double slope_probe = 1e-8;     // eps_2 > 0, units of x
-  double max_step = 10;          // > 0, units of x
-};
-
 // The step alpha >= 0 along the unit vector `direction` that minimises the
 // largest residual, by modified bisection [Zhang18, Alg. 4]. `scratch` keeps
 // its memory between calls. About 3 log2(max_step / step_tolerance)
 // evaluations of all residuals.
 double FindStepSize(const ResidualSet& residuals, const Eigen::Vector3d& x,
                     const Eigen::Vector3d& direction, Norm norm,
-                    const StepSizeOptions& options,
+                    const FastDescentOptions& options,
                     std::vector<LineResidual>* scratch);
 
 // Throws std::invalid_argument naming the first field out of range.
@@ -99,15 +93,11 @@ class FastDescent {
 // result of a problem does not depend on the other problems or on their order.
 //
 // FastDescent solves problems that are difficult for lanes (an optimum far
-// away, many steps) or have more than kMaxResiduals, from their start. It
+// away, many steps) or have more than 128 residuals, from their start. It
 // solves all of them with `paper` settings, with other norms, and on machines
 // with short vectors (LaneKernels::lanes_pay).
 class SideBySideDescent {
  public:
-  // A longer problem fills the lanes of a vector by itself, and eight of them
-  // would not fit into a cache.
-  static constexpr int kMaxResiduals = 128;
-
   struct Problem {
     // The start, which becomes the optimum. Not null.
     Eigen::Vector3d* x = nullptr;
@@ -119,10 +109,10 @@ class SideBySideDescent {
   // Writes the residuals of one problem, as rows a_1, b_1, a_2, b_2, c, d.
   class RowWriter {
    public:
-    void Add(const double row[kLaneRow]) {
+    void Add(const double row[kResidualRow]) {
       if (count_ == static_cast<int>(rows_->size())) rows_->emplace_back();
       LaneRow& lanes = (*rows_)[count_++];
-      for (int k = 0; k < kLaneRow; ++k) lanes.entry[k][lane_] = row[k];
+      for (int k = 0; k < kResidualRow; ++k) lanes.entry[k][lane_] = row[k];
     }
 
    private:

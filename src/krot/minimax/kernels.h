@@ -17,13 +17,12 @@ inline constexpr double kZeroPixels = 1e-10;
 // 1e-6, 1e-5 (docs/history/journal.md, "One triangulation"). Rounding in the
 // model is about 1e-16 / kappa.
 inline constexpr double kFirstKappa = 1e-2;
-inline constexpr double kSmallestKappa = 1e-5;
 inline constexpr double kLargestKappa = 1e9;
 // A descent to a coarse tolerance does not need a kappa far below it, and takes
 // fewer steps without (docs/history/journal.md, "Res-Int, the first ten
 // sweeps").
 inline double SmallestKappa(double tolerance) {
-  return std::max(kSmallestKappa, 0.1 * tolerance);
+  return std::max(1e-5, 0.1 * tolerance);
 }
 // Factors of kappa after a good trial and after a failed one.
 inline constexpr double kKappaFall = 0.01;
@@ -56,11 +55,9 @@ inline constexpr double kSmallestWeight = 1e-9;
 inline constexpr double kMuchGrowth = 2;
 inline constexpr double kLeastGrowth = 1e-3;
 // A step is not shortened if depths fall by less than kSmallFall, relative, as
-// shorter steps cost iterations. No depth falls below kSmallestDepthShare of
-// its present value.
+// shorter steps cost iterations. No depth falls by more than kLargestFall.
 inline constexpr double kSmallFall = 0.1;
-inline constexpr double kSmallestDepthShare = 0.1;
-inline constexpr double kLargestFall = 1 - kSmallestDepthShare;
+inline constexpr double kLargestFall = 0.9;
 // Smallest pivot of H, relative to its trace: it keeps H invertible despite
 // rounding.
 inline constexpr double kPivotRounding = 1e-14;
@@ -75,24 +72,26 @@ inline constexpr double kNearby = 1e3;
 // Plain memory, no Eigen: this header is shared with code compiled for other
 // vector units.
 
-inline constexpr int kResidualLanes = 8;
+// Residuals, or problems, side by side.
+inline constexpr int kLanes = 8;
+using LaneDoubles = double[kLanes];
 
 // A row of a residual [Zhang18, (2), (3)]: a_1, b_1, a_2, b_2, c, d.
 inline constexpr int kResidualRow = 12;
 
 // Eight residuals side by side, one of them per lane.
 struct alignas(64) ResidualBlock {
-  double row[kResidualRow][kResidualLanes];
+  double row[kResidualRow][kLanes];
 };
 
 // Eight residuals side by side, differentiated.
 struct alignas(64) GradientBlock {
-  double value[kResidualLanes];
-  double gradient[3][kResidualLanes];
-  double depth[kResidualLanes];
+  double value[kLanes];
+  double gradient[3][kLanes];
+  double depth[kLanes];
   // The Hessian for the depth held fixed is curvature * bend * bend'.
-  double curvature[kResidualLanes];
-  double bend[3][kResidualLanes];
+  double curvature[kLanes];
+  double bend[3][kLanes];
 };
 
 // The functions that residual_kernel.cc defines for one kind of vector units.
@@ -106,10 +105,10 @@ struct ResidualKernels {
   // its derivatives (0 where r_i = 0, which has none).
   void (*evaluate_gradients)(const ResidualBlock* blocks, int64_t num_blocks,
                              const double x[3], GradientBlock* gradients);
-  // The largest share of the step d, at most 1, on which no depth falls below
-  // `lowest` of what it is at x; all must be positive. 0 <= lowest < 1.
+  // The largest share of the step d, at most 1, on which no depth falls by more
+  // than kLargestFall of what it is at x; all must be positive.
   double (*depth_share)(const ResidualBlock* blocks, int64_t num_blocks,
-                        const double x[3], const double d[3], double lowest);
+                        const double x[3], const double d[3]);
   // The upper triangle, row by row, of
   //   sum_i (A_i'A_i + cost^2 c_i c_i') / w_i^2
   // over all lanes of `num_blocks` blocks; all depths must be positive.
@@ -120,15 +119,10 @@ extern const ResidualKernels& best_residual_kernels;
 
 // Problems (1) side by side, one per lane of a vector.
 
-inline constexpr int kLanes = 8;
-using LaneDoubles = double[kLanes];
-
-// A row of a residual of every lane's problem: a_1, b_1, a_2, b_2, c, d as in
-// ResidualBlock. A problem that has fewer residuals than the others has
-// 0 / 1 here.
-inline constexpr int kLaneRow = 12;
+// A row of a residual of every lane's problem, as in ResidualBlock. A problem
+// that has fewer residuals than the others has 0 / 1 here.
 struct alignas(64) LaneRow {
-  LaneDoubles entry[kLaneRow];
+  LaneDoubles entry[kResidualRow];
 };
 
 // A residual of every lane near x, value + gradient . d. Every iteration writes
@@ -140,21 +134,25 @@ struct alignas(64) LanePiece {
   LaneDoubles multiplier;  // mu of newton_descent.h
 };
 
-inline constexpr double kNoPieceIndex = -2;
+// Indices in place of a residual's, as doubles in lanes: of the zero piece (no
+// residual falls below 0), and of no piece.
+enum PieceIndex { kZeroPieceIndex = -1, kNoPieceIndex = -2 };
 // The largest number of active pieces.
 inline constexpr int kCorners = 4;
 
-// The status of a lane's problem.
-inline constexpr double kLaneIdle = 0;   // the lane has no problem
-inline constexpr double kLaneFresh = 1;  // not evaluated yet
-inline constexpr double kLaneRuns = 2;
-// The problem has ended, like a NewtonDescent:
-inline constexpr double kLaneStationary = 3;
-inline constexpr double kLaneZeroCost = 4;
-inline constexpr double kLaneLowEnough = 5;
-inline constexpr double kLaneBehind = 6;
-// Not for lanes: the minimiser is far away, or it takes too many steps.
-inline constexpr double kLaneGivesUp = 7;
+// The status of a lane's problem, a double in lanes.
+enum LaneStatus {
+  kLaneIdle,   // the lane has no problem
+  kLaneFresh,  // not evaluated yet
+  kLaneRuns,
+  // The problem has ended, like a NewtonDescent:
+  kLaneStationary,
+  kLaneZeroCost,
+  kLaneLowEnough,
+  kLaneBehind,
+  // Not for lanes: the minimiser is far away, or it takes too many steps.
+  kLaneGivesUp,
+};
 
 // DescentGoal (newton_descent.h) and the limit of iterations.
 struct LaneGoal {
@@ -164,9 +162,7 @@ struct LaneGoal {
   int max_iterations;
 };
 
-// The descents of all lanes between two steps. For a new problem the caller
-// sets `status` to kLaneFresh, `count`, `x`, `index` and `multiplier` of a warm
-// start (0 without one), and then calls Begin.
+// The descents of all lanes between two steps (SideBySideDescent::Begin).
 struct alignas(64) LaneDescents {
   LaneDoubles status;
   LaneDoubles count;  // residuals, >= 1
@@ -175,7 +171,7 @@ struct alignas(64) LaneDescents {
   LaneDoubles cost;
   LaneDoubles iterations;  // steps tried
 
-  // The active set: indices of residuals, kZeroPieceIndex (lane_hull.h) or
+  // The active set: indices of residuals, kZeroPieceIndex or
   // kNoPieceIndex, and their weights.
   LaneDoubles index[kCorners];
   LaneDoubles weight[kCorners];
@@ -191,9 +187,6 @@ struct alignas(64) LaneDescents {
   LaneDoubles depth_start;
   LaneDoubles x_metric[3];
   LaneDoubles metric[6];
-
-  // Sets the other fields of a lane with a new problem.
-  void Begin(int lane);
 };
 
 // The functions that lane_descent.cc defines for one kind of vector units.

@@ -1,20 +1,11 @@
 #include "krot/minimax/kernels.h"
 
-#include <limits>
+#include <cmath>
 
 #include "krot/minimax/lane_model.h"
 
 namespace krot::internal::KROT_UNITS {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// A lane gives up after this many steps. Problems that take so many need more
-// than twice as many, or converge faster with tangents.
-constexpr double kMaxSteps = 25;
-// It also gives up after this many calls: its active set changes without an
-// end.
-constexpr double kMaxCalls = 60;
 
 LaneMask IsSet(const LaneDoubles& flag) { return Load(flag) == 1; }
 Lanes Flag(const LaneMask& mask) { return Select(mask, 1, 0); }
@@ -46,7 +37,7 @@ class Stepping {
   void Try();
   void Decide();
   void Learn(const LaneMask& learns);
-  void SetStatus(const LaneMask& where, double status) {
+  void SetStatus(const LaneMask& where, LaneStatus status) {
     status_ = Select(where, status, status_);
   }
   void StoreDescents();
@@ -106,7 +97,7 @@ void Stepping::LookAtFresh() {
   SetStatus(is_fresh_ & (cost_ <= goal_.sufficient), kLaneLowEnough);
   SetStatus(is_fresh_ & (cost_ <= kZeroPixels), kLaneZeroCost);
   SetStatus(is_fresh_ & (cost_ <= goal_.level), kLaneLowEnough);
-  SetStatus(is_fresh_ & ~(cost_ < kInfinity), kLaneBehind);
+  SetStatus(is_fresh_ & ~(cost_ < HUGE_VAL), kLaneBehind);
 }
 
 // See LocalModel::IsMetricGood.
@@ -192,7 +183,7 @@ void Stepping::Decide() {
 
   Learn(tries & ~ends & ~accepts);
   lessons_ = Select(accepts, 0, lessons_);
-  cost_failed_ = Select(accepts, kInfinity, cost_failed_);
+  cost_failed_ = Select(accepts, HUGE_VAL, cost_failed_);
   kappa_ = Select(accepts & (kept > kGoodShare),
                   Max(kKappaFall * kappa_, smallest_kappa), kappa_);
   kappa_ = Select(lowers_kappa, smallest_kappa, kappa_);
@@ -205,8 +196,11 @@ void Stepping::Decide() {
   const Lanes calls = Load(descents_.calls) + 1;
   Store(calls, &descents_.calls);
   Store(Flag(is_cold_ & ~is_solved_), &descents_.is_cold);
-  const Lanes max_steps = Min(goal_.max_iterations, kMaxSteps);
-  SetStatus(is_running_ & ((kappa_ > kLargestKappa) | (calls >= kMaxCalls) |
+  // A lane gives up after 25 steps, as problems that take so many need more
+  // than twice as many, or converge faster with tangents; and after 60 calls,
+  // in which its active set changes without an end.
+  const Lanes max_steps = Min(goal_.max_iterations, 25);
+  SetStatus(is_running_ & ((kappa_ > kLargestKappa) | (calls >= 60) |
                            (iterations >= max_steps)),
             kLaneGivesUp);
   SetStatus(accepts & (cost_ <= goal_.sufficient), kLaneLowEnough);

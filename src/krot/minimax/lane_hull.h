@@ -10,9 +10,6 @@ namespace krot::internal::KROT_UNITS {
 // same moves of weights, one at a time, in every lane that needs one. For
 // kernels only.
 
-// The index of the zero piece: no residual falls below 0.
-inline constexpr double kZeroPieceIndex = -1;
-
 // An active piece, in the coordinates where the curvature is 1.
 struct LaneCorner {
   Lanes index;

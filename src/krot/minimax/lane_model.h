@@ -166,15 +166,11 @@ struct LaneStep {
   LaneMask is_open;  // lanes in which it is not found yet
 };
 
-// At most this many moves of weights are made in one call; lanes that need more
-// continue in the next one. With fewer moves, steps take more calls; with more,
-// other lanes wait longer.
-inline constexpr int kMovesPerStep = 4;
-// See simplex_qp.cc.
-inline constexpr double kLevelRounding = 1e-15;
-
 // Minimises the model with H^-1 = L'L in the lanes `running`, starting from the
-// hull's active set. Scales the gradients of the hull by L.
+// hull's active set. Scales the gradients of the hull by L. At most four moves
+// of weights are made in one call; lanes that need more continue in the next
+// one. With fewer moves, steps take more calls; with more, other lanes wait
+// longer.
 inline LaneStep MinimizeLaneModel(const LanePiece* pieces, int count,
                                   const LaneMatrix& L, const Lanes& cost,
                                   const LaneMask& running, LaneHull* hull) {
@@ -183,7 +179,7 @@ inline LaneStep MinimizeLaneModel(const LanePiece* pieces, int count,
   }
   LaneStep result = {{0, 0, 0}, 0, 0, running};
   LaneMask& is_open = result.is_open;
-  for (int move = 0; move < kMovesPerStep && Any(is_open); ++move) {
+  for (int move = 0; move < 4 && Any(is_open); ++move) {
     const LaneMask is_due = hull->MoveWeights();
     const Lanes3 step = hull->Step();
     const Lanes level = hull->Level(step);
@@ -191,7 +187,7 @@ inline LaneStep MinimizeLaneModel(const LanePiece* pieces, int count,
     result.d = Select(is_open, d, result.d);
     result.level = Select(is_open, level, result.level);
     result.held_back = Select(is_open, Dot(step, step), result.held_back);
-    const Lanes rounding = kLevelRounding * Max(cost, hull->Scale());
+    const Lanes rounding = 1e-15 * Max(cost, hull->Scale());  // simplex_qp.cc
     LaneCorner piece = HighestPiece(pieces, count, d, level + rounding);
     const LaneMask is_higher =
         (piece.index > kNoPieceIndex) & ~hull->Holds(piece.index);

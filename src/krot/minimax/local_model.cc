@@ -13,7 +13,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr int kZeroPiece = 0;
-constexpr int kNoMember = -1;
 
 // The distance of x from the place where v and w vanish: if x is a point, its
 // distance from the camera; if x is a translation, the camera's distance from
@@ -46,7 +45,7 @@ void LocalModel::Linearize(const Vector3d& x, double cost, Norm norm) {
   x_ = x;
   norm_ = norm;
   pieces_.assign(1, {});
-  member_of_piece_.assign(1, kNoMember);
+  member_of_piece_.assign(1, -1);
   if (norm.p == 2) {
     AddSmoothPieces();
   } else {
@@ -68,8 +67,8 @@ void LocalModel::AddSmoothPieces() {
   pieces_.resize(members_.size() + 1);
   member_of_piece_.resize(members_.size() + 1);
   for (size_t m = 0; m < members_.size(); ++m) {
-    const GradientBlock& block = gradients_[m / kResidualLanes];
-    const size_t lane = m % kResidualLanes;
+    const GradientBlock& block = gradients_[m / kLanes];
+    const size_t lane = m % kLanes;
     pieces_[m + 1].value = block.value[lane];
     for (int j = 0; j < 3; ++j) {
       pieces_[m + 1].gradient[j] = block.gradient[j][lane];
@@ -115,8 +114,8 @@ void LocalModel::SetMetric(double cost) {
 // c_i and b_i of the member m.
 LocalModel::Bend LocalModel::BendOf(size_t m) const {
   if (norm_.p == 2) {
-    const GradientBlock& block = gradients_[m / kResidualLanes];
-    const size_t lane = m % kResidualLanes;
+    const GradientBlock& block = gradients_[m / kLanes];
+    const size_t lane = m % kLanes;
     return {block.curvature[lane],
             {block.bend[0][lane], block.bend[1][lane], block.bend[2][lane]}};
   }
@@ -244,8 +243,7 @@ bool LocalModel::AddTangents(const Vector3d& x_trial,
 double LocalModel::ShareOf(const Vector3d& d) const {
   const Vector3d longer = (kLargestFall / kSmallFall) * d;
   const double share = best_residual_kernels.depth_share(
-      rows_.blocks(), rows_.num_blocks(), x_.data(), longer.data(),
-      kSmallestDepthShare);
+      rows_.blocks(), rows_.num_blocks(), x_.data(), longer.data());
   if (share == 1) return 1;
   const double fall = kSmallFall / share;
   return std::min(1 / (1 + fall), kLargestFall / fall);

@@ -1,12 +1,9 @@
 #include "krot/minimax/kernels.h"
 
 #include <cmath>
-#include <limits>
 
 namespace krot::internal::KROT_UNITS {
 namespace {
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 struct NormL2 {
   double operator()(double v1, double v2) const {
@@ -41,8 +38,8 @@ struct Lane {
   double v1, v2, w;
 };
 
-inline Lane EvaluateLane(const double (&row)[kResidualRow][kResidualLanes],
-                         int k, const double x[3]) {
+inline Lane EvaluateLane(const double (&row)[kResidualRow][kLanes], int k,
+                         const double x[3]) {
   return {row[0][k] * x[0] + row[1][k] * x[1] + row[2][k] * x[2] + row[3][k],
           row[4][k] * x[0] + row[5][k] * x[1] + row[6][k] * x[2] + row[7][k],
           row[8][k] * x[0] + row[9][k] * x[1] + row[10][k] * x[2] + row[11][k]};
@@ -52,19 +49,19 @@ template <typename NormFunction>
 double Evaluate(const ResidualBlock* blocks, int64_t num_blocks,
                 NormFunction norm, const double point[3], double* values) {
   const double x[3] = {point[0], point[1], point[2]};  // not aliased by values
-  double largest[kResidualLanes] = {};
+  double largest[kLanes] = {};
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;
-    double* value = values + block * kResidualLanes;
-    for (int k = 0; k < kResidualLanes; ++k) {
+    double* value = values + block * kLanes;
+    for (int k = 0; k < kLanes; ++k) {
       const Lane lane = EvaluateLane(row, k, x);
       const double r = norm(lane.v1, lane.v2) / lane.w;  // (2)
-      value[k] = lane.w > 0 ? r : kInfinity;
+      value[k] = lane.w > 0 ? r : HUGE_VAL;
       largest[k] = largest[k] < value[k] ? value[k] : largest[k];
     }
   }
   double result = 0;
-  for (int k = 0; k < kResidualLanes; ++k) {
+  for (int k = 0; k < kLanes; ++k) {
     result = result < largest[k] ? largest[k] : result;
   }
   return result;
@@ -74,7 +71,7 @@ double EvaluateResiduals(const ResidualBlock* blocks, int64_t num_blocks,
                          double p, const double x[3], double* values) {
   if (p == 2) return Evaluate(blocks, num_blocks, NormL2(), x, values);
   if (p == 1) return Evaluate(blocks, num_blocks, NormL1(), x, values);
-  if (p == kInfinity) {
+  if (p == HUGE_VAL) {
     return Evaluate(blocks, num_blocks, NormLInf(), x, values);
   }
   return Evaluate(blocks, num_blocks, NormLp{p}, x, values);
@@ -85,7 +82,7 @@ void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;
     GradientBlock result;
-    for (int k = 0; k < kResidualLanes; ++k) {
+    for (int k = 0; k < kLanes; ++k) {
       const Lane lane = EvaluateLane(row, k, x);
       const double n = NormL2()(lane.v1, lane.v2);
       const double w_inverse = 1 / lane.w;
@@ -108,20 +105,20 @@ void EvaluateGradients(const ResidualBlock* blocks, int64_t num_blocks,
 }
 
 double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
-                  const double x[3], const double d[3], double lowest) {
+                  const double x[3], const double d[3]) {
   double result = 1;
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;
-    double fall[kResidualLanes];
-    double room[kResidualLanes];
+    double fall[kLanes];
+    double room[kLanes];
     int num_too_far = 0;
-    for (int k = 0; k < kResidualLanes; ++k) {
+    for (int k = 0; k < kLanes; ++k) {
       fall[k] = -(row[8][k] * d[0] + row[9][k] * d[1] + row[10][k] * d[2]);
-      room[k] = (1 - lowest) * EvaluateLane(row, k, x).w;
+      room[k] = kLargestFall * EvaluateLane(row, k, x).w;
       num_too_far += room[k] < fall[k];
     }
     if (num_too_far == 0) continue;
-    for (int k = 0; k < kResidualLanes; ++k) {
+    for (int k = 0; k < kLanes; ++k) {
       const double share = room[k] < fall[k] ? room[k] / fall[k] : 1;
       result = share < result ? share : result;
     }
@@ -131,12 +128,12 @@ double DepthShare(const ResidualBlock* blocks, int64_t num_blocks,
 
 void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
                const double x[3], double cost, double metric[6]) {
-  double sums[6][kResidualLanes] = {};
+  double sums[6][kLanes] = {};
   for (int64_t block = 0; block < num_blocks; ++block) {
     const auto& row = blocks[block].row;
-    double share[kResidualLanes];
-    double growth[kResidualLanes];
-    for (int k = 0; k < kResidualLanes; ++k) {
+    double share[kLanes];
+    double growth[kLanes];
+    for (int k = 0; k < kLanes; ++k) {
       const double w = EvaluateLane(row, k, x).w;
       share[k] = 1 / (w * w);
       growth[k] = cost * cost * share[k];
@@ -144,7 +141,7 @@ void SumMetric(const ResidualBlock* blocks, int64_t num_blocks,
     int entry = 0;
     for (int i = 0; i < 3; ++i) {
       for (int j = i; j < 3; ++j, ++entry) {
-        for (int k = 0; k < kResidualLanes; ++k) {
+        for (int k = 0; k < kLanes; ++k) {
           sums[entry][k] += share[k] * (row[i][k] * row[j][k] +
                                         row[4 + i][k] * row[4 + j][k]) +
                             growth[k] * row[8 + i][k] * row[8 + j][k];

@@ -4,14 +4,21 @@
 #include <cmath>
 #include <limits>
 
+#include "krot/base/vector_units.h"
+
 namespace krot::internal {
+
+KROT_DECLARE_KERNELS(ResidualKernels, kResidualKernels)
+KROT_DECLARE_KERNELS(LaneKernels, kLaneKernels)
+
+const ResidualKernels& best_residual_kernels =
+    KROT_BEST_KERNELS(kResidualKernels);
+const LaneKernels& best_lane_kernels = KROT_BEST_KERNELS(kLaneKernels);
+
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-// Limits the curvature of ||v||_p, which for p < 2 is unbounded near the axes.
-constexpr double kSmallestRatio = 1e-6;
 
 // The four signed sums whose maximum is ||v||_p, p = 1 or infinity.
 void PolyhedralSigns(Norm norm, Vector2d signs[4]) {
@@ -41,7 +48,8 @@ void DifferentiateNorm(const Vector2d& v, Norm norm, double n,
   for (int k = 0; k < 2; ++k) {
     const double ratio = std::abs(v[k]) / n;  // in [0, 1]
     (*gradient)[k] = std::copysign(std::pow(ratio, p - 1), v[k]);
-    const double bent = std::pow(std::max(ratio, kSmallestRatio), p - 2);
+    // For p < 2 the curvature is unbounded near the axes.
+    const double bent = std::pow(std::max(ratio, 1e-6), p - 2);
     *trace += (p - 1) / n * (bent - std::pow(ratio, 2 * p - 2));
   }
   *trace = std::max(*trace, 0.0);
@@ -102,10 +110,10 @@ ResidualPiece TangentPiece(const Residual& residual, const Vector3d& x,
 
 // Adds a block whose lanes all hold r = 0 / 1.
 void ResidualSet::AddBlock() {
-  const size_t block = size_ / kResidualLanes;
+  const size_t block = size_ / kLanes;
   if (block == blocks_.size()) {
     blocks_.emplace_back();
-    values_.resize(values_.size() + kResidualLanes);
+    values_.resize(values_.size() + kLanes);
   }
   blocks_[block] = {};
   for (double& d : blocks_[block].row[11]) d = 1;
@@ -113,9 +121,9 @@ void ResidualSet::AddBlock() {
 
 void ResidualSet::AddFrom(const ResidualSet& other, int i) {
   double row[kResidualRow];
-  const ResidualBlock& block = other.blocks_[i / kResidualLanes];
+  const ResidualBlock& block = other.blocks_[i / kLanes];
   for (int k = 0; k < kResidualRow; ++k) {
-    row[k] = block.row[k][i % kResidualLanes];
+    row[k] = block.row[k][i % kLanes];
   }
   Add(row);
 }

@@ -54,9 +54,9 @@ class ResidualSet {
  public:
   void Clear() { size_ = 0; }
   void Add(const double row[kResidualRow]) {
-    const int lane = size_ % kResidualLanes;
+    const int lane = size_ % kLanes;
     if (lane == 0) AddBlock();
-    ResidualBlock& block = blocks_[size_ / kResidualLanes];
+    ResidualBlock& block = blocks_[size_ / kLanes];
     for (int k = 0; k < kResidualRow; ++k) block.row[k][lane] = row[k];
     ++size_;
   }
@@ -70,8 +70,8 @@ class ResidualSet {
 
   int size() const { return size_; }
   Residual operator[](int i) const {
-    const auto& row = blocks_[i / kResidualLanes].row;
-    const int lane = i % kResidualLanes;
+    const auto& row = blocks_[i / kLanes].row;
+    const int lane = i % kLanes;
     Residual residual;
     for (int k = 0; k < 3; ++k) {
       residual.A(0, k) = row[k][lane];
@@ -84,8 +84,8 @@ class ResidualSet {
   }
 
   double Depth(int i, const Eigen::Vector3d& x) const {
-    const auto& row = blocks_[i / kResidualLanes].row;
-    const int lane = i % kResidualLanes;
+    const auto& row = blocks_[i / kLanes].row;
+    const int lane = i % kLanes;
     return row[8][lane] * x[0] + row[9][lane] * x[1] + row[10][lane] * x[2] +
            row[11][lane];
   }
@@ -97,9 +97,7 @@ class ResidualSet {
 
   // In the kernels' layout; unused lanes of the last block hold r = 0 / 1.
   const ResidualBlock* blocks() const { return blocks_.data(); }
-  int num_blocks() const {
-    return (size_ + kResidualLanes - 1) / kResidualLanes;
-  }
+  int num_blocks() const { return (size_ + kLanes - 1) / kLanes; }
 
  private:
   void AddBlock();

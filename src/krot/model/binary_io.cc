@@ -1,11 +1,107 @@
-#include "krot/model/binary_io.h"
+#include "krot/model/formats.h"
 
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "krot/camera/camera_model.h"
+#include "krot/context.h"
 
 namespace krot::internal {
 namespace {
+
+static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__,
+              "COLMAP's binary files are read and written as they lie in "
+              "memory, which must be little endian");
+
+// Reads the packed little-endian values of a file in memory one after another.
+// Every read is checked against the file's end and throws ModelError beyond it;
+// `what` names in the message what was expected there ("the camera's width").
+class BinaryReader {
+ public:
+  // Keeps a reference to `file`.
+  explicit BinaryReader(const FileBytes& file) : file_(file) {}
+
+  template <typename T>
+  T Read(const char* what) {
+    T value;
+    ReadArray(&value, 1, what);
+    return value;
+  }
+
+  // Fills values[0, count). The bytes are copied, so T must have no padding.
+  template <typename T>
+  void ReadArray(T* values, size_t count, const char* what) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    const size_t num_bytes = count * sizeof(T);
+    if (num_bytes > BytesLeft()) FailTruncated(num_bytes, what);
+    if (num_bytes == 0) return;
+    std::memcpy(values, file_.bytes.data() + offset_, num_bytes);
+    offset_ += num_bytes;
+  }
+
+  // Reads the number of records that follow, each of which takes
+  // `min_record_bytes` or more. Fails if the rest of the file cannot hold so
+  // many, so that memory may be reserved for them.
+  template <typename Count>
+  size_t ReadCount(size_t min_record_bytes, const char* what) {
+    const size_t start = offset_;
+    const Count count = Read<Count>(what);
+    const size_t limit = BytesLeft() / min_record_bytes;
+    if (count > limit) {
+      Fail(start, std::string(what) + " = " + std::to_string(count),
+           "at most " + std::to_string(limit) + " (" +
+               std::to_string(BytesLeft()) + " bytes are left)");
+    }
+    return static_cast<size_t>(count);
+  }
+
+  // The characters up to the next '\0', which is skipped as well.
+  std::string_view ReadString(const char* what) {
+    const char* begin = file_.bytes.data() + offset_;
+    const void* end = std::memchr(begin, '\0', BytesLeft());
+    if (end == nullptr) {
+      Fail(offset_, "no zero byte before the end of the file",
+           std::string("one that ends ") + what);
+    }
+    const auto length =
+        static_cast<size_t>(static_cast<const char*>(end) - begin);
+    offset_ += length + 1;
+    return {begin, length};
+  }
+
+  void ExpectEnd() const {
+    if (BytesLeft() == 0) return;
+    Fail(offset_,
+         std::to_string(BytesLeft()) + " more bytes after the last record",
+         "the end of the file");
+  }
+
+  // The offset of the next value; Fail takes it.
+  size_t offset() const { return offset_; }
+
+  // "cameras.bin, byte 12: found ..., expected ...".
+  [[noreturn]] void Fail(size_t offset, const std::string& found,
+                         const std::string& expected) const {
+    throw ModelError(file_.path + ", byte " + std::to_string(offset) +
+                     ": found " + found + ", expected " + expected);
+  }
+
+  size_t BytesLeft() const { return file_.bytes.size() - offset_; }
+
+ private:
+  [[noreturn]] void FailTruncated(size_t num_bytes, const char* what) const {
+    Fail(offset_,
+         "the end of the file after " + std::to_string(BytesLeft()) +
+             " more bytes",
+         std::to_string(num_bytes) + " bytes: " + what);
+  }
+
+  const FileBytes& file_;
+  size_t offset_ = 0;
+};
 
 // These records have the same layout in memory as in the file.
 static_assert(sizeof(Point2D) == 24 && std::is_trivially_copyable_v<Point2D>);
@@ -18,9 +114,6 @@ static_assert(sizeof(SensorId) == 8 &&
 
 // The smallest size of one record in bytes, with empty lists.
 constexpr size_t kPoseBytes = 7 * sizeof(double);
-constexpr size_t kCameraBytes = 4 + 4 + 8 + 8;
-constexpr size_t kRigBytes = 4 + 4;
-constexpr size_t kFrameBytes = 4 + 4 + kPoseBytes + 4;
 constexpr size_t kImageBytes = 4 + kPoseBytes + 4 + 1 + 8;
 constexpr size_t kPoint3DBytes = 8 + 24 + 3 + 8 + 8;
 
@@ -139,14 +232,14 @@ void AppendPose(const Pose& pose, std::string* bytes) {
 void ParseCamerasBinary(const FileBytes& file, Model* model) {
   BinaryReader reader(file);
   model->cameras.resize(
-      reader.ReadCount<uint64_t>(kCameraBytes, "number of cameras"));
+      reader.ReadCount<uint64_t>(4 + 4 + 8 + 8, "number of cameras"));
   for (Camera& camera : model->cameras) camera = ReadCamera(&reader);
   reader.ExpectEnd();
 }
 
 void ParseRigsBinary(const FileBytes& file, Model* model) {
   BinaryReader reader(file);
-  model->rigs.resize(reader.ReadCount<uint64_t>(kRigBytes, "number of rigs"));
+  model->rigs.resize(reader.ReadCount<uint64_t>(4 + 4, "number of rigs"));
   for (Rig& rig : model->rigs) rig = ReadRig(&reader);
   reader.ExpectEnd();
 }
@@ -154,7 +247,7 @@ void ParseRigsBinary(const FileBytes& file, Model* model) {
 void ParseFramesBinary(const FileBytes& file, Model* model) {
   BinaryReader reader(file);
   model->frames.resize(
-      reader.ReadCount<uint64_t>(kFrameBytes, "number of frames"));
+      reader.ReadCount<uint64_t>(4 + 4 + kPoseBytes + 4, "number of frames"));
   for (Frame& frame : model->frames) ReadFrame(&reader, &frame);
   reader.ExpectEnd();
 }

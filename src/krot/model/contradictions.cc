@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {

@@ -18,12 +18,6 @@ using namespace internal;
 
 namespace {
 
-// COLMAP's pair id is this times the smaller image id plus the larger one.
-constexpr int64_t kMaxNumImages = 2147483647;
-
-constexpr int kConfigWatermark = 7;
-constexpr int kMaxConfig = 9;
-
 // Index in Model::images by the database's image id, for images that both have.
 using ImageOfId = std::unordered_map<int64_t, int32_t>;
 
@@ -101,9 +95,8 @@ bool AreSameFeatures(const std::vector<Eigen::Vector2d>& keypoints,
     are_equal = keypoints[i] == Eigen::Vector2d(points2D[i].x, points2D[i].y);
   }
   if (are_equal) return true;
-  constexpr double kSameOrder = 0.9;
-  return Correlation(keypoints, points2D, 0) > kSameOrder &&
-         Correlation(keypoints, points2D, 1) > kSameOrder;
+  return std::min(Correlation(keypoints, points2D, 0),
+                  Correlation(keypoints, points2D, 1)) > 0.9;
 }
 
 // Whether at least half of the 2D points that see a 3D point are among the
@@ -217,7 +210,7 @@ void ReadPairs(const Model& model, const ImageOfId& join,
                      ", expected 2147483647 times an image id plus another "
                      "one");
     }
-    if (config < 0 || config > kMaxConfig) {
+    if (config < 0 || config > 9) {
       database->Fail("found configuration " + std::to_string(config) +
                      " of a two-view geometry, expected 0 to 9");
     }
@@ -230,7 +223,7 @@ void ReadPairs(const Model& model, const ImageOfId& join,
       ++read->num_other_pairs;
       continue;
     }
-    if (config == kConfigWatermark) {
+    if (config == 7) {  // watermark
       ++read->num_watermarks;
       continue;
     }

@@ -3,7 +3,7 @@
 #include "krot/base/write_file.h"
 #include "krot/database.h"
 #include "krot/model.h"
-#include "krot/model/pose_priors.h"
+#include "krot/model/model_io.h"
 
 namespace krot {
 

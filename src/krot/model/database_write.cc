@@ -9,14 +9,13 @@
 
 #include "krot/base/write_file.h"
 #include "krot/database.h"
+#include "krot/model/sqlite_rows.h"
 
 namespace krot {
 
 using namespace internal;
 
 namespace {
-
-constexpr int64_t kIdsOfImages = 2147483647;
 
 // The tables as COLMAP 3.8 creates them; later versions add what they need.
 constexpr char kTables[] =
@@ -139,7 +138,7 @@ void InsertPairs(const Model& model, const Database& contents,
       std::swap(id1, id2);
       for (auto& match : matches) std::swap(match[0], match[1]);
     }
-    const int64_t pair_id = kIdsOfImages * id1 + id2;
+    const int64_t pair_id = kMaxNumImages * id1 + id2;
     const auto rows = static_cast<int64_t>(matches.size());
     const size_t bytes = matches.size() * sizeof(matches[0]);
     file->Insert("INSERT INTO matches VALUES (?, ?, 2, ?)", {pair_id, rows},

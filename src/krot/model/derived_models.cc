@@ -11,7 +11,6 @@
 #include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 
 namespace krot::internal {
 
@@ -163,11 +162,6 @@ namespace {
 using Eigen::Vector3d;
 using Real = long double;
 
-// A model is far out if its distance from the origin exceeds this many extents.
-// Then coordinates lose digits, and adjustments need more steps: four times as
-// many at a hundred extents, where turning a camera moves it about the origin.
-constexpr double kFarOut = 10;
-
 // The median of each coordinate; none without positions.
 std::optional<Vector3d> MedianPosition(const std::vector<Vector3d>& positions) {
   if (positions.empty()) return std::nullopt;
@@ -265,7 +259,10 @@ LocalFrame::LocalFrame(const Model& model, const FixedParts& fixed,
   if (!middle) return;
   double extent = MedianDistance(positions, *middle);
   if (extent == 0) extent = MedianDistance(Points(model, {}), *middle);
-  if (!(extent > 0) || !(middle->norm() > kFarOut * extent)) return;
+  // Far out, coordinates lose digits, and adjustments need more steps: four
+  // times as many at a hundred extents, where turning a camera moves it about
+  // the origin.
+  if (!(extent > 0) || !(middle->norm() > 10 * extent)) return;
   // Rounds to a power of two beyond the extent, so that differences are exact.
   const double unit = std::exp2(std::ceil(std::log2(extent)));
   origin_ = (*middle / unit).array().round() * unit;

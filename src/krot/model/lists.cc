@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -54,8 +53,6 @@ using Eigen::Vector3d;
 const std::vector<size_t> kCounts = {10, 6, 4, 3};
 constexpr char kExpected[] =
     "X Y Z RADIUS, or X Y Z and three semi-axes, or these and QW QX QY QZ";
-// The largest ratio of two semi-axes.
-constexpr double kLargestRatio = 1e4;
 
 [[noreturn]] void FailWithoutRadius(const TextReader& reader) {
   reader.Fail("no RADIUS behind X Y Z",
@@ -101,7 +98,6 @@ double Spread(std::vector<Vector3d> positions, int axis) {
 // degree is 111 km, so in metres the spread would be 10^5 times as large.
 bool AreDegrees(const std::vector<Vector3d>& positions,
                 const std::vector<Vector3d>& in_model) {
-  constexpr double kNextToNothing = 0.01;
   Vector3d farthest = Vector3d::Zero();
   for (const Vector3d& x : positions)
     farthest = farthest.cwiseMax(x.cwiseAbs());
@@ -113,7 +109,7 @@ bool AreDegrees(const std::vector<Vector3d>& positions,
     other = std::max(other, Spread(in_model, axis));
   }
   if (other == 0) other = Spread(positions, 2);
-  return spread > 0 && spread < kNextToNothing * std::min(larger, other);
+  return spread > 0 && spread < 0.01 * std::min(larger, other);
 }
 
 bool NamesDegrees(std::string header) {
@@ -177,8 +173,7 @@ bool IsFit(const Ellipsoid& region) {
   const double norm = region.world_from_axes.norm();
   return region.centre.allFinite() && region.semi_axes.allFinite() &&
          region.semi_axes.minCoeff() > 0 &&
-         region.semi_axes.maxCoeff() <=
-             kLargestRatio * region.semi_axes.minCoeff() &&
+         region.semi_axes.maxCoeff() <= 1e4 * region.semi_axes.minCoeff() &&
          std::isfinite(norm) && norm > 0;
 }
 
@@ -187,10 +182,8 @@ std::vector<KnownPosition> ReadPositions(const FileBytes& file,
                                          const PositionsOptions& options) {
   std::vector<Vector3d> centres;
   for (const ImageGeometry& image : ImageGeometries(model)) {
-    centres.push_back(
-        image.has_pose
-            ? Center(image.cam_from_world)
-            : Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+    centres.push_back(image.has_pose ? Center(image.cam_from_world)
+                                     : Vector3d::Constant(kNaN));
   }
   return ReadList(file, model, KnownPosition::Of::kImage, centres, options);
 }

@@ -10,9 +10,8 @@
 #include "krot/base/write_file.h"
 #include "krot/context.h"
 #include "krot/model.h"
-#include "krot/model/binary_io.h"
+#include "krot/model/formats.h"
 #include "krot/model/rigs.h"
-#include "krot/model/text_io.h"
 
 namespace krot::internal {
 namespace {
@@ -20,12 +19,6 @@ namespace {
 [[noreturn]] void FailWithErrno(const std::string& path, const char* action) {
   const std::string reason = std::generic_category().message(errno);
   throw ModelError(path + ": cannot be " + action + ": " + reason);
-}
-
-bool IsLfsPointer(std::string_view bytes) {
-  constexpr std::string_view kSignature =
-      "version https://git-lfs.github.com/spec/";
-  return bytes.substr(0, kSignature.size()) == kSignature;
 }
 
 }  // namespace
@@ -44,7 +37,7 @@ FileBytes ReadFileBytes(const std::filesystem::path& path) {
     FailWithErrno(file.path, "read");
   }
 
-  if (IsLfsPointer(file.bytes)) {
+  if (file.bytes.rfind("version https://git-lfs.github.com/spec/", 0) == 0) {
     throw ModelError(file.path +
                      ": is a Git LFS pointer, not a model; run `git lfs pull` "
                      "where it was cloned");
@@ -84,9 +77,6 @@ const ModelPart kParts[] = {
     {"points3D", false, ParsePoints3DBinary, ParsePoints3DText,
      FormatPoints3DBinary, FormatPoints3DText},
 };
-constexpr const char* kProjectFile = "project.ini";
-// Splatting programs convert points3D.bin to this file and read it instead.
-constexpr const char* kPointsOfOthers = "points3D.ply";
 
 constexpr ModelFormat kFormats[] = {ModelFormat::kBinary, ModelFormat::kText};
 
@@ -261,14 +251,15 @@ void WriteModel(const Model& model, const fs::path& folder,
   Translating<WriteError>(folder, "written", [&] {
     FolderSwap swap(folder, options.on_note);
     WriteModelFiles(model, options.format, swap.staging());
-    const fs::path project = options.copy_project_from / kProjectFile;
+    const fs::path project = options.copy_project_from / "project.ini";
     if (!options.copy_project_from.empty() && fs::exists(project)) {
-      fs::copy_file(project, swap.staging() / kProjectFile);
+      fs::copy_file(project, swap.staging() / project.filename());
     }
     swap.Commit(IsModelFile);
   });
   std::error_code ignored;
-  const fs::path points = folder / kPointsOfOthers;
+  // Splatting programs convert points3D.bin to this file and read it instead.
+  const fs::path points = folder / "points3D.ply";
   if (!options.on_note || !fs::exists(points, ignored)) return;
   options.on_note(points.string() +
                   " is older than the model beside it, and splatting programs "

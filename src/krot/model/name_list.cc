@@ -10,7 +10,6 @@ namespace krot::internal {
 namespace {
 
 constexpr int32_t kAmbiguous = -1;  // several images have the name
-constexpr std::string_view kBlanksAndQuotes = " \t\r;\"";
 constexpr std::string_view kSeparators = " \t\r;\",";
 
 std::string Quoted(std::string_view text) {
@@ -46,7 +45,7 @@ bool HasNumber(std::string_view line) {
 // end.
 bool HasDecimalComma(std::string_view line) {
   for (;;) {
-    const std::string_view word = TakeLast(kBlanksAndQuotes, &line);
+    const std::string_view word = TakeLast(" \t\r;\"", &line);
     if (word.empty() ||
         word.find_first_not_of("0123456789+-.,eE") != std::string_view::npos) {
       return false;

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "krot/model.h"
+#include "krot/model/formats.h"
 #include "krot/model/known_distances.h"
-#include "krot/model/text_io.h"
-#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
 
 namespace krot::internal {
 

@@ -17,8 +17,6 @@ namespace {
 // Two poses are the same up to this: radians, or relative to a length. Rounding
 // to six digits causes much smaller differences.
 constexpr double kSamePose = 1e-3;
-// How far a quaternion's length may be from 1.
-constexpr double kFarFromUnit = 0.01;
 
 using Rotations = std::vector<Eigen::Quaterniond>;
 
@@ -44,10 +42,8 @@ constexpr std::array<Convention, 8> kConventions = {{
 
 // One explanation is much better than another if its median angle is less than
 // a fifth of the other's, and the other's is above a degree.
-constexpr double kMuchBetter = 5;
-constexpr double kNoticeableDeg = 1;
 bool IsMuchBetter(double median_deg, double than_deg) {
-  return than_deg > kNoticeableDeg && kMuchBetter * median_deg < than_deg;
+  return than_deg > 1 && 5 * median_deg < than_deg;
 }
 
 Rotations ReadAs(const Convention& convention,
@@ -94,9 +90,8 @@ struct WorldTurn {
   double median_deg = std::numeric_limits<double>::infinity();
 };
 WorldTurn FindWorldTurn(const Rotations& own, const Rotations& listed) {
-  constexpr size_t kTried = 32;
   WorldTurn best;
-  const size_t step = (own.size() + kTried - 1) / kTried;
+  const size_t step = (own.size() + 31) / 32;
   for (size_t n = 0; n < own.size(); n += step) {
     const Eigen::Quaterniond turn = own[n].conjugate() * listed[n];
     const double median_deg = Median(AnglesDeg(own, listed, turn));
@@ -129,7 +124,7 @@ double Length(const QuaternionWxyz& q) {
 // An image without a pose may have a quaternion of zeros, which does not count.
 bool IsFar(const Pose& pose) {
   const double length = Length(pose.quaternion_wxyz);
-  return length > 0 && std::abs(length - 1) > kFarFromUnit;
+  return length > 0 && std::abs(length - 1) > 0.01;
 }
 
 void CheckQuaternions(const Model& model,

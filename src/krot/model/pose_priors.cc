@@ -1,4 +1,4 @@
-#include "krot/model/pose_priors.h"
+#include "krot/model/model_io.h"
 
 #include <algorithm>
 #include <cmath>
@@ -21,16 +21,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int64_t kWgs84 = 0;
-constexpr int64_t kCartesian = 1;
-constexpr int64_t kCamera = 0;  // COLMAP's sensor type of cameras
-constexpr double kSigmas = 3;
-
 struct PosePrior {
   int32_t image = 0;
   Vector3d position;
   std::optional<Matrix3d> covariance;
-  int64_t coordinate_system = kCartesian;
+  bool is_geodetic = false;
 };
 
 // The matrix in the blob; none unless it holds exactly that many finite
@@ -59,7 +54,6 @@ std::vector<PosePrior> ReadRows(SqliteDatabase* database, const Model& model) {
   // The table differs between versions. COLMAP 4 stores the sensor, too;
   // earlier versions only the image; 3.10 has no covariance. Before that, the
   // latitude, longitude and height of EXIF were in the prior_t of the images.
-  constexpr int kOldest = 3;
   std::optional<SqliteRows> rows;
   int form = 0;
   for (const auto& [table, columns] :
@@ -75,22 +69,23 @@ std::vector<PosePrior> ReadRows(SqliteDatabase* database, const Model& model) {
       rows.emplace(database, table, columns);
       break;
     } catch (const ModelError&) {
-      if (form++ == kOldest) throw;
+      if (form++ == 3) throw;
     }
   }
+  const bool is_oldest = form == 3;
   std::vector<PosePrior> priors;
   while (rows->Next()) {
-    if (form == 0 && rows->Integer(4) != kCamera) continue;
+    if (form == 0 && rows->Integer(4) != kSensorTypeCamera) continue;
     const auto image = image_of_id.find(rows->Integer(0));
     if (image == image_of_id.end()) continue;
     PosePrior prior{image->second, Vector3d::Constant(kNaN), std::nullopt,
-                    kWgs84};
-    if (form == kOldest) {
+                    is_oldest};
+    if (is_oldest) {
       for (int c = 0; c < 3; ++c) prior.position[c] = rows->Real(c + 1);
     } else {
       const auto position = MatrixOf<Vector3d>(rows->Blob(1));
       if (position) prior.position = *position;
-      prior.coordinate_system = rows->Integer(2);
+      prior.is_geodetic = rows->Integer(2) == 0;  // WGS84
       if (form < 2) prior.covariance = MatrixOf<Matrix3d>(rows->Blob(3));
     }
     if (prior.position.allFinite()) priors.push_back(std::move(prior));
@@ -104,17 +99,17 @@ double Radians(double degrees) { return degrees / kDegreesPerRadian; }
 
 // Earth-centred, earth-fixed coordinates of latitude, longitude and height.
 Vector3d EarthCentred(const Vector3d& geodetic) {
-  constexpr double kSemiMajorAxis = 6378137;  // metres, WGS84
-  constexpr double kFlattening = 1 / 298.257223563;
-  constexpr double kSquaredEccentricity = kFlattening * (2 - kFlattening);
+  // WGS84: the semi-major axis is 6378137 m.
+  const double flattening = 1 / 298.257223563;
+  const double squared_eccentricity = flattening * (2 - flattening);
   const double latitude = Radians(geodetic[0]);
   const double longitude = Radians(geodetic[1]);
   const double sine = std::sin(latitude);
   const double normal =
-      kSemiMajorAxis / std::sqrt(1 - kSquaredEccentricity * sine * sine);
+      6378137 / std::sqrt(1 - squared_eccentricity * sine * sine);
   return {(normal + geodetic[2]) * std::cos(latitude) * std::cos(longitude),
           (normal + geodetic[2]) * std::cos(latitude) * std::sin(longitude),
-          (normal * (1 - kSquaredEccentricity) + geodetic[2]) * sine};
+          (normal * (1 - squared_eccentricity) + geodetic[2]) * sine};
 }
 
 // A rotation whose rows are east, north and up.
@@ -173,7 +168,7 @@ std::optional<Ellipsoid> RegionOfPrior(const PosePrior& prior) {
   if (!(solver.eigenvalues().minCoeff() > 0)) return std::nullopt;
   Matrix3d axes = solver.eigenvectors();
   if (axes.determinant() < 0) axes.col(0) = -axes.col(0);
-  Ellipsoid region{prior.position, kSigmas * solver.eigenvalues().cwiseSqrt(),
+  Ellipsoid region{prior.position, 3 * solver.eigenvalues().cwiseSqrt(),
                    Eigen::Quaterniond(axes)};
   if (!IsFit(region)) return std::nullopt;
   return region;
@@ -192,11 +187,9 @@ std::vector<KnownPosition> ReadPosePriors(const std::filesystem::path& path,
         "found no pose prior of the model's images, expected positions; colmap "
         "feature_extractor takes them from EXIF");
   }
-  const auto is_geodetic = [](const PosePrior& prior) {
-    return prior.coordinate_system == kWgs84;
-  };
   const auto num_geodetic =
-      std::count_if(priors.begin(), priors.end(), is_geodetic);
+      std::count_if(priors.begin(), priors.end(),
+                    [](const auto& prior) { return prior.is_geodetic; });
   if (num_geodetic == static_cast<int64_t>(priors.size())) {
     TakeIntoLocalFrame(model, &database, path.string(), options.on_note,
                        &priors);

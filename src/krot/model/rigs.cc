@@ -1,20 +1,12 @@
 #include "krot/model/rigs.h"
 
+#include <algorithm>
+#include <array>
+
 #include "krot/model.h"
 
 namespace krot::internal {
 namespace {
-
-template <typename Id, typename Record>
-std::unordered_map<Id, int32_t> IndicesById(
-    const std::vector<Record>& records) {
-  std::unordered_map<Id, int32_t> indices;
-  indices.reserve(records.size());
-  for (size_t n = 0; n < records.size(); ++n) {
-    indices.emplace(records[n].id, static_cast<int32_t>(n));
-  }
-  return indices;
-}
 
 // Composes the pose of `image` from its frame's pose and its sensor's pose in
 // the rig.
@@ -30,24 +22,24 @@ void Place(const Pose& rig_from_world, const Pose& cam_from_rig,
 }  // namespace
 
 std::vector<ImageGeometry> ImageGeometries(const Model& model) {
-  const auto camera_index = IndicesById<CameraId>(model.cameras);
-  const auto rig_index = IndicesById<RigId>(model.rigs);
-  const auto image_index = ImageIndices(model);
+  const IdIndex<CameraId> camera_index(model.cameras);
+  const IdIndex<RigId> rig_index(model.rigs);
+  const IdIndex<ImageId> image_index(model.images);
   std::vector<ImageGeometry> images(model.images.size());
   for (size_t n = 0; n < images.size(); ++n) {
-    images[n].camera = camera_index.at(model.images[n].camera_id);
+    images[n].camera = camera_index.Find(model.images[n].camera_id).value();
   }
   for (size_t f = 0; f < model.frames.size(); ++f) {
     const Frame& frame = model.frames[f];
-    const int32_t rig = rig_index.at(frame.rig_id);
+    const int32_t rig = rig_index.Find(frame.rig_id).value();
     for (const FrameData& data : frame.data) {
       if (data.sensor_id.type != kSensorTypeCamera) continue;
       const std::optional<SensorPlace> place =
           FindSensor(model.rigs[rig], data.sensor_id);
       if (!place || !place->sensor_from_rig) continue;
-      const auto found = image_index.find(static_cast<ImageId>(data.data_id));
-      if (found == image_index.end()) continue;
-      ImageGeometry& image = images[found->second];
+      const auto found = image_index.Find(static_cast<ImageId>(data.data_id));
+      if (!found) continue;
+      ImageGeometry& image = images[*found];
       image.frame = static_cast<int32_t>(f);
       image.rig = rig;
       image.sensor = place->index;
@@ -70,33 +62,31 @@ std::optional<SensorPlace> FindSensor(const Rig& rig,
 }
 
 std::unordered_map<ImageId, int32_t> ImageIndices(const Model& model) {
-  return IndicesById<ImageId>(model.images);
+  std::unordered_map<ImageId, int32_t> indices;
+  indices.reserve(model.images.size());
+  for (size_t n = 0; n < model.images.size(); ++n) {
+    indices.emplace(model.images[n].id, static_cast<int32_t>(n));
+  }
+  return indices;
 }
 
 namespace {
 
-struct Entry {
-  int32_t type;
-  std::string_view name;
-};
-constexpr Entry kEntries[] = {{kSensorTypeInvalid, "INVALID"},
-                              {kSensorTypeCamera, "CAMERA"},
-                              {kSensorTypeImu, "IMU"}};
+// Of the types from -1 on.
+const std::array<std::string_view, 3> kSensorTypes = {"INVALID", "CAMERA",
+                                                      "IMU"};
 
 }  // namespace
 
 std::optional<std::string_view> SensorTypeName(int32_t type) {
-  for (const Entry& entry : kEntries) {
-    if (entry.type == type) return entry.name;
-  }
-  return std::nullopt;
+  if (type < -1 || type > 1) return std::nullopt;
+  return kSensorTypes[static_cast<size_t>(type + 1)];
 }
 
 std::optional<int32_t> SensorTypeFromName(std::string_view name) {
-  for (const Entry& entry : kEntries) {
-    if (entry.name == name) return entry.type;
-  }
-  return std::nullopt;
+  const auto found = std::find(kSensorTypes.begin(), kSensorTypes.end(), name);
+  if (found == kSensorTypes.end()) return std::nullopt;
+  return static_cast<int32_t>(found - kSensorTypes.begin()) - 1;
 }
 
 void UseTrivialRigs(Model* model) {

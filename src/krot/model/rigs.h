@@ -1,15 +1,95 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "krot/geometry.h"
 #include "krot/model.h"
 
 namespace krot::internal {
+
+// Finds records (cameras, images, points3D, ...) by their id.
+//
+//   const IdIndex<ImageId> image_index(model.images);
+//   const std::optional<int32_t> i = image_index.Find(image_id);
+//
+// COLMAP's ids are nearly consecutive: then Find is one look-up in a table,
+// otherwise a binary search. If several records have the same id, the first one
+// counts. Building costs O(n), O(n log n) for sparse ids.
+template <typename Id>
+class IdIndex {
+ public:
+  template <typename Record>
+  explicit IdIndex(const std::vector<Record>& records) {
+    uint64_t max_id = 0;
+    for (const Record& record : records) {
+      max_id = std::max<uint64_t>(max_id, record.id);
+    }
+    if (max_id <= 4 * records.size() + 1024) {
+      FillTable(records, max_id);
+    } else {
+      FillSorted(records);
+    }
+  }
+
+  // The index of the record with this id; none if there is no such record.
+  std::optional<int32_t> Find(Id id) const {
+    if (!table_.empty()) {
+      if (id >= table_.size() || table_[id] < 0) return std::nullopt;
+      return table_[id];
+    }
+    const auto entry = std::lower_bound(sorted_.begin(), sorted_.end(),
+                                        std::pair<Id, int32_t>(id, 0));
+    if (entry == sorted_.end() || entry->first != id) return std::nullopt;
+    return entry->second;
+  }
+
+  // An id that several records share; none if all differ.
+  std::optional<Id> duplicate() const { return duplicate_; }
+
+ private:
+  template <typename Record>
+  void FillTable(const std::vector<Record>& records, uint64_t max_id) {
+    table_.assign(max_id + 1, -1);
+    for (size_t i = 0; i < records.size(); ++i) {
+      int32_t& position = table_[records[i].id];
+      if (position >= 0) {
+        duplicate_ = records[i].id;
+      } else {
+        position = static_cast<int32_t>(i);
+      }
+    }
+  }
+
+  template <typename Record>
+  void FillSorted(const std::vector<Record>& records) {
+    sorted_.reserve(records.size());
+    for (size_t i = 0; i < records.size(); ++i) {
+      sorted_.emplace_back(records[i].id, static_cast<int32_t>(i));
+    }
+    std::sort(sorted_.begin(), sorted_.end());
+    for (size_t i = 1; i < sorted_.size(); ++i) {
+      if (sorted_[i].first == sorted_[i - 1].first) {
+        duplicate_ = sorted_[i].first;
+      }
+    }
+  }
+
+  std::vector<int32_t> table_;                  // by id, -1 for none
+  std::vector<std::pair<Id, int32_t>> sorted_;  // if there is no table
+  std::optional<Id> duplicate_;
+};
+
+// `image 3 ("a.jpg")`.
+inline std::string Describe(const Image& image) {
+  return "image " + std::to_string(image.id) + " (\"" + image.name + "\")";
+}
 
 // The pose of an image: x_cam = cam_from_rig * (rig_from_world * x_world).
 //

@@ -38,8 +38,7 @@ void RequireSqlite(const std::filesystem::path& path) {
                      ": is a Git LFS pointer, not a database; run git lfs pull "
                      "where it was cloned");
   }
-  constexpr std::string_view kMagic("SQLite format 3\0", 16);
-  if (std::string_view(head).substr(0, kMagic.size()) != kMagic) {
+  if (head.compare(0, 16, "SQLite format 3", 16) != 0) {  // with its zero byte
     throw ModelError(path.string() +
                      ": is no SQLite database, expected COLMAP's, which is "
                      "mostly called database.db");
@@ -171,8 +170,7 @@ void SqliteDatabase::Require(int status) const {
   // SQLite reports some damage as a lack of memory, too. If there is memory
   // for far more than a row, it is damage.
   if ((status & 0xff) == SQLITE_NOMEM) {
-    constexpr int kMuch = 1 << 20;  // bytes
-    void* const memory = sqlite3_malloc(kMuch);
+    void* const memory = sqlite3_malloc(1 << 20);  // bytes
     if (memory == nullptr) throw std::bad_alloc();
     sqlite3_free(memory);
     reason = "its tables make no sense";

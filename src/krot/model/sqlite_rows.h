@@ -61,6 +61,9 @@ class SqliteDatabase {
   int64_t bytes_left_ = 0;
 };
 
+// COLMAP's pair id is this times the smaller image id plus the larger one.
+inline constexpr int64_t kMaxNumImages = 2147483647;
+
 // The rows of a table, one after another. Throws ModelError for values of
 // another type than asked for.
 class SqliteRows {

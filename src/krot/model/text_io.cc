@@ -1,4 +1,4 @@
-#include "krot/model/text_io.h"
+#include "krot/model/formats.h"
 
 #include <optional>
 #include <string_view>
@@ -242,12 +242,10 @@ void AppendSensorId(const SensorId& sensor_id, std::string* text) {
 // Fails for names that a line cannot hold, or that would lose blanks at their
 // ends.
 void CheckNameFitsText(const Image& image) {
-  constexpr std::string_view kBlanks = " \t\r";
   const std::string& name = image.name;
-  const bool fits =
-      name.find_first_of("\r\n") == std::string::npos &&
-      (name.empty() || (kBlanks.find(name.front()) == std::string_view::npos &&
-                        kBlanks.find(name.back()) == std::string_view::npos));
+  const bool fits = name.find_first_of("\r\n") == std::string::npos &&
+                    (name.empty() || (!TextReader::IsBlank(name.front()) &&
+                                      !TextReader::IsBlank(name.back())));
   if (fits) return;
   throw WriteError("image " + std::to_string(image.id) + ": found the name \"" +
                    name +

@@ -1,17 +1,52 @@
-#include "krot/model/validate.h"
-
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "krot/camera/camera_model.h"
+#include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
 namespace {
+
+// A model and indices of its ids.
+struct IndexedModel {
+  explicit IndexedModel(const Model& model)
+      : records(model),
+        cameras(model.cameras),
+        rigs(model.rigs),
+        frames(model.frames),
+        images(model.images),
+        points3D(model.points3D) {}
+
+  const Model& records;
+  IdIndex<CameraId> cameras;
+  IdIndex<RigId> rigs;
+  IdIndex<FrameId> frames;
+  IdIndex<ImageId> images;
+  IdIndex<Point3DId> points3D;
+};
+
+// Joins the parts into a message and throws it as a ModelError.
+template <typename... Parts>
+[[noreturn]] void Fail(const Parts&... parts) {
+  std::ostringstream message;
+  message.precision(17);
+  (message << ... << parts);
+  throw ModelError(message.str());
+}
+
+// Fails unless the value is finite; `owner()` names the record that it belongs
+// to.
+template <typename Owner>
+void CheckFinite(double value, const Owner& owner, const char* quantity) {
+  if (std::isfinite(value)) return;
+  Fail(owner(), ": found ", quantity, " ", value, ", expected a finite number");
+}
 
 // Advice at the end of messages about inconsistent rigs and frames.
 constexpr const char* kUsePosesOfImages =
@@ -136,8 +171,8 @@ void CheckFrame(const IndexedModel& model, const Frame& frame,
   }
 }
 
-}  // namespace
-
+// Checks rigs and frames as ValidateModel promises, but not that their ids are
+// unique.
 void ValidateRigsAndFrames(const IndexedModel& model) {
   for (const Rig& rig : model.records.rigs) CheckRig(rig, model.cameras);
   const std::vector<Image>& images = model.records.images;
@@ -151,8 +186,6 @@ void ValidateRigsAndFrames(const IndexedModel& model) {
          ": found in no frame, expected one: the model has rigs and frames");
   }
 }
-
-namespace {
 
 // Advice at the end of messages about track elements whose 2D point does not
 // exist.
@@ -182,8 +215,7 @@ void CheckTrackElement(const IndexedModel& model, const Point3D& point,
   }
 }
 
-}  // namespace
-
+// Checks that tracks refer to existing 2D points. Requires valid track ranges.
 void ValidateObservations(const IndexedModel& model) {
   for (const Point3D& point : model.records.points3D) {
     for (uint64_t i = point.track_begin; i < point.track_end; ++i) {
@@ -191,14 +223,6 @@ void ValidateObservations(const IndexedModel& model) {
     }
   }
 }
-
-}  // namespace krot::internal
-
-namespace krot {
-
-using namespace internal;
-
-namespace {
 
 template <typename Id>
 void CheckIds(const IdIndex<Id>& index, const char* records) {
@@ -275,6 +299,11 @@ void CheckTracksAreConsecutive(const Model& model) {
 }
 
 }  // namespace
+}  // namespace krot::internal
+
+namespace krot {
+
+using namespace internal;
 
 void ValidateModel(const Model& model) {
   const IndexedModel indexed(model);

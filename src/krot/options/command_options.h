@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "krot/options/option_table.h"
@@ -15,6 +16,11 @@ namespace krot::internal {
 // Solver, FastDescent and Problem.
 void AddSolveOptions(SolveModelOptions* options, Context* context,
                      OptionTable* table);
+
+// A number of pixels > 0, if it is given.
+void AddPixels(const std::string& name, const std::string& help,
+               const std::string& default_text, std::optional<double>* pixels,
+               OptionTable* table);
 
 // Problem.same_image, which `outlier_filter` has, too.
 void AddSameImage(BuildProblemOptions* options, OptionTable* table);

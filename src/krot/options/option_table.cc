@@ -20,25 +20,6 @@ bool ParseInto(const std::string& text, Number* value) {
   return parsed.has_value();
 }
 
-std::string WithUnit(const std::string& text, const std::string& unit) {
-  return unit.empty() ? text : text + ", " + unit;
-}
-
-std::string Text(int value) { return std::to_string(value); }
-std::string Text(double value) { return NumberText(value); }
-
-template <typename Number>
-Range<Number> MakeAtLeast(Number min, const std::string& unit) {
-  return {WithUnit(">= " + Text(min), unit),
-          [min](Number value) { return value >= min; }};
-}
-
-template <typename Number>
-Range<Number> MakeBetween(Number min, Number max, const std::string& unit) {
-  return {WithUnit("in [" + Text(min) + ", " + Text(max) + "]", unit),
-          [min, max](Number value) { return value >= min && value <= max; }};
-}
-
 std::string LowerCase(std::string text) {
   for (char& c : text) {
     c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -91,38 +72,7 @@ bool IsSameWord(const std::string& a, const std::string& b) {
   return LowerCase(a) == LowerCase(b);
 }
 
-Range<int> AtLeast(int min, const std::string& unit) {
-  return MakeAtLeast(min, unit);
-}
-
-Range<double> AtLeast(double min, const std::string& unit) {
-  return MakeAtLeast(min, unit);
-}
-
-Range<double> Above(double min, const std::string& unit) {
-  return {WithUnit("> " + NumberText(min), unit),
-          [min](double value) { return value > min; }};
-}
-
-Range<int> Between(int min, int max, const std::string& unit) {
-  return MakeBetween(min, max, unit);
-}
-
-Range<double> Between(double min, double max, const std::string& unit) {
-  return MakeBetween(min, max, unit);
-}
-
-Range<double> InHalfOpen(double min, double max, const std::string& unit) {
-  return {
-      WithUnit("in [" + NumberText(min) + ", " + NumberText(max) + ")", unit),
-      [min, max](double value) { return value >= min && value < max; }};
-}
-
-std::string NumberText(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
+std::string NumberText(double value) { return RangeText("", value); }
 
 std::string ChoiceText(const std::vector<std::string>& choices) {
   std::string text = "{";
@@ -211,15 +161,9 @@ void OptionTable::AddReal(const std::string& name, double* value,
 void OptionTable::AddChoice(const std::string& name, std::string* value,
                             const std::vector<std::string>& choices,
                             const std::string& description) {
-  Add({name, description, "one of " + ChoiceText(choices), *value, false,
-       [value, choices](const std::string& text) {
-         const auto choice = std::find_if(
-             choices.begin(), choices.end(),
-             [&](const std::string& c) { return IsSameWord(c, text); });
-         if (choice != choices.end()) *value = *choice;
-         return choice != choices.end();
-       },
-       false, choices});
+  std::vector<std::pair<std::string, std::string>> named;
+  for (const std::string& choice : choices) named.emplace_back(choice, choice);
+  AddNamed(name, value, named, description);
 }
 
 void OptionTable::AddThreads(const std::string& name, int* value,

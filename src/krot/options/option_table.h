@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -32,14 +33,36 @@ struct Range {
   std::function<bool(Number)> contains;
 };
 
-// `unit` is appended to the text if not empty: ">= 0, pixels".
-Range<int> AtLeast(int min, const std::string& unit = "");
-Range<double> AtLeast(double min, const std::string& unit = "");
-Range<double> Above(double min, const std::string& unit = "");
-Range<int> Between(int min, int max, const std::string& unit = "");
-Range<double> Between(double min, double max, const std::string& unit = "");
+// The parts of a range's text, with the unit behind them if there is one:
+// ">= 0, pixels".
+template <typename... Parts>
+std::string RangeText(const std::string& unit, const Parts&... parts) {
+  std::ostringstream text;
+  (text << ... << parts);
+  return unit.empty() ? text.str() : text.str() + ", " + unit;
+}
+
+template <typename Number>
+Range<Number> AtLeast(Number min, const std::string& unit = "") {
+  return {RangeText(unit, ">= ", min),
+          [min](Number value) { return value >= min; }};
+}
+template <typename Number>
+Range<Number> Above(Number min, const std::string& unit = "") {
+  return {RangeText(unit, "> ", min),
+          [min](Number value) { return value > min; }};
+}
+template <typename Number>
+Range<Number> Between(Number min, Number max, const std::string& unit = "") {
+  return {RangeText(unit, "in [", min, ", ", max, "]"),
+          [min, max](Number value) { return value >= min && value <= max; }};
+}
 // [min, max)
-Range<double> InHalfOpen(double min, double max, const std::string& unit = "");
+template <typename Number>
+Range<Number> InHalfOpen(Number min, Number max, const std::string& unit = "") {
+  return {RangeText(unit, "in [", min, ", ", max, ")"),
+          [min, max](Number value) { return value >= min && value < max; }};
+}
 
 // Whether the words are the same up to upper and lower case.
 bool IsSameWord(const std::string& a, const std::string& b);

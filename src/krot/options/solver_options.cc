@@ -75,6 +75,18 @@ void AddSolveOptions(SolveModelOptions* options, Context* context,
   AddSameImage(&options->problem, table);
 }
 
+void AddPixels(const std::string& name, const std::string& help,
+               const std::string& default_text, std::optional<double>* pixels,
+               OptionTable* table) {
+  table->Add({name, help, "a number > 0, pixels", default_text, false,
+              [pixels](const std::string& text) {
+                double value = 0;
+                if (!ParseReal(text, &value) || !(value > 0)) return false;
+                *pixels = value;
+                return true;
+              }});
+}
+
 void AddSameImage(BuildProblemOptions* options, OptionTable* table) {
   table->AddNamed<SameImage>(
       "Problem.same_image", &options->same_image,
@@ -159,18 +171,6 @@ namespace {
 
 // The paper's stopping rule, which comes with its settings [Zhang18, Sec. 5].
 constexpr double kPaperSweepTolerance = 1e-3;
-
-void AddPixels(const std::string& name, const std::string& help,
-               const std::string& default_text, std::optional<double>* pixels,
-               OptionTable* table) {
-  table->Add({name, help, "a number > 0, pixels", default_text, false,
-              [pixels](const std::string& text) {
-                double value = 0;
-                if (!ParseReal(text, &value) || !(value > 0)) return false;
-                *pixels = value;
-                return true;
-              }});
-}
 
 void AddScheduleOptions(SolveModelOptions* options, OptionTable* table) {
   table->AddNamed<SolveMethod>(

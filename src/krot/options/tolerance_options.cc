@@ -8,23 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "krot/model/validate.h"
+#include "krot/model/rigs.h"
 #include "krot/options/option_table.h"
 
 namespace krot::internal {
 
 void AddOutlierFilterOptions(OutlierFilterOptions* options, Context* context,
                              OptionTable* table) {
-  table->Add({"OutlierFilter.max_error",
-              "The bound for all errors; without it, what noise does not "
-              "explain is removed",
-              "a number > 0, pixels", "", false,
-              [options](const std::string& text) {
-                double value = 0;
-                if (!ParseReal(text, &value) || !(value > 0)) return false;
-                options->max_error = value;
-                return true;
-              }});
+  AddPixels("OutlierFilter.max_error",
+            "The bound for all errors; without it, what noise does not explain "
+            "is removed",
+            "", &options->max_error, table);
   table->AddNamed<OutlierMethod>(
       "OutlierFilter.method", &options->method,
       {{"conflicts", OutlierMethod::kConflicts},
@@ -65,8 +59,6 @@ void ResolveOutlierFilterOptions(const OptionTable& table, bool makes_profile,
 
 namespace {
 
-constexpr int32_t kAmbiguous = -1;
-
 std::vector<std::string> SplitAtCommas(const std::string& list) {
   std::vector<std::string> names;
   std::istringstream stream(list);
@@ -84,11 +76,9 @@ std::vector<std::string> SplitAtCommas(const std::string& list) {
 
 std::vector<int32_t> FindImages(const std::string& option,
                                 const std::string& list, const Model& model) {
-  std::map<std::string, int32_t> by_name;
+  std::multimap<std::string, int32_t> by_name;
   for (size_t i = 0; i < model.images.size(); ++i) {
-    const auto [image, is_new] =
-        by_name.emplace(model.images[i].name, static_cast<int32_t>(i));
-    if (!is_new) image->second = kAmbiguous;
+    by_name.emplace(model.images[i].name, static_cast<int32_t>(i));
   }
   const IdIndex<ImageId> by_id(model.images);
   std::vector<int32_t> found;
@@ -103,7 +93,7 @@ std::vector<int32_t> FindImages(const std::string& option,
       image = by_id.Find(static_cast<ImageId>(id));
     }
     if (!image) Refuse(option, name, "images of the model, by name or id");
-    if (*image == kAmbiguous) {
+    if (by_name.count(name) > 1) {
       Refuse(option, name + ", which several images bear", "one, by its id");
     }
     found.push_back(*image);

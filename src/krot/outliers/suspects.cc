@@ -12,7 +12,6 @@
 #include "krot/base/numbers.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 
 namespace krot::internal {
 namespace {

@@ -6,7 +6,6 @@
 
 #include "krot/base/numbers.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 #include "krot/pipeline/settling.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"

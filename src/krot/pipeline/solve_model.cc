@@ -7,7 +7,6 @@
 #include "krot/linear/reduced_camera_system.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
-#include "krot/model/validate.h"
 #include "krot/pipeline/stages.h"
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"

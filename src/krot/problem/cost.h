@@ -111,9 +111,9 @@ inline bool IsZeroUpToRounding(double cost) { return cost < 1e-9; }
 // In the layout of kernels.h:
 //   {A11, A12, A13, b1, A21, A22, A23, b2, c1, c2, c3, d}.
 
-namespace detail {
-
-inline void AffineRow(const Observation& observation, const AffineMap& map,
+// For Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr, so
+// that `map` is the view's CamFromWorld.
+inline void AffineRow(const AffineMap& map, const Observation& observation,
                       double row[kResidualRow]) {
   const auto& E = observation.E;
   for (int k = 0; k < 4; ++k) {  // columns: of x and of 1
@@ -126,15 +126,6 @@ inline void AffineRow(const Observation& observation, const AffineMap& map,
   }
 }
 
-}  // namespace detail
-
-// For Int_k: the unknown is the point s; R = R_sr R_rw, o = R_sr t_f + t_sr.
-inline void IntersectionRow(const AffineMap& cam_from_world,
-                            const Observation& observation,
-                            double row[kResidualRow]) {
-  detail::AffineRow(observation, cam_from_world, row);
-}
-
 // For Res_j: the unknown is the frame's translation t_f, with the point s fixed
 // at `point`; R = R_sr, o = R_sr R_rw s + t_sr.
 inline void ResectionRow(const View& view, const Observation& observation,
@@ -144,7 +135,7 @@ inline void ResectionRow(const View& view, const Observation& observation,
   map.leftCols<3>() = view.cam_from_rig_rotation;
   map.col(3) =
       view.cam_from_world_rotation * point + view.cam_from_rig_translation;
-  detail::AffineRow(observation, map, row);
+  AffineRow(map, observation, row);
 }
 
 // Whether R_sr = I, as of a frame's reference sensor.

@@ -16,6 +16,10 @@
 namespace krot::internal {
 namespace {
 
+// Centres closer than this, relative to the size of their coordinates and of
+// the component, coincide: rounding is a thousand times smaller.
+constexpr double kCoincident = 1e-12;
+
 // The views that have observations, in the order of their first observations.
 std::vector<int32_t> SeenViews(const KnownRotationProblem& problem,
                                const Context& context) {
@@ -227,13 +231,15 @@ std::vector<double> TypicalDistances(const KnownRotationProblem& problem,
   return GroupMedians(distances, frame_of, problem.num_frames, context);
 }
 
+}  // namespace
+
 std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,
-                                 const std::vector<FrameGeometry>& frames,
-                                 const Components& components,
                                  const Estimate& reference,
                                  const Estimate& estimate,
                                  const std::vector<char>& is_loose,
                                  const Context& context) {
+  const std::vector<FrameGeometry> frames = DescribeFrames(problem, context);
+  const Components components = FindComponents(problem, context);
   const std::vector<double> before =
       TypicalDistances(problem, reference, context);
   const std::vector<double> after =
@@ -268,27 +274,15 @@ std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,
   return is_held;
 }
 
-}  // namespace
-
-std::vector<char> FindHeldFrames(const KnownRotationProblem& problem,
-                                 const Estimate& reference,
-                                 const Estimate& estimate,
-                                 const std::vector<char>& is_loose,
-                                 const Context& context) {
-  return FindHeldFrames(problem, DescribeFrames(problem, context),
-                        FindComponents(problem, context), reference, estimate,
-                        is_loose, context);
-}
-
 void RestoreGauge(const KnownRotationProblem& problem,
                   const Estimate& reference, Estimate* estimate,
                   const Context& context, const std::vector<char>* held) {
   const Components components = FindComponents(problem, context);
   std::vector<FrameGeometry> frames = DescribeFrames(problem, context);
   const std::vector<char> is_held =
-      held != nullptr ? *held
-                      : FindHeldFrames(problem, frames, components, reference,
-                                       *estimate, {}, context);
+      held != nullptr
+          ? *held
+          : FindHeldFrames(problem, reference, *estimate, {}, context);
   const std::vector<char> scale_is_free = ScaleIsFree(frames, components);
   for (int32_t f = 0; f < problem.num_frames; ++f) {
     if (is_held[f] == 0) frames[f].num_views = 0;

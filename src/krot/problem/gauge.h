@@ -10,10 +10,6 @@
 
 namespace krot::internal {
 
-// Centres closer than this, relative to the size of their coordinates and of
-// the component, coincide: rounding is a thousand times smaller.
-inline constexpr double kCoincident = 1e-12;
-
 // The projection centre of a frame: that of its first view with an observation.
 struct FrameGeometry {
   Eigen::Matrix3d world_from_rig = Eigen::Matrix3d::Identity();  // R_rw'

@@ -31,17 +31,15 @@ void CheckIndices(const KnownRotationProblem& problem) {
   for (int64_t j = 0; j < num_views; ++j) {
     CheckIndex(problem.views[j].frame, problem.num_frames, "views", j, "frame");
   }
-  const size_t num_fixed_frames = problem.fixed_translations.size();
-  CheckArgument(
-      num_fixed_frames == 0 ||
-          static_cast<int32_t>(num_fixed_frames) == problem.num_frames,
-      "fixed_translations.size()", num_fixed_frames,
-      "0 or the number of frames");
-  const size_t num_fixed_points = problem.fixed_points.size();
-  CheckArgument(
-      num_fixed_points == 0 ||
-          static_cast<int32_t>(num_fixed_points) == problem.num_points,
-      "fixed_points.size()", num_fixed_points, "0 or the number of points");
+  const auto check_fixed = [](size_t size, int32_t count, const char* name,
+                              const char* requirement) {
+    CheckArgument(size == 0 || static_cast<int32_t>(size) == count, name, size,
+                  requirement);
+  };
+  check_fixed(problem.fixed_translations.size(), problem.num_frames,
+              "fixed_translations.size()", "0 or the number of frames");
+  check_fixed(problem.fixed_points.size(), problem.num_points,
+              "fixed_points.size()", "0 or the number of points");
   int32_t previous_point = 0;
   for (int64_t i = 0; i < num_observations; ++i) {
     const Observation& observation = problem.observations[i];
@@ -59,10 +57,6 @@ void CheckIndices(const KnownRotationProblem& problem) {
 }
 
 using Eigen::Vector3d;
-
-// Positions closer than this, relative to the size of their coordinates,
-// coincide.
-constexpr double kSamePosition = 1e-12;
 
 Vector3d CentreOf(const View& view, const Vector3d& translation) {
   return Center(
@@ -160,7 +154,7 @@ double FixedExtent(const KnownRotationProblem& problem) {
   ForFixedPositions(problem, [&](const Vector3d& x) {
     extent = std::max(extent, (x - *origin).norm());
   });
-  return extent > kSamePosition * origin->norm() ? extent : 0;
+  return extent > 1e-12 * origin->norm() ? extent : 0;
 }
 
 bool IsScaleFree(const KnownRotationProblem& problem) {

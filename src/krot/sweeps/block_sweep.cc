@@ -256,7 +256,7 @@ void BlockSweep::AddPointRows(int32_t point,
   for (int64_t i = problem_.point_begin[point];
        i < problem_.point_begin[point + 1]; ++i) {
     const Observation& observation = problem_.observations[i];
-    IntersectionRow(cameras_[observation.view], observation, row);
+    AffineRow(cameras_[observation.view], observation, row);
     writer->Add(row);
   }
 }

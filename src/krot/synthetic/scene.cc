@@ -94,10 +94,6 @@ Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
   const CameraModelInfo* info = FindCameraModel(model_id);
   CheckArgument(info != nullptr, "camera_model_id", model_id,
                 "the id of a camera model");
-  constexpr std::string_view kTwoFocalLengths = "fx";
-  const bool two_focal_lengths =
-      info->param_names.substr(0, 2) == kTwoFocalLengths;
-
   Camera camera;
   camera.model_id = model_id;
   camera.width = width;
@@ -107,7 +103,9 @@ Camera DefaultCamera(int model_id, uint64_t width, uint64_t height,
     return camera;
   }
   camera.params = {focal_length};
-  if (two_focal_lengths) camera.params.push_back(1.01 * focal_length);
+  if (info->param_names.substr(0, 2) == "fx") {
+    camera.params.push_back(1.01 * focal_length);
+  }
   camera.params.push_back(static_cast<double>(width) / 2);
   camera.params.push_back(static_cast<double>(height) / 2);
   const std::vector<double>& distortion = DefaultDistortion(model_id);
@@ -137,9 +135,8 @@ ImageId ImageIdOf(int frame, int sensor, int num_sensors) {
 
 // The name as COLMAP expects for rigs: one folder per camera.
 std::string ImageName(int frame, int sensor, int num_sensors) {
-  constexpr size_t kDigits = 6;
   std::string number = std::to_string(frame + 1);
-  if (number.size() < kDigits) number.insert(0, kDigits - number.size(), '0');
+  while (number.size() < 6) number.insert(0, "0");
   std::string name = "frame" + number + ".jpg";
   if (num_sensors == 1) return name;
   return "camera" + std::to_string(sensor + 1) + "/" + name;

@@ -78,18 +78,14 @@ Trajectory MakeTrajectory(const SceneOptions& options, Random* random);
 // and to the left.
 std::vector<Pose> MakeRigSensors(const SceneOptions& options);
 
-// The smallest distance of a point from an image that sees it, in viewing
-// distances.
-inline constexpr double kMinDepth = 0.2;
-
 // Says which points the images of a scene see, and at which pixels. All images
 // have copies of the same camera.
 class Imaging {
  public:
   // A point is in view if its pixel is at least `margin_px` inside the image's
-  // border, it is at least kMinDepth away and, except for panoramas, its ray is
-  // less than 80 degrees off the axis. Throws std::invalid_argument if the
-  // camera has no ray for a pixel of the border.
+  // border, it is at least 0.2 viewing distances away and, except for
+  // panoramas, its ray is less than 80 degrees off the axis. Throws
+  // std::invalid_argument if the camera has no ray for a pixel of the border.
   Imaging(const Camera& camera, double margin_px,
           const std::vector<Pose>& cam_from_world);
 

@@ -11,16 +11,12 @@
 namespace krot::internal {
 namespace {
 
-constexpr double kMaxTangent = 5.67;  // tangent of 80 degrees
-
 std::optional<Eigen::Vector2d> RayOf(const Camera& camera,
                                      const Eigen::Vector2d& pixel) {
-  UndistortedObservation undistorted;
-  if (UndistortPixel(camera.model_id, camera.params.data(), pixel, std::nullopt,
-                     &undistorted) != UndistortStatus::kOk) {
-    return std::nullopt;
-  }
-  return undistorted.u;
+  const auto undistorted =
+      UndistortPixel(camera.model_id, camera.params.data(), pixel);
+  if (!undistorted) return std::nullopt;
+  return undistorted->u;
 }
 
 // The largest ||u|| on the image's border, which bounds that of the interior.
@@ -44,7 +40,7 @@ double MaxRayRadius(const Camera& camera) {
       max_radius = std::max(max_radius, u->norm());
     }
   }
-  return std::min(max_radius, kMaxTangent);
+  return std::min(max_radius, 5.67);  // the tangent of 80 degrees
 }
 
 }  // namespace
@@ -67,7 +63,7 @@ std::optional<Eigen::Vector2d> Imaging::Project(
   const size_t j = static_cast<size_t>(image);
   const Eigen::Vector3d x_cam = cam_from_world_[j] * x_world;
   const double depth = has_image_plane_ ? x_cam.z() : x_cam.norm();
-  if (depth < kMinDepth) return std::nullopt;
+  if (depth < 0.2) return std::nullopt;
   if (has_image_plane_ && x_cam.hnormalized().norm() > max_ray_radius_) {
     return std::nullopt;
   }
@@ -199,14 +195,13 @@ class StructureSampler {
 Structure SampleStructure(const SceneOptions& options,
                           const Trajectory& trajectory, const Imaging& imaging,
                           Random* random) {
-  constexpr int kMaxTries = 1000;
   StructureSampler sampler(options, trajectory, imaging, random);
   Structure structure;
   for (int k = 0; k < options.num_points; ++k) {
     const int anchor = k % imaging.num_images();
     int tries = 0;
     while (!sampler.SamplePoint(anchor)) {
-      CheckArgument(++tries < kMaxTries, "rig_rotation_deg",
+      CheckArgument(++tries < 1000, "rig_rotation_deg",
                     options.rig_rotation_deg,
                     "such that every image shares points with another");
     }

@@ -125,20 +125,15 @@ Trajectory MakeStreet(const SceneOptions& options, Random* random) {
       std::max(options.image_width, options.image_height);
   const double view_width = options.image_width / focal_length;
   const double spacing = view_width / (2 * options.track_length);
-  constexpr double kBendLength = 20;  // viewing distances
-  constexpr double kBendAngle = 0.3;  // radians
-  constexpr double kWobble = 0.03;    // radians
-  constexpr double kSway = 0.02;      // viewing distances
 
   Trajectory trajectory;
   Eigen::Vector3d on_path = Eigen::Vector3d::Zero();
   for (int f = 0; f < options.num_frames; ++f) {
-    const double heading =
-        kBendAngle * std::sin(2 * kPi * f * spacing / kBendLength);
+    const double heading = 0.3 * std::sin(2 * kPi * f * spacing / 20);
     const Eigen::Vector3d ahead(std::cos(heading), 0, std::sin(heading));
     const Eigen::Vector3d aside(-std::sin(heading), 0, std::cos(heading));
-    const Eigen::Vector3d center = on_path + kSway * random->GaussianVector();
-    const Eigen::Vector3d forward = aside + kWobble * random->GaussianVector();
+    const Eigen::Vector3d center = on_path + 0.02 * random->GaussianVector();
+    const Eigen::Vector3d forward = aside + 0.03 * random->GaussianVector();
     trajectory.rig_from_world.push_back(
         PoseFromCenter(LookAlong(forward), center));
     on_path += spacing * ahead;

@@ -20,7 +20,7 @@
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/problem/subset.h"
 #include "krot/tolerances.h"
-#include "krot/verify/extent_check.h"
+#include "krot/verify/certificate_check.h"
 #include "krot/verify/force_checker.h"
 
 namespace krot::internal {

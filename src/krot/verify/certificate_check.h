@@ -73,6 +73,57 @@ struct CertificateCheck {
 CertificateCheck CheckCertificate(const KnownRotationProblem& problem,
                                   Norm norm, const Certificate& certificate);
 
+// A linear objective p'x, where x is the centre of a view or a point, in world
+// coordinates. With a pull, forces balance if they add up to p at the view's
+// frame, or to -p at the point.
+struct Pull {
+  enum class Kind { kView, kPoint };
+  Kind kind = Kind::kView;
+  int32_t index = 0;  // of the view, or of the point
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // p
+};
+
+// A proof of how far estimates whose residuals are all at most `bound` reach.
+// With the positions x_n and the directions p_n of the pulls,
+//
+//   sum_n p_n'x_n <= extent   for every estimate of a cost <= bound.
+//
+// With z the vector of all unknowns, w_i = c_i'z + d_i and v_i = A_i z + b_i,
+// let |y_i|_dual <= lambda_i, and let g'z + const = sum_n p_n'x_n. If
+//
+//   (1)  sum_i A_i'y_i + bound sum_i lambda_i c_i = -g,
+//   (2)  sum_i y_i'b_i + bound sum_i lambda_i d_i = kappa,
+//
+// then 0 <= sum_i (y_i'v_i + bound lambda_i w_i) = kappa - g'z. Extents are
+// finite only where something is fixed; at what is fixed, (1) asks for nothing
+// (docs/method/outliers.md, "What the data allow").
+struct ExtentCertificate {
+  double bound = 0;  // pixels
+  std::vector<Pull> pulls;
+  std::vector<CertifiedObservation> observations;  // ascending
+};
+
+struct ExtentCheck {
+  bool is_accepted = false;
+  double extent = 0;    // scene units
+  std::string refusal;  // one sentence; empty if accepted
+};
+
+// Judges a certificate from the problem alone, as CheckCertificate does, and
+// under the same assumptions. If it is accepted, (1) holds exactly for
+// multipliers near the certificate's with |y_i|_dual <= lambda_i, and the
+// extent allows for every rounding. Refuses a support with a component in which
+// nothing is fixed, and pulls at fixed positions, which would have no effect in
+// (1). Never throws. O(support log support).
+ExtentCheck CheckExtent(const KnownRotationProblem& problem, Norm norm,
+                        const ExtentCertificate& certificate);
+
+// The factor by which the pull `keeper`, at a view or a point, has to be
+// multiplied so that (1) holds there in the direction of `keeper`. It is the
+// multiplier of the constraint that holds the scale.
+double BalancingPull(const KnownRotationProblem& problem,
+                     const ExtentCertificate& certificate, const Pull& keeper);
+
 // The largest error of an entry of a rotation matrix that is computed from a
 // quaternion or is the product of two such matrices.
 inline constexpr double kRotationError = 2e-15;
@@ -80,9 +131,8 @@ inline constexpr double kRotationError = 2e-15;
 inline constexpr double kUnitRoundoff =
     std::numeric_limits<double>::epsilon() / 2;
 
-// Checks of the input of CheckCertificate before it proves anything. Each
-// returns the reason of a refusal, one sentence without its full stop, or
-// nothing.
+// Checks of the input before anything is proved. Each returns the reason of a
+// refusal, one sentence without its full stop, or nothing.
 
 // Requires finite numbers, a known norm, observations of the problem in
 // ascending order, and |y|_dual <= lambda for each.

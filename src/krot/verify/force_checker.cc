@@ -48,12 +48,6 @@ using Matrix3 = Eigen::Matrix<Real, 3, 3>;
 using Vector2 = ForceChecker::Vector2;
 using Vector3 = ForceChecker::Vector3;
 
-constexpr Real kRootTwo = 1.4142135623730951L;  // rounded up
-// Multipliers below this, relative to the largest, might underflow.
-constexpr double kSmallestShare = 1e-100;
-// No lambda may have to change by this or more, relative.
-constexpr Real kLargestChange = 0.5L;
-
 // The sum of forces at a point or frame, and the sum of the absolute values of
 // their terms.
 struct NodeBalance {
@@ -87,7 +81,7 @@ std::optional<std::string> ForceChecker::ScaleMultipliers() {
   }
   std::frexp(largest, &exponent_);
   for (const CertifiedObservation& o : certificate_.observations) {
-    if (o.lambda < kSmallestShare * largest) {
+    if (o.lambda < 1e-100 * largest) {  // it might underflow
       return "its multipliers differ by more than 100 decades";
     }
     const Observation& observation = whole_.observations[o.observation];
@@ -189,7 +183,7 @@ std::vector<std::optional<int32_t>> ForceChecker::FirstViews() const {
   return first_views;
 }
 
-ForceChecker::Offset ForceChecker::FromFirstView(int32_t view,
+FixedConstants::Part ForceChecker::FromFirstView(int32_t view,
                                                  int32_t first) const {
   if (view == first) return {};
   const View& own = part_.problem().views[view];
@@ -220,18 +214,12 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
     const View& view = problem.views[observation.view];
     const FixedConstants::Part of_point =
         fixed.OfPoint(view, observation.point);
-    Vector3 offset = of_point.x_cam;
-    Real size = of_point.size;
-    if (fixed.IsAwayFromOrigin(view.frame)) {
-      const FixedConstants::Part of_frame = fixed.OfFrame(view);
-      offset += of_frame.x_cam;
-      size += of_frame.size;
-    } else {
-      const Offset in_frame =
-          FromFirstView(observation.view, *first_views[view.frame]);
-      offset += in_frame.x_cam;
-      size += in_frame.size;
-    }
+    const FixedConstants::Part of_frame =
+        fixed.IsAwayFromOrigin(view.frame)
+            ? fixed.OfFrame(view)
+            : FromFirstView(observation.view, *first_views[view.frame]);
+    const Vector3 offset = of_point.x_cam + of_frame.x_cam;
+    const Real size = of_point.size + of_frame.size;
     constants.value += forces_[i].sum.dot(offset);
     constants.error += forces_[i].terms.sum() * relative_error * size +
                        corrections_[i] * offset.cwiseAbs().sum();
@@ -240,7 +228,8 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
   for (const Pull& pull : pulls_) {
     if (pull.kind != Pull::Kind::kView) continue;
     const View& view = problem.views[pull.index];
-    const Offset in_frame = FromFirstView(pull.index, *first_views[view.frame]);
+    const FixedConstants::Part in_frame =
+        FromFirstView(pull.index, *first_views[view.frame]);
     const Vector3 direction =
         scale * (view.cam_from_world_rotation.cast<Real>() *
                  pull.direction.cast<Real>());
@@ -256,13 +245,14 @@ ForceChecker::Constants ForceChecker::SumConstants() const {
 // The dual norm of a vector is at most its length, except for p = infinity:
 // then it is at most sqrt(2) times the length, reached along the diagonal.
 std::optional<double> ForceChecker::BoundRho(std::string* refusal) const {
-  const Real per_length = std::isinf(norm_.p) ? kRootTwo : 1;
+  const Real per_length =
+      std::isinf(norm_.p) ? 1.4142135623730951L : 1;  // rounded up
   Real rho = 0;
   for (size_t i = 0; i < lambda_.size(); ++i) {
     const Real correction = corrections_[i] / lambda_[i];
     const Real change =
         correction * compliances_[i].delta_lambda / certificate_.lower_bound;
-    if (!(change < kLargestChange)) {
+    if (!(change < 0.5L)) {
       *refusal = "its multipliers do not balance at a point or a frame";
       return std::nullopt;
     }

@@ -121,17 +121,7 @@ class FixedConstants {
   Real origin_size_ = 0;
 };
 
-// A linear objective p'x, where x is the centre of a view or a point, in world
-// coordinates. With a pull, forces balance if they add up to p at the view's
-// frame, or to -p at the point.
-struct Pull {
-  enum class Kind { kView, kPoint };
-  Kind kind = Kind::kView;
-  int32_t index = 0;  // of the view, or of the point
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  // p
-};
-
-// The position x of a pull, and p'x.
+// The position x of a pull, and its objective p'x.
 Eigen::Vector3d PositionOf(const KnownRotationProblem& problem,
                            const Estimate& estimate, const Pull& pull);
 double Along(const KnownRotationProblem& problem, const Estimate& estimate,
@@ -200,11 +190,7 @@ class ForceChecker {
   Real ErrorOfSums() const;
   // The offset of a view's centre from that of its frame's first view, in its
   // camera's coordinates.
-  struct Offset {
-    Vector3 x_cam = Vector3::Zero();
-    Real size = 0;
-  };
-  Offset FromFirstView(int32_t view, int32_t first) const;
+  FixedConstants::Part FromFirstView(int32_t view, int32_t first) const;
   // Per frame, its first view in the support.
   std::vector<std::optional<int32_t>> FirstViews() const;
 

@@ -17,6 +17,26 @@
 
 namespace krot::internal {
 
+// COLMAP's binary files (docs/formats.md): little endian, packed, without magic
+// number or version. Bytes that COLMAP 3.8 to 4.x wrote are reproduced exactly.
+//
+// Parse... replaces its part of the model. Throws ModelError with the byte
+// offset if the file is truncated, or holds a count larger than itself, an
+// unknown camera model, or bytes after its last record. Format... returns the
+// file's content. O(bytes), a few GB/s.
+
+void ParseCamerasBinary(const FileBytes& file, Model* model);
+void ParseRigsBinary(const FileBytes& file, Model* model);
+void ParseFramesBinary(const FileBytes& file, Model* model);
+void ParseImagesBinary(const FileBytes& file, Model* model);
+void ParsePoints3DBinary(const FileBytes& file, Model* model);
+
+std::string FormatCamerasBinary(const Model& model);
+std::string FormatRigsBinary(const Model& model);
+std::string FormatFramesBinary(const Model& model);
+std::string FormatImagesBinary(const Model& model);
+std::string FormatPoints3DBinary(const Model& model);
+
 // COLMAP's text files (docs/formats.md). Numbers are written with the fewest
 // digits that restore the same bits; a NaN keeps its sign but not its payload.
 // An image's name is the rest of its line and may contain blanks.
@@ -150,6 +170,8 @@ class TextReader {
                      ": found " + found + ", expected " + expected);
   }
 
+  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
   template <typename T>
   static std::optional<T> ParseNumber(std::string_view word) {
     // Like a C++ stream, accepts a plus sign in front.
@@ -168,17 +190,14 @@ class TextReader {
   // holds it exactly.
   template <typename T>
   static std::optional<T> ParseWhole(std::string_view word) {
-    constexpr double kExact = 9007199254740992.0;  // 2^53
     const std::optional<double> real = internal::ParseNumber<double>(word);
-    if (!real || std::trunc(*real) != *real || std::abs(*real) >= kExact ||
+    if (!real || std::trunc(*real) != *real || std::abs(*real) >= 0x1p53 ||
         *real < static_cast<double>(std::numeric_limits<T>::min()) ||
         *real > static_cast<double>(std::numeric_limits<T>::max())) {
       return std::nullopt;
     }
     return static_cast<T>(*real);
   }
-
-  static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
   void SkipBlanks() {
     size_t count = 0;
