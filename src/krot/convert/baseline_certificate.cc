@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -229,54 +228,29 @@ std::string BaselineJson(const BaselineCertificate& certificate) {
 }
 
 bool HoldsBaselines(const std::string& json) {
-  const Json parsed = Json::parse(json, nullptr, /*allow_exceptions=*/false);
-  return parsed.is_object() && parsed.contains("baselines");
+  return HasMember(json, "baselines");
 }
 
-BaselineCertificate ParseBaselines(const std::string& json,
+BaselineCertificate ParseBaselines(const std::string& text,
                                    const std::string& file_name) {
-  const JsonReader reader(file_name);
-  Json parsed;
-  try {
-    parsed = Json::parse(json);
-  } catch (const Json::exception& error) {
-    throw ModelError(file_name + ": no JSON: " + error.what());
-  }
-  const auto member = [&](const char* key) -> const Json& {
-    return reader.Member(parsed, "the file", key);
-  };
-  const Json& version = member("version");
-  if (version != kBaselineCertificateVersion) {
-    reader.Fail("version", version,
-                std::to_string(kBaselineCertificateVersion));
-  }
-  BaselineCertificate certificate;
-  certificate.tolerance_px =
-      reader.Number(member("tolerance_px"), "tolerance_px");
-  const Json& pairs = reader.Array(member("baselines"), "baselines");
-  for (size_t n = 0; n < pairs.size(); ++n) {
-    const std::string place = "baselines[" + std::to_string(n) + "]";
-    const auto of = [&](const char* key) -> const Json& {
-      return reader.Member(pairs[n], place, key);
-    };
-    const auto count = [&](const char* key) {
-      constexpr uint64_t kMost = 1ULL << 32;
-      return static_cast<int64_t>(reader.Id(of(key), place + "." + key, kMost));
-    };
-    BaselineCertificate::Pair& pair = certificate.pairs.emplace_back();
-    pair.image_id1 =
-        static_cast<ImageId>(reader.Id(of("image_id1"), place + ".image_id1",
-                                       std::numeric_limits<ImageId>::max()));
-    pair.image_id2 =
-        static_cast<ImageId>(reader.Id(of("image_id2"), place + ".image_id2",
-                                       std::numeric_limits<ImageId>::max()));
-    pair.num_matches = count("num_matches");
-    pair.num_explained = count("num_explained");
-    pair.most_explained = count("most_explained");
-    pair.baseline = reader.Triple(of("baseline"), place + ".baseline");
-    pair.cells = reader.String(of("cells"), place + ".cells");
-  }
-  return certificate;
+  return ParseFile(text, file_name, [](const PlacedJson& json) {
+    const PlacedJson version = json["version"];
+    if (version.json() != kBaselineCertificateVersion) {
+      version.Fail(std::to_string(kBaselineCertificateVersion));
+    }
+    BaselineCertificate certificate;
+    certificate.tolerance_px = json["tolerance_px"].Number();
+    for (const PlacedJson& pair : json["baselines"].Elements()) {
+      certificate.pairs.push_back({pair["image_id1"].Integer<ImageId>(),
+                                   pair["image_id2"].Integer<ImageId>(),
+                                   pair["num_matches"].Integer<uint32_t>(),
+                                   pair["num_explained"].Integer<uint32_t>(),
+                                   pair["most_explained"].Integer<uint32_t>(),
+                                   pair["baseline"].Triple(),
+                                   pair["cells"].String()});
+    }
+    return certificate;
+  });
 }
 
 BaselineVerdict VerifyBaselines(const Model& model, const Database& database,

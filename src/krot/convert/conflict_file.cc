@@ -16,52 +16,7 @@
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
-namespace {
-
 using Json = CertificateFileJson;
-
-ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
-  const auto member = [&](const char* key) -> const Json& {
-    return reader.Member(json, "the file", key);
-  };
-  const Json& version = member("version");
-  if (version != 1 && version != kConflictFileVersion) {
-    reader.Fail("version", version, "1 or 2");
-  }
-  ConflictFile file;
-  file.version = version;
-  file.norm = reader.ReadNorm(member("norm"));
-  file.max_error = reader.Number(member("max_error"), "max_error");
-  file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
-  const Json& conflicts = reader.Array(member("conflicts"), "conflicts");
-  for (size_t n = 0; n < conflicts.size(); ++n) {
-    const std::string place = "conflicts[" + std::to_string(n) + "]";
-    const auto number = [&](const char* key) {
-      return reader.Number(reader.Member(conflicts[n], place, key),
-                           place + "." + key);
-    };
-    ConflictFile::Conflict conflict;
-    conflict.lower_bound = number("lower_bound");
-    conflict.rows_bound = number("rows_bound");
-    conflict.defect = number("defect");
-    conflict.observations =
-        reader.ReadSupport(reader.Member(conflicts[n], place, "observations"),
-                           place + ".observations");
-    if (file.version == kConflictFileVersion) {
-      const std::string bounds = place + ".max_errors";
-      const Json& values = reader.Array(
-          reader.Member(conflicts[n], place, "max_errors"), bounds);
-      for (size_t i = 0; i < values.size(); ++i) {
-        conflict.max_errors.push_back(
-            reader.Number(values[i], bounds + "[" + std::to_string(i) + "]"));
-      }
-    }
-    file.conflicts.push_back(std::move(conflict));
-  }
-  return file;
-}
-
-}  // namespace
 
 ConflictFile DescribeConflicts(
     const Model& model, const BuiltProblem& built, Norm norm, double max_error,
@@ -107,17 +62,34 @@ std::string ConflictJson(const ConflictFile& file) {
 }
 
 bool HoldsConflicts(const std::string& json) {
-  const Json parsed = Json::parse(json, nullptr, /*allow_exceptions=*/false);
-  return parsed.is_object() && parsed.contains("conflicts");
+  return HasMember(json, "conflicts");
 }
 
-ConflictFile ParseConflicts(const std::string& json,
+ConflictFile ParseConflicts(const std::string& text,
                             const std::string& file_name) {
-  try {
-    return ReadConflicts(JsonReader(file_name), Json::parse(json));
-  } catch (const Json::exception& error) {
-    throw ModelError(file_name + ": no JSON: " + error.what());
-  }
+  return ParseFile(text, file_name, [](const PlacedJson& json) {
+    const PlacedJson version = json["version"];
+    if (version.json() != 1 && version.json() != kConflictFileVersion) {
+      version.Fail("1 or 2");
+    }
+    ConflictFile file;
+    file.version = version.json();
+    file.norm = ReadNorm(json["norm"]);
+    file.max_error = json["max_error"].Number();
+    file.model_sha256 = json["model_sha256"].String();
+    for (const PlacedJson& one : json["conflicts"].Elements()) {
+      ConflictFile::Conflict& conflict = file.conflicts.emplace_back();
+      conflict.lower_bound = one["lower_bound"].Number();
+      conflict.rows_bound = one["rows_bound"].Number();
+      conflict.defect = one["defect"].Number();
+      conflict.observations = ReadSupport(one["observations"]);
+      if (file.version != kConflictFileVersion) continue;
+      for (const PlacedJson& bound : one["max_errors"].Elements()) {
+        conflict.max_errors.push_back(bound.Number());
+      }
+    }
+    return file;
+  });
 }
 
 namespace {
