@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -20,10 +21,6 @@ namespace {
 
 using Json = CertificateFileJson;
 using Eigen::Vector3d;
-
-// Cells are halved at most this often; until then their corners are exact
-// numbers.
-constexpr int kDeepestCell = 50;
 
 // An interval for each coordinate of a vector.
 using Box = std::array<Interval, 3>;
@@ -120,7 +117,7 @@ class CellChecker {
   // Why the cells prove nothing; empty if they prove most_explained.
   std::string Run() {
     std::vector<int32_t> all(conditions_.size());
-    for (size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int32_t>(k);
+    std::iota(all.begin(), all.end(), 0);
     for (int face = 0; face < 3 && refusal_.empty(); ++face) {
       Check(face, 0, 0, 1, 0, all);
     }
@@ -134,7 +131,8 @@ class CellChecker {
   void Check(int face, double s, double t, double half_width, int depth,
              const std::vector<int32_t>& above) {
     if (!refusal_.empty()) return;
-    if (next_ == pair_.cells.size() || depth > kDeepestCell) {
+    // The corners of cells that were halved so often are exact numbers.
+    if (next_ == pair_.cells.size() || depth > 50) {
       refusal_ = "its cells do not cover all directions";
       return;
     }
@@ -255,10 +253,8 @@ BaselineCertificate ParseBaselines(const std::string& text,
 
 BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                                 const BaselineCertificate& certificate) {
-  BaselineVerdict verdict;
   if (!(certificate.tolerance_px > 0)) {
-    verdict.refusal = "its tolerance_px is no positive number";
-    return verdict;
+    return {false, "its tolerance_px is no positive number"};
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   std::map<std::pair<ImageId, ImageId>, const VerifiedPair*> pairs;
@@ -275,21 +271,16 @@ BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                              std::to_string(pair.image_id2);
     const auto found = pairs.find({pair.image_id1, pair.image_id2});
     if (found == pairs.end()) {
-      verdict.refusal =
-          "model and database have not " + name + ", or it is there twice";
-      return verdict;
+      return {false,
+              "model and database have not " + name + ", or it is there twice"};
     }
     const std::string refusal =
         RefusePair(ConditionsOf(model, geometries, database, *found->second),
                    certificate.tolerance_px, pair);
-    if (!refusal.empty()) {
-      verdict.refusal = name + ": " + refusal;
-      return verdict;
-    }
+    if (!refusal.empty()) return {false, name + ": " + refusal};
     pairs.erase(found);
   }
-  verdict.is_accepted = true;
-  return verdict;
+  return {true, ""};
 }
 
 }  // namespace krot::internal

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "krot/context.h"
-#include "krot/convert/build_steps.h"
+#include "krot/convert/build_problem.h"
 #include "krot/convert/model_digest.h"
 #include "krot/convert/reprojection.h"
 #include "krot/problem/cost.h"

@@ -199,15 +199,17 @@ std::optional<std::string> RefuseConflict(const Model& model,
 ConflictVerdict VerifyConflictFile(const Model& model,
                                    const ConflictFile& file) {
   ConflictVerdict verdict;
-  if (file.model_sha256 != ModelSha256(model)) {
-    verdict.refusal =
-        "it belongs to another model: cameras, rotations or observations "
-        "differ";
+  const auto refused = [&](const std::string& refusal) {
+    verdict.refusal = refusal;
     return verdict;
+  };
+  if (file.model_sha256 != ModelSha256(model)) {
+    return refused(
+        "it belongs to another model: cameras, rotations or observations "
+        "differ");
   }
   if (!(file.max_error > 0) || !std::isfinite(file.max_error)) {
-    verdict.refusal = "its max_error is no positive number";
-    return verdict;
+    return refused("its max_error is no positive number");
   }
   BuiltProblem built = BuildProblem(model, {});
   std::vector<Entry> entries = FindEntries(model, built, file);
@@ -218,12 +220,11 @@ ConflictVerdict VerifyConflictFile(const Model& model,
     entries = FindEntries(model, built, file);
   }
   if (const Entry* missing = FirstMissing(entries)) {
-    verdict.refusal =
+    return refused(
         "observation " + std::to_string(missing->observation->point2D_idx) +
         " of image " + std::to_string(missing->observation->image_id) + " in " +
         NameOfConflict(missing->conflict) +
-        " is not among those that can be used, or is there twice";
-    return verdict;
+        " is not among those that can be used, or is there twice");
   }
   std::vector<std::vector<Entry>> of_conflict(file.conflicts.size());
   for (const Entry& entry : entries) {
@@ -232,10 +233,7 @@ ConflictVerdict VerifyConflictFile(const Model& model,
   for (size_t n = 0; n < of_conflict.size(); ++n) {
     const std::optional<std::string> refusal =
         RefuseConflict(model, built, file, n, std::move(of_conflict[n]));
-    if (refusal) {
-      verdict.refusal = *refusal;
-      return verdict;
-    }
+    if (refusal) return refused(*refusal);
   }
   verdict.is_accepted = true;
   verdict.num_conflicts = static_cast<int64_t>(file.conflicts.size());
