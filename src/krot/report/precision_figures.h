@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/adjust/precision.h"
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/numbers.h"
 #include "krot/model.h"
 
