@@ -205,7 +205,7 @@ struct ModelReport {
   // Tracks that hold two or more observations of one image.
   int64_t num_tracks_with_repeated_image = 0;
   DepthStatistics depth;
-  TriangulationAngleStatistics triangulation_angle;
+  ValueRange triangulation_angle_deg;
   std::optional<DistanceReport> distances;
 };
 
