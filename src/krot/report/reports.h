@@ -155,9 +155,6 @@ struct ComparisonReport {
   std::optional<CertificateVerdict> certificate2;
 };
 
-// "frame", "similarity" or "none".
-std::string AlignmentName(AlignmentKind kind);
-
 // For the terminal; the `max_rows` worst images, points and support
 // observations.
 std::string ComparisonTable(const ComparisonReport& report, int max_rows);
@@ -342,10 +339,6 @@ std::string MethodName(SolveMethod method);
 
 // The value that --Solver.norm takes: "1", "2", "inf", "1.5".
 std::string NormName(Norm norm);
-
-// The errors before, after and, if there was such a step, after the polish,
-// with a sentence about that.
-std::string SolveErrorTable(const SolveSummary& summary);
 
 // What one run of `krot tolerance_analyzer` found.
 struct ToleranceReport {
