@@ -1,4 +1,4 @@
-#include "krot/adjust/precision.h"
+#include "krot/adjust/bundle_adjustment.h"
 
 #include <cmath>
 #include <functional>

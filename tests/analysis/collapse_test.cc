@@ -1,4 +1,4 @@
-#include "krot/analysis/collapse.h"
+#include "krot/analysis/model_comparison.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

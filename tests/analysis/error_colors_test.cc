@@ -85,15 +85,5 @@ TEST(ColorPointsByError, ChangesNothingButColors) {
   EXPECT_THAT(model, IsModel(scene));
 }
 
-TEST(ColorPointsByError, RefusesWhatDoesNotFit) {
-  Model model = ThreePoints();
-  EXPECT_THROW(ColorPointsByError({1, 2}, 4, &model), std::invalid_argument);
-  const std::vector<double> errors(5, 1.0);
-  for (const double top : {0.0, -1.0, kNoError, kInfinity}) {
-    EXPECT_THROW(ColorPointsByError(errors, top, &model),
-                 std::invalid_argument);
-  }
-}
-
 }  // namespace
 }  // namespace krot::internal

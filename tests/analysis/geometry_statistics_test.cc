@@ -75,26 +75,24 @@ TEST(ComputeDepthStatistics, IgnoresImagesWithoutPose) {
   EXPECT_EQ(ComputeDepthStatistics(model).max, 0);
 }
 
-TEST(ComputeTriangulationAngleStatistics, TakesEachPointsLargestAngle) {
+TEST(TriangulationAnglesDeg, TakesEachPointsLargestAngle) {
   Model model = ThreeImages();
   AddPoint({1, 0, 1}, {0, 1, 2}, &model);  // 45, 45 and 90 degrees
   AddPoint({0, 0, 1}, {0, 1}, &model);     // 45 degrees
   AddPoint({0, 0, 1}, {1, 1}, &model);     // one image twice: 0
   AddPoint({0, 0, 1}, {1}, &model);        // none
-  const TriangulationAngleStatistics angles =
-      ComputeTriangulationAngleStatistics(model);
+  const ValueRange angles = TriangulationAnglesDeg(model);
   EXPECT_EQ(angles.count, 3);
-  EXPECT_EQ(angles.min_deg, 0);
-  EXPECT_NEAR(angles.median_deg, 45, 1e-12);
-  EXPECT_NEAR(angles.max_deg, 90, 1e-12);
+  EXPECT_EQ(angles.min, 0);
+  EXPECT_NEAR(angles.median, 45, 1e-12);
+  EXPECT_NEAR(angles.max, 90, 1e-12);
 }
 
-TEST(ComputeTriangulationAngleStatistics, OfTinyAnglesKeepsItsDigits) {
+TEST(TriangulationAnglesDeg, OfTinyAnglesKeepsItsDigits) {
   Model model = ThreeImages();
   AddPoint({0, 0, 1e9}, {0, 1}, &model);
-  const TriangulationAngleStatistics angles =
-      ComputeTriangulationAngleStatistics(model);
-  EXPECT_NEAR(angles.max_deg * 0.017453292519943295 * 1e9, 1, 1e-12);
+  const ValueRange angles = TriangulationAnglesDeg(model);
+  EXPECT_NEAR(angles.max * 0.017453292519943295 * 1e9, 1, 1e-12);
 }
 
 }  // namespace

@@ -118,15 +118,5 @@ TEST(WorstObservations, AreNoMoreThanThereAreErrors) {
   EXPECT_TRUE(WorstObservations(ThreeCountedImages(), kErrors, 0).empty());
 }
 
-TEST(ModelStatistics, RefuseErrorsOfAnotherModel) {
-  EXPECT_THROW(ErrorsByImage(ThreeCountedImages(), {1}), std::invalid_argument);
-  EXPECT_THROW(ErrorsByCamera(ThreeCountedImages(), {1}),
-               std::invalid_argument);
-  EXPECT_THROW(WorstObservations(ThreeCountedImages(), {1}, 1),
-               std::invalid_argument);
-  EXPECT_THROW(WorstObservations(ThreeCountedImages(), kErrors, -1),
-               std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace krot::internal

@@ -1,4 +1,4 @@
-#include "krot/convert/build_steps.h"
+#include "krot/convert/build_problem.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,3 @@
-#include "krot/convert/build_steps.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <utility>
 
-#include "krot/analysis/collapse.h"
+#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_input.h"
 #include "krot/base/context.h"
 #include "krot/base/write_file.h"

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include <Eigen/Geometry>
 
+#include "krot/base/disjoint_sets.h"
 #include "krot/camera/camera_model.h"
 #include "krot/context.h"
 #include "krot/geometry.h"
@@ -127,6 +131,10 @@ Eigen::Map<const Vector3d> TranslationOf(const PoseBlock& block) {
   return Eigen::Map<const Vector3d>(block.data() + 4);
 }
 
+Vector3d CenterOf(const PoseBlock& block) {
+  return Center({RotationOf(block), TranslationOf(block)});
+}
+
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
                                       const FixedParts& fixed) {
   AdjustmentBlocks blocks;
@@ -149,6 +157,15 @@ AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
   CollectObservations(model, min_track_length, fixed, &blocks);
   MarkFixed(fixed, &blocks);
   return blocks;
+}
+
+std::vector<int64_t> PointBegins(const AdjustmentBlocks& blocks) {
+  std::vector<int64_t> begins(blocks.points.size() + 1, 0);
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    ++begins[observation.point + 1];
+  }
+  std::partial_sum(begins.begin(), begins.end(), begins.begin());
+  return begins;
 }
 
 namespace {
@@ -214,8 +231,7 @@ void MovePose(const AdjustmentColumns::Pose& columns, const PoseBlock& from,
               const std::vector<Vector3d>& direction, double step,
               PoseBlock* to) {
   if (columns.center == AdjustmentColumns::kHeld) return;
-  const Vector3d center = Center({RotationOf(from), TranslationOf(from)}) +
-                          step * direction[columns.center];
+  const Vector3d center = CenterOf(from) + step * direction[columns.center];
   if (columns.rotation != AdjustmentColumns::kHeld) {
     const Quaterniond q = (Quaterniond(from[0], from[1], from[2], from[3]) *
                            ToRotation(step * direction[columns.rotation]))
@@ -314,6 +330,60 @@ void MoveAlong(const AdjustmentColumns& columns, const AdjustmentBlocks& from,
   if (columns.cap != AdjustmentColumns::kHeld) {
     to->cap2 = from.cap2 + step * blocks[columns.cap][0];
   }
+}
+
+std::vector<AdjustmentComponent> FindComponents(const AdjustmentBlocks& blocks,
+                                                bool refine_sensors) {
+  const size_t num_frames = blocks.frames.size();
+  const size_t num_sensors = blocks.sensors.size();
+  const size_t num_nodes = num_frames + num_sensors + blocks.points.size();
+  DisjointSets nodes(static_cast<int64_t>(num_nodes));
+  std::vector<bool> is_used(num_nodes, false);
+  std::vector<bool> is_scaled(num_frames, false);
+  for (const AdjustmentObservation& observation : blocks.observations) {
+    const size_t frame = observation.frame;
+    const size_t point = num_frames + num_sensors + observation.point;
+    is_used[frame] = is_used[point] = true;
+    nodes.Unite(point, frame);
+    if (observation.sensor < 0) continue;
+    const size_t sensor = num_frames + observation.sensor;
+    if (refine_sensors) {
+      is_used[sensor] = true;
+      nodes.Unite(sensor, frame);
+    } else if (TranslationOf(blocks.sensors[observation.sensor]).norm() > 0) {
+      is_scaled[frame] = true;
+    }
+  }
+
+  std::vector<bool> is_held(num_nodes, false);
+  for (size_t f = 0; f < num_frames; ++f) is_held[f] = blocks.frame_is_fixed[f];
+  for (size_t k = 0; k < blocks.points.size(); ++k) {
+    is_held[num_frames + num_sensors + k] = blocks.point_is_fixed[k];
+  }
+  for (const PositionObservation& position : blocks.positions) {
+    is_held[position.point >= 0 ? num_frames + num_sensors + position.point
+                                : position.frame] = true;
+  }
+
+  std::map<size_t, AdjustmentComponent> components;
+  for (size_t node = 0; node < num_nodes; ++node) {
+    if (!is_used[node]) continue;
+    AdjustmentComponent& component = components[nodes.Find(node)];
+    component.is_held = component.is_held || is_held[node];
+    if (node < num_frames) {
+      component.frames.push_back(node);
+      component.has_fixed_scale = component.has_fixed_scale || is_scaled[node];
+    } else if (node < num_frames + num_sensors) {
+      component.sensors.push_back(node - num_frames);
+    } else {
+      component.points.push_back(node - num_frames - num_sensors);
+    }
+  }
+  std::vector<AdjustmentComponent> list;
+  for (auto& [root, component] : components) {
+    list.push_back(std::move(component));
+  }
+  return list;
 }
 
 }  // namespace krot::internal

@@ -24,6 +24,7 @@ PoseBlock ToBlock(const Pose& pose);
 Pose ToPose(const PoseBlock& block);
 Eigen::Matrix3d RotationOf(const PoseBlock& block);
 Eigen::Map<const Eigen::Vector3d> TranslationOf(const PoseBlock& block);
+Eigen::Vector3d CenterOf(const PoseBlock& block);
 
 // One observation: the blocks that its reprojection error depends on, and the
 // measured pixel.
@@ -83,6 +84,9 @@ int32_t SensorBlock(const ImageGeometry& image,
 // without an image plane sees a point. O(observations).
 AdjustmentBlocks MakeAdjustmentBlocks(const Model& model, int min_track_length,
                                       const FixedParts& fixed = {});
+
+// Where each point's observations begin; num_points + 1 of them.
+std::vector<int64_t> PointBegins(const AdjustmentBlocks& blocks);
 
 // A copy of the model with the values of the blocks. Records whose blocks did
 // not change since `before` keep their bits; the poses of images follow their
@@ -202,9 +206,6 @@ double HalfSquaredNorm(const std::vector<ProjectedError>& errors);
 // The norm of the largest error; 0 if there are no errors.
 double LargestError(const std::vector<ProjectedError>& errors);
 
-// No camera model has more parameters.
-constexpr int kMaxCameraParams = 16;
-
 // The pixel of a ray (u, v, 1) and its derivatives by (u, v).
 struct DifferentiatedPixel {
   Eigen::Vector2d pixel;
@@ -248,6 +249,8 @@ class ErrorJacobians {
   int num_blocks(int64_t i) const {
     return static_cast<int>(begin_[i + 1] - begin_[i] - 1);
   }
+  // The blocks of observations begin, ..., end - 1, each once and ascending.
+  std::vector<int32_t> BlocksOf(int64_t begin, int64_t end) const;
 
  private:
   const AdjustmentColumns& columns_;

@@ -50,7 +50,7 @@ class BarrierSystem {
       : columns_(columns),
         loop_(static_cast<int64_t>(blocks.observations.size()), num_threads),
         jacobians_(columns, blocks),
-        observation_begin_(blocks.points.size() + 1, 0),
+        observation_begin_(PointBegins(blocks)),
         structure_(FindStructure(blocks)),
         schur_(structure_, {num_threads}),
         L_inverse_(blocks.points.size()),
@@ -142,27 +142,14 @@ class BarrierSystem {
   // The most blocks of an observation: the poses of its frame and sensor,
   // sixteen parameters, and the cap.
   static constexpr int kMaxBlocks = 4 + 6 + 1;
-  // A point's pivots are no smaller than this share of its trace.
-  static constexpr double kLeastPivot = 1e-14;
 
-  // The blocks that every point depends on, each once and ascending. Also sets
-  // observation_begin_.
-  BlockStructure FindStructure(const AdjustmentBlocks& blocks) {
-    for (const AdjustmentObservation& observation : blocks.observations) {
-      ++observation_begin_[observation.point + 1];
-    }
+  // The blocks that every point depends on.
+  BlockStructure FindStructure(const AdjustmentBlocks& blocks) const {
     BlockStructure structure;
     structure.point_begin.assign(1, 0);
     structure.frame_is_fixed.assign(columns_.num_blocks, 0);
     for (size_t k = 0; k < blocks.points.size(); ++k) {
-      observation_begin_[k + 1] += observation_begin_[k];
-      std::vector<int32_t> seen;
-      for (int64_t i = begin(k); i < end(k); ++i) {
-        seen.insert(seen.end(), jacobians_.blocks(i),
-                    jacobians_.blocks(i) + jacobians_.num_blocks(i));
-      }
-      std::sort(seen.begin(), seen.end());
-      seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+      const std::vector<int32_t> seen = jacobians_.BlocksOf(begin(k), end(k));
       structure.frame_of.insert(structure.frame_of.end(), seen.begin(),
                                 seen.end());
       structure.point_begin.push_back(
@@ -255,7 +242,8 @@ class BarrierSystem {
     if (!columns_.point_moves[k]) return;
     diagonal_.points[k] = H.diagonal();
     H.diagonal() *= 1 + damping;
-    InvertCholesky(H, kLeastPivot * H.trace(), &L_inverse_[k]);
+    // Pivots are no smaller than this share of the trace.
+    InvertCholesky(H, 1e-14 * H.trace(), &L_inverse_[k]);
     for (size_t c = 0; c < G[0].size(); ++c) {
       const Vector3d column =
           L_inverse_[k] * Vector3d(G[0][c], G[1][c], G[2][c]);
@@ -326,7 +314,7 @@ class BarrierSystem {
   const AdjustmentColumns& columns_;
   const ObservationLoop loop_;
   ErrorJacobians jacobians_;
-  std::vector<int64_t> observation_begin_;  // num_points + 1
+  std::vector<int64_t> observation_begin_;  // by point
   const BlockStructure structure_;
   SchurComplement schur_;
 

@@ -14,38 +14,13 @@
 namespace krot::internal {
 namespace {
 
-// The first weight, as a multiple of the mean cost of an observation. With a
-// small weight a start near the cap stays there, or a poorer local minimum is
-// found: at 1.02 times its lowest maximum, a model took 19 steps to 11164
-// pixels^2 with 15, 23 steps to 11222 with 10, and 21 steps to 11323 with 3.
-constexpr double kStartWeight = 15;
-// The path has converged once the gap, relative to what is minimised, and the
-// stationarity are below these.
+// The path has converged once the gap, relative to what is minimised, is below
+// this.
 constexpr double kGapTolerance = 1e-4;
-constexpr double kStationarityTolerance = 1e-6;
 // A step leaves at least this share of the way to the cap, and of a multiplier.
 constexpr double kBoundaryShare = 0.01;
-// Multipliers stay within this factor of mu / h.
-constexpr double kMultiplierRange = 100;
-// The weight falls by this factor after a step of at least the second length.
-// After a shorter step its minimum is still far away; if the weight fell then,
-// all further steps would be short.
-constexpr double kCentring = 0.2;
-constexpr double kFallingStep = 0.5;
-// The trust region shrinks after a step of less than this share of the longest
-// one that the linearised errors allow. Its radius stays between the other two.
-constexpr double kPoorShare = 0.3;
 constexpr double kLeastRadius = 1e-6;
 constexpr double kLargestRadius = 1e6;
-// A cap that is lowered begins at so many times the largest error. Its square
-// has so many times the weight of the squared errors, which therefore raise the
-// square of the lowest maximum by at most twice the inverse, relative.
-constexpr double kFirstCap = 1.1;
-constexpr double kCapWeight = 1e4;
-// The least squares that follow have a cap so far above the lowest maximum, and
-// start at least so far below the cap, relative.
-constexpr double kCapRoom = 5e-4;
-constexpr double kLeastRoom = 1e-4;
 
 // Steps of a primal-dual interior point method towards the minima of the
 // barrier problem of barrier_system.h as its weight mu falls: along Newton's
@@ -72,10 +47,17 @@ class BarrierPath {
         summary_(*summary) {}
 
   // Begin with a cap that stays, or with one that is lowered.
-  void BeginBelowCap() { Begin(kStartWeight * cost_ / count(), 0); }
-  // For this mu the cap has no slope at the start.
+  //
+  // The first weight is a multiple of the mean cost of an observation. With a
+  // small one a start near the cap stays there, or a poorer local minimum is
+  // found: at 1.02 times its lowest maximum, a model took 19 steps to 11164
+  // pixels^2 with 15, 23 steps to 11222 with 10, and 21 steps to 11323 with 3.
+  void BeginBelowCap() { Begin(15 * cost_ / count(), 0); }
+  // The square of the cap has 10^4 times the weight of the squared errors,
+  // which therefore raise the square of the lowest maximum by at most 2e-4,
+  // relative. For this mu the cap has no slope at the start.
   void BeginAtCap() {
-    const double cap_weight = kCapWeight * cost_ / cap2();
+    const double cap_weight = 1e4 * cost_ / cap2();
     double sum = 0;
     for (const ProjectedError& error : errors_) sum += 1 / SlackOf(error);
     Begin(cap_weight / sum, cap_weight);
@@ -138,7 +120,7 @@ class BarrierPath {
   bool IsConverged() {
     if (!IsGapReached()) return false;
     const std::optional<double> stationarity = MeasureStationarity();
-    return stationarity && *stationarity <= kStationarityTolerance;
+    return stationarity && *stationarity <= 1e-6;
   }
 
   const AdjustmentBlocks& blocks() const { return now_; }
@@ -262,25 +244,27 @@ class BarrierPath {
       const double newton = (mu_ - lambda * SlackSlope(i)) / h;
       const double central =
           mu_ / Slack(stepped_cap2, stepped[i].r.squaredNorm());
-      multipliers_[i] =
-          std::clamp(std::max(newton, kBoundaryShare * lambda),
-                     central / kMultiplierRange, central * kMultiplierRange);
+      multipliers_[i] = std::clamp(std::max(newton, kBoundaryShare * lambda),
+                                   central / 100, central * 100);
     }
   }
 
-  // After a step that was this share of the longest.
+  // After a step that was this share of the longest one that the linearised
+  // errors allow.
   void UpdateRadius(double share) {
-    if (share < kPoorShare) {
+    if (share < 0.3) {
       radius_ = std::max(radius_ / 10, std::min(radius_, 1.0));
     } else if (share > 0.5) {
       radius_ = std::min(10 * radius_, kLargestRadius);
     }
   }
 
+  // After a short step the minimum for this weight is still far away; if the
+  // weight fell then, all further steps would be short.
   void LowerWeight(double step) {
-    if (step < kFallingStep) return;
+    if (step < 0.5) return;
     const double last = 0.5 * kGapTolerance * Objective() / count();
-    mu_ = std::max(last, kCentring * mu_);
+    mu_ = std::max(last, 0.2 * mu_);
   }
 
   void Tell(int iteration, double step) const {
@@ -349,13 +333,14 @@ void LowerMaxError(const BundleAdjustmentOptions& options,
   with_cap.AddCap();
   const double start_error = LargestError(*ProjectErrors(
       *blocks, std::numeric_limits<double>::infinity(), context.num_threads));
-  blocks->cap2 = std::pow(kFirstCap * start_error, 2);
+  blocks->cap2 = std::pow(1.1 * start_error, 2);
   BarrierPath path(options, context, with_cap, *blocks, summary);
   path.BeginAtCap();
   path.Follow();
   summary->lowest_max_error = std::min(path.LargestError(), start_error);
-  const double cap = (1 + kCapRoom) * *summary->lowest_max_error;
-  if (path.LargestError() < (1 - kLeastRoom) * cap) *blocks = path.blocks();
+  const double cap = (1 + 5e-4) * *summary->lowest_max_error;
+  // The least squares below this cap need some room at their start.
+  if (path.LargestError() < (1 - 1e-4) * cap) *blocks = path.blocks();
   blocks->cap2 = cap * cap;
 }
 

@@ -171,12 +171,6 @@ void MinimizeBelowCap(const BundleAdjustmentOptions& options,
 
 }  // namespace
 
-BundleAdjustmentResult AdjustBundle(const Model& model,
-                                    const BundleAdjustmentOptions& options,
-                                    const Context& context) {
-  return AdjustBundle(model, options, context, {}, nullptr);
-}
-
 BundleAdjustmentResult AdjustBundle(
     const Model& model, const BundleAdjustmentOptions& options,
     const Context& context, AdjustmentDatum datum,

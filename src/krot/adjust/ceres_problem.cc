@@ -28,9 +28,8 @@ using Eigen::Vector3d;
 
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
-constexpr int kPoint = 0;
-constexpr int kFrame = 1;
-constexpr int kSensor = 2;
+// The order of a residual's parameter blocks; the camera is last.
+enum { kPoint, kFrame, kSensor };
 
 // x -> R(q) x + t for a block qw qx qy qz tx ty tz of unit quaternion, with
 //   R(q) x = x + 2 w (v x x) + 2 v x (v x x),  q = (w, v).
@@ -70,11 +69,6 @@ void StoreJacobian(const Eigen::Matrix<double, 2, kCols>& jacobian,
 using PoseManifold = ceres::ProductManifold<ceres::QuaternionManifold,
                                             ceres::EuclideanManifold<3>>;
 
-// As the gauge is free, only the damping, the diagonal of J'J divided by the
-// radius, makes the normal equations positive definite. With a larger radius
-// rounding would decide whether they are.
-constexpr double kLargestTrustRegion = 1e8;
-
 // Makes the coordinates in `constant` of a block of `size` constant.
 void HoldStill(double* block, int size, const std::vector<int>& constant,
                ceres::Problem* problem) {
@@ -104,27 +98,17 @@ void ParameterizePose(bool is_refined, bool is_rotation_refined,
 // derivatives some ten thousand times. Where images see each other all around,
 // the factor has hardly a zero, and takes ten times as long at 1000 images.
 bool SuitsDirectSolver(const AdjustmentBlocks& blocks) {
-  constexpr double kOperationsPerObservation = 1e4;
-  constexpr double kPoseBlock = 8;  // 6 x 6 blocks against 3 x 3
   BlockStructure structure;
   structure.frame_is_fixed = blocks.frame_is_fixed;
-  structure.point_begin.assign(1, 0);
+  structure.point_begin = PointBegins(blocks);
   for (const AdjustmentObservation& observation : blocks.observations) {
-    if (!structure.frame_of.empty() &&
-        observation.point !=
-            blocks.observations[structure.frame_of.size() - 1].point) {
-      structure.point_begin.push_back(
-          static_cast<int64_t>(structure.frame_of.size()));
-    }
-    structure.frame_of.push_back(static_cast<int32_t>(observation.frame));
+    structure.frame_of.push_back(observation.frame);
   }
-  structure.point_begin.push_back(
-      static_cast<int64_t>(structure.frame_of.size()));
   const SparseFactorSize factor =
       FindSparseFactorSize(PairsThatSharePoints(structure));
-  return kPoseBlock * factor.operations <=
-         kOperationsPerObservation *
-             static_cast<double>(blocks.observations.size());
+  // Blocks are 6 x 6, not 3 x 3: eight times the operations.
+  return 8 * factor.operations <=
+         1e4 * static_cast<double>(blocks.observations.size());
 }
 
 }  // namespace
@@ -292,7 +276,10 @@ ceres::Solver::Options AdjustmentSolverOptions(
   solver.gradient_tolerance = options.gradient_tolerance;
   solver.parameter_tolerance = options.parameter_tolerance;
   solver.max_num_consecutive_invalid_steps = 10;
-  solver.max_trust_region_radius = kLargestTrustRegion;
+  // As the gauge is free, only the damping, the diagonal of J'J divided by the
+  // radius, makes the normal equations positive definite. With a larger radius
+  // rounding would decide whether they are.
+  solver.max_trust_region_radius = 1e8;
   solver.num_threads = ResolveNumThreads(context.num_threads);
   if (!options.refine_points3D) {
     solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;

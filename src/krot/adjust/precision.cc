@@ -23,8 +23,6 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 
-constexpr int64_t kItems = 64;  // per chunk of a parallel loop
-
 // The angle between two of a point's rays that is nearest to 90; degrees.
 double MeetingAngle(const std::vector<Vector3d>& rays) {
   double largest = 0;
@@ -49,16 +47,12 @@ class PrecisionOfAdjustment {
         columns_(columns),
         blocks_(blocks),
         num_threads_(context.num_threads),
-        begin_(blocks.points.size() + 1, 0),
+        begin_(PointBegins(blocks)),
         gauges_(FindGauges(options, columns, blocks, datum)) {
     result_.datum = datum;
     result_.is_least_squares =
         options.loss == RobustLoss::kTrivial && !options.IsBounded();
     result_.num_unknowns = columns.num_unknowns;
-    for (const AdjustmentObservation& o : blocks.observations) {
-      ++begin_[o.point + 1];
-    }
-    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
     for (const ComponentGauge& gauge : gauges_) {
       result_.datum_defect += gauge.size();
     }
@@ -150,7 +144,7 @@ class PrecisionOfAdjustment {
 
   void DescribePoints() {
     const auto num_points = static_cast<int64_t>(result_.points.size());
-    ParallelFor(num_points, kItems, num_threads_,
+    ParallelFor(num_points, /*chunk_size=*/64, num_threads_,
                 [&](int64_t begin, int64_t end, int) {
                   for (int64_t n = begin; n < end; ++n) {
                     DescribePoint(&result_.points[n]);

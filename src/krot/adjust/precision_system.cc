@@ -1,7 +1,5 @@
 #include "krot/adjust/precision_system.h"
 
-#include <numeric>
-
 #include <Eigen/LU>
 
 #include "krot/linear/blocks.h"
@@ -27,12 +25,10 @@ MatrixXd PointW(const TrackRows& rows, const MatrixXd& held,
 // Subtracts gauge motions from each motion so that it moves as few blocks as
 // possible: least is the sum of what they move by, by iterated weights.
 void TakeOffGauge(const MatrixXd& gauge, MatrixXd* motions) {
-  constexpr int kIterations = 50;
-  constexpr double kStill = 1e-12;  // of the largest motion
   for (Index c = 0; c < motions->cols(); ++c) {
     auto motion = motions->col(c);
-    for (int i = 0; i < kIterations; ++i) {
-      const double still = kStill * motion.norm();
+    for (int i = 0; i < 50; ++i) {
+      const double still = 1e-12 * motion.norm();
       MatrixXd weighted = gauge;
       for (Index n = 0; n < gauge.rows(); n += 3) {
         weighted.middleRows<3>(n) /= motion.segment<3>(n).norm() + still;
@@ -54,13 +50,9 @@ BlockCovariance::BlockCovariance(const AdjustmentColumns& columns,
       num_threads_(num_threads),
       size_(3 * Index{columns.num_blocks}),
       jacobians_(columns, blocks),
-      begin_(blocks.points.size() + 1, 0),
+      begin_(PointBegins(blocks)),
       position_of_(blocks.points.size(), nullptr),
       gauge_of_(blocks.points.size(), {-1, 0}) {
-  for (const AdjustmentObservation& o : blocks.observations) {
-    ++begin_[o.point + 1];
-  }
-  std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   for (size_t c = 0; c < gauges_.size(); ++c) {
     for (size_t n = 0; n < gauges_[c].points.size(); ++n) {
       gauge_of_[gauges_[c].points[n]] = {static_cast<int>(c),

@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "krot/adjust/adjustment_blocks.h"
-#include "krot/adjust/precision.h"
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/context.h"
 #include "krot/linear/blocks.h"
 #include "krot/model.h"
@@ -29,18 +29,17 @@ class TrackRows {
   // reference to the derivatives. A point that does not move has Q = 0.
   TrackRows(const ErrorJacobians& jacobians, bool moves, int64_t begin,
             int64_t end, const PositionObservation* position)
-      : jacobians_(jacobians), begin_(begin), end_(end) {
+      : jacobians_(jacobians),
+        begin_(begin),
+        end_(end),
+        blocks_(jacobians.BlocksOf(begin, end)) {
     for (int64_t i = begin; i < end; ++i) {
-      const int32_t* own = jacobians.blocks(i);
-      blocks_.insert(blocks_.end(), own, own + jacobians.num_blocks(i));
       for (int r = 0; r < 2; ++r) {
         for (int c = 0; c < 3; ++c) {
           Q_.push_back(moves ? jacobians.by_point(i)(r, c) : 0);
         }
       }
     }
-    std::sort(blocks_.begin(), blocks_.end());
-    blocks_.erase(std::unique(blocks_.begin(), blocks_.end()), blocks_.end());
     if (position != nullptr) {
       for (int r = 0; r < 3; ++r) {
         for (int c = 0; c < 3; ++c) {
@@ -108,7 +107,7 @@ class TrackRows {
  private:
   const ErrorJacobians& jacobians_;
   const int64_t begin_, end_;
-  std::vector<int32_t> blocks_;
+  const std::vector<int32_t> blocks_;
   std::vector<double> Q_;  // 3 columns, row by row; 2 rows per observation
   UpperTriangle R_;
   MatrixXd G_;

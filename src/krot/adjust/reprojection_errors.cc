@@ -18,6 +18,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 constexpr int32_t kHeld = AdjustmentColumns::kHeld;
+// No camera model has more parameters.
+constexpr int kMaxCameraParams = 16;
 
 std::vector<Eigen::Matrix3d> Rotations(const std::vector<PoseBlock>& poses) {
   std::vector<Eigen::Matrix3d> rotations;
@@ -97,7 +99,7 @@ class PixelOf {
 struct PlacedPose {
   explicit PlacedPose(const PoseBlock& block)
       : transform{RotationOf(block), TranslationOf(block)},
-        center(Center(transform)) {}
+        center(CenterOf(block)) {}
 
   RigidTransform transform;
   Vector3d center;
@@ -218,6 +220,17 @@ ErrorJacobians::ErrorJacobians(const AdjustmentColumns& columns,
   }
   begin_.push_back(static_cast<int64_t>(blocks_.size()));
   D_.assign(blocks_.size(), Matrix3d::Zero());
+}
+
+std::vector<int32_t> ErrorJacobians::BlocksOf(int64_t begin,
+                                              int64_t end) const {
+  std::vector<int32_t> all;
+  for (int64_t i = begin; i < end; ++i) {
+    all.insert(all.end(), blocks(i), blocks(i) + num_blocks(i));
+  }
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
 }
 
 void ErrorJacobians::Evaluate(const AdjustmentBlocks& blocks, int num_threads) {

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/check.h"
 #include "krot/context.h"
 #include "krot/model.h"
 #include "krot/model/model_checks.h"
@@ -23,7 +22,6 @@ constexpr std::array<std::array<uint8_t, 3>, 6> kStops = {{{58, 110, 165},
                                                            {244, 180, 26},
                                                            {230, 85, 13},
                                                            {190, 0, 60}}};
-constexpr std::array<uint8_t, 3> kUnknown = {128, 128, 128};
 
 // The largest finite error of the point's track; NaN if none is finite.
 double LargestError(const std::vector<double>& errors_px,
@@ -39,7 +37,7 @@ double LargestError(const std::vector<double>& errors_px,
 }  // namespace
 
 std::array<uint8_t, 3> ErrorColor(double error_px, double top_px) {
-  if (!std::isfinite(error_px)) return kUnknown;
+  if (!std::isfinite(error_px)) return {128, 128, 128};
   const double share = std::clamp(error_px / top_px, 0.0, 1.0);
   const double place = share * static_cast<double>(kStops.size() - 1);
   const size_t stop = std::min(kStops.size() - 2, static_cast<size_t>(place));
@@ -55,11 +53,6 @@ std::array<uint8_t, 3> ErrorColor(double error_px, double top_px) {
 
 void ColorPointsByError(const std::vector<double>& errors_px, double top_px,
                         Model* model) {
-  CheckArgument(errors_px.size() == model->track_elements.size(),
-                "errors_px.size()", errors_px.size(),
-                "the number of track elements");
-  CheckArgument(top_px > 0 && std::isfinite(top_px), "top_px", top_px,
-                "a positive number");
   for (Point3D& point : model->points3D) {
     point.color = ErrorColor(LargestError(errors_px, point), top_px);
   }

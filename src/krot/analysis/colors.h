@@ -15,9 +15,8 @@ std::array<uint8_t, 3> ErrorColor(double error_px, double top_px);
 
 // Gives every point the colour of the largest finite error of its track, so
 // that COLMAP's GUI shows several models on one scale (its own colours are
-// relative to each model's errors). `errors_px` as PixelErrors gives them;
-// throws std::invalid_argument if their number is not that of the track
-// elements or top_px is not a positive number. O(observations).
+// relative to each model's errors). `errors_px` as PixelErrors gives them.
+// Requires top_px > 0. O(observations).
 void ColorPointsByError(const std::vector<double>& errors_px, double top_px,
                         Model* model);
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -12,15 +12,12 @@
 #include <Eigen/LU>
 
 #include "krot/analysis/noise.h"
-#include "krot/base/check.h"
+#include "krot/base/numbers.h"
 
 namespace krot::internal {
 
 MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
                               const std::vector<double>& parallax_px) {
-  constexpr double kAlpha = 0.05;
-  constexpr double kMedianOverSigma = 0.6745;  // of |x|, Gaussian
-  constexpr double kLeastParallax = 5;         // median errors
   const auto median_of = [](const std::vector<double>& errors) {
     return errors[errors.size() / 2];
   };
@@ -31,7 +28,7 @@ MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
     if (errors.empty()) continue;
     pairs.push_back(&errors);
     num_matches += errors.size();
-    if (parallax_px[p] >= kLeastParallax * median_of(errors)) {
+    if (parallax_px[p] >= 5 * median_of(errors)) {
       with_parallax.push_back(&errors);
     }
   }
@@ -46,14 +43,12 @@ MatchNoise EstimateMatchNoise(const std::vector<std::vector<double>>& errors_px,
     if (median_of(*errors) > largest_median) break;
     better.insert(better.end(), errors->begin(), errors->end());
   }
-  std::nth_element(better.begin(), better.begin() + better.size() / 2,
-                   better.end());
   MatchNoise noise;
-  noise.sigma_px =
-      std::max(median_of(better) / kMedianOverSigma, kLeastNoisePx);
+  // The median of |x| is 0.6745 sigma for a Gaussian x.
+  noise.sigma_px = std::max(Median(std::move(better)) / 0.6745, kLeastNoisePx);
   noise.tolerance_px =
       noise.sigma_px *
-      std::sqrt(2 * std::log(static_cast<double>(num_matches) / kAlpha));
+      std::sqrt(2 * std::log(static_cast<double>(num_matches) / 0.05));
   return noise;
 }
 
@@ -123,13 +118,11 @@ FitStep StepAt(const std::vector<WitnessMatch>& matches,
 RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
                                const RigidTransform& cam_from_world,
                                PoseChange change, double noise_px) {
-  constexpr int kMaxIterations = 50;
-  constexpr double kLeastGain = 1e-4;  // of the sum, for another iteration
   Eigen::Matrix3d rotation = cam_from_world.rotation;
   Eigen::Vector3d center = Center(cam_from_world);
   if (matches.empty()) return cam_from_world;
   FitStep at = StepAt(matches, rotation, center, change, noise_px);
-  for (int i = 0; i < kMaxIterations && at.step.allFinite(); ++i) {
+  for (int i = 0; i < 50 && at.step.allFinite(); ++i) {
     // The step is halved until the sum falls.
     FitStep next{at.sum, at.step};
     Eigen::Matrix3d next_rotation;
@@ -144,7 +137,7 @@ RigidTransform FitEpipolarPose(const std::vector<WitnessMatch>& matches,
     if (!(next.sum < at.sum)) break;
     rotation = next_rotation;
     center = next_center;
-    const bool is_last = next.sum > (1 - kLeastGain) * at.sum;
+    const bool is_last = next.sum > (1 - 1e-4) * at.sum;
     at = next;
     if (is_last) break;
   }
@@ -203,10 +196,6 @@ struct IsLessPromising {
   }
 };
 
-// A match is given up only if it is off by more than rounding. So the checker's
-// interval arithmetic, which rounds outwards, gives it up, too.
-constexpr double kMoreThanRounding = 1 + 1e-10;
-
 class CellSearch {
  public:
   CellSearch(const std::vector<EpipolarMatch>& matches, double tolerance_px,
@@ -219,9 +208,7 @@ class CellSearch {
       }
     }
     all_.resize(matches.size());
-    for (size_t k = 0; k < matches.size(); ++k) {
-      all_[k] = static_cast<int32_t>(k);
-    }
+    std::iota(all_.begin(), all_.end(), 0);
   }
 
   BaselineSearch Run() {
@@ -259,7 +246,7 @@ class CellSearch {
 
  private:
   // Appends a cell and its parts as BaselineCertificate has them. The recursion
-  // is no deeper than kSmallest allows.
+  // is no deeper than the smallest cells allow.
   void DescribeCell(int64_t order) {
     const int64_t first = first_part_[order];
     best_.cells += first < 0 ? '0' : '1';
@@ -307,10 +294,12 @@ class CellSearch {
       const double allowed =
           square(tolerance_px_) * (condition.gradient * b).squaredNorm();
       if (square(distance) <= allowed) ++num_at_centre;
+      // A match is given up only if it is off by more than rounding. So the
+      // checker's interval arithmetic, which rounds outwards, gives it up, too.
       if (square(distance + change) <= allowed) {
         ++cell.num_sure;
       } else if (distance <= change ||
-                 square(distance - change) <= kMoreThanRounding * allowed) {
+                 square(distance - change) <= (1 + 1e-10) * allowed) {
         open_.push_back(k);
       } else if (--num_possible <= best_.num_explained) {
         return;
@@ -324,8 +313,7 @@ class CellSearch {
     const int64_t upper_bound =
         cell.num_sure + static_cast<int64_t>(open_.size());
     if (upper_bound <= best_.num_explained) return;
-    constexpr double kSmallest = 1e-12;
-    if (cell.half_width < kSmallest) {
+    if (cell.half_width < 1e-12) {
       unresolved_ = std::max(unresolved_, upper_bound);
       return;
     }
@@ -349,8 +337,6 @@ class CellSearch {
 
 BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
                               double tolerance_px, int64_t max_cells) {
-  CheckArgument(tolerance_px > 0, "tolerance_px", tolerance_px, "positive");
-  CheckArgument(max_cells > 0, "max_cells", max_cells, "positive");
   return CellSearch(matches, tolerance_px, max_cells).Run();
 }
 

@@ -60,15 +60,11 @@ struct EpipolarMatch {
   }
 
   // How far the two pixels must move together, in pixels and to first order,
-  // until both lie on their epipolar lines (Sampson's distance); the sign says
-  // on which side they are. The baseline's length does not matter; 0 where it
-  // gives no lines.
-  double SignedErrorPx(const Eigen::Vector3d& baseline) const {
-    const double change = (gradient * baseline).norm();
-    return change > 0 ? normal.dot(baseline) / change : 0;
-  }
+  // until both lie on their epipolar lines (Sampson's distance). The baseline's
+  // length does not matter; 0 where it gives no lines.
   double ErrorPx(const Eigen::Vector3d& baseline) const {
-    return std::abs(SignedErrorPx(baseline));
+    const double change = (gradient * baseline).norm();
+    return change > 0 ? std::abs(normal.dot(baseline) / change) : 0;
   }
   // The error for the worst baseline: how far the pixels must move until the
   // rays are parallel.
@@ -190,8 +186,7 @@ struct BaselineSearch {
 // divided. Ends early after `max_cells` cells, and at cells that are no longer
 // than 1e-12. The same result on every machine. O(cells * matches); a thousand
 // matches, half of them wrong, take milliseconds.
-//
-// Throws std::invalid_argument unless tolerance_px > 0 and max_cells > 0.
+// Requires tolerance_px > 0 and max_cells > 0.
 BaselineSearch SearchBaseline(const std::vector<EpipolarMatch>& matches,
                               double tolerance_px, int64_t max_cells = 1000000);
 

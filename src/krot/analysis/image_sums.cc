@@ -24,15 +24,9 @@ using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-// A pose's system is scaled to ones on its diagonal. Nothing holds directions
-// whose eigenvalues are below this.
-constexpr double kSingularPose = 1e-9;
 // For smaller lambda the density is nearly even, and a series replaces formulas
 // that would lose digits.
 constexpr double kFlat = 1e-4;
-// Relative to an image's median distance: nearer points are left out, as a
-// point in the camera would drown all others in rounding.
-constexpr double kNearest = 1e-6;
 
 // An observation at the least squares of its track.
 struct PoseRow {
@@ -58,7 +52,8 @@ void Add(const PoseRow& row, const Eigen::Matrix2d& R, ImageSums* sums) {
 }
 
 // Finds the step. As rotations and centres have different units, the diagonal
-// is scaled to 1 first.
+// is scaled to 1 first. Nothing holds directions whose eigenvalues are below
+// 1e-9 then.
 void Solve(ImageSums* sums) {
   Vector6 scale = sums->M.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
@@ -67,7 +62,7 @@ void Solve(ImageSums* sums) {
   Vector6 y = of_M.eigenvectors().transpose() * scale.cwiseProduct(sums->g);
   for (int j = 0; j < 6; ++j) {
     const double value = of_M.eigenvalues()[j];
-    y[j] = value > kSingularPose ? -y[j] / value : 0;
+    y[j] = value > 1e-9 ? -y[j] / value : 0;
   }
   sums->step = scale.cwiseProduct(of_M.eigenvectors() * y);
 }
@@ -110,7 +105,8 @@ class ImageAdder {
     nearest_.assign(model_.images.size(), 0);
     for (size_t n = 0; n < distances.size(); ++n) {
       if (distances[n].empty()) continue;
-      nearest_[n] = kNearest * Median(std::move(distances[n]));
+      // A nearer point would drown all others in rounding.
+      nearest_[n] = 1e-6 * Median(std::move(distances[n]));
     }
     for (size_t k = 0; k < model_.points3D.size(); ++k) {
       AddTrack(k, geometries);

@@ -190,9 +190,9 @@ class PoseJudge {
     }
     std::vector<int32_t> above;
     if (all.empty()) return above;
-    std::nth_element(all.begin(), all.begin() + all.size() / 2, all.end());
+    const double median = Median(std::move(all));
     for (const auto& [mean, image] : means) {
-      if (mean > 2 * all[all.size() / 2]) above.push_back(image);
+      if (mean > 2 * median) above.push_back(image);
     }
     return above;
   }

@@ -17,19 +17,6 @@ using namespace internal;
 
 namespace {
 
-// An image with so many times the noise of most may still be sound.
-constexpr double kNoisyImage = 3;
-// A misplaced image: another pose takes this share of its squared errors away.
-constexpr double kExplained = 0.5;
-// If a pose takes less from the median image's, the model is adjusted: 0.005 at
-// most for real ones, and 0.1 to 0.2 for their minimax solutions.
-constexpr double kNotAdjusted = 0.1;
-// An image keeps few tracks below this part of the median image's share.
-constexpr double kFewKept = 1.0 / 3;
-// In median deviations: three standard deviations of Gaussian values.
-constexpr double kStandsOut = 4.5;
-// Observations that must agree: three determine a pose, and as many check it.
-constexpr int64_t kFewestAgree = 6;
 // Relative to the median image's standard deviation.
 constexpr double kWeaklyHeld = 10;
 
@@ -175,10 +162,12 @@ class Checker {
           const ImageCheck& image = check_.images[n];
           return static_cast<double>(2 * image.num_wrong - image.num_tested);
         });
+    // A pose takes 0.005 of the median image's squared errors at most in
+    // adjusted real models, and 0.1 to 0.2 in their minimax solutions.
     check_.is_adjusted = snooping_.noise.sigma_px.value_or(0) < kLeastNoisePx ||
                          MedianOfSound([&](size_t n) {
                            return sums_[n].UnexpectedGainShare();
-                         }) < kNotAdjusted;
+                         }) < 0.1;
     if (check_.is_adjusted) {
       ask(
           ImageFault::kMisplaced, [&](size_t n) { return IsMisplaced(n); },
@@ -207,7 +196,8 @@ class Checker {
           sums_[n].CenterSpread() <= kWeaklyHeld * spread) {
         continue;
       }
-      if (image.num_tested - image.num_wrong < kFewestAgree) {
+      // Three observations determine a pose, and as many must check it.
+      if (image.num_tested - image.num_wrong < 6) {
         if (RelativeKept(n) < 1) few.push_back(n);
       } else if (ContradictionExponent(n) > LeastExponent(n) &&
                  (weakest < 0 ||
@@ -246,13 +236,14 @@ class Checker {
   // contradicts so many of its observations; 0 if as many are to be expected.
   double ContradictionExponent(size_t n) const {
     const ImageCheck& image = check_.images[n];
-    const double ratio = snooping_.noise.critical_w / kNoisyImage;
+    const double ratio = snooping_.noise.critical_w / 3;
     return SuccessExponent(image.num_wrong, image.num_tested,
                            std::exp(-ratio * ratio / 2));
   }
 
+  // Whether another pose takes half of its squared errors away.
   bool IsMisplaced(size_t n) const {
-    return sums_[n].GainShare() > kExplained &&
+    return sums_[n].GainShare() > 0.5 &&
            sums_[n].GainExponent(*snooping_.noise.sigma_px) > LeastExponent();
   }
 
@@ -263,7 +254,8 @@ class Checker {
           std::max(in_disc_[n].lambda, std::numeric_limits<double>::min()));
     };
     const double median = MedianOfSound(log_lambda);
-    return std::exp(median - kStandsOut * MedianOfSound([&](size_t n) {
+    // In median deviations: three standard deviations of Gaussian values.
+    return std::exp(median - 4.5 * MedianOfSound([&](size_t n) {
                                return std::abs(log_lambda(n) - median);
                              }));
   }
@@ -284,9 +276,9 @@ class Checker {
                std::max<size_t>(1, model_.images[n].points2D.size()));
   }
 
-  // Below 1 if that share is small compared with the median image's.
+  // Below 1 if that share is less than a third of the median image's.
   double RelativeKept(size_t n) const {
-    return median_kept_ > 0 ? KeptShare(n) / (kFewKept * median_kept_) : 1;
+    return median_kept_ > 0 ? KeptShare(n) / (1.0 / 3 * median_kept_) : 1;
   }
 
   template <typename Value>

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
-#include <limits>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -18,16 +17,6 @@
 
 namespace krot::internal {
 namespace {
-
-// Relative to the image's larger side. 2D points that have nothing to do with
-// their 3D points are off by about half of it.
-constexpr double kUnrelated = 0.1;
-// The median errors of two sides that are both right differ at most by this
-// factor, and this many pixels.
-constexpr double kClearly = 2;
-constexpr double kPixel = 1;
-// What rounding may add to the largest error, relative.
-constexpr double kRounding = 1e-9;
 
 struct SideFit {
   Contradictions::Fit px;
@@ -78,9 +67,9 @@ bool IsBetterAlone(const Model& model, Reading reading, const SideFit& both) {
   return alone && 2 * alone->count >= both.count && alone->px.max < both.px.max;
 }
 
-bool IsRelated(const SideFit& side) {
-  return side.relative_median <= kUnrelated;
-}
+// 2D points that have nothing to do with their 3D points are off by about half
+// of the image's larger side.
+bool IsRelated(const SideFit& side) { return side.relative_median <= 0.1; }
 
 // The reading that fits the model best; none if neither side fits.
 std::optional<Reading> Choose(const Model& model,
@@ -88,9 +77,10 @@ std::optional<Reading> Choose(const Model& model,
                               const std::optional<SideFit>& images) {
   if (!tracks || !images) return Reading::kBoth;
   if (!IsRelated(*tracks) && !IsRelated(*images)) return std::nullopt;
+  // The median errors of two sides that are both right differ by a factor of
+  // two and a pixel at most.
   const auto is_clearly_worse = [](const SideFit& side, const SideFit& other) {
-    return !IsRelated(side) ||
-           side.px.median > kClearly * other.px.median + kPixel;
+    return !IsRelated(side) || side.px.median > 2 * other.px.median + 1;
   };
   if (is_clearly_worse(*tracks, *images)) return Reading::kImages;
   if (is_clearly_worse(*images, *tracks)) return Reading::kTracks;
@@ -164,22 +154,17 @@ std::optional<std::pair<double, double>> WorseImagesSide(const Model& before,
   const double max_after = errors_after.not_finite > errors.not_finite
                                ? kInfinity
                                : errors_after.max;
-  if (!(max_after > errors.max * (1 + kRounding))) return std::nullopt;
+  const bool is_worse = max_after > errors.max * (1 + 1e-9);  // than rounding
+  if (!is_worse) return std::nullopt;
   return std::pair(errors.max, max_after);
 }
 
 namespace {
 
-// The median error is small with the model's own rotations if it is at most
-// this share of the largest image side.
-constexpr double kFits = 0.01;
-// A wrong convention multiplies errors by far more than this.
-constexpr double kFarSmaller = 5;
-
 std::optional<double> FiniteMedian(std::vector<double> errors) {
   if (errors.empty()) return std::nullopt;
   for (double& error : errors) {
-    if (std::isnan(error)) error = std::numeric_limits<double>::infinity();
+    if (std::isnan(error)) error = kInfinity;
   }
   const double median = Median(std::move(errors));
   return std::isfinite(median) ? std::optional<double>(median) : std::nullopt;
@@ -228,11 +213,12 @@ RotationInput TakeRotations(const FileBytes& file, Model* model,
   input.median_error_after = FiniteMedian(std::move(after));
   const bool model_fits =
       input.median_error_before &&
-      *input.median_error_before <= kFits * LargestSide(*model);
+      *input.median_error_before <= 0.01 * LargestSide(*model);
   if (input.replaced.mistake.empty() || !model_fits) return input;
+  // A wrong convention multiplies errors by far more than five.
   const bool is_far_worse =
       !input.median_error_after ||
-      kFarSmaller * *input.median_error_before < *input.median_error_after;
+      5 * *input.median_error_before < *input.median_error_after;
   if (is_far_worse) {
     throw ModelError(file.path + ": " + input.replaced.mistake +
                      "; the median error is " +

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "krot/base/check.h"
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
 #include "krot/model/rigs.h"
@@ -16,16 +15,9 @@
 namespace krot::internal {
 namespace {
 
-void CheckErrors(const Model& model, const std::vector<double>& errors_px) {
-  CheckArgument(errors_px.size() == model.track_elements.size(),
-                "errors_px.size()", errors_px.size(),
-                "the number of track elements");
-}
-
 // The errors of the track elements, gathered by the index of their image.
 std::vector<std::vector<double>> GroupByImage(
     const Model& model, const std::vector<double>& errors_px) {
-  CheckErrors(model, errors_px);
   const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
   std::vector<std::vector<double>> groups(model.images.size());
   for (size_t e = 0; e < errors_px.size(); ++e) {
@@ -115,8 +107,6 @@ std::vector<CameraErrors> ErrorsByCamera(const Model& model,
 
 std::vector<WorstObservation> WorstObservations(
     const Model& model, const std::vector<double>& errors_px, int count) {
-  CheckErrors(model, errors_px);
-  CheckArgument(count >= 0, "count", count, ">= 0");
   struct Candidate {
     size_t element;
     size_t point;
@@ -158,20 +148,10 @@ using Eigen::Vector3d;
 
 constexpr double kNoAngle = -1;
 
-struct Range {
-  double min = 0;
-  double median = 0;
-  double max = 0;
-};
-
-Range RangeOf(std::vector<double> values) {
-  if (values.empty()) return Range();
+ValueRange RangeOf(std::vector<double> values) {
+  if (values.empty()) return {};
   const auto [min, max] = std::minmax_element(values.begin(), values.end());
-  Range range{*min, 0, *max};
-  const auto middle = values.begin() + (values.size() - 1) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  range.median = *middle;
-  return range;
+  return {*min, LowerMedian(values), *max, static_cast<int64_t>(values.size())};
 }
 
 // atan2 keeps small angles exact, where acos would lose half the digits.
@@ -201,9 +181,6 @@ std::map<int64_t, int64_t> TrackLengthHistogram(const Model& model) {
 
 std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
     const Model& model) {
-  constexpr size_t kFewest = 5;
-  constexpr double kOff = 1.1;
-  constexpr double kDeviations = 3;
   std::vector<std::vector<size_t>> images_of(model.cameras.size());
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   for (size_t n = 0; n < geometries.size(); ++n) {
@@ -217,15 +194,14 @@ std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
   }
   std::vector<std::optional<OddFocalLength>> odd(model.images.size());
   for (const auto& [kind, cameras] : kinds) {
-    if (cameras.size() < kFewest) continue;
+    if (cameras.size() < 5) continue;
     std::vector<double> logs, deviations;
     for (const size_t c : cameras) {
       logs.push_back(std::log(model.cameras[c].params[0]));
     }
     const double median = Median(logs);
     for (const double log : logs) deviations.push_back(std::abs(log - median));
-    const double least =
-        std::max(std::log(kOff), kDeviations * Median(deviations));
+    const double least = std::max(std::log(1.1), 3 * Median(deviations));
     for (size_t n = 0; n < cameras.size(); ++n) {
       if (deviations[n] <= least) continue;
       odd[images_of[cameras[n]].front()] = {std::exp(logs[n]),
@@ -238,7 +214,7 @@ std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
 DepthStatistics ComputeDepthStatistics(const Model& model) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
-  DepthStatistics statistics;
+  int64_t num_not_positive = 0;
   std::vector<double> depths;
   depths.reserve(model.track_elements.size());
   for (const Point3D& point : model.points3D) {
@@ -248,19 +224,13 @@ DepthStatistics ComputeDepthStatistics(const Model& model) {
       if (!image.has_pose) continue;
       depths.push_back(image.cam_from_world.rotation.row(2).dot(point.xyz) +
                        image.cam_from_world.translation.z());
-      statistics.not_positive += !(depths.back() > 0);
+      num_not_positive += !(depths.back() > 0);
     }
   }
-  statistics.count = static_cast<int64_t>(depths.size());
-  const Range range = RangeOf(std::move(depths));
-  statistics.min = range.min;
-  statistics.median = range.median;
-  statistics.max = range.max;
-  return statistics;
+  return {RangeOf(std::move(depths)), num_not_positive};
 }
 
-TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
-    const Model& model, int num_threads) {
+ValueRange TriangulationAnglesDeg(const Model& model, int num_threads) {
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   const std::unordered_map<ImageId, int32_t> indices = ImageIndices(model);
   std::vector<double> angles(model.points3D.size(), kNoAngle);
@@ -282,13 +252,8 @@ TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
       });
   angles.erase(std::remove(angles.begin(), angles.end(), kNoAngle),
                angles.end());
-  TriangulationAngleStatistics statistics;
-  statistics.count = static_cast<int64_t>(angles.size());
-  const Range range = RangeOf(std::move(angles));
-  statistics.min_deg = range.min * kDegreesPerRadian;
-  statistics.median_deg = range.median * kDegreesPerRadian;
-  statistics.max_deg = range.max * kDegreesPerRadian;
-  return statistics;
+  for (double& angle : angles) angle *= kDegreesPerRadian;
+  return RangeOf(std::move(angles));
 }
 
 }  // namespace krot::internal

@@ -44,9 +44,8 @@ struct CameraErrors {
 };
 
 // The errors of every image or camera, as Model::images and Model::cameras,
-// also of those without observations. `errors_px` as PixelErrors gives them;
-// throws std::invalid_argument if their number is not that of the track
-// elements. O(observations).
+// also of those without observations. `errors_px` as PixelErrors gives them.
+// O(observations).
 std::vector<ImageErrors> ErrorsByImage(const Model& model,
                                        const std::vector<double>& errors_px);
 std::vector<CameraErrors> ErrorsByCamera(const Model& model,
@@ -82,12 +81,16 @@ struct OddFocalLength {
 std::vector<std::optional<OddFocalLength>> FindOddFocalLengths(
     const Model& model);
 
-// Over all observations whose image has a pose. Zero if there are none.
-struct DepthStatistics {
-  double min = 0;     // scene units
+// Zeros if there are no values.
+struct ValueRange {
+  double min = 0;
   double median = 0;  // the lower one of two
   double max = 0;
   int64_t count = 0;
+};
+
+// The depths of all observations whose image has a pose, scene units.
+struct DepthStatistics : ValueRange {
   int64_t not_positive = 0;  // points in or behind the plane of their camera
 };
 // Requires a valid model. O(observations).
@@ -95,15 +98,8 @@ DepthStatistics ComputeDepthStatistics(const Model& model);
 
 // Per point the largest angle between two of its rays, from the point to the
 // camera centres: how well its depth is determined. Points with fewer than two
-// observations by images with a pose have none.
-struct TriangulationAngleStatistics {
-  double min_deg = 0;
-  double median_deg = 0;  // the lower one of two
-  double max_deg = 0;
-  int64_t count = 0;  // points that have an angle
-};
-// Requires a valid model. O(sum of squared track lengths).
-TriangulationAngleStatistics ComputeTriangulationAngleStatistics(
-    const Model& model, int num_threads = -1);
+// observations by images with a pose have none. Requires a valid model. O(sum
+// of squared track lengths).
+ValueRange TriangulationAnglesDeg(const Model& model, int num_threads = -1);
 
 }  // namespace krot::internal

@@ -268,7 +268,6 @@ NoiseSnooping SnoopNoise(const Model& model, const NoiseOptions& options,
   // instead.
   if (2 * static_cast<int64_t>(result.removed.size()) > num_tested) {
     result = Snooper(model, options, context, sigma).Snoop();
-    result.is_sigma_kept = true;
   }
   return result;
 }

@@ -31,11 +31,10 @@ struct SnoopedObservation {
 struct NoiseSnooping {
   ModelNoise noise;                         // of what is left
   std::vector<SnoopedObservation> removed;  // largest w first
-  std::vector<double> sigma_path_px;        // before each removal, and at last
-  // Whether sigma was kept as it was at first, because it fell, when measured
-  // anew, until more than half of the observations were gone. This happens
-  // where observations have no common noise.
-  bool is_sigma_kept = false;
+  // Before each removal, and at last. It is kept as it was at first if it fell,
+  // when measured anew, until more than half of the observations were gone.
+  // This happens where observations have no common noise.
+  std::vector<double> sigma_path_px;
 };
 
 // Relative to the largest eigenvalue of a sum of squares: less is rounding.

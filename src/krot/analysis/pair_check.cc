@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -18,9 +17,6 @@ namespace krot {
 using namespace internal;
 
 namespace {
-
-// COLMAP's mapper uses no pair with fewer (Mapper.min_num_matches).
-constexpr int64_t kMinMatches = 15;
 
 class PairChecker {
  public:
@@ -71,7 +67,7 @@ class PairChecker {
       CheckedPair& checked = check_.pairs[p];
       checked.image1 = pair.image1;
       checked.image2 = pair.image2;
-      checked.median_error_px = std::numeric_limits<double>::quiet_NaN();
+      checked.median_error_px = kNaN;
       const ImageGeometry& first = rays_.geometries[pair.image1];
       const ImageGeometry& second = rays_.geometries[pair.image2];
       if (!first.has_pose || !second.has_pose) return;
@@ -81,10 +77,11 @@ class PairChecker {
           static_cast<int64_t>(pair.matches.size() - matches.size());
       const Eigen::Vector3d center1 = Center(first.cam_from_world);
       const Eigen::Vector3d center2 = Center(second.cam_from_world);
-      constexpr double kSamePlace = 1e-12;  // of the coordinates: rounding
-      if (checked.num_matches < kMinMatches ||
+      // COLMAP's mapper uses no pair with fewer matches
+      // (Mapper.min_num_matches). Centres in one place differ by rounding.
+      if (checked.num_matches < 15 ||
           (center2 - center1).norm() <=
-              kSamePlace * (center1.norm() + center2.norm())) {
+              1e-12 * (center1.norm() + center2.norm())) {
         return;
       }
       const Eigen::Vector3d baseline = (center2 - center1).normalized();
@@ -95,9 +92,7 @@ class PairChecker {
         parallaxes.push_back(match.ParallaxPx());
       }
       std::sort(errors.begin(), errors.end());
-      const auto middle = parallaxes.begin() + parallaxes.size() / 2;
-      std::nth_element(parallaxes.begin(), middle, parallaxes.end());
-      parallax_px_[p] = *middle;
+      parallax_px_[p] = Median(std::move(parallaxes));
       checked.median_error_px = errors[errors.size() / 2];
       checked.state = PairState::kUndecided;
     });

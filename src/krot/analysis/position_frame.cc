@@ -8,7 +8,6 @@
 #include <Eigen/Eigenvalues>
 
 #include "krot/analysis/frame_search.h"
-#include "krot/analysis/model_comparison.h"
 #include "krot/base/numbers.h"
 #include "krot/context.h"
 #include "krot/geometry/transform.h"
@@ -21,21 +20,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// The least scatter of positions, relative to their size: those of a synthetic
-// scene may be exact.
-constexpr double kLeastScatter = 1e-6;
-// Places this near to a line, relative to its length, are on it.
-constexpr double kOnLine = 3e-5;
-// A turn about the line is too loose from this standard deviation on, radians.
-constexpr double kLooseTurn = 1.0 / 3;
-
-// How far places lie from their best line and along it, root mean squares.
-struct LineFit {
-  double along = 0;
-  double beside = 0;
-};
-
-LineFit FitLine(const std::vector<FramePair>& pairs) {
+// The variances of the model's places along their principal axes, ascending.
+Vector3d PrincipalVariances(const std::vector<FramePair>& pairs) {
   const double count = static_cast<double>(pairs.size());
   Vector3d mean = Vector3d::Zero();
   for (const FramePair& pair : pairs) mean += pair.pose.center2 / count;
@@ -44,9 +30,9 @@ LineFit FitLine(const std::vector<FramePair>& pairs) {
     const Vector3d offset = pair.pose.center2 - mean;
     covariance += offset * offset.transpose() / count;
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(covariance);
-  const Vector3d variances = solver.eigenvalues().cwiseMax(0);
-  return {std::sqrt(variances[2]), std::sqrt(variances[0] + variances[1])};
+  return Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance)
+      .eigenvalues()
+      .cwiseMax(0);
 }
 
 // With two significant digits.
@@ -60,16 +46,10 @@ class FrameFinder {
  public:
   FrameFinder(const Model& model, const std::vector<KnownPosition>& positions,
               const std::string& source)
-      : model_(model), positions_(positions), source_(source) {
-    PairUp();
-  }
+      : model_(model), positions_(positions), source_(source) {}
 
   PositionFrame Run() {
-    if (pairs_.size() < 3) {
-      Fail("found " + std::to_string(pairs_.size()) +
-           " positions of what the model places, expected three at least, "
-           "which are not on one line");
-    }
+    PairUp();
     const auto found = SearchFrame(pairs_, has_radii_);
     if (!found) FailOnLine(0);
     own_from_model_ = *found;
@@ -93,6 +73,7 @@ class FrameFinder {
 
   void PairUp() {
     const std::vector<ImageGeometry> geometries = ImageGeometries(model_);
+    std::vector<Vector3d> own, in_model;
     for (size_t n = 0; n < positions_.size(); ++n) {
       const KnownPosition& position = positions_[n];
       FramePair pair;
@@ -112,12 +93,13 @@ class FrameFinder {
         has_radii_ = true;
       }
       pairs_.push_back(pair);
-    }
-    if (pairs_.empty()) return;
-    std::vector<Vector3d> own, in_model;
-    for (const FramePair& pair : pairs_) {
       own.push_back(pair.pose.center1);
       in_model.push_back(pair.pose.center2);
+    }
+    if (pairs_.size() < 3) {
+      Fail("found " + std::to_string(pairs_.size()) +
+           " positions of what the model places, expected three at least, "
+           "which are not on one line");
     }
     own_origin_ = MedianPlace(own);
     model_origin_ = MedianPlace(in_model);
@@ -129,25 +111,26 @@ class FrameFinder {
 
   // Fits the similarity to what agrees with it until that stays the same.
   std::vector<FramePair> Settle() {
-    std::vector<double> misfits = MisfitsOf(pairs_, own_from_model_);
     std::vector<double> sizes;
     for (const FramePair& pair : pairs_) {
       sizes.push_back(pair.pose.center1.norm());
     }
-    const double least = has_radii_ ? 1 : kLeastScatter * Median(sizes);
-    tolerance_ = std::max(least, SpreadTolerance(misfits));
-    std::vector<FramePair> agreeing = Within(pairs_, misfits, tolerance_);
+    // The positions of a synthetic scene may be exact.
+    const double least = has_radii_ ? 1 : 1e-6 * Median(sizes);
+    tolerance_ = std::max(
+        least, JudgeBySpread(MisfitsOf(pairs_, own_from_model_)).tolerance);
+    std::vector<FramePair> agreeing =
+        Within(pairs_, own_from_model_, tolerance_);
     for (int refit = 0; refit < kMaxRefits; ++refit) {
-      const auto refined = AlignCenters(PosesOf(agreeing));
-      if (!refined || !(refined->scale > 0)) break;
+      const auto refined = FitTo(agreeing);
+      if (!refined) break;
       own_from_model_ = *refined;
-      misfits = MisfitsOf(pairs_, own_from_model_);
       // Three equations for each position, seven unknowns.
       const double equations = 3 * static_cast<double>(agreeing.size());
       tolerance_ = std::max(
           least, kFarByMedian * std::sqrt(equations / (equations - 7)) *
                      Median(MisfitsOf(agreeing, own_from_model_)));
-      std::vector<FramePair> next = Within(pairs_, misfits, tolerance_);
+      std::vector<FramePair> next = Within(pairs_, own_from_model_, tolerance_);
       if (next.size() < 3) break;
       const bool is_same = std::equal(
           next.begin(), next.end(), agreeing.begin(), agreeing.end(),
@@ -169,9 +152,11 @@ class FrameFinder {
 
   void CheckAgreement(const std::vector<FramePair>& agreeing) const {
     const std::vector<double> distances = DistancesOf(agreeing);
-    const LineFit line = FitLine(agreeing);
-    const double along = own_from_model_.scale * line.along;
-    const double beside = own_from_model_.scale * line.beside;
+    // How far places lie from their best line and along it, root mean squares.
+    const Vector3d variances = PrincipalVariances(agreeing);
+    const double along = own_from_model_.scale * std::sqrt(variances[2]);
+    const double beside =
+        own_from_model_.scale * std::sqrt(variances[0] + variances[1]);
     const double median = Median(distances);
     if (!(kFarByMedian * median < std::hypot(along, beside))) {
       Fail(
@@ -185,17 +170,11 @@ class FrameFinder {
     for (const double distance : distances) squares += distance * distance;
     const double count = static_cast<double>(agreeing.size());
     const double sigma = std::sqrt(squares / (3 * count - 7));
-    if (!(beside > kOnLine * along) ||
-        sigma > kLooseTurn * beside * std::sqrt(count)) {
+    // On the line up to rounding, or with a standard deviation of the turn
+    // about it of more than a third, radians.
+    if (!(beside > 3e-5 * along) || sigma > beside * std::sqrt(count) / 3) {
       FailOnLine(beside);
     }
-  }
-
-  Vector3d InModel(const Vector3d& own) const {
-    return model_origin_ +
-           own_from_model_.rotation.transpose() *
-               (own - own_origin_ - own_from_model_.translation) /
-               own_from_model_.scale;
   }
 
   PositionFrame Result(const std::vector<FramePair>& agreeing) const {
@@ -215,9 +194,14 @@ class FrameFinder {
       if (is_wrong[pair.index] == 0) continue;
       const Vector3d offset = OffsetAt(own_from_model_, pair);
       const double misfit = (pair.unit_from_own * offset).norm();
-      frame.wrong.push_back({pair.index, NameOf(model_, positions_[pair.index]),
-                             offset.norm(),
-                             has_radii_ ? offset.norm() / misfit : tolerance_});
+      const KnownPosition& position = positions_[pair.index];
+      frame.wrong.push_back(
+          {pair.index,
+           position.of == KnownPosition::Of::kImage
+               ? model_.images[position.index].name
+               : "3D point " +
+                     std::to_string(model_.points3D[position.index].id),
+           offset.norm(), has_radii_ ? offset.norm() / misfit : tolerance_});
     }
     std::stable_sort(
         frame.wrong.begin(), frame.wrong.end(),
@@ -227,7 +211,10 @@ class FrameFinder {
       KnownPosition position = positions_[n];
       Ellipsoid& region = position.region;
       if (frame.radius) region.semi_axes.setConstant(*frame.radius);
-      region.centre = InModel(region.centre);
+      region.centre = model_origin_ + own_from_model_.rotation.transpose() *
+                                          (region.centre - own_origin_ -
+                                           own_from_model_.translation) /
+                                          own_from_model_.scale;
       region.semi_axes /= own_from_model_.scale;
       if (!region.IsBall()) {
         region.world_from_axes =

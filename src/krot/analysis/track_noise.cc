@@ -20,10 +20,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-constexpr int kMaxIterations = 50;
-// A fit ends when a step promises less than this share of the sum of squares.
-constexpr double kTolerance = 1e-8;
-
 ObservationNoise NotTested(double w) {
   ObservationNoise noise;
   noise.w = w;
@@ -134,7 +130,7 @@ class TrackNoise::Track {
   void Minimize() {
     double damping = 0;
     std::vector<Row> trial(rows_.size());
-    for (int i = 0; i < kMaxIterations; ++i) {
+    for (int i = 0; i < 50; ++i) {
       Matrix3d H = Matrix3d::Zero();
       Vector3d g = Vector3d::Zero();
       for (const Row& row : rows_) {
@@ -145,7 +141,8 @@ class TrackNoise::Track {
       if (!(scale > 0)) return;
       H.diagonal().array() += (damping + kNoDirection) * scale;
       const Vector3d step = -H.ldlt().solve(g);
-      if (!(-g.dot(step) > kTolerance * cost_)) return;
+      // A step must promise more than this share of the sum of squares.
+      if (!(-g.dot(step) > 1e-8 * cost_)) return;
       Vector4d X = X_ + TangentBasis(X_) * step;
       X.normalize();
       const auto basis = TangentBasis(X);

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -21,10 +21,6 @@ namespace {
 
 using Json = CertificateFileJson;
 using Eigen::Vector3d;
-
-// Cells are halved at most this often; until then their corners are exact
-// numbers.
-constexpr int kDeepestCell = 50;
 
 // An interval for each coordinate of a vector.
 using Box = std::array<Interval, 3>;
@@ -117,7 +113,7 @@ class CellChecker {
   // Why the cells prove nothing; empty if they prove most_explained.
   std::string Run() {
     std::vector<int32_t> all(conditions_.size());
-    for (size_t k = 0; k < all.size(); ++k) all[k] = static_cast<int32_t>(k);
+    std::iota(all.begin(), all.end(), 0);
     for (int face = 0; face < 3 && refusal_.empty(); ++face) {
       Check(face, 0, 0, 1, 0, all);
     }
@@ -131,7 +127,8 @@ class CellChecker {
   void Check(int face, double s, double t, double half_width, int depth,
              const std::vector<int32_t>& above) {
     if (!refusal_.empty()) return;
-    if (next_ == pair_.cells.size() || depth > kDeepestCell) {
+    // The corners of cells that were halved so often are exact numbers.
+    if (next_ == pair_.cells.size() || depth > 50) {
       refusal_ = "its cells do not cover all directions";
       return;
     }
@@ -225,62 +222,35 @@ std::string BaselineJson(const BaselineCertificate& certificate) {
 }
 
 bool HoldsBaselines(const std::string& json) {
-  const Json parsed = Json::parse(json, nullptr, /*allow_exceptions=*/false);
-  return parsed.is_object() && parsed.contains("baselines");
+  return HasMember(json, "baselines");
 }
 
-BaselineCertificate ParseBaselines(const std::string& json,
+BaselineCertificate ParseBaselines(const std::string& text,
                                    const std::string& file_name) {
-  const JsonReader reader(file_name);
-  Json parsed;
-  try {
-    parsed = Json::parse(json);
-  } catch (const Json::exception& error) {
-    throw ModelError(file_name + ": no JSON: " + error.what());
-  }
-  const auto member = [&](const char* key) -> const Json& {
-    return reader.Member(parsed, "the file", key);
-  };
-  const Json& version = member("version");
-  if (version != kBaselineCertificateVersion) {
-    reader.Fail("version", version,
-                std::to_string(kBaselineCertificateVersion));
-  }
-  BaselineCertificate certificate;
-  certificate.tolerance_px =
-      reader.Number(member("tolerance_px"), "tolerance_px");
-  const Json& pairs = reader.Array(member("baselines"), "baselines");
-  for (size_t n = 0; n < pairs.size(); ++n) {
-    const std::string place = "baselines[" + std::to_string(n) + "]";
-    const auto of = [&](const char* key) -> const Json& {
-      return reader.Member(pairs[n], place, key);
-    };
-    const auto count = [&](const char* key) {
-      constexpr uint64_t kMost = 1ULL << 32;
-      return static_cast<int64_t>(reader.Id(of(key), place + "." + key, kMost));
-    };
-    BaselineCertificate::Pair& pair = certificate.pairs.emplace_back();
-    pair.image_id1 =
-        static_cast<ImageId>(reader.Id(of("image_id1"), place + ".image_id1",
-                                       std::numeric_limits<ImageId>::max()));
-    pair.image_id2 =
-        static_cast<ImageId>(reader.Id(of("image_id2"), place + ".image_id2",
-                                       std::numeric_limits<ImageId>::max()));
-    pair.num_matches = count("num_matches");
-    pair.num_explained = count("num_explained");
-    pair.most_explained = count("most_explained");
-    pair.baseline = reader.Triple(of("baseline"), place + ".baseline");
-    pair.cells = reader.String(of("cells"), place + ".cells");
-  }
-  return certificate;
+  return ParseFile(text, file_name, [](const PlacedJson& json) {
+    const PlacedJson version = json["version"];
+    if (version.json() != kBaselineCertificateVersion) {
+      version.Fail(std::to_string(kBaselineCertificateVersion));
+    }
+    BaselineCertificate certificate;
+    certificate.tolerance_px = json["tolerance_px"].Number();
+    for (const PlacedJson& pair : json["baselines"].Elements()) {
+      certificate.pairs.push_back({pair["image_id1"].Integer<ImageId>(),
+                                   pair["image_id2"].Integer<ImageId>(),
+                                   pair["num_matches"].Integer<uint32_t>(),
+                                   pair["num_explained"].Integer<uint32_t>(),
+                                   pair["most_explained"].Integer<uint32_t>(),
+                                   pair["baseline"].Triple(),
+                                   pair["cells"].String()});
+    }
+    return certificate;
+  });
 }
 
 BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                                 const BaselineCertificate& certificate) {
-  BaselineVerdict verdict;
   if (!(certificate.tolerance_px > 0)) {
-    verdict.refusal = "its tolerance_px is no positive number";
-    return verdict;
+    return {false, "its tolerance_px is no positive number"};
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   std::map<std::pair<ImageId, ImageId>, const VerifiedPair*> pairs;
@@ -297,21 +267,16 @@ BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                              std::to_string(pair.image_id2);
     const auto found = pairs.find({pair.image_id1, pair.image_id2});
     if (found == pairs.end()) {
-      verdict.refusal =
-          "model and database have not " + name + ", or it is there twice";
-      return verdict;
+      return {false,
+              "model and database have not " + name + ", or it is there twice"};
     }
     const std::string refusal =
         RefusePair(ConditionsOf(model, geometries, database, *found->second),
                    certificate.tolerance_px, pair);
-    if (!refusal.empty()) {
-      verdict.refusal = name + ": " + refusal;
-      return verdict;
-    }
+    if (!refusal.empty()) return {false, name + ": " + refusal};
     pairs.erase(found);
   }
-  verdict.is_accepted = true;
-  return verdict;
+  return {true, ""};
 }
 
 }  // namespace krot::internal

@@ -11,7 +11,6 @@
 #include "krot/base/parallel_for.h"
 #include "krot/camera/camera_model.h"
 #include "krot/context.h"
-#include "krot/convert/build_steps.h"
 #include "krot/convert/reprojection.h"
 #include "krot/model/rigs.h"
 
@@ -20,10 +19,6 @@ namespace {
 
 using Eigen::Vector3d;
 using LeftOutCounts = std::array<int64_t, kNumLeftOutReasons>;
-
-// A depth below this, relative to the coordinates that it is the difference of,
-// may be rounding alone.
-constexpr double kDepthRounding = 1e-14;
 
 // The model, and tables that are looked up for every observation.
 struct Sources {
@@ -66,8 +61,7 @@ std::optional<Eigen::Matrix3d> RowAtPoint(const Sources& sources,
   const auto row =
       RowAtProjection(camera.model_id, camera.params.data(), pixel, x_cam);
   const double rounding =
-      kDepthRounding *
-      (xyz.norm() + geometry.cam_from_world.translation.norm());
+      1e-14 * (xyz.norm() + geometry.cam_from_world.translation.norm());
   if (!row || !(row->row(0).dot(x_cam) > rounding)) return std::nullopt;
   return row;
 }

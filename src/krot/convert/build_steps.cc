@@ -1,4 +1,4 @@
-#include "krot/convert/build_steps.h"
+#include "krot/convert/build_problem.h"
 
 #include <algorithm>
 #include <optional>
@@ -124,17 +124,8 @@ std::vector<Role> RolesOf(const Model& model, const BuiltProblem& built,
   return roles;
 }
 
-namespace {
-
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-// The smallest eigenvalue of mean(I - d d') is about half the mean squared sine
-// between the rays and their mean direction. Below this (angles of 1e-6) it is
-// within the rounding of rotations.
-constexpr double kParallel = 1e-12;
-
-}  // namespace
 
 std::optional<Vector3d> RetriangulateMidpoint(const std::vector<Ray>& rays) {
   if (rays.empty()) return std::nullopt;
@@ -153,7 +144,10 @@ std::optional<Vector3d> RetriangulateMidpoint(const std::vector<Ray>& rays) {
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(normal_matrix);
   const Vector3d& eigenvalues = solver.eigenvalues();
-  if (!(eigenvalues[0] > kParallel * static_cast<double>(rays.size()))) {
+  // The smallest eigenvalue of mean(I - d d') is about half the mean squared
+  // sine between the rays and their mean direction. Below 1e-12 (angles of
+  // 1e-6) it is within the rounding of rotations.
+  if (!(eigenvalues[0] > 1e-12 * static_cast<double>(rays.size()))) {
     return std::nullopt;
   }
   const Matrix3d& axes = solver.eigenvectors();

@@ -8,8 +8,7 @@
 #include <utility>
 
 #include "krot/context.h"
-#include "krot/convert/build_steps.h"
-#include "krot/convert/certificate_json.h"
+#include "krot/convert/build_problem.h"
 #include "krot/convert/model_digest.h"
 #include "krot/convert/reprojection.h"
 #include "krot/problem/cost.h"
@@ -215,35 +214,6 @@ std::vector<SupportObservation> ListSupport(const Model& model,
   return support;
 }
 
-namespace {
-
-using Json = CertificateFileJson;
-
-CertificateFile ReadCertificate(const JsonReader& reader, const Json& json) {
-  const auto member = [&](const char* key) -> const Json& {
-    return reader.Member(json, "the file", key);
-  };
-  const Json& version = member("version");
-  if (version != kCertificateVersion) {
-    reader.Fail("version", version, std::to_string(kCertificateVersion));
-  }
-  CertificateFile file;
-  file.norm = reader.ReadNorm(member("norm"));
-  file.lower_bound = reader.Number(member("lower_bound"), "lower_bound");
-  file.rows_bound = reader.Number(member("rows_bound"), "rows_bound");
-  file.defect = reader.Number(member("defect"), "defect");
-  file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
-  file.observations =
-      reader.ReadSupport(member("observations"), "observations");
-  const auto fixed = json.find("fixed");
-  if (fixed != json.end()) reader.ReadFixed(*fixed, &file);
-  const auto positions = json.find("positions");
-  if (positions != json.end()) reader.ReadPositions(*positions, &file);
-  return file;
-}
-
-}  // namespace
-
 std::vector<CertificateFile::SupportObservation> DescribeSupport(
     const Model& model, const BuiltProblem& built,
     const PixelCertificate& certificate) {
@@ -328,28 +298,6 @@ CertificateFile DescribeCertificate(const Model& model,
   DescribeFixed(model, built, certificate, &file);
   DescribePositions(model, built, certificate, &file);
   return file;
-}
-
-std::string CertificateJson(const CertificateFile& file) {
-  Json json = {
-      {"version", kCertificateVersion},  {"norm", NormJson(file.norm)},
-      {"lower_bound", file.lower_bound}, {"rows_bound", file.rows_bound},
-      {"defect", file.defect},           {"model_sha256", file.model_sha256}};
-  if (!file.fixed_images.empty() || !file.fixed_points.empty()) {
-    json["fixed"] = FixedJson(file);
-  }
-  if (!file.positions.empty()) json["positions"] = PositionsJson(file);
-  json["observations"] = SupportJson(file.observations);
-  return json.dump(1) + "\n";
-}
-
-CertificateFile ParseCertificate(const std::string& json,
-                                 const std::string& file_name) {
-  try {
-    return ReadCertificate(JsonReader(file_name), Json::parse(json));
-  } catch (const Json::exception& error) {
-    throw ModelError(file_name + ": no JSON: " + error.what());
-  }
 }
 
 std::string ReadCertificateText(const std::filesystem::path& path) {

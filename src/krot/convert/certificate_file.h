@@ -66,8 +66,6 @@ std::vector<SupportObservation> ListSupport(const Model& model,
                                             const Estimate& estimate, Norm norm,
                                             const Certificate& certificate);
 
-inline constexpr int kCertificateVersion = 2;
-
 // A certificate of a bound in true pixels (pixel_certificate.h) in terms of the
 // model's ids. This is what is written to a file; anyone who has the model can
 // check it (docs/formats.md).
@@ -141,34 +139,6 @@ CertificateFile ParseCertificate(const std::string& json,
 // empty.
 std::string ReadCertificateText(const std::filesystem::path& path);
 CertificateFile ReadCertificateFile(const std::filesystem::path& path);
-
-// ---- Known positions in the file of a certificate ----
-
-// Why the file's positions cannot be used; empty if they can.
-std::string RefusalOfPositions(const Model& model, const CertificateFile& file);
-
-// The file's positions in terms of the model; requires that they are not
-// refused.
-std::vector<KnownPosition> KnownPositionsOf(const Model& model,
-                                            const CertificateFile& file);
-
-// Finds the file's rows of known positions for the observations of a problem
-// that was built with these positions. The problem has no rows for an image or
-// point without observations; if the proof needs them, (1) does not hold and
-// the checker refuses it.
-class CertificatePositions {
- public:
-  // Keeps references.
-  CertificatePositions(const Model& model, const CertificateFile& file,
-                       const BuiltProblem& built);
-
-  // The row of a position's observation; null if the file has fewer rows.
-  const CertificateFile::Position::Row* RowOf(int64_t observation) const;
-
- private:
-  const BuiltProblem& built_;
-  std::vector<const CertificateFile::Position*> positions_;
-};
 
 // Accepts if the model's digest agrees, every observation is one of the problem
 // that BuildProblem makes of the model, and CheckPixelCertificate accepts the

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include "krot/context.h"
 #include "krot/convert/certificate_file.h"
 #include "krot/math/norm.h"
 
@@ -15,45 +18,71 @@ namespace krot::internal {
 
 using CertificateFileJson = nlohmann::ordered_json;
 
-// Reads values from a parsed file; every error is a ModelError that names the
-// file and the place.
-class JsonReader {
+// A value of a parsed file, with its place there. Every error is a ModelError
+// that names the file and the place.
+class PlacedJson {
  public:
   using Json = CertificateFileJson;
 
-  explicit JsonReader(std::string file_name);
+  // The whole file. Keeps references.
+  PlacedJson(const std::string& file_name, const Json& file)
+      : file_name_(file_name), json_(file) {}
 
-  [[noreturn]] void Fail(const std::string& place, const Json& found,
-                         const std::string& expected) const;
-  const Json& Member(const Json& object, const std::string& place,
-                     const char* key) const;
-  double Number(const Json& value, const std::string& place) const;
-  uint64_t Id(const Json& value, const std::string& place,
-              uint64_t largest) const;
-  std::string String(const Json& value, const std::string& place) const;
-  const Json& Array(const Json& value, const std::string& place) const;
-  Eigen::Vector3d Triple(const Json& value, const std::string& place) const;
-  // QW QX QY QZ.
-  Eigen::Quaterniond Quaternion(const Json& value,
-                                const std::string& place) const;
-  Eigen::Vector2d Pair(const Json& value, const std::string& place) const;
-  Norm ReadNorm(const Json& value) const;
-  // The support of a certificate.
-  std::vector<CertificateFile::SupportObservation> ReadSupport(
-      const Json& observations, const std::string& place) const;
-  // Sets the file's fixed images and points.
-  void ReadFixed(const Json& fixed, CertificateFile* file) const;
-  // Sets the file's known positions.
-  void ReadPositions(const Json& positions, CertificateFile* file) const;
+  const Json& json() const { return json_; }
+  bool Has(const char* key) const { return json_.contains(key); }
+  // The member of an object.
+  PlacedJson operator[](const char* key) const;
+  // The elements of an array.
+  std::vector<PlacedJson> Elements() const;
+
+  double Number() const;
+  std::string String() const;
+  Eigen::Vector2d Pair() const;
+  Eigen::Vector3d Triple() const;
+  Eigen::Quaterniond Quaternion() const;  // QW QX QY QZ
+  template <typename Unsigned>
+  Unsigned Integer() const {
+    return static_cast<Unsigned>(
+        IntegerUpTo(std::numeric_limits<Unsigned>::max()));
+  }
+
+  [[noreturn]] void Fail(const std::string& expected) const;
 
  private:
-  const std::string file_name_;
+  PlacedJson(const std::string& file_name, const Json& json, std::string place)
+      : file_name_(file_name), json_(json), place_(std::move(place)) {}
+
+  uint64_t IntegerUpTo(uint64_t largest) const;
+  template <int kCount>
+  Eigen::Matrix<double, kCount, 1> Numbers(const char* expected) const;
+
+  const std::string& file_name_;
+  const Json& json_;
+  const std::string place_;  // empty: the whole file
 };
 
+// Returns what `read` makes of the file.
+template <typename Read>
+auto ParseFile(const std::string& json, const std::string& file_name,
+               const Read& read) {
+  try {
+    const CertificateFileJson file = CertificateFileJson::parse(json);
+    return read(PlacedJson(file_name, file));
+  } catch (const CertificateFileJson::exception& error) {
+    throw ModelError(file_name + ": no JSON: " + error.what());
+  }
+}
+
+// Whether the text is an object with this member.
+bool HasMember(const std::string& json, const char* key);
+
 CertificateFileJson NormJson(Norm norm);
-CertificateFileJson FixedJson(const CertificateFile& file);
-CertificateFileJson PositionsJson(const CertificateFile& file);
+Norm ReadNorm(const PlacedJson& json);
+
+// The support of a certificate.
 CertificateFileJson SupportJson(
     const std::vector<CertificateFile::SupportObservation>& observations);
+std::vector<CertificateFile::SupportObservation> ReadSupport(
+    const PlacedJson& observations);
 
 }  // namespace krot::internal

@@ -20,8 +20,7 @@ namespace {
 using Of = KnownPosition::Of;
 using OfAndId = std::pair<Of, uint64_t>;
 
-}  // namespace
-
+// Why the file's positions cannot be used; empty if they can.
 std::string RefusalOfPositions(const Model& model,
                                const CertificateFile& file) {
   const IdIndex<ImageId> image_index(model.images);
@@ -50,6 +49,8 @@ std::string RefusalOfPositions(const Model& model,
   return "";
 }
 
+// The file's positions in terms of the model; requires that they are not
+// refused.
 std::vector<KnownPosition> KnownPositionsOf(const Model& model,
                                             const CertificateFile& file) {
   const IdIndex<ImageId> image_index(model.images);
@@ -65,29 +66,38 @@ std::vector<KnownPosition> KnownPositionsOf(const Model& model,
   return positions;
 }
 
-CertificatePositions::CertificatePositions(const Model& model,
-                                           const CertificateFile& file,
-                                           const BuiltProblem& built)
-    : built_(built) {
-  std::map<OfAndId, const CertificateFile::Position*> by_key;
-  for (const CertificateFile::Position& position : file.positions) {
-    by_key.emplace(OfAndId(position.of, position.id), &position);
+// Finds the file's rows of known positions for the observations of a problem
+// that was built with these positions. The problem has no rows for an image or
+// point without observations; if the proof needs them, (1) does not hold and
+// the checker refuses it.
+class CertificatePositions {
+ public:
+  // Keeps references.
+  CertificatePositions(const Model& model, const CertificateFile& file,
+                       const BuiltProblem& built)
+      : built_(built) {
+    std::map<OfAndId, const CertificateFile::Position*> by_key;
+    for (const CertificateFile::Position& position : file.positions) {
+      by_key.emplace(OfAndId(position.of, position.id), &position);
+    }
+    for (const BuiltPosition& position : built.positions) {
+      positions_.push_back(
+          by_key.at({position.of, IdOf(model, built, position)}));
+    }
   }
-  for (const BuiltPosition& position : built.positions) {
-    positions_.push_back(
-        by_key.at({position.of, IdOf(model, built, position)}));
+
+  // The row of a position's observation; null if the file has fewer rows.
+  const CertificateFile::Position::Row* RowOf(int64_t observation) const {
+    const CertificateFile::Position& position =
+        *positions_[PositionOf(built_, observation)];
+    const size_t n = RowIndex(built_, observation) % kRowsPerPosition;
+    return n < position.rows.size() ? &position.rows[n] : nullptr;
   }
-}
 
-const CertificateFile::Position::Row* CertificatePositions::RowOf(
-    int64_t observation) const {
-  const CertificateFile::Position& position =
-      *positions_[PositionOf(built_, observation)];
-  const size_t n = RowIndex(built_, observation) % kRowsPerPosition;
-  return n < position.rows.size() ? &position.rows[n] : nullptr;
-}
-
-namespace {
+ private:
+  const BuiltProblem& built_;
+  std::vector<const CertificateFile::Position*> positions_;
+};
 
 std::string NameOf(const CertificateFile::SupportObservation& o) {
   return "observation " + std::to_string(o.point2D_idx) + " of image " +

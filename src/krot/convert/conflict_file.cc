@@ -16,52 +16,7 @@
 #include "krot/problem/subset.h"
 
 namespace krot::internal {
-namespace {
-
 using Json = CertificateFileJson;
-
-ConflictFile ReadConflicts(const JsonReader& reader, const Json& json) {
-  const auto member = [&](const char* key) -> const Json& {
-    return reader.Member(json, "the file", key);
-  };
-  const Json& version = member("version");
-  if (version != 1 && version != kConflictFileVersion) {
-    reader.Fail("version", version, "1 or 2");
-  }
-  ConflictFile file;
-  file.version = version;
-  file.norm = reader.ReadNorm(member("norm"));
-  file.max_error = reader.Number(member("max_error"), "max_error");
-  file.model_sha256 = reader.String(member("model_sha256"), "model_sha256");
-  const Json& conflicts = reader.Array(member("conflicts"), "conflicts");
-  for (size_t n = 0; n < conflicts.size(); ++n) {
-    const std::string place = "conflicts[" + std::to_string(n) + "]";
-    const auto number = [&](const char* key) {
-      return reader.Number(reader.Member(conflicts[n], place, key),
-                           place + "." + key);
-    };
-    ConflictFile::Conflict conflict;
-    conflict.lower_bound = number("lower_bound");
-    conflict.rows_bound = number("rows_bound");
-    conflict.defect = number("defect");
-    conflict.observations =
-        reader.ReadSupport(reader.Member(conflicts[n], place, "observations"),
-                           place + ".observations");
-    if (file.version == kConflictFileVersion) {
-      const std::string bounds = place + ".max_errors";
-      const Json& values = reader.Array(
-          reader.Member(conflicts[n], place, "max_errors"), bounds);
-      for (size_t i = 0; i < values.size(); ++i) {
-        conflict.max_errors.push_back(
-            reader.Number(values[i], bounds + "[" + std::to_string(i) + "]"));
-      }
-    }
-    file.conflicts.push_back(std::move(conflict));
-  }
-  return file;
-}
-
-}  // namespace
 
 ConflictFile DescribeConflicts(
     const Model& model, const BuiltProblem& built, Norm norm, double max_error,
@@ -107,17 +62,34 @@ std::string ConflictJson(const ConflictFile& file) {
 }
 
 bool HoldsConflicts(const std::string& json) {
-  const Json parsed = Json::parse(json, nullptr, /*allow_exceptions=*/false);
-  return parsed.is_object() && parsed.contains("conflicts");
+  return HasMember(json, "conflicts");
 }
 
-ConflictFile ParseConflicts(const std::string& json,
+ConflictFile ParseConflicts(const std::string& text,
                             const std::string& file_name) {
-  try {
-    return ReadConflicts(JsonReader(file_name), Json::parse(json));
-  } catch (const Json::exception& error) {
-    throw ModelError(file_name + ": no JSON: " + error.what());
-  }
+  return ParseFile(text, file_name, [](const PlacedJson& json) {
+    const PlacedJson version = json["version"];
+    if (version.json() != 1 && version.json() != kConflictFileVersion) {
+      version.Fail("1 or 2");
+    }
+    ConflictFile file;
+    file.version = version.json();
+    file.norm = ReadNorm(json["norm"]);
+    file.max_error = json["max_error"].Number();
+    file.model_sha256 = json["model_sha256"].String();
+    for (const PlacedJson& one : json["conflicts"].Elements()) {
+      ConflictFile::Conflict& conflict = file.conflicts.emplace_back();
+      conflict.lower_bound = one["lower_bound"].Number();
+      conflict.rows_bound = one["rows_bound"].Number();
+      conflict.defect = one["defect"].Number();
+      conflict.observations = ReadSupport(one["observations"]);
+      if (file.version != kConflictFileVersion) continue;
+      for (const PlacedJson& bound : one["max_errors"].Elements()) {
+        conflict.max_errors.push_back(bound.Number());
+      }
+    }
+    return file;
+  });
 }
 
 namespace {
@@ -227,15 +199,17 @@ std::optional<std::string> RefuseConflict(const Model& model,
 ConflictVerdict VerifyConflictFile(const Model& model,
                                    const ConflictFile& file) {
   ConflictVerdict verdict;
-  if (file.model_sha256 != ModelSha256(model)) {
-    verdict.refusal =
-        "it belongs to another model: cameras, rotations or observations "
-        "differ";
+  const auto refused = [&](const std::string& refusal) {
+    verdict.refusal = refusal;
     return verdict;
+  };
+  if (file.model_sha256 != ModelSha256(model)) {
+    return refused(
+        "it belongs to another model: cameras, rotations or observations "
+        "differ");
   }
   if (!(file.max_error > 0) || !std::isfinite(file.max_error)) {
-    verdict.refusal = "its max_error is no positive number";
-    return verdict;
+    return refused("its max_error is no positive number");
   }
   BuiltProblem built = BuildProblem(model, {});
   std::vector<Entry> entries = FindEntries(model, built, file);
@@ -246,12 +220,11 @@ ConflictVerdict VerifyConflictFile(const Model& model,
     entries = FindEntries(model, built, file);
   }
   if (const Entry* missing = FirstMissing(entries)) {
-    verdict.refusal =
+    return refused(
         "observation " + std::to_string(missing->observation->point2D_idx) +
         " of image " + std::to_string(missing->observation->image_id) + " in " +
         NameOfConflict(missing->conflict) +
-        " is not among those that can be used, or is there twice";
-    return verdict;
+        " is not among those that can be used, or is there twice");
   }
   std::vector<std::vector<Entry>> of_conflict(file.conflicts.size());
   for (const Entry& entry : entries) {
@@ -260,10 +233,7 @@ ConflictVerdict VerifyConflictFile(const Model& model,
   for (size_t n = 0; n < of_conflict.size(); ++n) {
     const std::optional<std::string> refusal =
         RefuseConflict(model, built, file, n, std::move(of_conflict[n]));
-    if (refusal) {
-      verdict.refusal = *refusal;
-      return verdict;
-    }
+    if (refusal) return refused(*refusal);
   }
   verdict.is_accepted = true;
   verdict.num_conflicts = static_cast<int64_t>(file.conflicts.size());

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/convert/build_steps.h"
+#include "krot/convert/build_problem.h"
 #include "krot/model/rigs.h"
 
 namespace krot::internal {
@@ -53,72 +53,24 @@ uint32_t Turn(uint32_t word, int bits) {
   return (word >> bits) | (word << (32 - bits));
 }
 
-}  // namespace
-
-Sha256Stream::Sha256Stream() : state_(kStart) {}
-
-void Sha256Stream::Append(const unsigned char* bytes, size_t size) {
-  num_bytes_ += size;
-  for (size_t n = 0; n < size; ++n) {
-    block_[block_size_++] = bytes[n];
-    if (block_size_ == block_.size()) DigestBlock();
-  }
-}
-
-// Names are those of the standard: the schedule w, the working variables a to
-// h.
-void Sha256Stream::DigestBlock() {
-  std::array<uint32_t, 64> w;
-  for (size_t t = 0; t < 16; ++t) {
-    w[t] = uint32_t{block_[4 * t]} << 24 | uint32_t{block_[4 * t + 1]} << 16 |
-           uint32_t{block_[4 * t + 2]} << 8 | uint32_t{block_[4 * t + 3]};
-  }
-  for (size_t t = 16; t < 64; ++t) {
-    const uint32_t x = w[t - 15], y = w[t - 2];
-    w[t] = w[t - 16] + (Turn(x, 7) ^ Turn(x, 18) ^ (x >> 3)) + w[t - 7] +
-           (Turn(y, 17) ^ Turn(y, 19) ^ (y >> 10));
-  }
-  auto [a, b, c, d, e, f, g, h] = state_;
-  for (size_t t = 0; t < 64; ++t) {
-    const uint32_t t1 = h + (Turn(e, 6) ^ Turn(e, 11) ^ Turn(e, 25)) +
-                        ((e & f) ^ (~e & g)) + kRounds[t] + w[t];
-    const uint32_t t2 = (Turn(a, 2) ^ Turn(a, 13) ^ Turn(a, 22)) +
-                        ((a & b) ^ (a & c) ^ (b & c));
-    h = g, g = f, f = e, e = d + t1, d = c, c = b, b = a, a = t1 + t2;
-  }
-  const std::array<uint32_t, 8> worked = {a, b, c, d, e, f, g, h};
-  for (size_t n = 0; n < 8; ++n) state_[n] += worked[n];
-  block_size_ = 0;
-}
-
-std::array<unsigned char, 32> Sha256Stream::Finish() {
-  const uint64_t num_bits = 8 * num_bytes_;
-  const unsigned char one = 0x80, zero = 0;
-  Append(&one, 1);
-  while (block_size_ != 56) Append(&zero, 1);
-  for (int shift = 56; shift >= 0; shift -= 8) {
-    const auto byte = static_cast<unsigned char>(num_bits >> shift);
-    Append(&byte, 1);
-  }
-  std::array<unsigned char, 32> digest;
-  for (size_t n = 0; n < digest.size(); ++n) {
-    digest[n] = static_cast<unsigned char>(state_[n / 4] >> (24 - 8 * (n % 4)));
-  }
-  return digest;
-}
-
-namespace {
-
-// Collects little-endian bytes and digests them in pieces.
+// Digests bytes as they come, numbers in little-endian order.
 class Digest {
  public:
+  void Bytes(std::string_view bytes) {
+    num_bytes_ += bytes.size();
+    for (const char byte : bytes) {
+      block_[block_size_++] = static_cast<unsigned char>(byte);
+      if (block_size_ == block_.size()) DigestBlock();
+    }
+  }
+
   void Integer(uint64_t value) {
-    std::array<unsigned char, 8> bytes;
-    for (unsigned char& byte : bytes) {
-      byte = static_cast<unsigned char>(value & 0xff);
+    char bytes[8];
+    for (char& byte : bytes) {
+      byte = static_cast<char>(value & 0xff);
       value >>= 8;
     }
-    Append(bytes);
+    Bytes({bytes, sizeof(bytes)});
   }
 
   void Number(double value) {
@@ -127,35 +79,55 @@ class Digest {
     Integer(bits);
   }
 
-  void Bytes(std::string_view bytes) {
-    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-  }
-
+  // The digest of everything so far; must be the last call.
   std::string Hex() {
-    Flush();
+    const uint64_t num_bits = 8 * num_bytes_;
+    Bytes("\x80");
+    while (block_size_ != 56) Bytes({"", 1});
+    for (int shift = 56; shift >= 0; shift -= 8) {
+      const auto byte = static_cast<char>(num_bits >> shift);
+      Bytes({&byte, 1});
+    }
     std::string hex;
-    for (const unsigned char byte : sha256_.Finish()) {
-      hex += "0123456789abcdef"[byte >> 4];
-      hex += "0123456789abcdef"[byte & 15];
+    for (const uint32_t word : state_) {
+      for (int shift = 28; shift >= 0; shift -= 4) {
+        hex += "0123456789abcdef"[word >> shift & 15];
+      }
     }
     return hex;
   }
 
  private:
-  static constexpr size_t kPiece = 1 << 16;
-
-  void Append(const std::array<unsigned char, 8>& bytes) {
-    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-    if (buffer_.size() >= kPiece) Flush();
+  // Names are those of the standard: the schedule w, the working variables a to
+  // h.
+  void DigestBlock() {
+    std::array<uint32_t, 64> w;
+    for (size_t t = 0; t < 16; ++t) {
+      w[t] = uint32_t{block_[4 * t]} << 24 | uint32_t{block_[4 * t + 1]} << 16 |
+             uint32_t{block_[4 * t + 2]} << 8 | uint32_t{block_[4 * t + 3]};
+    }
+    for (size_t t = 16; t < 64; ++t) {
+      const uint32_t x = w[t - 15], y = w[t - 2];
+      w[t] = w[t - 16] + (Turn(x, 7) ^ Turn(x, 18) ^ (x >> 3)) + w[t - 7] +
+             (Turn(y, 17) ^ Turn(y, 19) ^ (y >> 10));
+    }
+    auto [a, b, c, d, e, f, g, h] = state_;
+    for (size_t t = 0; t < 64; ++t) {
+      const uint32_t t1 = h + (Turn(e, 6) ^ Turn(e, 11) ^ Turn(e, 25)) +
+                          ((e & f) ^ (~e & g)) + kRounds[t] + w[t];
+      const uint32_t t2 = (Turn(a, 2) ^ Turn(a, 13) ^ Turn(a, 22)) +
+                          ((a & b) ^ (a & c) ^ (b & c));
+      h = g, g = f, f = e, e = d + t1, d = c, c = b, b = a, a = t1 + t2;
+    }
+    const std::array<uint32_t, 8> worked = {a, b, c, d, e, f, g, h};
+    for (size_t n = 0; n < 8; ++n) state_[n] += worked[n];
+    block_size_ = 0;
   }
 
-  void Flush() {
-    sha256_.Append(buffer_.data(), buffer_.size());
-    buffer_.clear();
-  }
-
-  Sha256Stream sha256_;
-  std::vector<unsigned char> buffer_;
+  std::array<uint32_t, 8> state_ = kStart;
+  std::array<unsigned char, 64> block_;
+  size_t block_size_ = 0;
+  uint64_t num_bytes_ = 0;
 };
 
 void AddQuaternion(const Pose& pose, Digest* digest) {

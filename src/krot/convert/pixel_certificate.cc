@@ -15,19 +15,11 @@
 namespace krot::internal {
 namespace {
 
-// The largest number of corrections of gamma in MakePixelCertificate; mostly
-// two are enough.
-constexpr int kMaxCorrections = 8;
 // Leaves room for the changes of the multipliers that the check allows for.
 constexpr double kMargin = 1e-9;
-// Shares by which a refused certificate is lowered, one after another.
-constexpr double kLower[] = {1e-8, 1e-7, 1e-6};
 // Support lines that are found in parallel; those after them can use the
 // highest one so far.
 constexpr int64_t kLinesAtOnce = 32;
-// A remainder need not be known more exactly than this: it only scales an
-// allowance for rounding.
-constexpr double kSmallRemainder = 0.1;
 
 std::string NameOf(const Model& model, const BuiltProblem& built, int64_t i) {
   if (!built.HasPixel(i)) return "a position";
@@ -88,10 +80,12 @@ bool KeepsToItsSide(const Reprojection& reprojection, const BuiltProblem& built,
   }
   const Reprojection::Source& source = reprojection.SourceOf(o.observation);
   const double gamma = certificate.lower_bound;
-  const std::optional<double> kappa = RemainderBound(
-      source.model_id, source.params, built.pixels[o.observation],
-      certificate.bearings[n], built.ScaleOf(o.observation) * gamma, norm.p,
-      kSmallRemainder);
+  // It need not be known more exactly than to a tenth: it only scales an
+  // allowance for rounding.
+  const std::optional<double> kappa =
+      RemainderBound(source.model_id, source.params,
+                     built.pixels[o.observation], certificate.bearings[n],
+                     built.ScaleOf(o.observation) * gamma, norm.p, 0.1);
   if (!kappa) return false;
   // |L| <= sqrt(2) |L|_p over S_i; both sides are divided by the scale, of
   // which gamma is a bound.
@@ -162,7 +156,8 @@ std::optional<PixelCertificate> MakePixelCertificate(
   const Reprojection reprojection(model, built);
   PixelCertificate certificate{rows, std::move(bearings), 0};
   double gamma = rows.lower_bound * (1 - kMargin);
-  for (int n = 0; n < kMaxCorrections; ++n) {
+  // Corrections of gamma; mostly two are enough.
+  for (int n = 0; n < 8; ++n) {
     const double highest =
         HighestLine(reprojection, built, norm, rows, certificate.bearings,
                     gamma, 1 - kMargin / 2, context);
@@ -181,51 +176,47 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
                                             Norm norm,
                                             const PixelCertificate& certificate,
                                             const Context& context) {
-  PixelCertificateCheck check;
+  const auto refused = [](const std::string& refusal) {
+    PixelCertificateCheck check;
+    check.refusal = refusal;
+    return check;
+  };
   const std::vector<CertifiedObservation>& support =
       certificate.rows.observations;
   const double gamma = certificate.lower_bound;
   if (!(gamma > 0) || !std::isfinite(gamma)) {
-    check.refusal = "its lower bound is no positive number";
-    return check;
+    return refused("its lower bound is no positive number");
   }
   if (certificate.bearings.size() != support.size()) {
-    check.refusal = "it has not one bearing per observation";
-    return check;
+    return refused("it has not one bearing per observation");
   }
   const Reprojection reprojection(model, built);
   KnownRotationProblem problem = built.problem;
   for (size_t n = 0; n < support.size(); ++n) {
     const int64_t i = support[n].observation;
     if (i < 0 || i >= static_cast<int64_t>(problem.observations.size())) {
-      check.refusal = "it names an observation that is not there";
-      return check;
+      return refused("it names an observation that is not there");
     }
     if (!built.HasPixel(i)) {
       if (PutPositionRow(built, i, certificate.bearings[n],
                          certificate.rows.lower_bound, &problem)) {
         continue;
       }
-      check.refusal = "an apex is too near to its position, or too far";
-      return check;
+      return refused("an apex is too near to its position, or too far");
     }
     const Reprojection::Source& source = reprojection.SourceOf(i);
     const auto row = RowAtProjection(source.model_id, source.params,
                                      built.pixels[i], certificate.bearings[n]);
     if (!row) {
-      check.refusal =
-          "the bearing of " + NameOf(model, built, i) + " does not project";
-      return check;
+      return refused("the bearing of " + NameOf(model, built, i) +
+                     " does not project");
     }
     problem.observations[i].E = *row;
     problem.observations[i].E.bottomRows<2>() /= built.ScaleOf(i);
   }
   const CertificateCheck rows =
       CheckCertificate(problem, norm, certificate.rows);
-  if (!rows.is_accepted) {
-    check.refusal = rows.refusal;
-    return check;
-  }
+  if (!rows.is_accepted) return refused(rows.refusal);
   std::vector<char> keeps(support.size(), 0);
   for (size_t begin = 0; begin < support.size(); begin += kLinesAtOnce) {
     const size_t end = std::min<size_t>(support.size(), begin + kLinesAtOnce);
@@ -237,16 +228,12 @@ PixelCertificateCheck CheckPixelCertificate(const Model& model,
                 });
     for (size_t n = begin; n < end; ++n) {
       if (keeps[n]) continue;
-      check.refusal = NameOf(model, built, support[n].observation) +
-                      " may be seen below the bound on the far side of its "
-                      "support line";
-      return check;
+      return refused(NameOf(model, built, support[n].observation) +
+                     " may be seen below the bound on the far side of its "
+                     "support line");
     }
   }
-  check.is_accepted = true;
-  check.lower_bound = gamma;
-  check.defect = rows.defect;
-  return check;
+  return {true, gamma, rows.defect, ""};
 }
 
 PixelCertificateCheck LowerUntilAccepted(const Model& model,
@@ -256,7 +243,7 @@ PixelCertificateCheck LowerUntilAccepted(const Model& model,
   const double bound = certificate->lower_bound;
   PixelCertificateCheck check =
       CheckPixelCertificate(model, built, norm, *certificate, context);
-  for (const double share : kLower) {
+  for (const double share : {1e-8, 1e-7, 1e-6}) {
     if (check.is_accepted) break;
     certificate->lower_bound = (1 - share) * bound;
     check = CheckPixelCertificate(model, built, norm, *certificate, context);

@@ -41,13 +41,6 @@ inline constexpr double kPositionSlack = 1e-7;
 // A point inside all cones is inside the region up to this, relative.
 inline constexpr double kKeptPosition = 1e-6;
 
-// E of such a row for a camera with axes of that rotation. None if p cannot be
-// used: it is not finite, or |U p| is out of range.
-std::optional<Eigen::Matrix3d> MakePositionRow(
-    const Eigen::Matrix3d& cam_from_world,
-    const Eigen::Matrix3d& unit_from_world, const Eigen::Vector3d& apex,
-    double level);
-
 // Adds the known positions of images and points that the problem has, except
 // fixed ones. The rows are taken as if every camera and point were at the
 // centre of its region.
@@ -156,9 +149,6 @@ class Reprojection {
   Eigen::Vector3d InCamera(const Estimate& estimate, int64_t i) const;
 
  private:
-  double Resolution(const Estimate& estimate, int64_t i,
-                    const Eigen::Vector3d& x_cam) const;
-
   const BuiltProblem& built_;
   std::vector<Source> sources_;  // per view
   bool is_linear_;

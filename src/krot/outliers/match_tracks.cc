@@ -10,7 +10,6 @@
 #include "krot/base/check.h"
 #include "krot/base/parallel_for.h"
 #include "krot/convert/build_problem.h"
-#include "krot/convert/build_steps.h"
 #include "krot/model.h"
 #include "krot/model/rigs.h"
 #include "krot/pipeline/solve_model.h"

@@ -10,7 +10,7 @@
 
 #include "krot/base/numbers.h"
 #include "krot/base/parallel_for.h"
-#include "krot/convert/build_steps.h"
+#include "krot/convert/build_problem.h"
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 

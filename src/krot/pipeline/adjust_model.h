@@ -3,7 +3,6 @@
 #include <optional>
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/adjust/precision.h"
 #include "krot/base/context.h"
 #include "krot/model.h"
 #include "krot/pipeline/solve_model.h"

@@ -6,12 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/collapse.h"
+#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_input.h"
 #include "krot/base/check.h"
 #include "krot/base/context.h"
 #include "krot/convert/build_problem.h"
-#include "krot/convert/build_steps.h"
 #include "krot/convert/reprojection.h"
 #include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"

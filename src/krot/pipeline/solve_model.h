@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "krot/adjust/bundle_adjustment.h"
-#include "krot/analysis/collapse.h"
+#include "krot/analysis/model_comparison.h"
 #include "krot/base/context.h"
 #include "krot/convert/build_problem.h"
 #include "krot/convert/certificate_file.h"

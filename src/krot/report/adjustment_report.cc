@@ -127,25 +127,16 @@ std::string KnownPositionsSentence(const AdjustmentReport& report) {
 }  // namespace
 
 std::string AdjustmentTerminationName(BundleAdjustmentTermination termination) {
-  switch (termination) {
-    case BundleAdjustmentTermination::kNothingToAdjust:
-      return "nothing_to_adjust";
-    case BundleAdjustmentTermination::kConverged:
-      return "converged";
-    case BundleAdjustmentTermination::kCapConverged:
-      return "cap_converged";
-    case BundleAdjustmentTermination::kMaxIterations:
-      return "max_iterations";
-    case BundleAdjustmentTermination::kStalled:
-      return "stalled";
-    case BundleAdjustmentTermination::kInfeasibleStart:
-      return "infeasible_start";
-    case BundleAdjustmentTermination::kInterrupted:
-      return "interrupted";
-    case BundleAdjustmentTermination::kNotRun:
-      break;
-  }
-  return "not_run";
+  using Enum = BundleAdjustmentTermination;
+  return NameIn<Enum>({{Enum::kNotRun, "not_run"},
+                       {Enum::kNothingToAdjust, "nothing_to_adjust"},
+                       {Enum::kConverged, "converged"},
+                       {Enum::kCapConverged, "cap_converged"},
+                       {Enum::kMaxIterations, "max_iterations"},
+                       {Enum::kStalled, "stalled"},
+                       {Enum::kInfeasibleStart, "infeasible_start"},
+                       {Enum::kInterrupted, "interrupted"}},
+                      termination);
 }
 
 std::string NothingToAdjustSentence(const BundleAdjustmentSummary& summary) {

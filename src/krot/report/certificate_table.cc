@@ -20,9 +20,7 @@ std::string FixedSentence(const CertificateVerdict& verdict) {
 
 std::string PositionsSentence(const CertificateVerdict& verdict) {
   if (verdict.positions.empty()) return "";
-  return "It takes " +
-         Counted(static_cast<int64_t>(verdict.positions.size()),
-                 "known position") +
+  return "It takes " + Counted(verdict.positions.size(), "known position") +
          " of its file to be kept to the radii below.\n";
 }
 
@@ -62,8 +60,8 @@ std::string SupportTable(const std::vector<SupportObservation>& support,
   const std::string shown =
       count < support.size() ? "; the first " + std::to_string(count) : "";
   return "\nThe support, which alone sets the maximum: " +
-         Counted(static_cast<int64_t>(support.size()), "observation") +
-         ", worst first" + shown + "\n" + table.ToString();
+         Counted(support.size(), "observation") + ", worst first" + shown +
+         "\n" + table.ToString();
 }
 
 std::string CertificateTable(const CertificateVerdict& verdict,
@@ -98,8 +96,8 @@ std::string BaselineTable(const Model& model,
       "The certificate holds: with the rotations of this model no baselines "
       "explain more\nthan " +
       Thousands(most) + " of the " + Thousands(num_matches) + " matches of " +
-      Counted(static_cast<int64_t>(pairs.size()), "pair") +
-      " of images within " + FormatNumber(certificate.tolerance_px, 4) +
+      Counted(pairs.size(), "pair") + " of images within " +
+      FormatNumber(certificate.tolerance_px, 4) +
       " px of their epipolar lines.\nOf a pair that few explain, a rotation "
       "is wrong, or the matches are.\n";
   if (pairs.empty() || max_pairs == 0) return text;

@@ -12,23 +12,15 @@ const char* VerdictName(ImageVerdict verdict) {
 
 // The name in report.json of the reason why an image is wrong.
 const char* FaultName(ImageFault fault) {
-  switch (fault) {
-    case ImageFault::kMatches:
-      return "matches";
-    case ImageFault::kLens:
-      return "lens";
-    case ImageFault::kContradicted:
-      return "contradicted";
-    case ImageFault::kMisplaced:
-      return "misplaced";
-    case ImageFault::kChance:
-      return "chance";
-    case ImageFault::kUnsupported:
-      return "unsupported";
-    case ImageFault::kNone:
-      break;
-  }
-  return "none";
+  using Enum = ImageFault;
+  return NameIn<Enum>({{Enum::kNone, "none"},
+                       {Enum::kMatches, "matches"},
+                       {Enum::kLens, "lens"},
+                       {Enum::kContradicted, "contradicted"},
+                       {Enum::kMisplaced, "misplaced"},
+                       {Enum::kChance, "chance"},
+                       {Enum::kUnsupported, "unsupported"}},
+                      fault);
 }
 
 Json ImageJson(const ModelCheck& check, const ImageCheck& image) {
@@ -49,7 +41,91 @@ Json ImageJson(const ModelCheck& check, const ImageCheck& image) {
           {"shift", image.shift}};
 }
 
+const char* PairStateName(PairState state) {
+  using Enum = PairState;
+  return NameIn<Enum>({{Enum::kNotChecked, "not checked"},
+                       {Enum::kKept, "kept"},
+                       {Enum::kContradictory, "contradictory"},
+                       {Enum::kUndecided, "undecided"}},
+                      state);
+}
+
+const char* PoseFaultName(PoseFault fault) {
+  using Enum = PoseFault;
+  return NameIn<Enum>({{Enum::kNone, "none"},
+                       {Enum::kPosition, "position"},
+                       {Enum::kRotation, "rotation"},
+                       {Enum::kUnclear, "unclear"}},
+                      fault);
+}
+
+Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
+  Json images = Json::array();
+  for (const int32_t i : explanation.images) {
+    images.push_back(check.images[i].name);
+  }
+  return {{"images", images}, {"cost_matches", explanation.cost}};
+}
+
 }  // namespace
+
+Json PairJson(const PairCheck& check) {
+  Json images = Json::array();
+  for (const CheckedImage& image : check.images) {
+    images.push_back(
+        {{"image_id", image.image_id},
+         {"image_name", image.name},
+         {"num_kept_pairs", image.num_kept},
+         {"num_contradictory_pairs", image.num_contradictory},
+         {"num_undecided_pairs", image.num_undecided},
+         {"kept_matches", image.kept_matches},
+         {"contradictory_matches", image.contradictory_matches},
+         {"is_wrong", image.is_wrong},
+         {"fault", image.is_wrong ? Json(PoseFaultName(image.fault)) : Json()},
+         {"num_matches", image.num_matches},
+         {"num_agreeing_moved", image.num_agreeing_moved},
+         {"num_agreeing_turned", image.num_agreeing_turned},
+         {"moved_by", image.moved_by},
+         {"turned_by_deg", image.turned_by_deg},
+         {"is_rotation_proved_wrong", image.is_rotation_proved_wrong}});
+  }
+  Json pairs = Json::array();
+  for (const CheckedPair& pair : check.pairs) {
+    const bool is_contradictory = pair.state == PairState::kContradictory;
+    pairs.push_back({{"image1", check.images[pair.image1].name},
+                     {"image2", check.images[pair.image2].name},
+                     {"state", PairStateName(pair.state)},
+                     {"num_matches", pair.num_matches},
+                     {"num_agreeing", pair.num_agreeing},
+                     {"median_error_px", FiniteOrNull(pair.median_error_px)},
+                     {"num_explained",
+                      is_contradictory ? Json(pair.num_explained) : Json()},
+                     {"most_explained",
+                      is_contradictory ? Json(pair.most_explained) : Json()},
+                     {"has_wrong_matches", pair.has_wrong_matches}});
+  }
+  Json groups = Json::array();
+  for (const std::vector<int32_t>& group : check.groups) {
+    Json names = Json::array();
+    for (const int32_t i : group) names.push_back(check.images[i].name);
+    groups.push_back(names);
+  }
+  return {{"verdict", PairSentence(check)},
+          {"noise_px", check.noise_px},
+          {"tolerance_px", check.tolerance_px},
+          {"num_kept_pairs", check.num_kept},
+          {"num_contradictory_pairs", check.num_contradictory},
+          {"num_undecided_pairs", check.num_undecided},
+          {"num_not_checked_pairs", check.num_not_checked},
+          {"num_without_ray", check.num_without_ray},
+          {"cheapest", ExplanationJson(check.cheapest, check)},
+          {"runner_up",
+           check.runner_up ? ExplanationJson(*check.runner_up, check) : Json()},
+          {"is_cheapest_proved", check.is_cheapest_proved},
+          {"groups", groups},
+          {"images", images},
+          {"pairs", pairs}};
+}
 
 std::string CheckJson(const CheckReport& report) {
   const ModelCheck& check = report.check;

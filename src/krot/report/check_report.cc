@@ -84,8 +84,7 @@ std::string ImageTable(const ModelCheck& check, ImageVerdict verdict,
             "than ten times as far\nas the median image's (standard deviation, "
             "scene units)";
   if (images.size() > max_rows) {
-    head += "; " + std::to_string(max_rows) + " of " +
-            Thousands(static_cast<int64_t>(images.size()));
+    head += "; " + std::to_string(max_rows) + " of " + Thousands(images.size());
   }
   return "\n" + head + "\n" + table.ToString();
 }
@@ -122,9 +121,8 @@ std::string TrackTable(const ModelCheck& check, size_t max_rows) {
                       FormatNumber(track.second.y(), 3) + " " +
                       FormatNumber(track.second.z(), 3)});
   }
-  return "\nTracks that are two points: " +
-         Thousands(static_cast<int64_t>(check.tracks.size())) + "\n" +
-         table.ToString();
+  return "\nTracks that are two points: " + Thousands(check.tracks.size()) +
+         "\n" + table.ToString();
 }
 
 std::string RobustAdjustment(const std::string& model, double scale_px) {
@@ -293,7 +291,7 @@ std::string ForAdjusted(const CheckReport& report) {
   }
   if (check.pairs && !check.pairs->groups.empty()) {
     return "The images fall into " +
-           Counted(static_cast<int64_t>(check.pairs->groups.size()), "group") +
+           Counted(check.pairs->groups.size(), "group") +
            " that contradict each other by their verified matches: the place "
            "of a whole group is wrong, or those matches are.";
   }

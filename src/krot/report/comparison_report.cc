@@ -200,6 +200,14 @@ Json CountJson(const ComparisonSummary& summary, int64_t ModelCounts::*count) {
           {"shared", summary.shared.*count}};
 }
 
+std::string AlignmentName(AlignmentKind kind) {
+  using Enum = AlignmentKind;
+  return NameIn<Enum>({{Enum::kNone, "none"},
+                       {Enum::kFrame, "frame"},
+                       {Enum::kSimilarity, "similarity"}},
+                      kind);
+}
+
 Json AlignmentJson(const ComparisonSummary& summary) {
   const Similarity& similarity = summary.world1_from_world2;
   const Eigen::Matrix3d& R = similarity.rotation;
@@ -249,18 +257,6 @@ Json WorstPointsJson(const std::vector<PointDifference>& points) {
 }
 
 }  // namespace
-
-std::string AlignmentName(AlignmentKind kind) {
-  switch (kind) {
-    case AlignmentKind::kNone:
-      return "none";
-    case AlignmentKind::kFrame:
-      return "frame";
-    case AlignmentKind::kSimilarity:
-      return "similarity";
-  }
-  return "";
-}
 
 std::string ComparisonJson(const ComparisonReport& report) {
   const ComparisonSummary& summary = report.summary;

@@ -55,9 +55,8 @@ size_t HistogramBin(double error_px) {
 }
 
 int64_t NextRank(int64_t rank) {
-  constexpr double kStep = 1.05;
   return std::max(rank + 1,
-                  static_cast<int64_t>(kStep * static_cast<double>(rank)));
+                  static_cast<int64_t>(1.05 * static_cast<double>(rank)));
 }
 
 }  // namespace

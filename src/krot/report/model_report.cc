@@ -67,8 +67,7 @@ ModelReport AnalyzeModel(const Model& model, int num_worst, int num_threads) {
       model.points3D.begin(), model.points3D.end(),
       [&](const Point3D& point) { return RepeatsAnImage(model, point); });
   report.depth = ComputeDepthStatistics(model);
-  report.triangulation_angle =
-      ComputeTriangulationAngleStatistics(model, num_threads);
+  report.triangulation_angle_deg = TriangulationAnglesDeg(model, num_threads);
   return report;
 }
 
@@ -229,14 +228,13 @@ std::string TrackTable(const ModelReport& report) {
 
 std::string GeometryTable(const ModelReport& report) {
   const DepthStatistics& depth = report.depth;
-  const TriangulationAngleStatistics& angle = report.triangulation_angle;
+  const ValueRange& angle = report.triangulation_angle_deg;
   TextTable table;
   table.AddRow({"", "min", "median", "max"});
   table.AddRow({"depth, scene units", FormatNumber(depth.min, 4),
                 FormatNumber(depth.median, 4), FormatNumber(depth.max, 4)});
-  table.AddRow({"triangulation angle, degrees", FormatNumber(angle.min_deg, 4),
-                FormatNumber(angle.median_deg, 4),
-                FormatNumber(angle.max_deg, 4)});
+  table.AddRow({"triangulation angle, degrees", FormatNumber(angle.min, 4),
+                FormatNumber(angle.median, 4), FormatNumber(angle.max, 4)});
   return "\nGeometry\n" + table.ToString() +
          std::to_string(depth.not_positive) +
          " observations lie in or behind the plane of their camera.\n";
@@ -359,7 +357,7 @@ Json TrackLengthsJson(const std::map<int64_t, int64_t>& track_lengths) {
 
 std::string ModelJson(const ModelReport& report, const std::string& version) {
   const DepthStatistics& depth = report.depth;
-  const TriangulationAngleStatistics& angle = report.triangulation_angle;
+  const ValueRange& angle = report.triangulation_angle_deg;
   const Json json = {
       {"version", version},
       {"command", "model_analyzer"},
@@ -382,9 +380,9 @@ std::string ModelJson(const ModelReport& report, const std::string& version) {
         {"max", depth.max}}},
       {"triangulation_angle_deg",
        {{"count", angle.count},
-        {"min", angle.min_deg},
-        {"median", angle.median_deg},
-        {"max", angle.max_deg}}},
+        {"min", angle.min},
+        {"median", angle.median},
+        {"max", angle.max}}},
   };
   return ReportText(json);
 }

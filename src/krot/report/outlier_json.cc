@@ -22,7 +22,7 @@ Json RemovedJson(const std::vector<RemovedObservation>& removed) {
                     {"point3D_id", o.point3D_id},
                     {"error_before_px", FiniteOrNull(o.error_before_px)},
                     {"error_after_px", FiniteOrNull(o.error_after_px)},
-                    {"conflict", o.conflict ? Json(*o.conflict) : Json()},
+                    {"conflict", NumberOrNull(o.conflict)},
                     {"w", o.w ? FiniteOrNull(*o.w) : Json()}});
   }
   return json;
@@ -58,9 +58,7 @@ Json RotationSuspectJson(const OutlierFilterSummary& summary) {
           {"num_conflicts", suspect.num_conflicts},
           {"conflict_share", ConflictShare(suspect.num_conflicts, summary)},
           {"angle_deg", suspect.angle_deg},
-          {"axis_in_cam",
-           {suspect.axis_in_cam.x(), suspect.axis_in_cam.y(),
-            suspect.axis_in_cam.z()}},
+          {"axis_in_cam", VectorJson(suspect.axis_in_cam)},
           {"num_observations", suspect.num_observations},
           {"num_above", suspect.num_above},
           {"num_above_turned", suspect.num_above_turned},
@@ -100,7 +98,7 @@ Json ProfileLevelsJson(const ErrorProfileSummary& profile) {
                       {"point3D_ids", level.point_ids}});
   }
   return {{"levels", std::move(levels)},
-          {"elbow", profile.elbow ? Json(*profile.elbow) : Json()}};
+          {"elbow", NumberOrNull(profile.elbow)}};
 }
 
 Json NoiseJson(const std::optional<NoiseSummary>& noise) {
@@ -108,7 +106,7 @@ Json NoiseJson(const std::optional<NoiseSummary>& noise) {
   return {{"sigma", noise->limit.sigma},
           {"max_error", noise->limit.max_error},
           {"lowest_max_error", noise->lowest_max_error},
-          {"lower_bound", NumberOrNull(noise->lower_bound)}};
+          {"lower_bound", noise->lower_bound}};
 }
 
 }  // namespace
@@ -192,15 +190,13 @@ std::string OutlierCsv(const OutlierFilterSummary& summary) {
 Json WeakPartsJson(const OutlierFilterSummary& summary) {
   Json parts = Json::array();
   for (const WeakPart& part : summary.weak_parts) {
-    parts.push_back(
-        {{"image_names", part.image_names},
-         {"num_tracks", part.num_tracks},
-         {"num_agreeing", part.num_agreeing},
-         {"scale_factor",
-          std::isfinite(part.scale_factor) ? Json(part.scale_factor) : Json()},
-         {"is_held", part.is_held},
-         {"turn_deg", part.turn_deg},
-         {"num_agreeing_turned", part.num_agreeing_turned}});
+    parts.push_back({{"image_names", part.image_names},
+                     {"num_tracks", part.num_tracks},
+                     {"num_agreeing", part.num_agreeing},
+                     {"scale_factor", FiniteOrNull(part.scale_factor)},
+                     {"is_held", part.is_held},
+                     {"turn_deg", part.turn_deg},
+                     {"num_agreeing_turned", part.num_agreeing_turned}});
   }
   return parts;
 }

@@ -76,8 +76,6 @@ std::string UnreliableSentence(const OutlierFilterSummary& summary) {
 
 namespace {
 
-constexpr size_t kShownSuspects = 5;
-
 std::string RotationSentence(const OutlierFilterSummary& summary) {
   if (!summary.rotation_suspect) return "";
   const RotationSuspect& suspect = *summary.rotation_suspect;
@@ -193,7 +191,7 @@ std::string SuspectTable(const OutlierFilterSummary& summary) {
   if (summary.images.empty()) return "";
   TextTable table;
   table.AddRow({"image", "observations", "removed", "conflicts"});
-  const size_t count = std::min(summary.images.size(), kShownSuspects);
+  const size_t count = std::min<size_t>(summary.images.size(), 5);
   for (size_t n = 0; n < count; ++n) {
     const Suspect& image = summary.images[n];
     table.AddRow({image.name, std::to_string(image.num_observations),
@@ -206,21 +204,16 @@ std::string SuspectTable(const OutlierFilterSummary& summary) {
 }  // namespace
 
 std::string OutlierMethodName(OutlierMethod method) {
-  switch (method) {
-    case OutlierMethod::kConflicts:
-      return "conflicts";
-    case OutlierMethod::kThreshold:
-      return "threshold";
-    case OutlierMethod::kSnooping:
-      break;
-  }
-  return "snooping";
+  using Enum = OutlierMethod;
+  return NameIn<Enum>({{Enum::kSnooping, "snooping"},
+                       {Enum::kConflicts, "conflicts"},
+                       {Enum::kThreshold, "threshold"}},
+                      method);
 }
 
 std::string BracketSentence(const OutlierFilterSummary& summary) {
-  std::string sentence =
-      "removed " + Thousands(static_cast<int64_t>(summary.removed.size())) +
-      " of " + Thousands(summary.num_observations);
+  std::string sentence = "removed " + Thousands(summary.removed.size()) +
+                         " of " + Thousands(summary.num_observations);
   if (summary.conflicts) {
     sentence +=
         "; at least " + Thousands(summary.num_proved) + " must go (" +

@@ -11,34 +11,6 @@
 namespace krot::internal {
 namespace {
 
-const char* PairStateName(PairState state) {
-  switch (state) {
-    case PairState::kKept:
-      return "kept";
-    case PairState::kContradictory:
-      return "contradictory";
-    case PairState::kUndecided:
-      return "undecided";
-    case PairState::kNotChecked:
-      break;
-  }
-  return "not checked";
-}
-
-const char* PoseFaultName(PoseFault fault) {
-  switch (fault) {
-    case PoseFault::kPosition:
-      return "position";
-    case PoseFault::kRotation:
-      return "rotation";
-    case PoseFault::kUnclear:
-      return "unclear";
-    case PoseFault::kNone:
-      break;
-  }
-  return "none";
-}
-
 std::string PercentOf(int64_t part, int64_t of) {
   return of == 0 ? "-"
                  : FormatNumber(100.0 * static_cast<double>(part) /
@@ -111,14 +83,6 @@ std::string GroupTable(const PairCheck& check, size_t max_rows) {
   }
   return "\nGroups of images that agree inside and contradict each other\n" +
          table.ToString();
-}
-
-Json ExplanationJson(const Explanation& explanation, const PairCheck& check) {
-  Json images = Json::array();
-  for (const int32_t i : explanation.images) {
-    images.push_back(check.images[i].name);
-  }
-  return {{"images", images}, {"cost_matches", explanation.cost}};
 }
 
 }  // namespace
@@ -210,71 +174,10 @@ std::string PairTable(const PairCheck& check, int max_rows) {
          WrongPairTable(check, num_rows);
 }
 
-Json PairJson(const PairCheck& check) {
-  Json images = Json::array();
-  for (const CheckedImage& image : check.images) {
-    images.push_back(
-        {{"image_id", image.image_id},
-         {"image_name", image.name},
-         {"num_kept_pairs", image.num_kept},
-         {"num_contradictory_pairs", image.num_contradictory},
-         {"num_undecided_pairs", image.num_undecided},
-         {"kept_matches", image.kept_matches},
-         {"contradictory_matches", image.contradictory_matches},
-         {"is_wrong", image.is_wrong},
-         {"fault", image.is_wrong ? Json(PoseFaultName(image.fault)) : Json()},
-         {"num_matches", image.num_matches},
-         {"num_agreeing_moved", image.num_agreeing_moved},
-         {"num_agreeing_turned", image.num_agreeing_turned},
-         {"moved_by", image.moved_by},
-         {"turned_by_deg", image.turned_by_deg},
-         {"is_rotation_proved_wrong", image.is_rotation_proved_wrong}});
-  }
-  Json pairs = Json::array();
-  for (const CheckedPair& pair : check.pairs) {
-    const bool is_contradictory = pair.state == PairState::kContradictory;
-    pairs.push_back({{"image1", check.images[pair.image1].name},
-                     {"image2", check.images[pair.image2].name},
-                     {"state", PairStateName(pair.state)},
-                     {"num_matches", pair.num_matches},
-                     {"num_agreeing", pair.num_agreeing},
-                     {"median_error_px", std::isfinite(pair.median_error_px)
-                                             ? Json(pair.median_error_px)
-                                             : Json()},
-                     {"num_explained",
-                      is_contradictory ? Json(pair.num_explained) : Json()},
-                     {"most_explained",
-                      is_contradictory ? Json(pair.most_explained) : Json()},
-                     {"has_wrong_matches", pair.has_wrong_matches}});
-  }
-  Json groups = Json::array();
-  for (const std::vector<int32_t>& group : check.groups) {
-    Json names = Json::array();
-    for (const int32_t i : group) names.push_back(check.images[i].name);
-    groups.push_back(names);
-  }
-  return {{"verdict", PairSentence(check)},
-          {"noise_px", check.noise_px},
-          {"tolerance_px", check.tolerance_px},
-          {"num_kept_pairs", check.num_kept},
-          {"num_contradictory_pairs", check.num_contradictory},
-          {"num_undecided_pairs", check.num_undecided},
-          {"num_not_checked_pairs", check.num_not_checked},
-          {"num_without_ray", check.num_without_ray},
-          {"cheapest", ExplanationJson(check.cheapest, check)},
-          {"runner_up",
-           check.runner_up ? ExplanationJson(*check.runner_up, check) : Json()},
-          {"is_cheapest_proved", check.is_cheapest_proved},
-          {"groups", groups},
-          {"images", images},
-          {"pairs", pairs}};
-}
-
 namespace {
 
-// How many matches are shown of a kept pair, and of any other.
-constexpr size_t kMatchesOfKept = 30;
-constexpr size_t kMatchesOfOthers = 100;
+// The longer side of images on the report page, pixels.
+constexpr int kPairViewSide = 480;
 
 class PairView {
  public:
@@ -327,8 +230,7 @@ class PairView {
   }
 
   Json MatchesOf(const VerifiedPair& pair, const CheckedPair& checked) const {
-    const size_t most =
-        checked.state == PairState::kKept ? kMatchesOfKept : kMatchesOfOthers;
+    const size_t most = checked.state == PairState::kKept ? 30 : 100;
     const size_t shown = std::min(most, pair.matches.size());
     const bool is_checked = checked.state != PairState::kNotChecked;
     const Eigen::Vector3d baseline =
@@ -363,6 +265,90 @@ class PairView {
 Json PairViewJson(const Model& model, const Database& database,
                   const PairCheck& check) {
   return PairView(model, database, check).Run();
+}
+
+namespace {
+
+double MeanTrackLength(const TrackReport& report) {
+  return report.num_points == 0 ? 0
+                                : static_cast<double>(report.num_observations) /
+                                      static_cast<double>(report.num_points);
+}
+
+}  // namespace
+
+std::string TrackSentence(const TrackReport& report) {
+  return Thousands(report.num_points) + " points with " +
+         Thousands(report.num_observations) + " observations: tracks of " +
+         FormatNumber(MeanTrackLength(report), 2) +
+         " images, root mean square error " +
+         FormatNumber(report.pixel_error.rms, 3) + " px.";
+}
+
+std::string TrackTable(const TrackReport& report) {
+  const MatchTracksSummary& summary = report.summary;
+  std::string text = TrackSentence(report) + "\n\n";
+  TextTable table;
+  const auto add = [&](const char* what, int64_t count) {
+    table.AddRow({what, Thousands(count)});
+  };
+  add("pairs of images whose matches are used", summary.num_pairs);
+  add("their matches", summary.num_matches);
+  add("of these, that contradict the poses", summary.num_disagreeing);
+  add("tracks that the others join", summary.num_components);
+  add("of these, with an image twice", summary.num_image_twice);
+  add("divided, as no point fits all", summary.num_in_conflict);
+  add("left out, as they are a single match", summary.num_two_views);
+  add("left out, as their rays are too narrow", summary.num_narrow);
+  text += table.ToString();
+  if (summary.num_contradictory_pairs > 0) {
+    text += "\nThe matches of " +
+            Counted(summary.num_contradictory_pairs, "other pair") +
+            " contradict the poses and are not used; krot model_checker "
+            "--database_path\nsays whether images are wrong or matches.\n";
+  }
+  return text + "\n" +
+         RunSentence(report.run,
+                     "triangulated " +
+                         FormatNumber(report.seconds_triangulate, 2) + " s");
+}
+
+Json MatchesJson(const MatchTracksSummary& summary) {
+  return {{"num_pairs", summary.num_pairs},
+          {"num_contradictory_pairs", summary.num_contradictory_pairs},
+          {"num_matches", summary.num_matches},
+          {"num_disagreeing_matches", summary.num_disagreeing},
+          {"num_components", summary.num_components},
+          {"num_image_twice", summary.num_image_twice},
+          {"num_in_conflict", summary.num_in_conflict},
+          {"num_two_views", summary.num_two_views},
+          {"num_narrow", summary.num_narrow}};
+}
+
+std::string MatchesSentence(const MatchTracksSummary& summary) {
+  return "The points come from the matches of " +
+         Counted(summary.num_pairs, "pair") + " of images" +
+         (summary.num_contradictory_pairs > 0
+              ? "; those of " +
+                    Counted(summary.num_contradictory_pairs, "other pair") +
+                    " contradict the positions and are not used"
+              : std::string()) +
+         ".\n";
+}
+
+std::string TrackJson(const TrackReport& report) {
+  Json json = {
+      {"version", report.run.version},
+      {"command", "point_triangulator"},
+      {"verdict", TrackSentence(report)},
+      {"num_points", report.num_points},
+      {"num_observations", report.num_observations},
+      {"mean_track_length", MeanTrackLength(report)},
+      {"pixel_error", ErrorJson(report.pixel_error)},
+  };
+  json.update(MatchesJson(report.summary));
+  return ReportText(json, report.run,
+                    {{"triangulate", report.seconds_triangulate}});
 }
 
 }  // namespace krot::internal

@@ -27,9 +27,6 @@ std::string PairTable(const PairCheck& check, int max_rows);
 // The same as an object for report.json; docs/cli.md lists its keys.
 Json PairJson(const PairCheck& check);
 
-// The longer side of images on the report page, pixels.
-inline constexpr int kPairViewSide = 480;
-
 // What the page draws of the matches. `images` are in the order of the report:
 // their width and height on the page, and jpeg, which is null until a photo is
 // added. `matches` lists up to 100 matches of each pair (of kept pairs 30),

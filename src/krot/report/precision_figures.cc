@@ -1,5 +1,7 @@
 #include "krot/report/precision_figures.h"
 
+#include <cmath>
+#include <optional>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -7,15 +9,12 @@
 #include "krot/analysis/noise.h"
 #include "krot/camera/camera_model.h"
 #include "krot/geometry.h"
+#include "krot/report/report_json.h"
+#include "krot/report/reports.h"
 
 namespace krot::internal {
-namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kHighCorrelation = 0.95;
-
-}  // namespace
 
 PrecisionFigures::PrecisionFigures(const AdjustmentPrecision& precision,
                                    const Model& model)
@@ -100,18 +99,6 @@ Eigen::VectorXd Deviations(const Eigen::MatrixXd& covariance) {
   return covariance.diagonal().cwiseMax(0).cwiseSqrt();
 }
 
-std::vector<Correlation> HighCorrelations(const Eigen::MatrixXd& covariance) {
-  const Eigen::VectorXd sigma = Deviations(covariance);
-  std::vector<Correlation> high;
-  for (Eigen::Index a = 0; a < sigma.size(); ++a) {
-    for (Eigen::Index b = 0; b < a; ++b) {
-      const double value = covariance(a, b) / (sigma[a] * sigma[b]);
-      if (std::abs(value) > kHighCorrelation) high.push_back({b, a, value});
-    }
-  }
-  return high;
-}
-
 std::vector<std::string> ParamNames(int model_id) {
   std::istringstream names(std::string(FindCameraModel(model_id)->param_names));
   std::vector<std::string> list;
@@ -119,6 +106,125 @@ std::vector<std::string> ParamNames(int model_id) {
     list.push_back(name);
   }
   return list;
+}
+
+namespace {
+
+std::string DatumName(AdjustmentDatum datum) {
+  using Enum = AdjustmentDatum;
+  return NameIn<Enum>({{Enum::kCameras, "cameras"},
+                       {Enum::kPoints, "points"},
+                       {Enum::kFirstCamera, "first_camera"}},
+                      datum);
+}
+
+Json NumbersJson(const Eigen::VectorXd& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(FiniteOrNull(value));
+  return list;
+}
+
+// The rows of a matrix; null if it is not known.
+template <typename Matrix>
+Json CovarianceJson(const std::optional<Matrix>& covariance) {
+  if (!covariance) return nullptr;
+  Json rows = Json::array();
+  for (Eigen::Index r = 0; r < covariance->rows(); ++r) {
+    rows.push_back(NumbersJson(covariance->row(r)));
+  }
+  return rows;
+}
+
+Json ObservationsJson(const std::vector<NamedObservation>& observations,
+                      double sigma0_px) {
+  Json list = Json::array();
+  for (const NamedObservation& o : observations) {
+    list.push_back({{"image_id", o.image->id},
+                    {"image_name", o.image->name},
+                    {"point2D_idx", o.point2D_idx},
+                    {"point3D_id", o.point3D_id},
+                    {"residual", NumbersJson(o.precision->residual_px)},
+                    {"error", o.error_px},
+                    {"redundancy", NumbersJson(o.precision->redundancy)},
+                    {"w", FiniteOrNull(o.w)},
+                    {"smallest_detectable_error",
+                     FiniteOrNull(o.DetectablePx(sigma0_px))}});
+  }
+  return list;
+}
+
+}  // namespace
+
+nlohmann::ordered_json SurveyJson(const std::optional<SurveyComparison>& survey,
+                                  bool are_points) {
+  if (!survey) return nullptr;
+  Json places = Json::array();
+  for (const SurveyComparison::Place& place : survey->places) {
+    Json json = are_points ? Json{{"point3D_id", place.point3D_id}}
+                           : Json{{"name", place.name}};
+    json["surveyed"] = VectorJson(place.surveyed);
+    json["difference"] = VectorJson(place.difference);
+    if (!are_points) json["deviations"] = place.deviations;
+    places.push_back(std::move(json));
+  }
+  return {{"scale", survey->scale}, {"rms", survey->rms}, {"points", places}};
+}
+
+nlohmann::ordered_json PrecisionJson(const AdjustmentPrecision& precision,
+                                     const Model& model) {
+  const PrecisionFigures figures(precision, model);
+  Json cameras = Json::array(), images = Json::array(), rays = Json::object(),
+       angles = Json::array();
+  for (const CameraPrecision& one : precision.cameras) {
+    const Camera& camera = model.cameras[one.camera];
+    Json names = Json::array(), values = Json::array();
+    for (const int n : one.params) {
+      names.push_back(ParamNames(camera.model_id)[n]);
+      values.push_back(camera.params[n]);
+    }
+    cameras.push_back({{"camera_id", camera.id},
+                       {"params", names},
+                       {"values", values},
+                       {"covariance", CovarianceJson(one.covariance)}});
+  }
+  for (const ImagePrecision& one : precision.images) {
+    images.push_back({{"image_id", model.images[one.image].id},
+                      {"name", model.images[one.image].name},
+                      {"num_observations", one.num_observations},
+                      {"rms", NumbersJson(one.rms_px)},
+                      {"max", one.max_px},
+                      {"covariance", CovarianceJson(one.covariance)}});
+  }
+  for (const auto& [num_rays, num_points] : figures.num_with_rays) {
+    rays[std::to_string(num_rays)] = num_points;
+  }
+  for (const PointPrecision& point : figures.SmallestAngles()) {
+    angles.push_back({{"point3D_id", model.points3D[point.point].id},
+                      {"num_rays", point.num_rays},
+                      {"angle_deg", point.angle_deg}});
+  }
+  return {
+      {"is_least_squares", precision.is_least_squares},
+      {"datum", DatumName(precision.datum)},
+      {"num_unknowns", precision.num_unknowns},
+      {"datum_defect", precision.datum_defect},
+      {"num_undetermined", precision.num_undetermined},
+      {"redundancy", precision.redundancy},
+      {"sigma0", FiniteOrNull(precision.sigma0_px)},
+      {"cameras", cameras},
+      {"images", images},
+      {"rays", rays},
+      {"mean_angle_deg", figures.mean_angle_deg},
+      {"smallest_angles", angles},
+      {"points_sigma_rms", NumbersJson(figures.RmsSigma())},
+      {"median_smallest_detectable_error",
+       FiniteOrNull(figures.MedianDetectablePx())},
+      {"num_uncontrolled", figures.num_uncontrolled},
+      {"critical_w", FiniteOrNull(figures.critical_w)},
+      {"num_above", figures.num_above},
+      {"largest_residuals",
+       ObservationsJson(figures.LargestResiduals(), precision.sigma0_px)},
+      {"largest_w", ObservationsJson(figures.LargestW(), precision.sigma0_px)}};
 }
 
 }  // namespace krot::internal

@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "krot/adjust/precision.h"
+#include "krot/adjust/bundle_adjustment.h"
 #include "krot/base/numbers.h"
 #include "krot/model.h"
 
@@ -70,15 +70,8 @@ struct PrecisionFigures {
   const AdjustmentPrecision& precision_;
 };
 
-struct Correlation {
-  Eigen::Index a, b;
-  double value;
-};
-
 // The standard deviations: square roots of the diagonal.
 Eigen::VectorXd Deviations(const Eigen::MatrixXd& covariance);
-// The correlations whose absolute value is above 0.95.
-std::vector<Correlation> HighCorrelations(const Eigen::MatrixXd& covariance);
 
 // The names of a camera model's parameters: "f", "cx", "cy", "k".
 std::vector<std::string> ParamNames(int model_id);

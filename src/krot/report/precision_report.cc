@@ -50,13 +50,19 @@ std::string ValiditySentence(const AdjustModelSummary& summary) {
   return "";
 }
 
+// The correlations whose absolute value is above 0.95.
 template <typename NameOf>
 std::string CorrelationWords(const Eigen::MatrixXd& covariance,
                              const NameOf& name_of) {
+  const Eigen::VectorXd sigma = Deviations(covariance);
   std::string words;
-  for (const Correlation& one : HighCorrelations(covariance)) {
-    words += (words.empty() ? "" : ", ") + name_of(one.a) + "-" +
-             name_of(one.b) + " " + FormatNumber(100 * one.value, 1) + " %";
+  for (Eigen::Index a = 0; a < sigma.size(); ++a) {
+    for (Eigen::Index b = 0; b < a; ++b) {
+      const double value = covariance(a, b) / (sigma[a] * sigma[b]);
+      if (!(std::abs(value) > 0.95)) continue;
+      words += (words.empty() ? "" : ", ") + name_of(b) + "-" + name_of(a) +
+               " " + FormatNumber(100 * value, 1) + " %";
+    }
   }
   return words;
 }

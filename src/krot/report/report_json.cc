@@ -8,10 +8,6 @@ Json FiniteOrNull(double value) {
   return std::isfinite(value) ? Json(value) : Json();
 }
 
-Json NumberOrNull(const std::optional<double>& value) {
-  return value ? Json(*value) : Json();
-}
-
 Json VectorJson(const Eigen::Vector3d& vector) {
   return {vector.x(), vector.y(), vector.z()};
 }

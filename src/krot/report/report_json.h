@@ -1,7 +1,9 @@
 #pragma once
 
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -20,7 +22,20 @@ namespace krot::internal {
 // What the JSON writers share; only .cc files of this folder use this header.
 using Json = nlohmann::ordered_json;
 
-Json NumberOrNull(const std::optional<double>& value);
+// The name of an enum's value; the first one's for values that are not listed.
+template <typename Enum>
+const char* NameIn(std::initializer_list<std::pair<Enum, const char*>> names,
+                   Enum value) {
+  for (const auto& [one, name] : names) {
+    if (one == value) return name;
+  }
+  return names.begin()->second;
+}
+
+template <typename Number>
+Json NumberOrNull(const std::optional<Number>& value) {
+  return value ? Json(*value) : Json();
+}
 // Null for infinity and NaN.
 Json FiniteOrNull(double value);
 

@@ -141,9 +141,6 @@ struct ComparisonReport {
   std::optional<CertificateVerdict> certificate2;
 };
 
-// "frame", "similarity" or "none".
-std::string AlignmentName(AlignmentKind kind);
-
 // For the terminal; the `max_rows` worst images, points and support
 // observations.
 std::string ComparisonTable(const ComparisonReport& report, int max_rows);
@@ -191,7 +188,7 @@ struct ModelReport {
   // Tracks that hold two or more observations of one image.
   int64_t num_tracks_with_repeated_image = 0;
   DepthStatistics depth;
-  TriangulationAngleStatistics triangulation_angle;
+  ValueRange triangulation_angle_deg;
   std::optional<DistanceReport> distances;
 };
 
@@ -332,10 +329,6 @@ std::string MethodName(SolveMethod method);
 
 // The value that --Solver.norm takes: "1", "2", "inf", "1.5".
 std::string NormName(Norm norm);
-
-// The errors before, after and, if there was such a step, after the polish,
-// with a sentence about that.
-std::string SolveErrorTable(const SolveSummary& summary);
 
 // What one run of `krot tolerance_analyzer` found.
 struct ToleranceReport {

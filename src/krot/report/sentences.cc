@@ -51,7 +51,7 @@ std::string LooseImagesSentence(const std::vector<LooseImage>& images) {
 
 std::string RunawaysSentence(const std::vector<LooseImage>& images) {
   if (images.empty()) return "";
-  return Counted(static_cast<int64_t>(images.size()), "image") +
+  return Counted(images.size(), "image") +
          " moved farther than cameras are from one another or from what they "
          "see: " +
          FirstFew(images, &NameOf) + ".\n";
@@ -185,8 +185,8 @@ std::string CollapseLines(const Collapse& collapse) {
   const auto add = [&](const std::vector<Point3DId>& points,
                        const std::string& where) {
     if (points.empty()) return;
-    text += Counted(static_cast<int64_t>(points.size()), "point") +
-            " came to lie " + where + ": " + PointList(points) + ".\n";
+    text += Counted(points.size(), "point") + " came to lie " + where + ": " +
+            PointList(points) + ".\n";
   };
   add(collapse.in_camera, "in a camera, where any observation of it fits");
   add(collapse.at_infinity, "at infinity, as their rays are parallel");
@@ -254,8 +254,6 @@ std::vector<std::string> PoseSentences(const PoseChecks& poses) {
 
 std::string RotationsSentence(const std::string& path,
                               const RotationInput& input) {
-  // Far more than the error of a noisy sensor.
-  constexpr double kLargeDeg = 10;
   const ReplacedRotations& replaced = input.replaced;
   std::string line =
       path + ": the rotations of " + Counted(replaced.num_frames, "frame");
@@ -275,7 +273,8 @@ std::string RotationsSentence(const std::string& path,
     return "warning: " + line +
            ". The list is probably written otherwise: " + replaced.mistake;
   }
-  if (replaced.is_comparable && replaced.median_turn_deg > kLargeDeg) {
+  // Ten degrees are far more than the error of a noisy sensor.
+  if (replaced.is_comparable && replaced.median_turn_deg > 10) {
     return "warning: " + line +
            ". So large a turn is right only where the model's own rotations "
            "are worthless";

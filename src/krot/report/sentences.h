@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "krot/analysis/collapse.h"
+#include "krot/analysis/model_comparison.h"
 #include "krot/analysis/model_input.h"
 #include "krot/base/context.h"
 #include "krot/model/model_checks.h"

@@ -95,15 +95,11 @@ std::string GivenBackSentence(const SolveSummary& summary) {
 }
 
 std::string MethodName(SolveMethod method) {
-  switch (method) {
-    case SolveMethod::kResInt:
-      return "res_int";
-    case SolveMethod::kJoint:
-      return "joint";
-    case SolveMethod::kAuto:
-      break;
-  }
-  return "auto";
+  using Enum = SolveMethod;
+  return NameIn<Enum>({{Enum::kAuto, "auto"},
+                       {Enum::kResInt, "res_int"},
+                       {Enum::kJoint, "joint"}},
+                      method);
 }
 
 std::string NormName(Norm norm) {
@@ -116,35 +112,21 @@ std::string NormName(Norm norm) {
 namespace {
 
 const char* TerminationName(SolveTermination termination) {
-  switch (termination) {
-    case SolveTermination::kGapReached:
-      return "gap_reached";
-    case SolveTermination::kZeroCost:
-      return "zero_cost";
-    case SolveTermination::kStalled:
-      return "stalled";
-    case SolveTermination::kUnproved:
-      return "unproved";
-    case SolveTermination::kMaxSweeps:
-      return "max_sweeps";
-    case SolveTermination::kMaxIterations:
-      return "max_iterations";
-    case SolveTermination::kInfeasible:
-      return "infeasible";
-    case SolveTermination::kNoStart:
-      return "no_start";
-    case SolveTermination::kInterrupted:
-      return "interrupted";
-    case SolveTermination::kNothingToSolve:
-      return "nothing_to_solve";
-    case SolveTermination::kWithinBound:
-      return "within_bound";
-    case SolveTermination::kCollapsed:
-      return "collapsed";
-    case SolveTermination::kNotRun:
-      break;
-  }
-  return "not_run";
+  using Enum = SolveTermination;
+  return NameIn<Enum>({{Enum::kNotRun, "not_run"},
+                       {Enum::kGapReached, "gap_reached"},
+                       {Enum::kZeroCost, "zero_cost"},
+                       {Enum::kStalled, "stalled"},
+                       {Enum::kUnproved, "unproved"},
+                       {Enum::kMaxSweeps, "max_sweeps"},
+                       {Enum::kMaxIterations, "max_iterations"},
+                       {Enum::kInfeasible, "infeasible"},
+                       {Enum::kNoStart, "no_start"},
+                       {Enum::kInterrupted, "interrupted"},
+                       {Enum::kNothingToSolve, "nothing_to_solve"},
+                       {Enum::kWithinBound, "within_bound"},
+                       {Enum::kCollapsed, "collapsed"}},
+                      termination);
 }
 
 // The largest error of observations that were left out because their track has
@@ -231,20 +213,14 @@ Json PolishJson(const std::optional<PolishSummary>& polish) {
 }
 
 const char* FinishTerminationName(InteriorPointTermination termination) {
-  switch (termination) {
-    case InteriorPointTermination::kConverged:
-      return "converged";
-    case InteriorPointTermination::kMaxIterations:
-      return "max_iterations";
-    case InteriorPointTermination::kNoProgress:
-      return "no_progress";
-    case InteriorPointTermination::kSingular:
-      return "singular";
-    case InteriorPointTermination::kInterrupted:
-      return "interrupted";
-    default:
-      return "not_run";
-  }
+  using Enum = InteriorPointTermination;
+  return NameIn<Enum>({{Enum::kNotRun, "not_run"},
+                       {Enum::kConverged, "converged"},
+                       {Enum::kMaxIterations, "max_iterations"},
+                       {Enum::kNoProgress, "no_progress"},
+                       {Enum::kSingular, "singular"},
+                       {Enum::kInterrupted, "interrupted"}},
+                      termination);
 }
 
 Json FinishJson(const std::optional<FinishSummary>& finish) {
@@ -307,9 +283,7 @@ std::string SolveJson(const SolveReport& report) {
       {"num_images", summary.num_images},
       {"num_points", summary.num_points},
       {"num_observations", summary.num_observations},
-      {"working_observations", summary.num_working_observations
-                                   ? Json(*summary.num_working_observations)
-                                   : Json()},
+      {"working_observations", NumberOrNull(summary.num_working_observations)},
       {"left_out", left_out},
       {"same_image",
        {{"num_tracks", summary.num_same_image_tracks},

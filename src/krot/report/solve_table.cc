@@ -30,8 +30,8 @@ void AddCost(const SolveSummary& summary, TextTable* table) {
                  FormatNumber(summary.cost_final, 4)});
 }
 
-}  // namespace
-
+// The errors before, after and, if there was such a step, after the polish,
+// with a sentence about that.
 std::string SolveErrorTable(const SolveSummary& summary) {
   std::vector<std::string> head = {"", "before", "after"};
   std::vector<PixelErrorStatistics> estimates = {summary.pixel_error_before,
@@ -46,14 +46,6 @@ std::string SolveErrorTable(const SolveSummary& summary) {
   AddCost(summary, &table);
   return table.ToString() + PolishSentence(summary);
 }
-
-namespace {
-
-// How many observations of the support the terminal shows.
-constexpr int kListedSupport = 10;
-// The gap of the rows is worth mentioning if it is below this share of the true
-// gap.
-constexpr double kNoticeablySmaller = 0.5;
 
 // For example "no translations and points bring all errors below 3.4201 px".
 // Requires a proved bound.
@@ -76,7 +68,7 @@ std::string BoundWords(const SolveSummary& summary) {
 std::string LinearGapSentence(const SolveSummary& summary) {
   const std::optional<double> linear_gap = LinearRelativeGap(summary);
   if (summary.termination == SolveTermination::kGapReached || !linear_gap ||
-      *linear_gap > kNoticeablySmaller * *summary.relative_gap) {
+      *linear_gap > 0.5 * *summary.relative_gap) {
     return "";
   }
   return " With every error linearised at this estimate the gap is " +
@@ -124,8 +116,7 @@ std::string WorkingSetWords(const SolveSummary& summary) {
 // For example " after 2 rounds, 12 joint iterations on 3 % of the observations
 // and 4 sweeps".
 std::string StepsWords(const SolveSummary& summary) {
-  const std::string sweeps =
-      Counted(static_cast<int64_t>(summary.sweeps.size()), "sweep");
+  const std::string sweeps = Counted(summary.sweeps.size(), "sweep");
   const auto num_starting = std::count_if(
       summary.iterations.begin(), summary.iterations.end(),
       [](const JointIteration& state) { return state.target.has_value(); });
@@ -324,8 +315,8 @@ std::string SolveTable(const SolveReport& report) {
        << SolveEndSentence(summary) << '\n'
        << VerdictSentence(summary) << '\n';
   if (summary.is_certified) {
-    text << SupportTable(summary.support, kListedSupport)
-         << PositionsTable(summary.support_positions, kListedSupport);
+    text << SupportTable(summary.support, 10)
+         << PositionsTable(summary.support_positions, 10);
   }
   if (report.distances) {
     text << DistanceTable(*report.distances, {"before", "after"});

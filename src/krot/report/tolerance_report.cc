@@ -14,7 +14,6 @@ namespace krot::internal {
 namespace {
 
 constexpr const char* kAxes[] = {"x", "y", "z"};
-constexpr int kMaxDecimals = 12;
 
 // The number of decimals that shows three digits of the narrowest interval.
 int DecimalsFor(const std::vector<ToleranceBox>& boxes) {
@@ -28,7 +27,7 @@ int DecimalsFor(const std::vector<ToleranceBox>& boxes) {
   }
   if (narrowest == 0) return 6;
   return std::clamp(2 - static_cast<int>(std::floor(std::log10(narrowest))), 0,
-                    kMaxDecimals);
+                    12);
 }
 
 std::string EndText(const BoxEnd& end, int decimals) {
@@ -62,19 +61,13 @@ std::vector<ToleranceBox> Listed(std::vector<ToleranceBox> boxes,
 }
 
 const char* ToleranceTerminationName(ToleranceTermination termination) {
-  switch (termination) {
-    case ToleranceTermination::kNotRun:
-      return "not_run";
-    case ToleranceTermination::kNothingToSolve:
-      return "nothing_to_solve";
-    case ToleranceTermination::kNoEstimate:
-      return "no_estimate";
-    case ToleranceTermination::kDone:
-      return "done";
-    case ToleranceTermination::kInterrupted:
-      return "interrupted";
-  }
-  return "";
+  using Enum = ToleranceTermination;
+  return NameIn<Enum>({{Enum::kNotRun, "not_run"},
+                       {Enum::kNothingToSolve, "nothing_to_solve"},
+                       {Enum::kNoEstimate, "no_estimate"},
+                       {Enum::kDone, "done"},
+                       {Enum::kInterrupted, "interrupted"}},
+                      termination);
 }
 
 std::string GaugeSentence(const ToleranceSummary& summary) {
@@ -140,9 +133,9 @@ Json LengthsJson(const std::vector<ToleranceLength>& lengths) {
 std::string LengthText(std::optional<double> length, int outwards = 0) {
   if (!length) return "-";
   if (outwards != 0 && *length > 0) {
-    constexpr double kSame = 1e-9;  // units of the last digit
+    // Ends that differ by 1e-9 of the last digit are the same.
     const double unit = std::pow(10, std::floor(std::log10(*length)) - 5);
-    length = unit * outwards * std::ceil(outwards * *length / unit - kSame);
+    length = unit * outwards * std::ceil(outwards * *length / unit - 1e-9);
   }
   std::ostringstream text;
   text << std::setprecision(6) << *length;

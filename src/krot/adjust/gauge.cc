@@ -6,6 +6,7 @@
 #include <Eigen/LU>
 
 #include "krot/adjust/precision_system.h"
+#include "krot/base/numbers.h"
 #include "krot/geometry.h"
 #include "krot/geometry/transform.h"
 
@@ -31,8 +32,7 @@ class Motion {
          const AdjustmentComponent& component)
       : columns_(columns), blocks_(blocks), component_(component) {
     for (const size_t f : component.frames) {
-      centers_.push_back(Center(
-          {RotationOf(blocks.frames[f]), TranslationOf(blocks.frames[f])}));
+      centers_.push_back(CenterOf(blocks.frames[f]));
       origin_ += centers_.back() / static_cast<double>(component.frames.size());
     }
     double sum = 0;
@@ -76,10 +76,7 @@ class Motion {
     }
     for (const size_t s : component_.sensors) {
       const AdjustmentColumns::Pose& pose = columns_.sensors[s];
-      const PoseBlock& sensor = blocks_.sensors[s];
-      visit(pose.center,
-            OfBaseline(Center({RotationOf(sensor), TranslationOf(sensor)})),
-            true);
+      visit(pose.center, OfBaseline(CenterOf(blocks_.sensors[s])), true);
     }
   }
 
@@ -245,6 +242,142 @@ std::vector<ComponentGauge> FindGauges(const BundleAdjustmentOptions& options,
     if (gauge.size() > 0) gauges.push_back(std::move(gauge));
   }
   return gauges;
+}
+
+namespace {
+
+struct CenterStatistics {
+  Vector3d centroid = Vector3d::Zero();
+  double rms = 0;  // distance to the centroid
+};
+
+CenterStatistics Summarize(const std::vector<PoseBlock>& frames,
+                           const std::vector<size_t>& indices) {
+  CenterStatistics statistics;
+  const double count = static_cast<double>(indices.size());
+  for (const size_t f : indices) {
+    statistics.centroid += CenterOf(frames[f]) / count;
+  }
+  for (const size_t f : indices) {
+    statistics.rms +=
+        (CenterOf(frames[f]) - statistics.centroid).squaredNorm() / count;
+  }
+  statistics.rms = std::sqrt(statistics.rms);
+  return statistics;
+}
+
+// The rotation nearest to the sum of R_before^T R_after; the identity if
+// several are.
+Matrix3d MeanRotation(const std::vector<PoseBlock>& before,
+                      const std::vector<PoseBlock>& after,
+                      const std::vector<size_t>& indices) {
+  Matrix3d sum = Matrix3d::Zero();
+  for (const size_t f : indices) {
+    sum += RotationOf(before[f]).transpose() * RotationOf(after[f]);
+  }
+  return NearestRotation(sum).value_or(Matrix3d::Identity());
+}
+
+// For each frame the typical distance of the points that it sees.
+std::vector<double> TypicalDistances(
+    const AdjustmentBlocks& blocks,
+    const std::vector<AdjustmentObservation>& of) {
+  std::vector<double> distances;
+  std::vector<int32_t> frame_of;
+  for (const AdjustmentObservation& observation : of) {
+    distances.push_back((blocks.points[observation.point] -
+                         CenterOf(blocks.frames[observation.frame]))
+                            .norm());
+    frame_of.push_back(observation.frame);
+  }
+  return GroupMedians(distances, frame_of,
+                      static_cast<int32_t>(blocks.frames.size()), {});
+}
+
+// The frames of a component that keep their place among the others, once the
+// world has turned.
+std::vector<size_t> HeldFrames(const AdjustmentBlocks& before,
+                               const AdjustmentBlocks& after,
+                               const std::vector<double>& distances_before,
+                               const std::vector<double>& distances_after,
+                               const AdjustmentComponent& component,
+                               const Matrix3d& rotation) {
+  std::vector<CameraMove> cameras;
+  for (const size_t f : component.frames) {
+    cameras.push_back({CenterOf(before.frames[f]),
+                       rotation * CenterOf(after.frames[f]),
+                       distances_before[f], distances_after[f]});
+  }
+  const std::vector<char> keeps =
+      FindConsensus(cameras, !component.has_fixed_scale);
+  std::vector<size_t> held;
+  for (size_t n = 0; n < keeps.size(); ++n) {
+    if (keeps[n] != 0) held.push_back(component.frames[n]);
+  }
+  return held;
+}
+
+// Moves the frame's centre to `center`, and turns the frame with the world
+// unless `keep_rotation`.
+void MoveFrame(const Vector3d& center, const Matrix3d& world_rotation,
+               bool keep_rotation, PoseBlock* frame) {
+  Pose pose = ToPose(*frame);
+  if (!keep_rotation) {
+    pose.quaternion_wxyz = ToWxyz(
+        Eigen::Quaterniond(RotationOf(*frame) * world_rotation.transpose()));
+  }
+  pose.translation = -(pose.Rotation() * center);
+  const PoseBlock moved = ToBlock(pose);
+  std::copy(moved.begin() + (keep_rotation ? 4 : 0), moved.end(),
+            frame->begin() + (keep_rotation ? 4 : 0));
+}
+
+}  // namespace
+
+void RestoreSimilarity(const BundleAdjustmentOptions& options,
+                       const AdjustmentBlocks& before,
+                       AdjustmentBlocks* after) {
+  if (!options.refine_rig_from_world || !options.refine_points3D) return;
+  const bool keep_rotation = options.constant_rig_from_world_rotation;
+  const std::vector<double> distances_before =
+      TypicalDistances(before, before.observations);
+  const std::vector<double> distances_after =
+      TypicalDistances(*after, before.observations);
+  for (const AdjustmentComponent& component :
+       FindComponents(before, options.refine_sensor_from_rig)) {
+    if (component.is_held) continue;
+    const auto rotation_of =
+        [&](const std::vector<size_t>& frames) -> Matrix3d {
+      return keep_rotation ? Matrix3d::Identity()
+                           : MeanRotation(before.frames, after->frames, frames);
+    };
+    const std::vector<size_t> held =
+        HeldFrames(before, *after, distances_before, distances_after, component,
+                   rotation_of(component.frames));
+    const CenterStatistics old_centers = Summarize(before.frames, held);
+    const CenterStatistics new_centers = Summarize(after->frames, held);
+    // Applies to coordinates relative to the new centroid.
+    Similarity similarity;
+    similarity.translation = old_centers.centroid;
+    if (!component.has_fixed_scale && old_centers.rms > 0 &&
+        new_centers.rms > 0) {
+      similarity.scale = old_centers.rms / new_centers.rms;
+    }
+    similarity.rotation = rotation_of(held);
+    const auto move = [&](const Vector3d& x) -> Vector3d {
+      return similarity * (x - new_centers.centroid);
+    };
+    for (const size_t f : component.frames) {
+      MoveFrame(move(CenterOf(after->frames[f])), similarity.rotation,
+                keep_rotation, &after->frames[f]);
+    }
+    for (const size_t s : component.sensors) {
+      Eigen::Map<Vector3d>(after->sensors[s].data() + 4) *= similarity.scale;
+    }
+    for (const size_t k : component.points) {
+      after->points[k] = move(after->points[k]);
+    }
+  }
 }
 
 }  // namespace krot::internal
