@@ -14,7 +14,7 @@ import sys
 # (std::invalid_argument, CheckArgument) has one form for all.
 SPEAKER = re.compile(
     r"\b(?:ModelError|WriteError|OptionError|CommandError|Error|Fail\w*|fail|"
-    r"Refuse)(?:\s+\w+)?\(|\brefusal\s*=")
+    r"Refuse|refused)(?:\s+\w+)?\(|\brefusal\s*=")
 RETURNED = re.compile(r"\breturn\b")
 # Whose functions return why they refuse.
 RETURNING = re.compile(r"verify/certificate_(check|input)\.cc$|verdict\.cc$")

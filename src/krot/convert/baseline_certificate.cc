@@ -249,8 +249,11 @@ BaselineCertificate ParseBaselines(const std::string& text,
 
 BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                                 const BaselineCertificate& certificate) {
+  const auto refused = [](const std::string& refusal) {
+    return BaselineVerdict{false, refusal};
+  };
   if (!(certificate.tolerance_px > 0)) {
-    return {false, "its tolerance_px is no positive number"};
+    return refused("its tolerance_px is no positive number");
   }
   const std::vector<ImageGeometry> geometries = ImageGeometries(model);
   std::map<std::pair<ImageId, ImageId>, const VerifiedPair*> pairs;
@@ -267,13 +270,13 @@ BaselineVerdict VerifyBaselines(const Model& model, const Database& database,
                              std::to_string(pair.image_id2);
     const auto found = pairs.find({pair.image_id1, pair.image_id2});
     if (found == pairs.end()) {
-      return {false,
-              "model and database have not " + name + ", or it is there twice"};
+      return refused("model and database have not " + name +
+                     ", or it is there twice");
     }
     const std::string refusal =
         RefusePair(ConditionsOf(model, geometries, database, *found->second),
                    certificate.tolerance_px, pair);
-    if (!refusal.empty()) return {false, name + ": " + refusal};
+    if (!refusal.empty()) return refused(name + ": " + refusal);
     pairs.erase(found);
   }
   return {true, ""};
