@@ -9,8 +9,10 @@
 #include "krot/base/context.h"
 #include "krot/conic/interior_point.h"
 #include "krot/math/norm.h"
+#include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"
 #include "krot/proof/certificate.h"
+#include "krot/solve.h"
 #include "krot/verify/certificate_check.h"
 
 namespace krot::internal {
@@ -88,19 +90,23 @@ struct JointOptions {
   double sufficient_cost = 0;        // stops once it is reached, pixels; >= 0
   JointCallback callback;            // counts over all components; may be empty
   Checkpoint* checkpoint = nullptr;  // of working sets; may be null
-};
 
-enum class JointTermination {
-  kNotRun,
-  // Certified, or a cost that is zero up to rounding, or sufficient.
-  kGapReached,
-  kMaxIterations,
-  kStalled,  // rounding ended the progress before the gap was reached
-  kInterrupted,
+  // Whether a cost, pixels, is low enough without a proof, and whether it is
+  // with one of `lower_bound`.
+  bool IsLowEnough(double cost_px) const {
+    return cost_px <= sufficient_cost || IsZeroUpToRounding(cost_px);
+  }
+  bool IsGapReached(double cost_px, double lower_bound) const {
+    return cost_px - lower_bound <= relative_gap * cost_px ||
+           IsLowEnough(cost_px);
+  }
 };
 
 struct JointSummary {
-  JointTermination termination = JointTermination::kNotRun;
+  // kGapReached: certified, or a cost that is zero up to rounding, or
+  // sufficient. kStalled: rounding ended the progress before. Otherwise
+  // kMaxIterations or kInterrupted.
+  SolveTermination termination = SolveTermination::kNotRun;
   double cost_initial = 0;  // pixels
   double cost_final = 0;    // <= cost_initial
   // The highest certified bound of any component: also one of the whole.
@@ -172,17 +178,12 @@ struct InitializerOptions {
   JointCallback callback;    // counts over all components; may be empty
 };
 
-enum class InitializerTermination {
-  kNotRun,
-  kFeasible,    // every depth is positive, every residual below max_error
-  kInfeasible,  // proved: no estimate does that
-  kFailed,      // neither was shown: no estimate was found at any bound
-  kInterrupted,
-};
-
 struct InitializerSummary {
-  InitializerTermination termination = InitializerTermination::kNotRun;
-  double cost = 0;  // pixels, of the estimate if feasible
+  // kWithinBound: every depth is positive, every residual below max_error;
+  // kInfeasible: proved, no estimate does that; kNoStart: neither was shown, no
+  // estimate was found at any bound; kInterrupted.
+  SolveTermination termination = SolveTermination::kNotRun;
+  double cost = 0;  // pixels, of the estimate within the bound
   std::vector<JointIteration> iterations;
   // kInfeasible: proves lower_bound > max_error.
   std::optional<Certificate> certificate;

@@ -50,7 +50,7 @@ bool HaveStart(const KnownRotationProblem& problem, const ErrorBound& bound,
   const InitializerSummary summary =
       FindStart(problem, options, context, start);
   Add(problem, summary.iterations, work);
-  return summary.termination == InitializerTermination::kFeasible;
+  return summary.termination == SolveTermination::kWithinBound;
 }
 
 }  // namespace

@@ -29,10 +29,8 @@ Neighbourhoods::Neighbourhoods(const KnownRotationProblem& problem,
       estimate_(estimate),
       points_of_frame_(problem.num_frames) {
   for (int32_t f = 0; f < problem_.num_frames; ++f) {
-    for (int64_t n = problem_.frame_begin[f]; n < problem_.frame_begin[f + 1];
-         ++n) {
-      const int32_t k =
-          problem_.observations[problem_.frame_observations[n]].point;
+    for (const int32_t i : problem_.OfFrame(f)) {
+      const int32_t k = problem_.observations[i].point;
       std::vector<int32_t>& points = points_of_frame_[f];
       if (points.empty() || points.back() != k) points.push_back(k);
     }
@@ -75,11 +73,10 @@ void Neighbourhoods::AddStrained(int32_t a, int32_t b,
   for (const int32_t k : common) {
     int64_t in_a = -1;
     int64_t in_b = -1;
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem_.OfPoint(k)) {
       if (!is_free[i]) continue;
-      if (FrameOf(i) == a) in_a = i;
-      if (FrameOf(i) == b) in_b = i;
+      if (problem_.FrameOf(i) == a) in_a = i;
+      if (problem_.FrameOf(i) == b) in_b = i;
     }
     if (in_a >= 0 && in_b >= 0) strained.emplace_back(-Strain(in_a, in_b), k);
   }
@@ -94,7 +91,7 @@ void Neighbourhoods::AddStrained(int32_t a, int32_t b,
 std::vector<int64_t> Neighbourhoods::Around(
     int64_t i, std::vector<int32_t> frames,
     const std::vector<char>& is_free) const {
-  frames.push_back(FrameOf(i));
+  frames.push_back(problem_.FrameOf(i));
   std::sort(frames.begin(), frames.end());
   frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
   std::vector<int32_t> points = {problem_.observations[i].point};
@@ -106,10 +103,9 @@ std::vector<int64_t> Neighbourhoods::Around(
   points.erase(std::unique(points.begin(), points.end()), points.end());
   std::vector<int64_t> observations;
   for (const int32_t k : points) {
-    for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
-         ++j) {
+    for (const int64_t j : problem_.OfPoint(k)) {
       const bool is_there =
-          std::binary_search(frames.begin(), frames.end(), FrameOf(j));
+          std::binary_search(frames.begin(), frames.end(), problem_.FrameOf(j));
       if (j == i || (is_free[j] && is_there)) observations.push_back(j);
     }
   }
@@ -120,9 +116,8 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
     int64_t i, int num_others, const std::vector<char>& is_free) const {
   const int32_t k = problem_.observations[i].point;
   std::vector<std::pair<double, int32_t>> strained;  // -strain, frame
-  for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
-       ++j) {
-    if (is_free[j] && j != i) strained.emplace_back(-Strain(i, j), FrameOf(j));
+  for (const int64_t j : problem_.OfPoint(k)) {
+    if (is_free[j] && j != i) strained.emplace_back(-Strain(i, j), problem_.FrameOf(j));
   }
   std::sort(strained.begin(), strained.end());
   std::vector<int32_t> others;

@@ -48,9 +48,6 @@ class Packing {
   ConflictPacking Run();
 
  private:
-  int32_t FrameOf(int64_t i) const {
-    return problem_.views[problem_.observations[i].view].frame;
-  }
   bool FitsIn(int64_t i, const std::vector<int32_t>& frames) const;
   std::optional<Conflict> Refute(int64_t i, const std::vector<int64_t>& near,
                                  Work* work) const;
@@ -100,11 +97,10 @@ class Packing {
 bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
   const int32_t k = problem_.observations[i].point;
   std::vector<int64_t> observations;
-  for (int64_t j = problem_.point_begin[k]; j < problem_.point_begin[k + 1];
-       ++j) {
+  for (const int64_t j : problem_.OfPoint(k)) {
     const bool is_there =
-        std::find(frames.begin(), frames.end(), FrameOf(j)) != frames.end() ||
-        FrameOf(j) == FrameOf(i);
+        std::find(frames.begin(), frames.end(), problem_.FrameOf(j)) != frames.end() ||
+        problem_.FrameOf(j) == problem_.FrameOf(i);
     if (j == i || (is_free_[j] && is_there)) observations.push_back(j);
   }
   const ProblemSubset subset(problem_, std::move(observations));
@@ -147,8 +143,7 @@ std::optional<Conflict> Packing::InTwoViews(int64_t i,
                                             Work* work) const {
   std::vector<std::vector<int64_t>> sets;
   const Observation& own = problem_.observations[i];
-  for (int64_t j = problem_.point_begin[own.point];
-       j < problem_.point_begin[own.point + 1]; ++j) {
+  for (const int64_t j : problem_.OfPoint(own.point)) {
     const bool is_twin = j != i && problem_.observations[j].view == own.view;
     if (is_twin && worth[j] > 0) {
       sets.push_back({std::min(i, j), std::max(i, j)});

@@ -35,9 +35,6 @@ class Neighbourhoods {
                               const std::vector<char>& is_free) const;
 
  private:
-  int32_t FrameOf(int64_t i) const {
-    return problem_.views[problem_.observations[i].view].frame;
-  }
   Eigen::Vector3d Direction(int64_t i) const;
   Eigen::Vector3d CentreOf(int64_t i) const;
   double Strain(int64_t i, int64_t j) const;

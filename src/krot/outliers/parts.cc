@@ -19,9 +19,8 @@ Groups::Groups(const KnownRotationProblem& problem,
   std::vector<int32_t> frames;
   for (int32_t k = 0; k < problem.num_points; ++k) {
     frames.clear();
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      frames.push_back(FrameOf(problem, i));
+    for (const int64_t i : problem.OfPoint(k)) {
+      frames.push_back(problem.FrameOf(i));
     }
     std::sort(frames.begin(), frames.end());
     frames.erase(std::unique(frames.begin(), frames.end()), frames.end());

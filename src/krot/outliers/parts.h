@@ -15,11 +15,6 @@
 
 namespace krot::internal {
 
-// The frame of observation i.
-inline int32_t FrameOf(const KnownRotationProblem& problem, int64_t i) {
-  return problem.views[problem.observations[i].view].frame;
-}
-
 // Two groups of frames that share tracks.
 struct GroupPair {
   int32_t a = -1, b = -1;

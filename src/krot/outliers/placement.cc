@@ -136,9 +136,7 @@ void PlaceFramesRobustly(const KnownRotationProblem& problem,
   const auto place = [&](int32_t f) {
     std::vector<Ray> rays;
     std::vector<int64_t> seen;
-    for (int64_t m = problem.frame_begin[f]; m < problem.frame_begin[f + 1];
-         ++m) {
-      const int64_t i = problem.frame_observations[m];
+    for (const int32_t i : problem.OfFrame(f)) {
       const Observation& o = problem.observations[i];
       if (!is_placed[o.point]) continue;
       const View& view = problem.views[o.view];

@@ -30,8 +30,7 @@ NearSet::NearSet(const KnownRotationProblem& problem)
 void NearSet::AddAbove(const std::vector<double>& errors, double level) {
   for (int32_t k = 0; k < problem_->num_points; ++k) {
     bool is_near = false;
-    for (int64_t i = problem_->point_begin[k]; i < problem_->point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem_->OfPoint(k)) {
       if (!(errors[i] <= level)) contains_[i] = 1;
       is_near = is_near || Contains(i);
     }
@@ -60,9 +59,7 @@ void NearSet::TieFrames() {
   for (int32_t f = 0; f < problem_->num_frames; ++f) {
     std::vector<int64_t> others;
     int64_t missing = kTiesPerFrame;
-    for (int64_t n = problem_->frame_begin[f]; n < problem_->frame_begin[f + 1];
-         ++n) {
-      const int64_t i = problem_->frame_observations[n];
+    for (const int32_t i : problem_->OfFrame(f)) {
       if (Contains(i)) {
         --missing;
       } else {
@@ -204,7 +201,7 @@ bool RemovalSearch::TakeBack(Removal* best) {
   for (int32_t k = 0; k < rows_.num_points; ++k) {
     int64_t nearest = -1;
     double error = 0;
-    for (int64_t i = rows_.point_begin[k]; i < rows_.point_begin[k + 1]; ++i) {
+    for (const int64_t i : rows_.OfPoint(k)) {
       if (!is_removed[i]) continue;
       const double own = Error(best->estimate, i);
       if (!std::isfinite(own) || (nearest >= 0 && own >= error)) continue;
@@ -213,7 +210,7 @@ bool RemovalSearch::TakeBack(Removal* best) {
     }
     if (nearest < 0) continue;
     asked.push_back(nearest);
-    for (int64_t i = rows_.point_begin[k]; i < rows_.point_begin[k + 1]; ++i) {
+    for (const int64_t i : rows_.OfPoint(k)) {
       if (!is_removed[i] || i == nearest) observations.push_back(i);
     }
   }
@@ -229,7 +226,7 @@ bool RemovalSearch::TakeBack(Removal* best) {
   for (const int64_t i : asked) {
     const int32_t k = rows_.observations[i].point;
     bool fits = true;
-    for (int64_t j = rows_.point_begin[k]; j < rows_.point_begin[k + 1]; ++j) {
+    for (const int64_t j : rows_.OfPoint(k)) {
       if (is_removed[j] && j != i) continue;
       fits = fits && Error(moved, j) <= max_error_;
     }

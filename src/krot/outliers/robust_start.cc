@@ -52,15 +52,13 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   std::vector<int64_t> covering;
   for (const int32_t k : longest_first) {
     bool is_needed = false;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem.OfPoint(k)) {
       is_needed =
-          is_needed || redundancy[FrameOf(problem, i)] < redundancy_per_frame;
+          is_needed || redundancy[problem.FrameOf(i)] < redundancy_per_frame;
     }
     if (!is_needed) continue;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      redundancy[FrameOf(problem, i)] += 2 - 3 / static_cast<double>(length(k));
+    for (const int64_t i : problem.OfPoint(k)) {
+      redundancy[problem.FrameOf(i)] += 2 - 3 / static_cast<double>(length(k));
       covering.push_back(i);
     }
   }
@@ -182,14 +180,11 @@ class GrownStart {
       const int64_t f = most(n == 0 ? num_seen : num_shared);
       is_frame_[f] = 1;
       num_shared[f] = -1;
-      for (int64_t m = problem_.frame_begin[f]; m < problem_.frame_begin[f + 1];
-           ++m) {
-        const int32_t k =
-            problem_.observations[problem_.frame_observations[m]].point;
+      for (const int32_t i : problem_.OfFrame(f)) {
+        const int32_t k = problem_.observations[i].point;
         if (std::exchange(is_seen[k], 1)) continue;
-        for (int64_t i = problem_.point_begin[k];
-             i < problem_.point_begin[k + 1]; ++i) {
-          const int32_t other = FrameOf(problem_, i);
+        for (const int64_t j : problem_.OfPoint(k)) {
+          const int32_t other = problem_.FrameOf(j);
           if (!is_frame_[other]) ++num_shared[other];
         }
       }
@@ -202,9 +197,8 @@ class GrownStart {
     std::vector<int64_t> seen;
     for (int32_t k = 0; k < problem_.num_points; ++k) {
       const size_t before = seen.size();
-      for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-           ++i) {
-        if (is_frame_[FrameOf(problem_, i)]) seen.push_back(i);
+      for (const int64_t i : problem_.OfPoint(k)) {
+        if (is_frame_[problem_.FrameOf(i)]) seen.push_back(i);
       }
       if (seen.size() < before + 2) seen.resize(before);
     }
@@ -225,11 +219,8 @@ class GrownStart {
     for (int32_t f = 0; f < problem_.num_frames; ++f) {
       if (is_frame_[f]) continue;
       num_seen[f] = 0;
-      for (int64_t m = problem_.frame_begin[f]; m < problem_.frame_begin[f + 1];
-           ++m) {
-        num_seen[f] +=
-            is_point_[problem_.observations[problem_.frame_observations[m]]
-                          .point];
+      for (const int32_t i : problem_.OfFrame(f)) {
+        num_seen[f] += is_point_[problem_.observations[i].point];
       }
     }
     const int64_t most = *std::max_element(num_seen.begin(), num_seen.end());
@@ -278,13 +269,11 @@ std::vector<std::vector<int64_t>> SplitIntoParts(
   std::vector<std::vector<int64_t>> split(
       *std::max_element(part_of.begin(), part_of.end()) + 1);
   for (int32_t k = 0; k < problem.num_points; ++k) {
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      const int32_t own = part_of[FrameOf(problem, i)];
+    for (const int64_t i : problem.OfPoint(k)) {
+      const int32_t own = part_of[problem.FrameOf(i)];
       int num_own = 0;
-      for (int64_t j = problem.point_begin[k]; j < problem.point_begin[k + 1];
-           ++j) {
-        num_own += part_of[FrameOf(problem, j)] == own;
+      for (const int64_t j : problem.OfPoint(k)) {
+        num_own += part_of[problem.FrameOf(j)] == own;
       }
       if (num_own >= 2) split[own].push_back(i);
     }
@@ -318,9 +307,8 @@ Estimate StartOfParts(const KnownRotationProblem& problem,
             &estimate);
   std::vector<int32_t> across;
   for (int32_t k = 0; k < problem.num_points; ++k) {
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
-      if (part_of[FrameOf(problem, i)] == point_part[k]) continue;
+    for (const int64_t i : problem.OfPoint(k)) {
+      if (part_of[problem.FrameOf(i)] == point_part[k]) continue;
       across.push_back(k);
       break;
     }

@@ -181,8 +181,7 @@ std::vector<Sighting> SightingsOf(const BuiltProblem& built,
   for (const int64_t i : observations) {
     const int32_t k = problem.observations[i].point;
     int64_t num_others = 0;
-    for (int64_t j = problem.point_begin[k]; j < problem.point_begin[k + 1];
-         ++j) {
+    for (const int64_t j : problem.OfPoint(k)) {
       num_others +=
           problem.observations[j].view != problem.observations[i].view;
     }

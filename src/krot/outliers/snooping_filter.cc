@@ -172,8 +172,7 @@ class SnoopingFilter {
     for (int32_t k = 0; k < problem.num_points; ++k) {
       std::vector<Eigen::Matrix<double, 2, 3>> rows;
       Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-      for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-           ++i) {
+      for (const int64_t i : problem.OfPoint(k)) {
         const Observation& o = problem.observations[i];
         const View& view = problem.views[o.view];
         const AffineMap map =

@@ -158,8 +158,7 @@ std::vector<std::vector<int64_t>> TwoViewConflicts::Candidates(
     int64_t i, const std::vector<float>& worth) const {
   const Observation& own = problem_.observations[i];
   std::vector<Candidate> candidates;
-  for (int64_t j = problem_.point_begin[own.point];
-       j < problem_.point_begin[own.point + 1]; ++j) {
+  for (const int64_t j : problem_.OfPoint(own.point)) {
     const Observation& other = problem_.observations[j];
     if (j == i || !(worth[j] > 0) || other.view == own.view) continue;
     const Vector3d baseline = CentreOf(j) - CentreOf(i);

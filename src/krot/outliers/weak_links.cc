@@ -50,7 +50,7 @@ double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
     const auto rows =
         2.0 * static_cast<double>(problem.point_begin[o.point + 1] -
                                   problem.point_begin[o.point]);
-    if (rows <= 4 || point_group[o.point] != group_of[FrameOf(problem, i)]) {
+    if (rows <= 4 || point_group[o.point] != group_of[problem.FrameOf(i)]) {
       continue;
     }
     errors.push_back(ResidualOf(ViewPoint(problem, o, estimate), Norm::L2()) *
@@ -110,9 +110,8 @@ std::vector<Side> Joiner::SidesOf(const std::vector<int32_t>& points,
                                   int32_t group) {
   std::vector<int64_t> observations;
   for (const int32_t k : points) {
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      if (group_of_[FrameOf(problem_, i)] == group) observations.push_back(i);
+    for (const int64_t i : problem_.OfPoint(k)) {
+      if (group_of_[problem_.FrameOf(i)] == group) observations.push_back(i);
     }
   }
   const ProblemSubset part(problem_, observations);
@@ -128,7 +127,7 @@ std::vector<Side> Joiner::SidesOf(const std::vector<int32_t>& points,
   for (int32_t k = 0; k < own.num_points; ++k) {
     Side& side = sides[k];
     side.x = estimate.points[k];
-    for (int64_t i = own.point_begin[k]; i < own.point_begin[k + 1]; ++i) {
+    for (const int64_t i : own.OfPoint(k)) {
       const double error =
           ResidualOf(ViewPoint(own, own.observations[i], estimate), Norm::L2());
       if (!(error < cap)) continue;
@@ -152,10 +151,9 @@ std::vector<SharedTrack> Joiner::TracksOf(const GroupPair& pair,
   std::vector<int32_t> points;
   for (int32_t k = 0; k < problem_.num_points; ++k) {
     bool has_a = false, has_b = false;
-    for (int64_t i = problem_.point_begin[k]; i < problem_.point_begin[k + 1];
-         ++i) {
-      has_a |= group_of_[FrameOf(problem_, i)] == pair.a;
-      has_b |= group_of_[FrameOf(problem_, i)] == pair.b;
+    for (const int64_t i : problem_.OfPoint(k)) {
+      has_a |= group_of_[problem_.FrameOf(i)] == pair.a;
+      has_b |= group_of_[problem_.FrameOf(i)] == pair.b;
     }
     if (has_a && has_b) points.push_back(k);
   }
@@ -316,7 +314,7 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
   std::vector<WeakLink> links;
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     std::vector<int32_t> frames;  // of the component, as the subset has them
-    for (const int64_t i : component) frames.push_back(FrameOf(problem, i));
+    for (const int64_t i : component) frames.push_back(problem.FrameOf(i));
     std::sort(frames.begin(), frames.end());
     frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
     const ProblemSubset subset(problem, std::move(component));
@@ -330,7 +328,7 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
     if (!HasBaseline(own)) NormalizeScale(own, &placed);
     std::vector<int32_t> point_part(own.num_points);
     for (int32_t k = 0; k < own.num_points; ++k) {
-      point_part[k] = parts[FrameOf(own, own.point_begin[k])];
+      point_part[k] = parts[own.FrameOf(own.point_begin[k])];
     }
     for (WeakLink& link : Joiner(own, std::move(parts), std::move(point_part),
                                  cap, /*may_move=*/false, context, &placed)

@@ -42,10 +42,11 @@ std::optional<PixelCertificate> ProveByRepair(const Model& model,
   const ProblemSubset part(built.problem, support);
   CertificateOptions options;
   options.sufficient_bound = (1 + kNegligibleLoss) * sufficient;
-  CertificateSearch search(part.problem(), norm, options, context);
-  search.TryAll(part.Restrict(x_hat), multipliers);
-  if (!search.best()) return std::nullopt;
-  const Certificate rows = InWhole(part, *search.best());
+  const std::optional<Certificate> repaired =
+      RepairCertificate(part.problem(), norm, part.Restrict(x_hat), multipliers,
+                        options, context);
+  if (!repaired) return std::nullopt;
+  const Certificate rows = InWhole(part, *repaired);
   return MakePixelCertificate(model, built, norm, rows,
                               BearingsOfPoints(model, built, x_hat, rows),
                               context);

@@ -8,40 +8,6 @@
 namespace krot::internal {
 namespace {
 
-// The share of the gap asked for that the proof for the rows may leave. The
-// rest is for what lenses and the gauge take from the bound.
-constexpr double kShareOfGap = 0.9;
-
-SolveTermination FromResInt(ResIntTermination termination) {
-  switch (termination) {
-    case ResIntTermination::kStalled:
-      return SolveTermination::kStalled;
-    case ResIntTermination::kMaxSweeps:
-      return SolveTermination::kMaxSweeps;
-    case ResIntTermination::kInterrupted:
-      return SolveTermination::kInterrupted;
-    case ResIntTermination::kNotRun:
-      break;
-  }
-  return SolveTermination::kNotRun;
-}
-
-SolveTermination FromJoint(JointTermination termination) {
-  switch (termination) {
-    case JointTermination::kGapReached:
-      return SolveTermination::kGapReached;
-    case JointTermination::kMaxIterations:
-      return SolveTermination::kMaxIterations;
-    case JointTermination::kStalled:
-      return SolveTermination::kStalled;
-    case JointTermination::kInterrupted:
-      return SolveTermination::kInterrupted;
-    case JointTermination::kNotRun:
-      break;
-  }
-  return SolveTermination::kNotRun;
-}
-
 class Schedule {
  public:
   Schedule(const KnownRotationProblem& problem,
@@ -94,7 +60,7 @@ void Schedule::Sweeps(ResIntOptions res_int) {
       [&] {
         const ResIntSummary result =
             SolveResInt(problem_, res_int, context_, &estimate_);
-        summary_.termination = FromResInt(result.termination);
+        summary_.termination = result.termination;
         cost_ = result.cost_final;
       },
       [&](StepValues* values) {
@@ -116,12 +82,12 @@ void Schedule::LeadingSweeps() {
 std::optional<Certificate> Schedule::Joint(KnownMultipliers* known) {
   JointOptions joint = options_.joint;
   joint.norm = options_.norm;
-  joint.relative_gap *= kShareOfGap;
+  joint.relative_gap *= 0.9;  // the rest is for lenses and the gauge
   joint.checkpoint = options_.checkpoint;
   joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
   const JointSummary result =
       SolveJoint(problem_, joint, context_, &estimate_, known);
-  summary_.termination = FromJoint(result.termination);
+  summary_.termination = result.termination;
   cost_ = result.cost_final;
   summary_.num_working_observations = result.num_working_observations;
   return result.certificate;

@@ -315,9 +315,7 @@ void Settling::MoveLooseFrame(int32_t f, double distance) {
   if (!((shift - to_input).norm() < to_input.norm())) return;
   Shift(f, shift);
   has_moved_frame_ = true;
-  for (int64_t j = problem_.frame_begin[f]; j < problem_.frame_begin[f + 1];
-       ++j) {
-    const int32_t i = problem_.frame_observations[j];
+  for (const int32_t i : problem_.OfFrame(f)) {
     squared_[i] = Squared(i, kNoLevel);
   }
 }

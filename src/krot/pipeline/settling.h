@@ -120,10 +120,8 @@ std::vector<Sum> Settling::SumsOf(const std::vector<int32_t>& frames,
       [&](std::vector<Sum>* of_whole) {
         ParallelFor(static_cast<int64_t>(frames.size()), /*chunk_size=*/1,
                     context_.num_threads, [&](int64_t n, int64_t, int) {
-                      for (int64_t j = problem_.frame_begin[frames[n]];
-                           j < problem_.frame_begin[frames[n] + 1]; ++j) {
-                        add_to(problem_.frame_observations[j], n,
-                               &(*of_whole)[n]);
+                      for (const int32_t i : problem_.OfFrame(frames[n])) {
+                        add_to(i, n, &(*of_whole)[n]);
                       }
                     });
       },

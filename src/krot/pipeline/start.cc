@@ -159,22 +159,11 @@ FoundStart FindFeasibleStart(const KnownRotationProblem& problem,
     log(static_cast<int>(num_logged) + 1, summary.iterations[num_logged]);
   }
   FoundStart start;
-  switch (summary.termination) {
-    case InitializerTermination::kFeasible:
-      start.estimate = std::move(estimate);
-      break;
-    case InitializerTermination::kInfeasible:
-      start.termination = SolveTermination::kInfeasible;
-      start.certificate = std::move(summary.certificate);
-      break;
-    case InitializerTermination::kInterrupted:
-      start.termination = SolveTermination::kInterrupted;
-      break;
-    case InitializerTermination::kNotRun:
-    case InitializerTermination::kFailed:
-      start.termination = SolveTermination::kNoStart;
-      break;
+  start.termination = summary.termination;
+  if (start.termination == SolveTermination::kWithinBound) {
+    start.estimate = std::move(estimate);
   }
+  start.certificate = std::move(summary.certificate);
   return start;
 }
 

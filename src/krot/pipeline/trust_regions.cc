@@ -123,8 +123,7 @@ Estimate BestPointsOnSegments(const Reprojection& reprojection,
   Estimate best = to;
   const auto cost_of = [&](int64_t k) {
     double cost = 0;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem.OfPoint(k)) {
       cost = std::max(cost, reprojection.Error(best, norm, i));
     }
     return cost;

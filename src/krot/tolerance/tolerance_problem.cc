@@ -178,8 +178,7 @@ std::vector<char> FindFarPoints(const KnownRotationProblem& problem, Norm norm,
   std::vector<int64_t> undecided;
   for (int32_t k = 0; k < problem.num_points; ++k) {
     if (cost(k) < bound || !std::isfinite(cost(k))) continue;
-    for (int64_t i = problem.point_begin[k]; i < problem.point_begin[k + 1];
-         ++i) {
+    for (const int64_t i : problem.OfPoint(k)) {
       undecided.push_back(i);
     }
   }
