@@ -13,16 +13,8 @@
 namespace krot::internal {
 namespace {
 
-constexpr int kMaxSteps = 30;
-constexpr int kMaxTries = 8;  // of one step
 // The last c, relative to the median.
 constexpr double kFactor = 2;
-constexpr double kLeastFall = 3e-4;
-constexpr double kLeastDamping = 1e-3;
-// Of a step's linear solve: the linear model does not hold far from here.
-constexpr double kTolerance = 1e-2;
-// In pixels: a smaller scale would be that of rounding.
-constexpr double kLeastScale = 1e-6;
 
 class RobustLeastSquares {
  public:
@@ -44,9 +36,9 @@ class RobustLeastSquares {
  private:
   // r_i^2; infinite where the point is not seen.
   std::vector<double> SquaredErrors(const Estimate& estimate) const;
-  void TakeScale() {
+  void TakeScale() {  // a scale below 1e-6 pixels would be that of rounding
     scale2_ = std::pow(
-        std::max(kLeastScale, factor_ * std::sqrt(Median(squared_errors_))), 2);
+        std::max(1e-6, factor_ * std::sqrt(Median(squared_errors_))), 2);
   }
   double Cost(const std::vector<double>& squared_errors) const {
     return loop_.Sum([&](int64_t i) {
@@ -117,7 +109,9 @@ void RobustLeastSquares::Linearize() {
 bool RobustLeastSquares::FindStep() {
   Linearize();
   if (!least_squares_.Factorize()) return false;
-  least_squares_.Solve(nullptr, target_.data(), kTolerance, &step_, nullptr);
+  // The linear model does not hold far from here.
+  least_squares_.Solve(nullptr, target_.data(), /*tolerance=*/1e-2, &step_,
+                       nullptr);
   // A point that no observation sees has no rows, and stays.
   for (Eigen::Vector3d& s : step_.points) {
     if (!s.allFinite()) s.setZero();
@@ -130,19 +124,19 @@ bool RobustLeastSquares::FindStep() {
 bool RobustLeastSquares::TakeStep() {
   const double before = Cost(squared_errors_);
   Estimate moved = estimate_;
-  for (int n = 0; n < kMaxTries && !context_.IsCancelled(); ++n) {
+  for (int n = 0; n < 8 && !context_.IsCancelled(); ++n) {
     if (FindStep()) {
       MoveCentres(rig_from_world_, estimate_, 1, step_, &moved);
       std::vector<double> squared_errors = SquaredErrors(moved);
       const double after = Cost(squared_errors);
       if (after < before) {
-        damping_ = std::max(kLeastDamping, damping_ / 4);
+        damping_ = std::max(1e-3, damping_ / 4);
         estimate_ = std::move(moved);
         squared_errors_ = std::move(squared_errors);
         const bool is_wide = factor_ > kFactor;
         factor_ = std::max(kFactor, factor_ / 2);
         TakeScale();
-        return is_wide || after < (1 - kLeastFall) * before;
+        return is_wide || after < (1 - 3e-4) * before;
       }
     }
     damping_ *= 4;
@@ -155,8 +149,9 @@ void RobustLeastSquares::Run() {
   if (squared_errors_.empty()) return;
   TakeScale();
   // If fewer than half of the points are seen, there is no scale.
-  for (int n = 0; n < kMaxSteps && std::isfinite(scale2_); ++n) {
-    context_.Stage("improving the start, step", n + 1, kMaxSteps);
+  const int max_steps = 30;
+  for (int n = 0; n < max_steps && std::isfinite(scale2_); ++n) {
+    context_.Stage("improving the start, step", n + 1, max_steps);
     if (context_.IsCancelled() || !TakeStep()) break;
   }
 }

@@ -14,16 +14,9 @@
 namespace krot::internal {
 namespace {
 
-// Relative gap to which the problem of the support is solved: far below any gap
-// that users ask for.
-constexpr double kGap = 1e-7;
 // If lenses lower the bound by less than this, relative, another solve is not
 // worth its time.
 constexpr double kNegligibleLoss = 1e-6;
-constexpr int kMaxSolves = 4;
-// A larger support is not solved as a problem of its own: that would take as
-// long as the whole problem did.
-constexpr size_t kLargeSupport = 20000;
 
 // For a certificate whose rows have been taken anew since it was made: repairs
 // its multipliers for the new rows, which is cheaper than solving them.
@@ -64,8 +57,8 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
   std::optional<PixelCertificate> best;
   JointOptions options;
   options.norm = norm;
-  options.relative_gap = kGap;
-  for (int solve = 0; solve < kMaxSolves && !support.empty(); ++solve) {
+  options.relative_gap = 1e-7;  // far below any that users ask for
+  for (int solve = 0; solve < 4 && !support.empty(); ++solve) {
     const ProblemSubset part(built.problem, support);
     KnownRotationProblem rows = part.problem();
     for (size_t n = 0; n < support.size(); ++n) {
@@ -150,7 +143,9 @@ std::optional<PixelCertificate> ProveHere(const Model& model,
   if (certificate != nullptr && Reprojection(model, built).IsLinear()) {
     return ProveLinear(model, built, x_hat, norm, *certificate, context);
   }
-  if (certificate != nullptr && support.size() > kLargeSupport) {
+  // To solve a large support as a problem of its own would take as long as the
+  // whole problem did.
+  if (certificate != nullptr && support.size() > 20000) {
     return ProveByRepair(model, built, x_hat, norm, *certificate, sufficient,
                          context);
   }

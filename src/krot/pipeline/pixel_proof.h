@@ -1,9 +1,7 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "krot/base/context.h"
@@ -22,64 +20,6 @@ namespace krot::internal {
 struct RowsCertificate {
   Certificate certificate;
   std::vector<int64_t> observation_of;
-};
-
-// The bounds that rounds have proved so far: in true pixels, and for the rows
-// that were solved last. Decides whether a true cost, in pixels, is near enough
-// to them. Internal to SolveInRounds.
-class RoundBounds {
- public:
-  // The gap asked for.
-  explicit RoundBounds(double relative_gap) : relative_gap_(relative_gap) {}
-
-  const std::optional<RowsCertificate>& rows() const { return rows_; }
-  void SetRows(std::optional<RowsCertificate> rows) { rows_ = std::move(rows); }
-  // Hands out the rows' certificate for a proof in pixels and forgets it: each
-  // is tried once.
-  std::optional<RowsCertificate> UseRows() {
-    return std::exchange(rows_, std::nullopt);
-  }
-
-  const std::optional<PixelCertificate>& proof() const { return proof_; }
-  void SetProof(std::optional<PixelCertificate> proof) {
-    proof_ = std::move(proof);
-  }
-  void Improve(std::optional<PixelCertificate> proof) {
-    if (!proof) return;
-    if (!proof_ || proof->lower_bound > proof_->lower_bound) SetProof(proof);
-  }
-
-  bool IsGapReached(double cost) const {
-    return proof_ && std::isfinite(cost) &&
-           cost - proof_->lower_bound <= relative_gap_ * cost;
-  }
-  // A bound that suffices for the gap at this cost. It leaves 5 % of the gap
-  // for the rounding of later steps.
-  double Sufficient(double cost) const {
-    constexpr double kShare = 0.95;
-    return (1 - kShare * relative_gap_) * cost;
-  }
-  // Whether the cost is so near to the rows' bound that a proof in pixels may
-  // reach the gap.
-  bool IsWorthProving(double cost) const {
-    constexpr double kGaps = 3;
-    return rows_ && cost - rows_->certificate.lower_bound <=
-                        kGaps * relative_gap_ * cost;
-  }
-  // Whether the bound in pixels suffices for this cost, or the rows' bound is
-  // so near to the cost that a proof in pixels, which gives a lower bound than
-  // the rows, should suffice, too.
-  bool IsNear(double cost) const {
-    constexpr double kShareForRows = 0.7;
-    return (proof_ && proof_->lower_bound >= Sufficient(cost)) ||
-           (rows_ && rows_->certificate.lower_bound >=
-                         (1 - kShareForRows * relative_gap_) * cost);
-  }
-
- private:
-  const double relative_gap_;
-  std::optional<RowsCertificate> rows_;
-  std::optional<PixelCertificate> proof_;
 };
 
 // A lower bound in true pixels for all estimates, from the observations that

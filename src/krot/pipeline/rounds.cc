@@ -8,34 +8,18 @@
 #include <vector>
 
 #include "krot/convert/reprojection.h"
-#include "krot/pipeline/known_positions.h"
 #include "krot/pipeline/pixel_proof.h"
-#include "krot/pipeline/trust_regions.h"
+#include "krot/pipeline/rounds.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
 
 namespace krot::internal {
 namespace {
 
-constexpr int kMaxRounds = 30;
-// A round that lowers the true cost by less than this, relative, is idle.
-constexpr double kStationary = 1e-6;
-// While trust regions are being tightened, this many idle rounds in a row end
-// the solve; otherwise one does.
-constexpr int kPatience = 3;
-// An observation keeps what its linear row promised if its true error exceeds
-// the rows' cost by at most this, relative.
-constexpr double kKeptPromise = 1e-5;
 // If sweeps have lowered the true cost to this share of what it was, and the
 // rows' cost is at most this share of the true one, the rows no longer describe
 // the true errors and are taken anew.
 constexpr double kFarFromRows = 0.5;
-// If the cost of rows exceeds the true cost at the estimate where they are
-// taken by more than this, relative, rounding has made them useless.
-constexpr double kRowsRounding = 1e-3;
-// Where positions are known, rows are solved to this share of the gap asked
-// for.
-constexpr double kShareWithPositions = 0.05;
 
 class Rounds {
  public:
@@ -56,7 +40,7 @@ class Rounds {
         cost_(LevelledCost(estimate_)),
         bounds_(options.joint.relative_gap) {
     if (positions_.Any()) {
-      rows_options_.joint.relative_gap *= kShareWithPositions;
+      rows_options_.joint.relative_gap *= 0.05;
     }
   }
 
@@ -183,10 +167,11 @@ bool Rounds::RunOne() {
     bounded = trust_.AddTo(rows, estimate_, cost_, &observation_of);
   }
   const KnownRotationProblem& problem = bounded ? *bounded : rows;
-  // A depth that consists of rounding alone makes the rows useless.
+  // A depth that consists of rounding alone makes the rows useless: their cost
+  // exceeds the true one where they were taken.
   const double rows_cost = RowsCost(problem, estimate_);
-  if (!std::isfinite(rows_cost) || (is_bounded && !positions_.Any() &&
-                                    rows_cost > (1 + kRowsRounding) * cost_)) {
+  if (!std::isfinite(rows_cost) ||
+      (is_bounded && !positions_.Any() && rows_cost > (1 + 1e-3) * cost_)) {
     return false;
   }
   Estimate solved = estimate_;
@@ -226,10 +211,10 @@ bool Rounds::RunOne() {
   cost_ = LevelledCost(estimate_);
   int64_t num_bounded = 0;
   if (round.step < 1) {
+    // Rounding does not break a row's promise.
     num_bounded = SumOfRanks(
-        context_,
-        trust_.Shrink(reprojection_, rows, from, solved, options_.norm,
-                      (1 + kKeptPromise) * round.linear_cost));
+        context_, trust_.Shrink(reprojection_, rows, from, solved,
+                                options_.norm, (1 + 1e-5) * round.linear_cost));
   } else {
     trust_.Clear();
   }
@@ -251,14 +236,14 @@ bool Rounds::RunOne() {
     return false;
   }
   if (has_level || is_bound_near_) return true;
-  const bool is_idle = !(cost_ < (1 - kStationary) * before);
+  const bool is_idle = !(cost_ < (1 - 1e-6) * before);
   num_idle_rounds_ = is_idle ? num_idle_rounds_ + 1 : 0;
   if (round.linear_cost <= kFarFromRows * cost_) known_multipliers_ = {};
   // One idle round is enough without trust regions. It is enough, too, if the
   // cost is near the rows' bound but that proves nothing in true pixels: then
   // the estimate is a local minimum only.
   if (num_bounded == 0 || (is_tried && !certificate())) return !is_idle;
-  return num_idle_rounds_ < kPatience;
+  return num_idle_rounds_ < 3;
 }
 
 void Rounds::Run() {
@@ -269,7 +254,7 @@ void Rounds::Run() {
     return;
   }
   reprojection_.TakeRows(estimate_, context_.num_threads, &built_.problem);
-  while (RunOne() && summary_.rounds.size() < kMaxRounds) {
+  while (RunOne() && summary_.rounds.size() < 30) {
   }
   if (IsRefuted()) return;
   if (!certificate() && !IsInterrupted()) Prove();

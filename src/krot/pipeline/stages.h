@@ -144,18 +144,6 @@ double SumOfLosses(const Reprojection& reprojection,
                    const KnownRotationProblem& problem, const ErrorLoss& loss,
                    const Estimate& estimate, const Context& context);
 
-// SolveModel with all radii of options.problem.positions times the smallest
-// factor, at least 1, at which the largest error can be at most
-// options.inflate_positions_to, pixels. The lowest maximum falls as radii grow.
-// So solves that reach this error bracket the factor from above, and solves
-// with a lower bound above it prove that the factor must be larger. The result
-// is that of the bracket's upper end; if even the largest factor tried is
-// refuted, it is the input with that proof (kInfeasible). Takes some ten
-// solves, each from the last one's estimate.
-SolveModelResult SolveWithInflatedPositions(const Model& model,
-                                            const SolveModelOptions& options,
-                                            const Context& context);
-
 // Estimates the largest resident set, in bytes, of a process that holds `model`
 // and runs SolveModel on it with summary.method and summary.init. The estimate
 // is within a quarter of the truth if the joint solver's working set does not

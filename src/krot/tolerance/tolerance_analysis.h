@@ -250,17 +250,6 @@ struct ToleranceSummary {
   double seconds = 0;
 };
 
-// The inverse of a list of indices in the model: for each of its `count`
-// elements the index in the list, or -1.
-std::vector<int32_t> InverseOf(const std::vector<int32_t>& of, size_t count);
-
-// Fills in summary->lengths, around the estimate that `built` starts from.
-// Lengths have a problem of their own: its gauge is the scale bar, if there is
-// one and the scale is free, and otherwise `gauge`.
-void FillLengths(const ToleranceOptions& options, const Model& model,
-                 const ToleranceGauge& gauge, const BuiltProblem& built,
-                 const Context& context, ToleranceSummary* summary);
-
 struct ToleranceResult {
   Model model;  // the input, or the solved one; the boxes are around it
   ToleranceSummary summary;
