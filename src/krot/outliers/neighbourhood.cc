@@ -117,7 +117,8 @@ std::vector<std::vector<int32_t>> Neighbourhoods::FrameSets(
   const int32_t k = problem_.observations[i].point;
   std::vector<std::pair<double, int32_t>> strained;  // -strain, frame
   for (const int64_t j : problem_.OfPoint(k)) {
-    if (is_free[j] && j != i) strained.emplace_back(-Strain(i, j), problem_.FrameOf(j));
+    if (is_free[j] && j != i)
+      strained.emplace_back(-Strain(i, j), problem_.FrameOf(j));
   }
   std::sort(strained.begin(), strained.end());
   std::vector<int32_t> others;

@@ -8,7 +8,6 @@
 #include "krot/base/context.h"
 #include "krot/model/derived_models.h"
 #include "krot/outliers/conflict.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
@@ -18,10 +17,6 @@
 
 namespace krot::internal {
 namespace {
-
-// Relative: rounding may raise an error by this much when a model is written.
-constexpr double kWithin = 1e-9;
-constexpr int kMaxThresholdSolves = 50;
 
 // The ids of these observations' points; ascending.
 std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
@@ -34,23 +29,18 @@ std::vector<uint64_t> PointIds(const Model& model, const BuiltProblem& built,
   return {ids.begin(), ids.end()};
 }
 
-class OutlierFilter {
+class OutlierFilter : private Filtering {
  public:
   OutlierFilter(const Model& model, const OutlierFilterOptions& options,
                 const Context& context)
-      : model_(model),
-        options_(options),
-        context_(context),
-        bound_{options.solve.norm, options.max_error.value_or(0)},
-        errors_before_(PixelErrors(model, context.num_threads)),
-        is_removed_(model.track_elements.size(), 0),
-        conflict_of_(model.track_elements.size(), -1) {}
+      : Filtering(model, options, context),
+        bound_{options.solve.norm, options.max_error.value_or(0)} {}
 
   OutlierFilterResult Run();
 
  private:
-  bool IsWithin(double error) const {
-    return error <= (1 + kWithin) * bound_.max_error;
+  bool IsWithin(double error) const {  // rounding counts for nothing
+    return error <= (1 + 1e-9) * bound_.max_error;
   }
   void FilterByConflicts();
   void FilterByThreshold();
@@ -66,33 +56,16 @@ class OutlierFilter {
   bool RemoveAbove();
   void FindWeakParts(const BuiltProblem& built);
 
-  const Model& model_;
-  const OutlierFilterOptions& options_;
-  const Context& context_;
   ErrorBound bound_;
-  const std::vector<double> errors_before_;  // per track element
-  std::vector<char> is_removed_;
-  std::vector<int64_t> conflict_of_;
-  RemovedObservations kept_;    // as of the last solve
   bool is_given_back_ = false;  // nothing is removed, the model is the input
-  OutlierFilterSummary summary_;
 };
 
 // Moves a copy of the input to the removal's estimate, in the input's frame.
 void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
                             Model* moved) {
-  std::vector<int64_t> kept;
-  size_t next = 0;
-  for (size_t i = 0; i < built.pixels.size(); ++i) {
-    if (next < removal.observations.size() &&
-        removal.observations[next] == static_cast<int64_t>(i)) {
-      ++next;
-    } else {
-      kept.push_back(static_cast<int64_t>(i));
-    }
-  }
   Estimate placed = removal.estimate;
-  const ProblemSubset part(built.problem, kept);
+  const ProblemSubset part(built.problem,
+                           AllBut(removal.observations, built.pixels.size()));
   Estimate own = part.Restrict(placed);
   RestoreGaugeIfHarmless(part.problem(), part.Restrict(built.start),
                          options_.solve.norm, context_, &own);
@@ -175,22 +148,11 @@ void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
   const Timer timer;
   ConflictPacking packing = PackAgainstRemoval(model_, built, bound_, removal,
                                                std::move(found), context_);
-  std::vector<Conflict>& conflicts = packing.conflicts;
   summary_.is_search_complete = packing.is_complete;
   if (context_.IsCancelled()) return;
-  summary_.rotation_suspect =
-      FindRotationSuspect(model_, built, bound_, conflicts, removal, context_);
-  std::vector<PixelCertificate> proofs;
-  for (Conflict& conflict : conflicts) {
-    for (const int64_t i : conflict.observations) {
-      conflict_of_[elements[i]] = summary_.num_proved;
-    }
-    ++summary_.num_proved;
-    summary_.num_irreducible += conflict.is_irreducible;
-    proofs.push_back(std::move(conflict.proof));
-  }
-  summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
-                                         bound_.max_error, proofs);
+  summary_.rotation_suspect = FindRotationSuspect(
+      model_, built, bound_, packing.conflicts, removal, context_);
+  TakeConflicts(built, elements, bound_, std::move(packing.conflicts));
   summary_.seconds_conflicts = timer.Seconds();
 }
 
@@ -292,16 +254,9 @@ void OutlierFilter::FilterByConflicts() {
   }
   // Observations that had no part in the problem may still be above the bound.
   if (!RemoveAbove()) return;
-  Model solved = std::move(kept_.model);
-  std::vector<char> is_gone(solved.track_elements.size());
-  for (size_t n = 0; n < is_gone.size(); ++n) {
-    is_gone[n] = is_removed_[kept_.element_of[n]];
-  }
-  RemovedObservations rest = RemoveObservations(solved, is_gone);
-  for (uint64_t& e : rest.element_of) e = kept_.element_of[e];
-  rest.num_left_alone += kept_.num_left_alone;
-  rest.num_points += kept_.num_points;
-  kept_ = std::move(rest);
+  std::vector<char> is_gone;
+  for (const uint64_t e : kept_.element_of) is_gone.push_back(is_removed_[e]);
+  RemoveMore(is_gone);
 }
 
 void OutlierFilter::FilterByThreshold() {
@@ -311,17 +266,11 @@ void OutlierFilter::FilterByThreshold() {
   Model moved = model_;
   do {
     Solve(moved);
-  } while (!context_.IsCancelled() &&
-           summary_.num_solves < kMaxThresholdSolves && RemoveAbove());
+  } while (!context_.IsCancelled() && summary_.num_solves < 50 &&
+           RemoveAbove());
 }
 
 OutlierFilterResult OutlierFilter::Run() {
-  summary_.method = options_.method;
-  summary_.norm = options_.solve.norm;
-  summary_.num_observations =
-      static_cast<int64_t>(model_.track_elements.size());
-  summary_.num_points = static_cast<int64_t>(model_.points3D.size());
-  summary_.pixel_error_before = Summarize(errors_before_);
   if (options_.method == OutlierMethod::kConflicts) {
     FilterByConflicts();
   } else {
@@ -334,18 +283,11 @@ OutlierFilterResult OutlierFilter::Run() {
     summary_.pixel_error_after = summary_.pixel_error_before;
     return {model_, std::move(summary_)};
   }
-  const std::vector<double> errors =
-      PixelErrors(kept_.model, context_.num_threads);
+  const std::vector<double> errors = Describe();
   UpdatePointErrors(errors, &kept_.model);
-  summary_.pixel_error_after = Summarize(errors);
   summary_.is_within =
       std::all_of(errors.begin(), errors.end(),
                   [this](double error) { return IsWithin(error); });
-  summary_.num_left_alone = kept_.num_left_alone;
-  summary_.num_points_removed = kept_.num_points;
-  summary_.removed = ListRemoved(model_, kept_.model, errors_before_,
-                                 is_removed_, conflict_of_, context_);
-  RankSuspects(model_, is_removed_, conflict_of_, &summary_);
   if (options_.solve.polish != Polish::kNone && summary_.solve) {
     summary_.solve->polish =
         PolishModel(options_.solve.polish, options_.solve.finish.loss,

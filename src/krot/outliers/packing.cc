@@ -98,9 +98,9 @@ bool Packing::FitsIn(int64_t i, const std::vector<int32_t>& frames) const {
   const int32_t k = problem_.observations[i].point;
   std::vector<int64_t> observations;
   for (const int64_t j : problem_.OfPoint(k)) {
-    const bool is_there =
-        std::find(frames.begin(), frames.end(), problem_.FrameOf(j)) != frames.end() ||
-        problem_.FrameOf(j) == problem_.FrameOf(i);
+    const bool is_there = std::find(frames.begin(), frames.end(),
+                                    problem_.FrameOf(j)) != frames.end() ||
+                          problem_.FrameOf(j) == problem_.FrameOf(i);
     if (j == i || (is_free_[j] && is_there)) observations.push_back(j);
   }
   const ProblemSubset subset(problem_, std::move(observations));

@@ -31,8 +31,8 @@ class Groups {
   // All frames of group g go over to group new_group[g].
   void Merge(const std::vector<int32_t>& new_group);
 
-  // All pairs of groups a < b that share tracks; their strength is the number of
-  // these. O(sum over tracks of their squared numbers of groups).
+  // All pairs of groups a < b that share tracks; their strength is the number
+  // of these. O(sum over tracks of their squared numbers of groups).
   std::vector<GroupPair> Pairs() const;
   // Per group: the tracks that two of its frames see, or its only frame; and of
   // these the tracks that frames of other groups see, too: at least two such

@@ -1,4 +1,4 @@
-#include "krot/outliers/placement.h"
+#include "krot/outliers/robust_start.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -100,6 +100,9 @@ Removal FindRemoval(const Model& model, const BuiltProblem& built,
                     const ErrorBound& bound, const Context& context,
                     int max_programmes = kMaxProgrammes);
 
+// The indices below `count` that are not `removed` (ascending).
+std::vector<int64_t> AllBut(const std::vector<int64_t>& removed, size_t count);
+
 // The lowest largest error of some observations, proved.
 struct OptimumWithout {
   Estimate estimate;     // of the whole problem

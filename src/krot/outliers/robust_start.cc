@@ -13,7 +13,6 @@
 #include "krot/finish/least_squares.h"
 #include "krot/linear/reduced_camera_system.h"
 #include "krot/outliers/parts.h"
-#include "krot/outliers/placement.h"
 #include "krot/problem/centre_unknowns.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"

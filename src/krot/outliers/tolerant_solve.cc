@@ -1,4 +1,3 @@
-#include "krot/outliers/filter_steps.h"
 
 #include <algorithm>
 #include <sstream>

@@ -17,9 +17,8 @@
 #include "krot/geometry.h"
 #include "krot/model/derived_models.h"
 #include "krot/model/rigs.h"
-#include "krot/outliers/filter_steps.h"
 #include "krot/outliers/match_tracks.h"
-#include "krot/outliers/placement.h"
+#include "krot/outliers/outlier_filter.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/gauge.h"
 

@@ -10,7 +10,6 @@
 
 #include "krot/analysis/noise.h"
 #include "krot/base/numbers.h"
-#include "krot/outliers/placement.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"
