@@ -15,13 +15,6 @@
 namespace krot::internal {
 namespace {
 
-// The probability that noise alone exceeds the limit.
-constexpr double kFalseAlarm = 0.05;
-// Slack programmes per level; a few are enough where the last level's weights
-// are at hand.
-constexpr int kFirstProgrammes = 4;
-constexpr int kNextProgrammes = 2;
-
 class Profiler {
  public:
   Profiler(const Model& model, const BuiltProblem& built,
@@ -94,8 +87,8 @@ NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   const double factor = norm.p == 1 ? std::sqrt(2.0) : 1;
   const auto count = static_cast<double>(noise.num_tested);
   limit.max_error =
-      std::max(kLeastNoisePx, factor * limit.sigma *
-                                  std::sqrt(2 * std::log(count / kFalseAlarm)));
+      std::max(kLeastNoisePx,
+               factor * limit.sigma * std::sqrt(2 * std::log(count / 0.05)));
   return limit;
 }
 
@@ -118,8 +111,9 @@ ErrorProfile Profiler::Run() {
     const double steps = std::max(1, options_.num_levels - n);
     double bound = std::max(last, now * std::pow(last / now, 1 / steps));
     if (noise < now) bound = std::max(bound, noise);
+    // A few programmes are enough where the last level's weights are at hand.
     ProfileLevel level =
-        Solve(search_.Find(bound, n == 0 ? kFirstProgrammes : kNextProgrammes),
+        Solve(search_.Find(bound, /*max_programmes=*/n == 0 ? 4 : 2),
               at_level(n + 1));
     if (context_.IsCancelled() || !(level.max_error < now)) break;
     Charge(&level);

@@ -15,14 +15,6 @@
 namespace krot::internal {
 namespace {
 
-// Of the open observations, so many with the largest errors are tried in more
-// frames.
-constexpr size_t kMaxForMoreFrames = 400;
-// If more observations are tight, no conflicts are looked for among them.
-constexpr size_t kMaxTight = 250;
-// Open observations that look for a conflict at the same time.
-constexpr size_t kBatch = 16;
-
 class Packing {
  public:
   Packing(const Model& model, const BuiltProblem& built,
@@ -166,7 +158,7 @@ void Packing::ChargeInTwoViews(std::vector<int64_t>* open) {
   std::vector<int64_t> left;
   while (!queue.empty() && MayGoOn()) {
     std::vector<int64_t> batch;
-    while (batch.size() < kBatch && !queue.empty()) {
+    while (batch.size() < 16 && !queue.empty()) {
       if (!IsTaken(queue.back())) batch.push_back(queue.back());
       queue.pop_back();
     }
@@ -227,8 +219,7 @@ bool Packing::Charge(int64_t i, int num_others) {
 void Packing::ChargeInFrames(std::vector<int64_t>* open) {
   for (const int num_others : {2, 3}) {
     std::vector<int64_t> left;
-    const size_t first =
-        open->size() - std::min(open->size(), kMaxForMoreFrames);
+    const size_t first = open->size() - std::min<size_t>(open->size(), 400);
     for (size_t n = 0; n < open->size(); ++n) {
       const int64_t i = (*open)[n];
       if (IsTaken(i)) continue;
@@ -274,7 +265,7 @@ void Packing::ChargeTight() {
   for (const int64_t i : removal_.tight) {
     if (is_free_[i]) tight.push_back(i);
   }
-  if (tight.empty() || tight.size() > kMaxTight || !MayGoOn()) return;
+  if (tight.empty() || tight.size() > 250 || !MayGoOn()) return;
   const ProblemSubset subset(problem_, tight);
   const BuiltProblem part = BuiltPart(built_, subset, built_.start);
   std::vector<int64_t> all(tight.size());

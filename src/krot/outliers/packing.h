@@ -35,8 +35,6 @@ class Neighbourhoods {
                               const std::vector<char>& is_free) const;
 
  private:
-  Eigen::Vector3d Direction(int64_t i) const;
-  Eigen::Vector3d CentreOf(int64_t i) const;
   double Strain(int64_t i, int64_t j) const;
   void AddStrained(int32_t a, int32_t b, const std::vector<char>& is_free,
                    std::vector<int32_t>* points) const;
@@ -98,7 +96,6 @@ class TwoViewConflicts {
   void AppendTriples(const HalfPlane& violated,
                      const std::vector<HalfPlane>& planes, float worth,
                      std::vector<Candidate>* candidates) const;
-  Eigen::Vector3d CentreOf(int64_t i) const;
 
   const KnownRotationProblem& problem_;
   const Estimate& estimate_;

@@ -15,6 +15,20 @@
 
 namespace krot::internal {
 
+// Calls body(a, b) for about `num_tried` of the pairs a < b of [0, count),
+// spread evenly, those that are farthest apart first.
+template <typename Body>
+void ForSomePairs(int64_t count, int64_t num_tried, const Body& body) {
+  const int64_t stride =
+      std::max<int64_t>(1, count * (count - 1) / 2 / num_tried);
+  int64_t pair = 0;
+  for (int64_t gap = count - 1; gap > 0; --gap) {
+    for (int64_t a = 0; a + gap < count; ++a, ++pair) {
+      if (pair % stride == 0) body(a, a + gap);
+    }
+  }
+}
+
 // Two groups of frames that share tracks.
 struct GroupPair {
   int32_t a = -1, b = -1;
@@ -85,8 +99,6 @@ std::vector<int32_t> FindParts(const KnownRotationProblem& problem,
 // The 99.9 % quantile of chi-squared of three degrees of freedom: one right
 // track in a thousand exceeds it.
 inline constexpr double kCutOff = 16.3;
-// Three standard deviations, squared: costs that rise by less are no worse.
-inline constexpr double kNoWorse = 9;
 
 // What one group says about a track: its point there, and the observations that
 // agree with it.
@@ -152,7 +164,8 @@ class PlaceSearch {
           return BestPoint(track, place).second < kCutOff * variance_;
         });
   }
-  double no_worse() const { return kNoWorse * variance_; }
+  // Three standard deviations, squared: costs that rise by less are no worse.
+  double no_worse() const { return 9 * variance_; }
 
  private:
   double SquaredError(int64_t i, const Eigen::Vector3d& x) const {

@@ -21,18 +21,6 @@
 namespace krot::internal {
 namespace {
 
-// The redundancy that tracks must give each frame, doubled until the tracks are
-// connected. A track of n observations has 2 n - 3, 2 - 3 / n for each of them.
-constexpr double kRedundancyPerFrame = 120;
-// A group that shares less of its tracks with others is a part with a programme
-// of its own.
-constexpr double kStrongShare = 0.2;
-// Programmes after the first, with weights.
-constexpr int kStartReweightings = 1;
-// A start needs no smaller mu; relative to the level.
-constexpr double kStartMu = 1e-3;
-// The `dear` of WeightsAgainst.
-constexpr double kDearExcess = 0.1;
 // The size of a core. The dense factor of so many costs next to nothing.
 constexpr int32_t kCoreFrames = 500;
 
@@ -65,9 +53,10 @@ std::vector<int64_t> CoveringTracks(const KnownRotationProblem& problem,
   return covering;
 }
 
-// The same with as much redundancy as it takes to connect all tracks.
+// The same with as much redundancy as it takes to connect all tracks, 120 for
+// each frame at least. A track of n observations has 2 n - 3.
 std::vector<int64_t> ConnectedTracks(const KnownRotationProblem& problem) {
-  for (double per_frame = kRedundancyPerFrame;; per_frame *= 2) {
+  for (double per_frame = 120;; per_frame *= 2) {
     std::vector<int64_t> tracks = CoveringTracks(problem, per_frame);
     if (tracks.size() == problem.observations.size() ||
         SplitIntoComponents(problem, tracks).size() == 1) {
@@ -92,13 +81,12 @@ Estimate StartByProgramme(const KnownRotationProblem& problem,
   Estimate own = part.Restrict(estimate);
   SlackOptions options;
   options.norm = norm;
-  options.smallest_mu = kStartMu;
-  for (int n = 0; n <= kStartReweightings && !context.IsCancelled(); ++n) {
-    context.Stage("positions from rotations and tracks, programme", n + 1,
-                  kStartReweightings + 1);
+  options.smallest_mu = 1e-3;  // a start needs no smaller
+  for (int n = 1; n <= 2 && !context.IsCancelled(); ++n) {
+    context.Stage("positions from rotations and tracks, programme", n, 2);
     const SlackSolution solution =
         MinimizeSlack(part.problem(), level, options, context, &own);
-    options.weights = WeightsAgainst(solution.slack, level, kDearExcess);
+    options.weights = WeightsAgainst(solution.slack, level, /*dear=*/0.1);
   }
   part.Replace(own, &estimate);
   std::vector<char> is_placed(problem.num_points, 0);
@@ -323,7 +311,7 @@ Estimate StartOfComponent(const KnownRotationProblem& problem, Norm norm,
   PartOptions options;
   options.min_tracks = 1;
   options.compares_scales = false;
-  options.min_share = kStrongShare;
+  options.min_share = 0.2;
   const std::vector<int32_t> part_of = FindParts(problem, options);
   if (*std::max_element(part_of.begin(), part_of.end()) == 0) {
     return StartOfPart(problem, norm, level, context);

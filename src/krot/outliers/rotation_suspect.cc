@@ -22,14 +22,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr int64_t kFewestConflicts = 3;
-constexpr double kMost = 0.5;  // of all conflicts
-constexpr double kGapOfSuspect = 1e-3;
-constexpr size_t kFewestSightings = 6;
-constexpr int kTurnIterations = 50;
-constexpr double kSmallestTurn = 1e-12;  // rad
-constexpr double kTurnDamping = 1e-9;    // relative
-
 // An observation of the image, and its point in the camera as that stands now.
 struct Sighting {
   Vector2d pixel;
@@ -88,14 +80,14 @@ Vector6d TurnFit::Step(const Turn& turn, bool with_rotation) const {
     gradient += weight * J.transpose() * e;
   }
   for (int k = 0; k < 6; ++k) {
-    normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + kTurnDamping) : 1;
+    normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + 1e-9) : 1;
   }
   return -normal.ldlt().solve(gradient);
 }
 
 Turn TurnFit::Fit(bool with_rotation) const {
   Turn turn;
-  for (int n = 0; n < kTurnIterations; ++n) {
+  for (int n = 0; n < 50; ++n) {
     const Vector6d step = Step(turn, with_rotation);
     if (!step.allFinite()) break;
     const Vector3d omega = step.head<3>();
@@ -106,7 +98,7 @@ Turn TurnFit::Fit(bool with_rotation) const {
           turn.rotation;
     }
     turn.translation += step.tail<3>();
-    if (with_rotation && angle < kSmallestTurn) break;
+    if (with_rotation && angle < 1e-12) break;
   }
   return turn;
 }
@@ -149,9 +141,8 @@ std::optional<int32_t> SuspectedView(const KnownRotationProblem& problem,
   }
   std::optional<int32_t> suspected;
   for (size_t v = 0; v < counts.size(); ++v) {
-    const bool is_in_most = counts[v] >= kFewestConflicts &&
-                            static_cast<double>(counts[v]) >=
-                                kMost * static_cast<double>(num_conflicts);
+    const bool is_in_most =
+        counts[v] >= 3 && 2 * counts[v] >= static_cast<int64_t>(num_conflicts);
     if (!is_in_most) continue;
     if (!suspected || num_removed[v] > num_removed[*suspected]) {
       suspected = static_cast<int32_t>(v);
@@ -211,8 +202,8 @@ std::optional<RotationSuspect> FindRotationSuspect(
   const Context within = context.Within("asking whether a rotation is wrong");
   const auto solve = [&](const std::vector<int64_t>& removed,
                          const Estimate& start) {
-    return SolveWithout(model, built, removed, start, bound.norm, kGapOfSuspect,
-                        within);
+    return SolveWithout(model, built, removed, start, bound.norm,
+                        /*relative_gap=*/1e-3, within);
   };
   const OptimumWithout with = solve({}, built.start);
   const OptimumWithout without = solve(observations, built.start);
@@ -221,7 +212,7 @@ std::optional<RotationSuspect> FindRotationSuspect(
   const Reprojection reprojection(model, built);
   std::vector<Sighting> sightings =
       SightingsOf(built, reprojection, observations, placed.estimate);
-  if (context.IsCancelled() || sightings.size() < kFewestSightings) {
+  if (context.IsCancelled() || sightings.size() < 6) {
     return std::nullopt;
   }
   RotationSuspect suspect;

@@ -13,10 +13,6 @@
 namespace krot::internal {
 namespace {
 
-// A start's errors are larger than the lowest maximum: up to so many times what
-// noise explains, they do not show that an observation has to go.
-constexpr double kNearlyFits = 3;
-
 std::string Pixels(double value) {
   std::ostringstream words;
   words.precision(3);
@@ -78,7 +74,9 @@ RemovalStart FindRemovalStart(const Model& model,
     const double largest =
         Reprojection(model, start.built)
             .TrueCost(start.built.start, norm, context.num_threads);
-    start.nearly_fits = largest <= kNearlyFits * start.max_error;
+    // A start's errors are larger than the lowest maximum, so that these do not
+    // show that an observation has to go.
+    start.nearly_fits = largest <= 3 * start.max_error;
     start.fits_its_positions =
         !options.has_other_rotations &&
         FitsItsPositions(model, options, context, start.max_error);

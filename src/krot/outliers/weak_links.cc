@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include <Eigen/Geometry>
@@ -24,8 +23,6 @@ using Eigen::Vector3d;
 // depths, and the ratio of neighbours on the grid.
 constexpr double kLargestScale = 30;
 constexpr double kScaleStep = 1.05;
-constexpr int kFineSteps = 10;      // to each side, within a grid step
-constexpr size_t kMaxTracks = 200;  // about; more are thinned out
 // Observations agree with a point up to so many standard deviations.
 constexpr double kAgreeing = 4;
 
@@ -56,10 +53,8 @@ double NoiseOf(const KnownRotationProblem& problem, const Estimate& estimate,
                      std::sqrt(rows / (rows - 3)));
   }
   if (errors.empty()) return kLeastNoisePx;
-  const auto middle =
-      errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return std::max(kLeastNoisePx, *middle / std::sqrt(2 * std::log(2.0)));
+  return std::max(kLeastNoisePx,
+                  Median(std::move(errors)) / std::sqrt(2 * std::log(2.0)));
 }
 
 // Joins groups of frames until none share tracks.
@@ -116,10 +111,9 @@ std::vector<Side> Joiner::SidesOf(const std::vector<int32_t>& points,
   const ProblemSubset part(problem_, observations);
   const KnownRotationProblem& own = part.problem();
   Estimate estimate = part.Restrict(estimate_);
-  std::vector<int32_t> all(own.num_points);
-  std::iota(all.begin(), all.end(), 0);
   const double cap = kAgreeing * sigma_;
-  PlacePointsRobustly(own, all, Norm::L2(), cap, context_, &estimate);
+  PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context_,
+                      &estimate);
   const std::vector<AffineMap> cameras =
       CamerasFromWorld(problem_, estimate_.translations);
   std::vector<Side> sides(points.size());
@@ -191,11 +185,10 @@ void Joiner::Move(int32_t group, const Place& place) {
 
 // Any three tracks agree at some turn. So twice as many must agree.
 void Joiner::FindTurn(const PlaceSearch& tracks, WeakLink* link) {
-  constexpr int64_t kTelling = 6;
   const std::optional<Place> turned = tracks.ProposeTurned();
   if (!turned) return;
   const int64_t count = tracks.NumAgreeing(*turned);
-  if (count < kTelling || 2 * count <= link->num_telling ||
+  if (count < 6 || 2 * count <= link->num_telling ||
       count < link->num_agreeing + 3) {
     return;
   }
@@ -211,7 +204,7 @@ WeakLink Joiner::Join(GroupPair pair) {
   const std::vector<SharedTrack> all = TracksOf(pair, &link.num_tracks);
   link.num_telling = static_cast<int64_t>(all.size());
   std::vector<SharedTrack> some;
-  const size_t stride = std::max<size_t>(1, all.size() / kMaxTracks);
+  const size_t stride = std::max<size_t>(1, all.size() / 200);
   for (size_t n = 0; n < all.size(); n += stride) some.push_back(all[n]);
   const PlaceSearch tracks(problem_, estimate_, sigma_, std::move(some));
   if (may_move_ && is_scale_free) {
@@ -227,9 +220,11 @@ WeakLink Joiner::Join(GroupPair pair) {
   std::vector<Place> places =
       tracks.Profile(ScalesAround(1, kScaleStep, num_steps), context_);
   if (is_scale_free) {
-    const double step = std::pow(kScaleStep, 1.0 / kFineSteps);
+    const int num_fine = 10;  // to each side, within a grid step
     const std::vector<Place> fine = tracks.Profile(
-        ScalesAround(places[0].scale, step, kFineSteps), context_);
+        ScalesAround(places[0].scale, std::pow(kScaleStep, 1.0 / num_fine),
+                     num_fine),
+        context_);
     places.insert(places.begin(), fine.begin(), fine.end());
   }
   if (!may_move_) {  // the estimate's own, which a search may miss
@@ -321,9 +316,7 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
     std::vector<int32_t> parts = FindParts(own, {});
     if (*std::max_element(parts.begin(), parts.end()) == 0) continue;
     Estimate placed = subset.Restrict(estimate);
-    std::vector<int32_t> all(own.num_points);
-    std::iota(all.begin(), all.end(), 0);
-    PlacePointsRobustly(own, all, Norm::L2(), cap, context, &placed);
+    PlacePointsRobustly(own, AllPoints(own), Norm::L2(), cap, context, &placed);
     if (!HasBaseline(own)) NormalizeScale(own, &placed);
     std::vector<int32_t> point_part(own.num_points);
     for (int32_t k = 0; k < own.num_points; ++k) {
