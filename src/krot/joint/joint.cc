@@ -84,7 +84,6 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
   std::vector<std::vector<int64_t>> components =
       context.ranks == nullptr ? SplitIntoComponents(problem)
                                : std::vector<std::vector<int64_t>>(1);
-  summary.num_components = static_cast<int32_t>(components.size());
   summary.termination = SolveTermination::kGapReached;
   double cost_of_solved = 0;
   for (std::vector<int64_t>& observations : components) {
@@ -93,10 +92,9 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
             ? ProblemSubset(problem, std::move(observations))
             : ProblemSubset(problem);
     KnownMultipliers own;
-    const bool is_one = summary.num_components == 1;
-    ComponentSolve solve(part.problem(), options, context,
-                         part.Restrict(*estimate),
-                         known != nullptr && is_one ? known : &own);
+    ComponentSolve solve(
+        part.problem(), options, context, part.Restrict(*estimate),
+        known != nullptr && components.size() == 1 ? known : &own);
     const SolveTermination termination =
         solve.Run([&](JointIteration iteration) {
           iteration.cost = std::max(cost_of_solved, *iteration.cost);
@@ -133,6 +131,8 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
 
 namespace {
 
+constexpr int kMaxIterationsOfStart = 200;
+
 // A depth that is small against the scene, as far as baselines or fixed
 // positions tell. Without either the scale is free, and any depth will do.
 double UnitDepth(const KnownRotationProblem& problem) {
@@ -149,7 +149,7 @@ InteriorPointTermination FindEstimateBelow(
     Estimate* estimate, std::vector<Multiplier>* multipliers) {
   InteriorPointOptions conic;
   conic.norm = options.norm;
-  conic.max_iterations = options.max_iterations;
+  conic.max_iterations = kMaxIterationsOfStart;
   conic.stop = [&](const ConicIterate& iterate) {
     if (options.callback) options.callback(bound);
     return iterate.gamma > 1 && iterate.gap < options.hopeless_gap;
@@ -160,10 +160,9 @@ InteriorPointTermination FindEstimateBelow(
       .termination;
 }
 
-bool LowerByFeasibility(const KnownRotationProblem& problem,
+void LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
                         const Context& context, Estimate* estimate) {
-  bool is_lower = false;
   std::vector<Multiplier> multipliers;
   for (;;) {
     const double bound =
@@ -172,9 +171,8 @@ bool LowerByFeasibility(const KnownRotationProblem& problem,
         FindEstimateBelow(problem, bound, options, context, estimate,
                           &multipliers) !=
             InteriorPointTermination::kFeasible) {
-      return is_lower;
+      return;
     }
-    is_lower = true;
   }
 }
 
@@ -220,7 +218,6 @@ void StartSearch::Record(JointIteration iteration) {
 FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
   FeasibleStartOptions start;
   start.norm = options_.norm;
-  start.max_iterations = options_.max_iterations;
   start.hopeless_gap = hopeless_gap;
   start.callback = [this](double bound) {
     JointIteration iteration;
@@ -246,7 +243,7 @@ SolveTermination StartSearch::DecideByOptimum(Estimate* estimate) {
     if (found != InteriorPointTermination::kFeasible) continue;
     JointOptions joint;
     joint.norm = options_.norm;
-    joint.max_iterations = options_.max_iterations;
+    joint.max_iterations = kMaxIterationsOfStart;
     joint.callback = [this](int, const JointIteration& iteration) {
       Record(iteration);
     };
@@ -327,7 +324,6 @@ InitializerSummary FindStart(const KnownRotationProblem& problem,
     part.Replace(start, &found);
   }
   summary.termination = SolveTermination::kWithinBound;
-  summary.cost = Cost(problem, found, options.norm, context.num_threads);
   *estimate = std::move(found);
   return summary;
 }

@@ -112,7 +112,6 @@ struct JointSummary {
   // The highest certified bound of any component: also one of the whole.
   std::optional<Certificate> certificate;
   double lower_bound = 0;  // pixels, what the certificate proves; 0 if none
-  int32_t num_components = 0;
   // The size of the last working sets, over all components.
   int64_t num_working_observations = 0;
   std::vector<JointIteration> iterations;
@@ -135,7 +134,6 @@ JointSummary SolveJoint(const KnownRotationProblem& problem,
 
 struct FeasibleStartOptions {
   Norm norm;
-  int max_iterations = 200;  // >= 1
   // A depth that is small against the scene, scene units. It affects the path
   // of the iterations, not what is feasible. None: a share of the longest
   // baseline or distance of fixed positions, or 1 where the scale is free.
@@ -162,9 +160,8 @@ InteriorPointTermination FindEstimateBelow(
     Estimate* estimate, std::vector<Multiplier>* multipliers);
 
 // Replaces an estimate by one at a quarter of its cost (FindEstimateBelow), as
-// often as one is found. Returns whether any was found. Each takes about five
-// iterations.
-bool LowerByFeasibility(const KnownRotationProblem& problem,
+// often as one is found. Each takes about five iterations.
+void LowerByFeasibility(const KnownRotationProblem& problem,
                         const FeasibleStartOptions& options,
                         const Context& context, Estimate* estimate);
 
@@ -172,10 +169,9 @@ bool LowerByFeasibility(const KnownRotationProblem& problem,
 // bisection iteration at a loose upper bound" [Zhang18, Sec. 4.2].
 
 struct InitializerOptions {
-  Norm norm;                 // p = 1, 2 or infinity
-  double max_error = 100;    // the bound that the start must meet, pixels; > 0
-  int max_iterations = 200;  // per component; >= 1
-  JointCallback callback;    // counts over all components; may be empty
+  Norm norm;               // p = 1, 2 or infinity
+  double max_error = 100;  // the bound that the start must meet, pixels; > 0
+  JointCallback callback;  // counts over all components; may be empty
 };
 
 struct InitializerSummary {
@@ -183,7 +179,6 @@ struct InitializerSummary {
   // kInfeasible: proved, no estimate does that; kNoStart: neither was shown, no
   // estimate was found at any bound; kInterrupted.
   SolveTermination termination = SolveTermination::kNotRun;
-  double cost = 0;  // pixels, of the estimate within the bound
   std::vector<JointIteration> iterations;
   // kInfeasible: proves lower_bound > max_error.
   std::optional<Certificate> certificate;

@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "krot/outliers/parts.h"
 #include "krot/outliers/robust_start.h"
 #include "krot/problem/cost.h"
 
@@ -26,12 +27,6 @@ Vector3d CentreOf(const KnownRotationProblem& problem, const Estimate& estimate,
   const View& view = problem.views[problem.observations[i].view];
   const AffineMap map = CamFromWorld(view, estimate.translations[view.frame]);
   return -map.leftCols<3>().transpose() * map.col(3);
-}
-
-template <typename Value>
-void SortUnique(std::vector<Value>* values) {
-  std::sort(values->begin(), values->end());
-  values->erase(std::unique(values->begin(), values->end()), values->end());
 }
 
 }  // namespace

@@ -15,6 +15,8 @@
 namespace krot::internal {
 namespace {
 
+constexpr int kNumLevels = 6;  // about, below the first
+
 class Profiler {
  public:
   Profiler(const Model& model, const BuiltProblem& built,
@@ -46,7 +48,7 @@ class Profiler {
 ProfileLevel Profiler::Solve(Removal removal, const Context& context) const {
   OptimumWithout optimum =
       SolveWithout(model_, built_, removal.observations, removal.estimate,
-                   options_.norm, options_.relative_gap, context);
+                   options_.norm, context);
   ProfileLevel level;
   level.removal = std::move(removal);
   level.removal.estimate = std::move(optimum.estimate);
@@ -57,7 +59,7 @@ ProfileLevel Profiler::Solve(Removal removal, const Context& context) const {
 }
 
 void Profiler::Charge(ProfileLevel* level) {
-  if (level->removal.observations.size() <= options_.max_charged) {
+  if (level->removal.observations.size() <= 50) {
     profile_.conflicts =
         PackAgainstRemoval(model_, built_, {options_.norm, level->max_error},
                            level->removal, std::move(profile_.conflicts),
@@ -97,7 +99,7 @@ ErrorProfile Profiler::Run() {
   nothing.estimate = built_.start;
   const auto at_level = [this](int n) {
     return context_.Within("error profile, level " + std::to_string(n) +
-                           " of about " + std::to_string(options_.num_levels));
+                           " of about " + std::to_string(kNumLevels));
   };
   profile_.levels.push_back(Solve(std::move(nothing), at_level(0)));
   const double first = profile_.levels[0].max_error;
@@ -108,7 +110,7 @@ ErrorProfile Profiler::Run() {
   for (int n = 0; !context_.IsCancelled(); ++n) {
     const double now = profile_.levels.back().max_error;
     if (!(now > last) || !std::isfinite(now)) break;
-    const double steps = std::max(1, options_.num_levels - n);
+    const double steps = std::max(1, kNumLevels - n);
     double bound = std::max(last, now * std::pow(last / now, 1 / steps));
     if (noise < now) bound = std::max(bound, noise);
     // A few programmes are enough where the last level's weights are at hand.
@@ -152,10 +154,6 @@ ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
                               const Context& context) {
   CheckArgument(!options.max_error || *options.max_error > 0, "max_error",
                 options.max_error.value_or(0), "> 0");
-  CheckArgument(options.relative_gap > 0, "relative_gap", options.relative_gap,
-                "> 0");
-  CheckArgument(options.num_levels >= 1, "num_levels", options.num_levels,
-                ">= 1");
   return Profiler(model, built, options, context).Run();
 }
 

@@ -102,7 +102,6 @@ void OutlierFilter::MeasureNoise(const BuiltProblem& built) {
   noise.limit = FindNoiseLimit(model_, built, bound_.norm, context_);
   const OptimumWithout lowest =
       SolveWithout(model_, built, {}, built.start, bound_.norm,
-                   ErrorProfileOptions().relative_gap,
                    context_.Within("comparing the errors with noise"));
   noise.lowest_max_error = lowest.max_error;
   noise.lower_bound = lowest.lower_bound;
@@ -113,10 +112,8 @@ void OutlierFilter::MeasureNoise(const BuiltProblem& built) {
 std::optional<Removal> OutlierFilter::MakeProfile(
     const BuiltProblem& built, std::vector<Conflict>* found) {
   const Timer timer;
-  ErrorProfileOptions options;
-  options.norm = bound_.norm;
-  options.max_error = options_.max_error;
-  ErrorProfile profile = FindErrorProfile(model_, built, options, context_);
+  ErrorProfile profile = FindErrorProfile(
+      model_, built, {bound_.norm, options_.max_error}, context_);
   ErrorProfileSummary& summary = summary_.profile.emplace();
   for (const ProfileLevel& level : profile.levels) {
     summary.levels.push_back(

@@ -53,10 +53,6 @@ struct ErrorProfileOptions {
   // first level's or, if that is lower and the first level is proved to be
   // above it, what noise explains.
   std::optional<double> max_error;
-  double relative_gap = 1e-3;  // of every level; > 0
-  int num_levels = 6;          // about, below the first; >= 1
-  // For levels that remove more observations no new conflicts are looked for.
-  size_t max_charged = 50;
 };
 
 struct ProfileLevel {
@@ -85,8 +81,8 @@ struct ErrorProfile {
 };
 
 // Goes from one optimum to the next: observations are removed for a bound below
-// it (RemovalSearch), in equal ratios down to the last level, with a stop at
-// what noise explains, and the rest is solved anew (SolveInRounds).
+// it (RemovalSearch), in about six equal ratios down to the last level, with a
+// stop at what noise explains, and the rest is solved anew (SolveWithout).
 // Observations that are left alone in their tracks hold nothing and do not
 // count. If cancelled, it returns the levels so far. Every level takes about as
 // long as two solves.
@@ -316,19 +312,15 @@ RemovalStart FindRemovalStart(const Model& model,
 
 // SolveModel for models with observations that cannot be satisfied: what `krot
 // solver` does between reading and writing.
+//
+// With max_error a few observations are removed so that all others keep it.
+// Without it all stay, unless the start is from nothing and noise does not
+// explain the lowest maximum (RemovalStart); then the observations that noise
+// does not explain are removed. If a certificate is asked for, this is only so
+// for a model of which SolveModel serves no observation.
 
-struct TolerantSolveOptions {
-  SolveModelOptions solve;
-  // The bound in pixels, > 0: a few observations are removed so that all others
-  // keep it. Without one all stay, unless the start is from nothing and noise
-  // does not explain the lowest maximum (RemovalStart); then the observations
-  // that noise does not explain are removed. If a certificate is asked for,
-  // this is only so for a model of which SolveModel serves no observation.
-  std::optional<double> max_error;
-  // As in OutlierFilterOptions.
-  bool has_start_from_nothing = false;
-  bool has_other_rotations = false;
-  bool find_conflicts = false;  // the proof of how many had to go
+struct TolerantSolveOptions : OutlierFilterOptions {
+  TolerantSolveOptions() { find_conflicts = false; }
 };
 
 struct TolerantSolveResult {

@@ -109,9 +109,6 @@ struct ConflictPacking {
   bool is_complete = true;  // false: it ended at the limit of work
 };
 
-// Work per observation. An endoscope's model needs 1,300, most fewer than 300.
-inline constexpr int64_t kMostWork = 1500;
-
 // Packs disjoint conflicts so that as many removed observations as possible
 // have one of their own: each charges a removed observation with others that
 // cannot be satisfied together with it. The removed observations with the
@@ -132,10 +129,11 @@ inline constexpr int64_t kMostWork = 1500;
 //
 // Where hardly anything can be decided, as with wrong rotations, it ends with
 // the conflicts so far once it has done `work_per_observation` (Work) for each
-// observation of the problem.
+// observation of the problem. An endoscope's model needs 1,300, most fewer than
+// 300.
 ConflictPacking PackAgainstRemoval(
     const Model& model, const BuiltProblem& built, const ErrorBound& bound,
     const Removal& removal, std::vector<Conflict> found, const Context& context,
-    int64_t work_per_observation = kMostWork);
+    int64_t work_per_observation = 1500);
 
 }  // namespace krot::internal

@@ -22,8 +22,7 @@ Groups::Groups(const KnownRotationProblem& problem,
     for (const int64_t i : problem.OfPoint(k)) {
       frames.push_back(problem.FrameOf(i));
     }
-    std::sort(frames.begin(), frames.end());
-    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    SortUnique(&frames);
     for (const int32_t frame : frames) sights_.push_back({frame, 1});
     begin_.push_back(static_cast<int64_t>(sights_.size()));
   }

@@ -15,6 +15,13 @@
 
 namespace krot::internal {
 
+// Leaves each value once, ascending.
+template <typename Value>
+void SortUnique(std::vector<Value>* values) {
+  std::sort(values->begin(), values->end());
+  values->erase(std::unique(values->begin(), values->end()), values->end());
+}
+
 // Calls body(a, b) for about `num_tried` of the pairs a < b of [0, count),
 // spread evenly, those that are farthest apart first.
 template <typename Body>

@@ -264,7 +264,7 @@ std::vector<int64_t> AllBut(const std::vector<int64_t>& removed, size_t count) {
 OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
                             const std::vector<int64_t>& removed,
                             const Estimate& start, Norm norm,
-                            double relative_gap, const Context& context) {
+                            const Context& context) {
   const ProblemSubset subset(
       built.problem,
       PruneUnconstrained(built.problem, AllBut(removed, built.pixels.size())));
@@ -277,7 +277,7 @@ OptimumWithout SolveWithout(const Model& model, const BuiltProblem& built,
   reprojection.TakeRows(estimate, context.num_threads, &part.problem);
   SolveModelOptions options;
   options.norm = norm;
-  options.joint.relative_gap = relative_gap;
+  options.joint.relative_gap = 1e-3;
   SolveSummary summary;
   optimum.proof = SolveInRounds(model, options, SolveMethod::kJoint, context,
                                 Timer(), &part, &estimate, &summary);

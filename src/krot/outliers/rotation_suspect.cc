@@ -12,6 +12,7 @@
 #include "krot/camera/camera_model.h"
 #include "krot/convert/reprojection.h"
 #include "krot/minimax/residual_set.h"
+#include "krot/outliers/parts.h"
 #include "krot/outliers/removal.h"
 
 namespace krot::internal {
@@ -122,8 +123,7 @@ std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,
     for (const int64_t i : conflict.observations) {
       views.push_back(problem.observations[i].view);
     }
-    std::sort(views.begin(), views.end());
-    views.erase(std::unique(views.begin(), views.end()), views.end());
+    SortUnique(&views);
     for (const int32_t v : views) ++counts[v];
   }
   return counts;
@@ -202,8 +202,7 @@ std::optional<RotationSuspect> FindRotationSuspect(
   const Context within = context.Within("asking whether a rotation is wrong");
   const auto solve = [&](const std::vector<int64_t>& removed,
                          const Estimate& start) {
-    return SolveWithout(model, built, removed, start, bound.norm,
-                        /*relative_gap=*/1e-3, within);
+    return SolveWithout(model, built, removed, start, bound.norm, within);
   };
   const OptimumWithout with = solve({}, built.start);
   const OptimumWithout without = solve(observations, built.start);

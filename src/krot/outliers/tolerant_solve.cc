@@ -104,13 +104,8 @@ TolerantSolveResult SolveWithoutOutliers(const Model& model,
                                          const TolerantSolveOptions& options,
                                          bool spares_what_fits,
                                          const Context& context) {
-  OutlierFilterOptions filter;
-  filter.max_error = options.max_error;
+  OutlierFilterOptions filter = options;
   filter.spares_what_fits = spares_what_fits;
-  filter.find_conflicts = options.find_conflicts;
-  filter.has_start_from_nothing = options.has_start_from_nothing;
-  filter.has_other_rotations = options.has_other_rotations;
-  filter.solve = options.solve;
   filter.solve.on_built = nullptr;
   filter.solve.find_lowest = options.solve.describe_certificate;
   OutlierFilterResult filtered = FilterOutliers(model, filter, context);

@@ -309,8 +309,7 @@ std::vector<WeakLink> FindWeakLinks(const KnownRotationProblem& problem,
   for (std::vector<int64_t>& component : SplitIntoComponents(problem)) {
     std::vector<int32_t> frames;  // of the component, as the subset has them
     for (const int64_t i : component) frames.push_back(problem.FrameOf(i));
-    std::sort(frames.begin(), frames.end());
-    frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
+    SortUnique(&frames);
     const ProblemSubset subset(problem, std::move(component));
     const KnownRotationProblem& own = subset.problem();
     std::vector<int32_t> parts = FindParts(own, {});

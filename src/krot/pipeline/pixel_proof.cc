@@ -111,16 +111,6 @@ std::optional<PixelCertificate> ProveInPixels(const Model& model,
 
 namespace {
 
-std::optional<PixelCertificate> ProveLinear(const Model& model,
-                                            const BuiltProblem& built,
-                                            const Estimate& x_hat, Norm norm,
-                                            const Certificate& certificate,
-                                            const Context& context) {
-  return MakePixelCertificate(
-      model, built, norm, certificate,
-      BearingsOfPoints(model, built, x_hat, certificate), context);
-}
-
 void NameValues(StepValues* values, std::optional<PixelCertificate>* proof) {
   values->Optional(proof, [&](PixelCertificate* p) {
     values->Value(&p->lower_bound);
@@ -141,7 +131,9 @@ std::optional<PixelCertificate> ProveHere(const Model& model,
                                           double sufficient,
                                           const Context& context) {
   if (certificate != nullptr && Reprojection(model, built).IsLinear()) {
-    return ProveLinear(model, built, x_hat, norm, *certificate, context);
+    return MakePixelCertificate(
+        model, built, norm, *certificate,
+        BearingsOfPoints(model, built, x_hat, *certificate), context);
   }
   // To solve a large support as a problem of its own would take as long as the
   // whole problem did.

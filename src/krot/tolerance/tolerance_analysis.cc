@@ -84,52 +84,45 @@ ToleranceGauge GaugeFor(const ToleranceOptions& options,
   return gauge;
 }
 
-std::vector<ToleranceBox> EmptyBoxes(const Model& model,
-                                     const ToleranceOptions& options) {
-  std::vector<ToleranceBox> boxes;
-  for (const int32_t i : options.images) {
-    ToleranceBox box;
-    box.is_image = true;
-    box.id = model.images[i].id;
-    box.name = model.images[i].name;
-    boxes.push_back(std::move(box));
-  }
-  for (const int32_t k : options.points) {
-    ToleranceBox box;
-    box.id = model.points3D[k].id;
-    box.position = model.points3D[k].xyz;
-    boxes.push_back(std::move(box));
-  }
-  return boxes;
-}
-
 void FillBoxes(const ToleranceOptions& options, const ToleranceProblem& problem,
                const std::vector<int32_t>& view_of, const Context& context,
                ToleranceSummary* summary) {
+  const Model& model = problem.model();
   const std::vector<int32_t> point_of =
-      InverseOf(problem.built().point_of, problem.model().points3D.size());
-  const auto num_boxes = static_cast<int64_t>(summary->boxes.size());
+      InverseOf(problem.built().point_of, model.points3D.size());
+  const size_t num_images = options.images.size();
+  const size_t num_boxes = num_images + options.points.size();
+  summary->boxes.resize(num_boxes);
   Context inner = context;
   if (num_boxes > 1) inner.num_threads = 1;
   std::atomic<int64_t> num_done = static_cast<int64_t>(summary->lengths.size());
-  ParallelFor(num_boxes, 1, context.num_threads, [&](int64_t n, int64_t, int) {
-    if (context.IsCancelled()) return;
+  const auto fill = [&](size_t n) {
     ToleranceBox& box = summary->boxes[n];
-    const auto num_images = static_cast<int64_t>(options.images.size());
-    const int32_t index = box.is_image
-                              ? view_of[options.images[n]]
-                              : point_of[options.points[n - num_images]];
-    box.is_free = index < 0;
+    Pull target;
+    box.is_image = n < num_images;
+    if (box.is_image) {
+      const int32_t i = options.images[n];
+      box.id = model.images[i].id;
+      box.name = model.images[i].name;
+      target = {Pull::Kind::kView, view_of[i]};
+    } else {
+      const int32_t k = options.points[n - num_images];
+      box.id = model.points3D[k].id;
+      box.position = model.points3D[k].xyz;
+      target = {Pull::Kind::kPoint, point_of[k]};
+    }
+    if (context.IsCancelled()) return;
+    box.is_free = target.index < 0;
     if (!box.is_free) {
-      const Pull target{box.is_image ? Pull::Kind::kView : Pull::Kind::kPoint,
-                        index};
       box.position = PositionOf(problem.problem(), problem.centre(), target);
       box.is_free = !IsFixedPosition(problem.problem(), target) &&
                     !problem.UsablePart({target});
       box.box = FindBox(problem, target, options.tolerance, inner);
     }
     if (options.on_box) options.on_box(++num_done);
-  });
+  };
+  ParallelFor(static_cast<int64_t>(num_boxes), 1, context.num_threads,
+              [&](int64_t n, int64_t, int) { fill(n); });
   for (const ToleranceBox& box : summary->boxes) {
     summary->num_programmes += box.box.num_programmes;
   }
@@ -332,7 +325,6 @@ ToleranceResult AnalyzeInFrame(const Model& model,
                                 options.solve.norm, options.max_error, context);
   summary.num_rowless = shared.num_rowless();
   summary.num_far_points = shared.num_far_points();
-  summary.boxes = EmptyBoxes(result.model, options);
   FillBoxes(options, shared, view_of, context, &summary);
   summary.agreement = Compare(summary.boxes);
   summary.termination = context.IsCancelled()

@@ -45,14 +45,12 @@ struct ExtentOptions {
   Norm norm;                // p = 1, 2 or infinity
   double bound = 0;         // of all residuals, pixels; > 0
   double tolerance = 0.01;  // of the way from the start to the proved end; > 0
-  int max_iterations = 100;
 };
 
 // How far estimates reach whose residuals are all below the bound.
 struct Extent {
   Estimate estimate;             // that reaches the farthest
   std::optional<double> proved;  // bounds the sum (CheckExtent); scene units
-  int iterations = 0;
 };
 
 // Maximises the sum of p'x over `pulls` from `start`, which must be below the

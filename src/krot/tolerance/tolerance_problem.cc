@@ -81,7 +81,7 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
 
   InteriorPointOptions interior_point;
   interior_point.norm = options.norm;
-  interior_point.max_iterations = options.max_iterations;
+  interior_point.max_iterations = 100;
   interior_point.stop = [&](const ConicIterate& iterate) {
     const double reached = Along(problem, *iterate.estimate, pulls);
     if (reached - at_start > far_away) return true;
@@ -95,10 +95,8 @@ Extent FindExtent(const KnownRotationProblem& problem, const Pulls& pulls,
            options.tolerance * (*extent.proved - at_start);
   };
   std::vector<Multiplier> multipliers;
-  extent.iterations =
-      MinimizeLinear(problem, interior_point, context, options.bound, objective,
-                     &extent.estimate, &multipliers)
-          .iterations;
+  MinimizeLinear(problem, interior_point, context, options.bound, objective,
+                 &extent.estimate, &multipliers);
   return extent;
 }
 
