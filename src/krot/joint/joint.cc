@@ -193,13 +193,98 @@ class StartSearch {
         summary_(*summary) {}
 
   // `*start` is meaningful if feasible.
-  SolveTermination Run(Estimate* start);
+  SolveTermination Run(Estimate* start) {
+    std::vector<Multiplier> multipliers;
+    const InteriorPointTermination found =
+        FindEstimateBelow(part_.problem(), options_.max_error, StartOptions(0),
+                          context_, start, &multipliers);
+    if (found == InteriorPointTermination::kInterrupted) {
+      return SolveTermination::kInterrupted;
+    }
+    if (found != InteriorPointTermination::kFeasible) {
+      CertificateOptions enough;
+      enough.sufficient_bound = (1 + 1e-9) * options_.max_error;  // rounding
+      const std::optional<Certificate> certificate =
+          MakeInfeasibilityCertificate(part_.problem(), options_.norm,
+                                       options_.max_error, multipliers, enough,
+                                       context_);
+      if (certificate && Proves(*certificate)) {
+        return SolveTermination::kInfeasible;
+      }
+      const SolveTermination decision = DecideByOptimum(start);
+      if (decision != SolveTermination::kWithinBound) return decision;
+    }
+    LowerByFeasibility(part_.problem(), StartOptions(/*hopeless_gap=*/1e-2),
+                       context_, start);
+    return context_.IsCancelled() ? SolveTermination::kInterrupted
+                                  : SolveTermination::kWithinBound;
+  }
 
  private:
-  FeasibleStartOptions StartOptions(double hopeless_gap);
-  SolveTermination DecideByOptimum(Estimate* estimate);
-  bool Proves(Certificate certificate);
-  void Record(JointIteration iteration);
+  FeasibleStartOptions StartOptions(double hopeless_gap) {
+    FeasibleStartOptions start;
+    start.norm = options_.norm;
+    start.hopeless_gap = hopeless_gap;
+    start.callback = [this](double bound) {
+      JointIteration iteration;
+      iteration.target = bound;
+      Record(iteration);
+    };
+    return start;
+  }
+
+  // Called where no estimate was found at the bound, nor a proof that there is
+  // none. Finds an estimate at a larger bound, ten times each, and solves from
+  // there for the optimum: it meets the bound itself, or its certificate proves
+  // that there is no start.
+  SolveTermination DecideByOptimum(Estimate* estimate) {
+    std::vector<Multiplier> multipliers;
+    for (double bound = 10 * options_.max_error; bound <= 1e7; bound *= 10) {
+      const InteriorPointTermination found =
+          FindEstimateBelow(part_.problem(), bound, StartOptions(0), context_,
+                            estimate, &multipliers);
+      if (found == InteriorPointTermination::kInterrupted) {
+        return SolveTermination::kInterrupted;
+      }
+      if (found != InteriorPointTermination::kFeasible) continue;
+      JointOptions joint;
+      joint.norm = options_.norm;
+      joint.max_iterations = kMaxIterationsOfStart;
+      joint.callback = [this](int, const JointIteration& iteration) {
+        Record(iteration);
+      };
+      const JointSummary optimum =
+          SolveJoint(part_.problem(), joint, context_, estimate);
+      if (optimum.certificate && Proves(*optimum.certificate)) {
+        return SolveTermination::kInfeasible;
+      }
+      if (optimum.termination == SolveTermination::kInterrupted) {
+        return SolveTermination::kInterrupted;
+      }
+      return optimum.cost_final < options_.max_error
+                 ? SolveTermination::kWithinBound
+                 : SolveTermination::kNoStart;
+    }
+    return SolveTermination::kNoStart;
+  }
+
+  // Whether a certificate of the part proves that there is no start. If so,
+  // keeps it in the summary.
+  bool Proves(Certificate certificate) {
+    const CertificateCheck check =
+        CheckCertificate(part_.problem(), options_.norm, certificate);
+    if (!(check.proved_bound > options_.max_error)) return false;
+    summary_.lower_bound = check.proved_bound;
+    summary_.certificate = InWhole(part_, std::move(certificate));
+    return true;
+  }
+
+  void Record(JointIteration iteration) {
+    iteration.seconds = timer_.Seconds();
+    summary_.iterations.push_back(iteration);
+    if (!options_.callback) return;
+    options_.callback(static_cast<int>(summary_.iterations.size()), iteration);
+  }
 
   const ProblemSubset& part_;
   const InitializerOptions options_;
@@ -207,97 +292,6 @@ class StartSearch {
   const Timer& timer_;
   InitializerSummary& summary_;
 };
-
-void StartSearch::Record(JointIteration iteration) {
-  iteration.seconds = timer_.Seconds();
-  summary_.iterations.push_back(iteration);
-  if (!options_.callback) return;
-  options_.callback(static_cast<int>(summary_.iterations.size()), iteration);
-}
-
-FeasibleStartOptions StartSearch::StartOptions(double hopeless_gap) {
-  FeasibleStartOptions start;
-  start.norm = options_.norm;
-  start.hopeless_gap = hopeless_gap;
-  start.callback = [this](double bound) {
-    JointIteration iteration;
-    iteration.target = bound;
-    Record(iteration);
-  };
-  return start;
-}
-
-// Called where no estimate was found at the bound, nor a proof that there is
-// none. Finds an estimate at a larger bound, ten times each, and solves from
-// there for the optimum: it meets the bound itself, or its certificate proves
-// that there is no start.
-SolveTermination StartSearch::DecideByOptimum(Estimate* estimate) {
-  std::vector<Multiplier> multipliers;
-  for (double bound = 10 * options_.max_error; bound <= 1e7; bound *= 10) {
-    const InteriorPointTermination found =
-        FindEstimateBelow(part_.problem(), bound, StartOptions(0), context_,
-                          estimate, &multipliers);
-    if (found == InteriorPointTermination::kInterrupted) {
-      return SolveTermination::kInterrupted;
-    }
-    if (found != InteriorPointTermination::kFeasible) continue;
-    JointOptions joint;
-    joint.norm = options_.norm;
-    joint.max_iterations = kMaxIterationsOfStart;
-    joint.callback = [this](int, const JointIteration& iteration) {
-      Record(iteration);
-    };
-    const JointSummary optimum =
-        SolveJoint(part_.problem(), joint, context_, estimate);
-    if (optimum.certificate && Proves(*optimum.certificate)) {
-      return SolveTermination::kInfeasible;
-    }
-    if (optimum.termination == SolveTermination::kInterrupted) {
-      return SolveTermination::kInterrupted;
-    }
-    return optimum.cost_final < options_.max_error
-               ? SolveTermination::kWithinBound
-               : SolveTermination::kNoStart;
-  }
-  return SolveTermination::kNoStart;
-}
-
-// Whether a certificate of the part proves that there is no start. If so, keeps
-// it in the summary.
-bool StartSearch::Proves(Certificate certificate) {
-  const CertificateCheck check =
-      CheckCertificate(part_.problem(), options_.norm, certificate);
-  if (!(check.proved_bound > options_.max_error)) return false;
-  summary_.lower_bound = check.proved_bound;
-  summary_.certificate = InWhole(part_, std::move(certificate));
-  return true;
-}
-
-SolveTermination StartSearch::Run(Estimate* start) {
-  std::vector<Multiplier> multipliers;
-  const InteriorPointTermination found =
-      FindEstimateBelow(part_.problem(), options_.max_error, StartOptions(0),
-                        context_, start, &multipliers);
-  if (found == InteriorPointTermination::kInterrupted) {
-    return SolveTermination::kInterrupted;
-  }
-  if (found != InteriorPointTermination::kFeasible) {
-    CertificateOptions enough;
-    enough.sufficient_bound = (1 + 1e-9) * options_.max_error;  // rounding
-    const std::optional<Certificate> certificate = MakeInfeasibilityCertificate(
-        part_.problem(), options_.norm, options_.max_error, multipliers, enough,
-        context_);
-    if (certificate && Proves(*certificate)) {
-      return SolveTermination::kInfeasible;
-    }
-    const SolveTermination decision = DecideByOptimum(start);
-    if (decision != SolveTermination::kWithinBound) return decision;
-  }
-  LowerByFeasibility(part_.problem(), StartOptions(/*hopeless_gap=*/1e-2),
-                     context_, start);
-  return context_.IsCancelled() ? SolveTermination::kInterrupted
-                                : SolveTermination::kWithinBound;
-}
 
 }  // namespace
 

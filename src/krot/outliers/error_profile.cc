@@ -29,12 +29,77 @@ class Profiler {
     profile_.noise = FindNoiseLimit(model, built, options.norm, context);
   }
 
-  ErrorProfile Run();
+  ErrorProfile Run() {
+    Removal nothing;
+    nothing.estimate = built_.start;
+    const auto at_level = [this](int n) {
+      return context_.Within("error profile, level " + std::to_string(n) +
+                             " of about " + std::to_string(kNumLevels));
+    };
+    profile_.levels.push_back(Solve(std::move(nothing), at_level(0)));
+    const double first = profile_.levels[0].max_error;
+    const double noise = profile_.noise.max_error;
+    const bool has_outliers = profile_.levels[0].lower_bound > noise;
+    const double last = options_.max_error.value_or(
+        has_outliers ? std::min(noise, first / 2) : first / 2);
+    for (int n = 0; !context_.IsCancelled(); ++n) {
+      const double now = profile_.levels.back().max_error;
+      if (!(now > last) || !std::isfinite(now)) break;
+      const double steps = std::max(1, kNumLevels - n);
+      double bound = std::max(last, now * std::pow(last / now, 1 / steps));
+      if (noise < now) bound = std::max(bound, noise);
+      // A few programmes are enough where the last level's weights are at hand.
+      ProfileLevel level =
+          Solve(search_.Find(bound, /*max_programmes=*/n == 0 ? 4 : 2),
+                at_level(n + 1));
+      if (context_.IsCancelled() || !(level.max_error < now)) break;
+      Charge(&level);
+      Append(std::move(level));
+    }
+    for (size_t n = 1; has_outliers && n < profile_.levels.size(); ++n) {
+      if (profile_.levels[n].max_error > noise) continue;
+      profile_.elbow = n;
+      break;
+    }
+    return std::move(profile_);
+  }
 
  private:
-  ProfileLevel Solve(Removal removal, const Context& context) const;
-  void Charge(ProfileLevel* level);
-  void Append(ProfileLevel level);
+  // The optimum of what a removal leaves.
+  ProfileLevel Solve(Removal removal, const Context& context) const {
+    OptimumWithout optimum =
+        SolveWithout(model_, built_, removal.observations, removal.estimate,
+                     options_.norm, context);
+    ProfileLevel level;
+    level.removal = std::move(removal);
+    level.removal.estimate = std::move(optimum.estimate);
+    level.max_error = optimum.max_error;
+    level.lower_bound = optimum.lower_bound;
+    level.proof = std::move(optimum.proof);
+    return level;
+  }
+
+  void Charge(ProfileLevel* level) {
+    if (level->removal.observations.size() <= 50) {
+      profile_.conflicts =
+          PackAgainstRemoval(model_, built_, {options_.norm, level->max_error},
+                             level->removal, std::move(profile_.conflicts),
+                             context_)
+              .conflicts;
+    }
+    level->num_proved = static_cast<int64_t>(profile_.conflicts.size());
+  }
+
+  // Appends a level; earlier ones that removed no fewer observations are
+  // dropped.
+  void Append(ProfileLevel level) {
+    std::vector<ProfileLevel>& levels = profile_.levels;
+    while (levels.size() > 1 && levels.back().removal.observations.size() >=
+                                    level.removal.observations.size()) {
+      levels.pop_back();
+    }
+    levels.push_back(std::move(level));
+  }
 
   const Model& model_;
   const BuiltProblem& built_;
@@ -43,41 +108,6 @@ class Profiler {
   RemovalSearch search_;
   ErrorProfile profile_;
 };
-
-// The optimum of what a removal leaves.
-ProfileLevel Profiler::Solve(Removal removal, const Context& context) const {
-  OptimumWithout optimum =
-      SolveWithout(model_, built_, removal.observations, removal.estimate,
-                   options_.norm, context);
-  ProfileLevel level;
-  level.removal = std::move(removal);
-  level.removal.estimate = std::move(optimum.estimate);
-  level.max_error = optimum.max_error;
-  level.lower_bound = optimum.lower_bound;
-  level.proof = std::move(optimum.proof);
-  return level;
-}
-
-void Profiler::Charge(ProfileLevel* level) {
-  if (level->removal.observations.size() <= 50) {
-    profile_.conflicts =
-        PackAgainstRemoval(model_, built_, {options_.norm, level->max_error},
-                           level->removal, std::move(profile_.conflicts),
-                           context_)
-            .conflicts;
-  }
-  level->num_proved = static_cast<int64_t>(profile_.conflicts.size());
-}
-
-// Appends a level; earlier ones that removed no fewer observations are dropped.
-void Profiler::Append(ProfileLevel level) {
-  std::vector<ProfileLevel>& levels = profile_.levels;
-  while (levels.size() > 1 && levels.back().removal.observations.size() >=
-                                  level.removal.observations.size()) {
-    levels.pop_back();
-  }
-  levels.push_back(std::move(level));
-}
 
 NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
   NoiseLimit limit;
@@ -92,41 +122,6 @@ NoiseLimit LimitOf(const Model& model, Norm norm, const Context& context) {
       std::max(kLeastNoisePx,
                factor * limit.sigma * std::sqrt(2 * std::log(count / 0.05)));
   return limit;
-}
-
-ErrorProfile Profiler::Run() {
-  Removal nothing;
-  nothing.estimate = built_.start;
-  const auto at_level = [this](int n) {
-    return context_.Within("error profile, level " + std::to_string(n) +
-                           " of about " + std::to_string(kNumLevels));
-  };
-  profile_.levels.push_back(Solve(std::move(nothing), at_level(0)));
-  const double first = profile_.levels[0].max_error;
-  const double noise = profile_.noise.max_error;
-  const bool has_outliers = profile_.levels[0].lower_bound > noise;
-  const double last = options_.max_error.value_or(
-      has_outliers ? std::min(noise, first / 2) : first / 2);
-  for (int n = 0; !context_.IsCancelled(); ++n) {
-    const double now = profile_.levels.back().max_error;
-    if (!(now > last) || !std::isfinite(now)) break;
-    const double steps = std::max(1, kNumLevels - n);
-    double bound = std::max(last, now * std::pow(last / now, 1 / steps));
-    if (noise < now) bound = std::max(bound, noise);
-    // A few programmes are enough where the last level's weights are at hand.
-    ProfileLevel level =
-        Solve(search_.Find(bound, /*max_programmes=*/n == 0 ? 4 : 2),
-              at_level(n + 1));
-    if (context_.IsCancelled() || !(level.max_error < now)) break;
-    Charge(&level);
-    Append(std::move(level));
-  }
-  for (size_t n = 1; has_outliers && n < profile_.levels.size(); ++n) {
-    if (profile_.levels[n].max_error > noise) continue;
-    profile_.elbow = n;
-    break;
-  }
-  return std::move(profile_);
 }
 
 }  // namespace

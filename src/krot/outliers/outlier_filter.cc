@@ -36,262 +36,251 @@ class OutlierFilter : private Filtering {
       : Filtering(model, options, context),
         bound_{options.solve.norm, options.max_error.value_or(0)} {}
 
-  OutlierFilterResult Run();
+  OutlierFilterResult Run() {
+    if (options_.method == OutlierMethod::kConflicts) {
+      FilterByConflicts();
+    } else {
+      FilterByThreshold();
+    }
+    summary_.max_error = bound_.max_error;
+    if (context_.IsCancelled()) return {model_, std::move(summary_)};
+    if (is_given_back_) {
+      summary_.is_within = true;
+      summary_.pixel_error_after = summary_.pixel_error_before;
+      return {model_, std::move(summary_)};
+    }
+    const std::vector<double> errors = Describe();
+    UpdatePointErrors(errors, &kept_.model);
+    summary_.is_within =
+        std::all_of(errors.begin(), errors.end(),
+                    [this](double error) { return IsWithin(error); });
+    if (options_.solve.polish != Polish::kNone && summary_.solve) {
+      summary_.solve->polish =
+          PolishModel(options_.solve.polish, options_.solve.finish.loss,
+                      options_.solve.problem.fixed, context_, &kept_.model);
+    }
+    return {std::move(kept_.model), std::move(summary_)};
+  }
 
  private:
   bool IsWithin(double error) const {  // rounding counts for nothing
     return error <= (1 + 1e-9) * bound_.max_error;
   }
-  void FilterByConflicts();
-  void FilterByThreshold();
+
+  void FilterByConflicts() {
+    const RemovalStart start = FindRemovalStart(model_, options_, context_);
+    const BuiltProblem& built = start.built;
+    summary_.init = start.init;
+    if (options_.spares_what_fits &&
+        (start.fits_its_positions || start.nearly_fits)) {
+      is_given_back_ = summary_.is_spared = true;
+      bound_.max_error = start.fits_its_positions ? 0 : start.max_error;
+      return;
+    }
+    bound_.max_error = start.max_error;
+    summary_.is_bound_beyond_reason =
+        !options_.max_error && start.max_error > options_.solve.init_max_error;
+    const std::vector<uint64_t> elements = ElementsOf(model_, built);
+    std::vector<Conflict> found;
+    const std::optional<Removal> removal = RemoveFew(built, &found);
+    if (context_.IsCancelled()) return;
+    if (!removal) {
+      is_given_back_ = true;
+      summary_.conflicts =
+          DescribeConflicts(model_, built, options_.solve.norm,
+                            summary_.noise->limit.max_error, {});
+      return;
+    }
+    for (const int64_t i : removal->observations) is_removed_[elements[i]] = 1;
+    if (options_.find_conflicts) {
+      Pack(built, *removal, std::move(found), elements);
+    }
+    if (options_.on_removed) {
+      options_.on_removed(static_cast<int64_t>(removal->observations.size()));
+    }
+    Model moved;
+    PlaceAt(built, *removal, &moved);
+    Solve(std::move(moved));
+    if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
+      FindWeakParts(built);
+    }
+    // Observations that had no part in the problem may still be above the
+    // bound.
+    if (!RemoveAbove()) return;
+    std::vector<char> is_gone;
+    for (const uint64_t e : kept_.element_of) is_gone.push_back(is_removed_[e]);
+    RemoveMore(is_gone);
+  }
+
+  void FilterByThreshold() {
+    for (size_t e = 0; e < errors_before_.size(); ++e) {
+      is_removed_[e] = !IsWithin(errors_before_[e]);
+    }
+    Model moved = model_;
+    do {
+      Solve(moved);
+    } while (!context_.IsCancelled() && summary_.num_solves < 50 &&
+             RemoveAbove());
+  }
+
+  // Chooses what to remove. Conflicts that this finds on the way go to `found`.
+  // Where noise is to choose the bound, it is set here, or none is returned if
+  // noise explains all errors.
   std::optional<Removal> RemoveFew(const BuiltProblem& built,
-                                   std::vector<Conflict>* found);
+                                   std::vector<Conflict>* found) {
+    if (built.pixels.empty()) return Removal{{}, built.start, {}};
+    if (options_.make_profile) return MakeProfile(built, found);
+    if (bound_.max_error == 0) {
+      MeasureNoise(built);
+      if (summary_.noise->ExplainsAll()) return std::nullopt;
+      bound_.max_error = summary_.noise->limit.max_error;
+    }
+    const Timer timer;
+    // A robust start leaves few above the bound already: programmes would take
+    // ten times as long to find a two-hundredth fewer, and do not hold parts'
+    // scales.
+    const bool is_enough =
+        summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
+    Removal removal = FindRemoval(model_, built, bound_, context_,
+                                  is_enough ? 0 : kMaxProgrammes);
+    summary_.seconds_removal = timer.Seconds();
+    return removal;
+  }
+
+  // The removal of the profile's last level or, where no bound was given, of
+  // its elbow.
   std::optional<Removal> MakeProfile(const BuiltProblem& built,
-                                     std::vector<Conflict>* found);
-  void MeasureNoise(const BuiltProblem& built);
+                                     std::vector<Conflict>* found) {
+    const Timer timer;
+    ErrorProfile profile = FindErrorProfile(
+        model_, built, {bound_.norm, options_.max_error}, context_);
+    ErrorProfileSummary& summary = summary_.profile.emplace();
+    for (const ProfileLevel& level : profile.levels) {
+      summary.levels.push_back(
+          {static_cast<int64_t>(level.removal.observations.size()),
+           level.max_error, level.lower_bound, level.num_proved,
+           PointIds(model_, built, level.removal.observations)});
+    }
+    summary.elbow = profile.elbow;
+    summary.seconds = timer.Seconds();
+    summary_.noise = NoiseSummary{profile.noise, profile.levels[0].max_error,
+                                  profile.levels[0].lower_bound};
+    size_t chosen = profile.levels.size() - 1;
+    if (!options_.max_error) {
+      if (!profile.elbow) return std::nullopt;
+      chosen = *profile.elbow;
+      bound_.max_error = profile.noise.max_error;
+    }
+    for (Conflict& conflict : profile.conflicts) {
+      if (conflict.proof.lower_bound > bound_.max_error) {
+        found->push_back(std::move(conflict));
+      }
+    }
+    return std::move(profile.levels[chosen].removal);
+  }
+
+  void MeasureNoise(const BuiltProblem& built) {
+    NoiseSummary& noise = summary_.noise.emplace();
+    noise.limit = FindNoiseLimit(model_, built, bound_.norm, context_);
+    const OptimumWithout lowest =
+        SolveWithout(model_, built, {}, built.start, bound_.norm,
+                     context_.Within("comparing the errors with noise"));
+    noise.lowest_max_error = lowest.max_error;
+    noise.lower_bound = lowest.lower_bound;
+  }
+
   void Pack(const BuiltProblem& built, const Removal& removal,
-            std::vector<Conflict> found, const std::vector<uint64_t>& elements);
-  void PlaceAt(const BuiltProblem& built, const Removal& removal, Model* moved);
-  void Solve(Model moved);
-  bool RemoveAbove();
-  void FindWeakParts(const BuiltProblem& built);
+            std::vector<Conflict> found,
+            const std::vector<uint64_t>& elements) {
+    const Timer timer;
+    ConflictPacking packing = PackAgainstRemoval(model_, built, bound_, removal,
+                                                 std::move(found), context_);
+    summary_.is_search_complete = packing.is_complete;
+    if (context_.IsCancelled()) return;
+    summary_.rotation_suspect = FindRotationSuspect(
+        model_, built, bound_, packing.conflicts, removal, context_);
+    TakeConflicts(built, elements, bound_, std::move(packing.conflicts));
+    summary_.seconds_conflicts = timer.Seconds();
+  }
+
+  // Moves a copy of the input to the removal's estimate, in the input's frame.
+  void PlaceAt(const BuiltProblem& built, const Removal& removal,
+               Model* moved) {
+    Estimate placed = removal.estimate;
+    const ProblemSubset part(built.problem,
+                             AllBut(removal.observations, built.pixels.size()));
+    Estimate own = part.Restrict(placed);
+    RestoreGaugeIfHarmless(part.problem(), part.Restrict(built.start),
+                           options_.solve.norm, context_, &own);
+    part.Replace(own, &placed);
+    *moved = ApplyEstimate(model_, built, placed);
+  }
+
+  // Solves what is left of a model that differs from the input in translations
+  // and points alone.
+  void Solve(Model moved) {
+    const Timer timer;
+    kept_ = RemoveObservations(moved, is_removed_);
+    if (!kept_.model.track_elements.empty()) {
+      // If all that is left can be within the bound, its least squares below
+      // that.
+      SolveModelOptions options = options_.solve;
+      options.init = SolveInit::kModel;
+      options.polish = Polish::kNone;
+      options.finish.max_error = bound_.max_error;
+      SolveModelResult solved = SolveModel(kept_.model, options, context_);
+      kept_.model = std::move(solved.model);
+      summary_.solve = std::move(solved.summary);
+      ++summary_.num_solves;
+    }
+    summary_.seconds_solve += timer.Seconds();
+  }
+
+  // Removes what is above the bound in the solved model. Returns whether any
+  // was.
+  bool RemoveAbove() {
+    const std::vector<double> errors =
+        PixelErrors(kept_.model, context_.num_threads);
+    bool is_any = false;
+    for (size_t n = 0; n < errors.size(); ++n) {
+      if (IsWithin(errors[n])) continue;
+      is_removed_[kept_.element_of[n]] = 1;
+      is_any = true;
+    }
+    return is_any;
+  }
+
+  // Looks for weakly tied parts in the solved model, by all tracks of the
+  // input.
+  void FindWeakParts(const BuiltProblem& built) {
+    Estimate estimate = built.start;
+    for (size_t f = 0; f < built.frame_of.size(); ++f) {
+      estimate.translations[f] =
+          kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
+    }
+    for (const WeakLink& link :
+         FindWeakLinks(built.problem, estimate,
+                       kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
+                       context_)) {
+      WeakPart& part = summary_.weak_parts.emplace_back();
+      for (size_t v = 0; v < built.image_of.size(); ++v) {
+        if (std::binary_search(link.frames.begin(), link.frames.end(),
+                               built.problem.views[v].frame)) {
+          part.image_names.push_back(model_.images[built.image_of[v]].name);
+        }
+      }
+      part.num_tracks = link.num_tracks;
+      part.num_agreeing = link.num_agreeing;
+      part.scale_factor = link.scale_factor;
+      part.is_held = link.IsHeld();
+      part.turn_deg = link.turn_deg;
+      part.num_agreeing_turned = link.num_agreeing_turned;
+    }
+  }
 
   ErrorBound bound_;
   bool is_given_back_ = false;  // nothing is removed, the model is the input
 };
-
-// Moves a copy of the input to the removal's estimate, in the input's frame.
-void OutlierFilter::PlaceAt(const BuiltProblem& built, const Removal& removal,
-                            Model* moved) {
-  Estimate placed = removal.estimate;
-  const ProblemSubset part(built.problem,
-                           AllBut(removal.observations, built.pixels.size()));
-  Estimate own = part.Restrict(placed);
-  RestoreGaugeIfHarmless(part.problem(), part.Restrict(built.start),
-                         options_.solve.norm, context_, &own);
-  part.Replace(own, &placed);
-  *moved = ApplyEstimate(model_, built, placed);
-}
-
-// Chooses what to remove. Conflicts that this finds on the way go to `found`.
-// Where noise is to choose the bound, it is set here, or none is returned if
-// noise explains all errors.
-std::optional<Removal> OutlierFilter::RemoveFew(const BuiltProblem& built,
-                                                std::vector<Conflict>* found) {
-  if (built.pixels.empty()) return Removal{{}, built.start, {}};
-  if (options_.make_profile) return MakeProfile(built, found);
-  if (bound_.max_error == 0) {
-    MeasureNoise(built);
-    if (summary_.noise->ExplainsAll()) return std::nullopt;
-    bound_.max_error = summary_.noise->limit.max_error;
-  }
-  const Timer timer;
-  // A robust start leaves few above the bound already: programmes would take
-  // ten times as long to find a two-hundredth fewer, and do not hold parts'
-  // scales.
-  const bool is_enough =
-      summary_.init == SolveInit::kFeasible && !options_.find_conflicts;
-  Removal removal = FindRemoval(model_, built, bound_, context_,
-                                is_enough ? 0 : kMaxProgrammes);
-  summary_.seconds_removal = timer.Seconds();
-  return removal;
-}
-
-void OutlierFilter::MeasureNoise(const BuiltProblem& built) {
-  NoiseSummary& noise = summary_.noise.emplace();
-  noise.limit = FindNoiseLimit(model_, built, bound_.norm, context_);
-  const OptimumWithout lowest =
-      SolveWithout(model_, built, {}, built.start, bound_.norm,
-                   context_.Within("comparing the errors with noise"));
-  noise.lowest_max_error = lowest.max_error;
-  noise.lower_bound = lowest.lower_bound;
-}
-
-// The removal of the profile's last level or, where no bound was given, of its
-// elbow.
-std::optional<Removal> OutlierFilter::MakeProfile(
-    const BuiltProblem& built, std::vector<Conflict>* found) {
-  const Timer timer;
-  ErrorProfile profile = FindErrorProfile(
-      model_, built, {bound_.norm, options_.max_error}, context_);
-  ErrorProfileSummary& summary = summary_.profile.emplace();
-  for (const ProfileLevel& level : profile.levels) {
-    summary.levels.push_back(
-        {static_cast<int64_t>(level.removal.observations.size()),
-         level.max_error, level.lower_bound, level.num_proved,
-         PointIds(model_, built, level.removal.observations)});
-  }
-  summary.elbow = profile.elbow;
-  summary.seconds = timer.Seconds();
-  summary_.noise = NoiseSummary{profile.noise, profile.levels[0].max_error,
-                                profile.levels[0].lower_bound};
-  size_t chosen = profile.levels.size() - 1;
-  if (!options_.max_error) {
-    if (!profile.elbow) return std::nullopt;
-    chosen = *profile.elbow;
-    bound_.max_error = profile.noise.max_error;
-  }
-  for (Conflict& conflict : profile.conflicts) {
-    if (conflict.proof.lower_bound > bound_.max_error) {
-      found->push_back(std::move(conflict));
-    }
-  }
-  return std::move(profile.levels[chosen].removal);
-}
-
-void OutlierFilter::Pack(const BuiltProblem& built, const Removal& removal,
-                         std::vector<Conflict> found,
-                         const std::vector<uint64_t>& elements) {
-  const Timer timer;
-  ConflictPacking packing = PackAgainstRemoval(model_, built, bound_, removal,
-                                               std::move(found), context_);
-  summary_.is_search_complete = packing.is_complete;
-  if (context_.IsCancelled()) return;
-  summary_.rotation_suspect = FindRotationSuspect(
-      model_, built, bound_, packing.conflicts, removal, context_);
-  TakeConflicts(built, elements, bound_, std::move(packing.conflicts));
-  summary_.seconds_conflicts = timer.Seconds();
-}
-
-// Solves what is left of a model that differs from the input in translations
-// and points alone.
-void OutlierFilter::Solve(Model moved) {
-  const Timer timer;
-  kept_ = RemoveObservations(moved, is_removed_);
-  if (!kept_.model.track_elements.empty()) {
-    // If all that is left can be within the bound, its least squares below
-    // that.
-    SolveModelOptions options = options_.solve;
-    options.init = SolveInit::kModel;
-    options.polish = Polish::kNone;
-    options.finish.max_error = bound_.max_error;
-    SolveModelResult solved = SolveModel(kept_.model, options, context_);
-    kept_.model = std::move(solved.model);
-    summary_.solve = std::move(solved.summary);
-    ++summary_.num_solves;
-  }
-  summary_.seconds_solve += timer.Seconds();
-}
-
-// Removes what is above the bound in the solved model. Returns whether any was.
-bool OutlierFilter::RemoveAbove() {
-  const std::vector<double> errors =
-      PixelErrors(kept_.model, context_.num_threads);
-  bool is_any = false;
-  for (size_t n = 0; n < errors.size(); ++n) {
-    if (IsWithin(errors[n])) continue;
-    is_removed_[kept_.element_of[n]] = 1;
-    is_any = true;
-  }
-  return is_any;
-}
-
-// Looks for weakly tied parts in the solved model, by all tracks of the input.
-void OutlierFilter::FindWeakParts(const BuiltProblem& built) {
-  Estimate estimate = built.start;
-  for (size_t f = 0; f < built.frame_of.size(); ++f) {
-    estimate.translations[f] =
-        kept_.model.frames[built.frame_of[f]].rig_from_world.translation;
-  }
-  for (const WeakLink& link :
-       FindWeakLinks(built.problem, estimate,
-                     kCapOfPoints * std::min(bound_.max_error, kLevelOfStart),
-                     context_)) {
-    WeakPart& part = summary_.weak_parts.emplace_back();
-    for (size_t v = 0; v < built.image_of.size(); ++v) {
-      if (std::binary_search(link.frames.begin(), link.frames.end(),
-                             built.problem.views[v].frame)) {
-        part.image_names.push_back(model_.images[built.image_of[v]].name);
-      }
-    }
-    part.num_tracks = link.num_tracks;
-    part.num_agreeing = link.num_agreeing;
-    part.scale_factor = link.scale_factor;
-    part.is_held = link.IsHeld();
-    part.turn_deg = link.turn_deg;
-    part.num_agreeing_turned = link.num_agreeing_turned;
-  }
-}
-
-void OutlierFilter::FilterByConflicts() {
-  const RemovalStart start = FindRemovalStart(model_, options_, context_);
-  const BuiltProblem& built = start.built;
-  summary_.init = start.init;
-  if (options_.spares_what_fits &&
-      (start.fits_its_positions || start.nearly_fits)) {
-    is_given_back_ = summary_.is_spared = true;
-    bound_.max_error = start.fits_its_positions ? 0 : start.max_error;
-    return;
-  }
-  bound_.max_error = start.max_error;
-  summary_.is_bound_beyond_reason =
-      !options_.max_error && start.max_error > options_.solve.init_max_error;
-  const std::vector<uint64_t> elements = ElementsOf(model_, built);
-  std::vector<Conflict> found;
-  const std::optional<Removal> removal = RemoveFew(built, &found);
-  if (context_.IsCancelled()) return;
-  if (!removal) {
-    is_given_back_ = true;
-    summary_.conflicts = DescribeConflicts(model_, built, options_.solve.norm,
-                                           summary_.noise->limit.max_error, {});
-    return;
-  }
-  for (const int64_t i : removal->observations) is_removed_[elements[i]] = 1;
-  if (options_.find_conflicts) {
-    Pack(built, *removal, std::move(found), elements);
-  }
-  if (options_.on_removed) {
-    options_.on_removed(static_cast<int64_t>(removal->observations.size()));
-  }
-  Model moved;
-  PlaceAt(built, *removal, &moved);
-  Solve(std::move(moved));
-  if (start.init == SolveInit::kFeasible && !context_.IsCancelled()) {
-    FindWeakParts(built);
-  }
-  // Observations that had no part in the problem may still be above the bound.
-  if (!RemoveAbove()) return;
-  std::vector<char> is_gone;
-  for (const uint64_t e : kept_.element_of) is_gone.push_back(is_removed_[e]);
-  RemoveMore(is_gone);
-}
-
-void OutlierFilter::FilterByThreshold() {
-  for (size_t e = 0; e < errors_before_.size(); ++e) {
-    is_removed_[e] = !IsWithin(errors_before_[e]);
-  }
-  Model moved = model_;
-  do {
-    Solve(moved);
-  } while (!context_.IsCancelled() && summary_.num_solves < 50 &&
-           RemoveAbove());
-}
-
-OutlierFilterResult OutlierFilter::Run() {
-  if (options_.method == OutlierMethod::kConflicts) {
-    FilterByConflicts();
-  } else {
-    FilterByThreshold();
-  }
-  summary_.max_error = bound_.max_error;
-  if (context_.IsCancelled()) return {model_, std::move(summary_)};
-  if (is_given_back_) {
-    summary_.is_within = true;
-    summary_.pixel_error_after = summary_.pixel_error_before;
-    return {model_, std::move(summary_)};
-  }
-  const std::vector<double> errors = Describe();
-  UpdatePointErrors(errors, &kept_.model);
-  summary_.is_within =
-      std::all_of(errors.begin(), errors.end(),
-                  [this](double error) { return IsWithin(error); });
-  if (options_.solve.polish != Polish::kNone && summary_.solve) {
-    summary_.solve->polish =
-        PolishModel(options_.solve.polish, options_.solve.finish.loss,
-                    options_.solve.problem.fixed, context_, &kept_.model);
-  }
-  return {std::move(kept_.model), std::move(summary_)};
-}
 
 }  // namespace
 

@@ -42,77 +42,72 @@ class TurnFit {
       : source_(source), bound_(bound), sightings_(std::move(sightings)) {}
 
   // Fits the translation and, if asked to, the rotation.
-  Turn Fit(bool with_rotation) const;
-  int64_t NumAbove(const Turn& turn) const;
+  Turn Fit(bool with_rotation) const {
+    Turn turn;
+    for (int n = 0; n < 50; ++n) {
+      const Vector6d step = Step(turn, with_rotation);
+      if (!step.allFinite()) break;
+      const Vector3d omega = step.head<3>();
+      const double angle = omega.norm();
+      if (angle > 0) {
+        turn.rotation =
+            Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix() *
+            turn.rotation;
+      }
+      turn.translation += step.tail<3>();
+      if (with_rotation && angle < 1e-12) break;
+    }
+    return turn;
+  }
+
+  int64_t NumAbove(const Turn& turn) const {
+    return std::count_if(
+        sightings_.begin(), sightings_.end(), [&](const Sighting& sighting) {
+          const std::optional<Vector2d> e = ProjectionError(
+              source_.model_id, source_.params, sighting.pixel,
+              turn.rotation * sighting.x_cam + turn.translation);
+          return !e || !(NormOf(*e, bound_.norm) <= bound_.max_error);
+        });
+  }
 
  private:
-  Vector6d Step(const Turn& turn, bool with_rotation) const;
+  // A Gauss-Newton step, with rows taken at the projection: e = v / w.
+  Vector6d Step(const Turn& turn, bool with_rotation) const {
+    Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+    Vector6d gradient = Vector6d::Zero();
+    for (const Sighting& sighting : sightings_) {
+      const Vector3d turned = turn.rotation * sighting.x_cam;
+      const Vector3d x = turned + turn.translation;
+      const std::optional<Matrix3d> row =
+          RowAtProjection(source_.model_id, source_.params, sighting.pixel, x);
+      if (!row) continue;
+      const Vector3d wv = *row * x;
+      const Vector2d e = wv.tail<2>() / wv[0];
+      const Eigen::Matrix<double, 2, 3> by_x =
+          (row->bottomRows<2>() - e * row->row(0)) / wv[0];
+      Eigen::Matrix<double, 2, 6> J;
+      J.rightCols<3>() = by_x;
+      J.leftCols<3>().setZero();
+      if (with_rotation) {
+        for (int k = 0; k < 3; ++k) {
+          J.col(k) = by_x * Vector3d::Unit(k).cross(turned);
+        }
+      }
+      const double weight =
+          1 / (1 + e.squaredNorm() / (bound_.max_error * bound_.max_error));
+      normal += weight * J.transpose() * J;
+      gradient += weight * J.transpose() * e;
+    }
+    for (int k = 0; k < 6; ++k) {
+      normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + 1e-9) : 1;
+    }
+    return -normal.ldlt().solve(gradient);
+  }
 
   const Reprojection::Source source_;
   const ErrorBound bound_;
   const std::vector<Sighting> sightings_;
 };
-
-// A Gauss-Newton step, with rows taken at the projection: e = v / w.
-Vector6d TurnFit::Step(const Turn& turn, bool with_rotation) const {
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  for (const Sighting& sighting : sightings_) {
-    const Vector3d turned = turn.rotation * sighting.x_cam;
-    const Vector3d x = turned + turn.translation;
-    const std::optional<Matrix3d> row =
-        RowAtProjection(source_.model_id, source_.params, sighting.pixel, x);
-    if (!row) continue;
-    const Vector3d wv = *row * x;
-    const Vector2d e = wv.tail<2>() / wv[0];
-    const Eigen::Matrix<double, 2, 3> by_x =
-        (row->bottomRows<2>() - e * row->row(0)) / wv[0];
-    Eigen::Matrix<double, 2, 6> J;
-    J.rightCols<3>() = by_x;
-    J.leftCols<3>().setZero();
-    if (with_rotation) {
-      for (int k = 0; k < 3; ++k) {
-        J.col(k) = by_x * Vector3d::Unit(k).cross(turned);
-      }
-    }
-    const double weight =
-        1 / (1 + e.squaredNorm() / (bound_.max_error * bound_.max_error));
-    normal += weight * J.transpose() * J;
-    gradient += weight * J.transpose() * e;
-  }
-  for (int k = 0; k < 6; ++k) {
-    normal(k, k) = normal(k, k) > 0 ? normal(k, k) * (1 + 1e-9) : 1;
-  }
-  return -normal.ldlt().solve(gradient);
-}
-
-Turn TurnFit::Fit(bool with_rotation) const {
-  Turn turn;
-  for (int n = 0; n < 50; ++n) {
-    const Vector6d step = Step(turn, with_rotation);
-    if (!step.allFinite()) break;
-    const Vector3d omega = step.head<3>();
-    const double angle = omega.norm();
-    if (angle > 0) {
-      turn.rotation =
-          Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix() *
-          turn.rotation;
-    }
-    turn.translation += step.tail<3>();
-    if (with_rotation && angle < 1e-12) break;
-  }
-  return turn;
-}
-
-int64_t TurnFit::NumAbove(const Turn& turn) const {
-  return std::count_if(
-      sightings_.begin(), sightings_.end(), [&](const Sighting& sighting) {
-        const std::optional<Vector2d> e =
-            ProjectionError(source_.model_id, source_.params, sighting.pixel,
-                            turn.rotation * sighting.x_cam + turn.translation);
-        return !e || !(NormOf(*e, bound_.norm) <= bound_.max_error);
-      });
-}
 
 // For each view the number of conflicts that it has observations in.
 std::vector<int64_t> ConflictsOfViews(const KnownRotationProblem& problem,

@@ -30,12 +30,67 @@ class Schedule {
         cost_(MaxOfRanks(context, Cost(problem, *estimate, options.norm,
                                        context.num_threads))) {}
 
-  void Sweeps(ResIntOptions res_int);
-  void LeadingSweeps();
-  std::optional<Certificate> Joint(KnownMultipliers* known);
+  void Sweeps(ResIntOptions res_int) {
+    res_int.norm = options_.norm;
+    res_int.callback = [this](int, const Sweep& sweep) {
+      AddSweep(sweep.cost);
+    };
+    RunStep(
+        options_.checkpoint, context_,
+        [&] {
+          const ResIntSummary result =
+              SolveResInt(problem_, res_int, context_, &estimate_);
+          summary_.termination = result.termination;
+          cost_ = result.cost_final;
+        },
+        [&](StepValues* values) {
+          NameValues(values, &estimate_);
+          values->Value(&summary_.termination);
+          values->Value(&cost_);
+          values->Values(&summary_.sweeps);
+        });
+  }
+
+  void LeadingSweeps() {
+    ResIntOptions res_int = options_.res_int;
+    res_int.max_sweeps = options_.max_leading_sweeps;
+    res_int.sweep_tolerance = options_.leading_sweep_tolerance;
+    res_int.patience = 1;
+    Sweeps(res_int);
+  }
+
+  std::optional<Certificate> Joint(KnownMultipliers* known) {
+    JointOptions joint = options_.joint;
+    joint.norm = options_.norm;
+    joint.relative_gap *= 0.9;  // the rest is for lenses and the gauge
+    joint.checkpoint = options_.checkpoint;
+    joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
+    const JointSummary result =
+        SolveJoint(problem_, joint, context_, &estimate_, known);
+    summary_.termination = result.termination;
+    cost_ = result.cost_final;
+    summary_.num_working_observations = result.num_working_observations;
+    return result.certificate;
+  }
+
   // If the cost is above init_max_error: looks for a start from nothing, and
   // takes it if it is better.
-  void StartAfresh();
+  void StartAfresh() {
+    if (!(cost_ > options_.init_max_error)) return;
+    context_.Note("the start is a rough one; looking for a better");
+    FoundStart found = FindFeasibleStart(
+        problem_, options_, context_,
+        LogIterations(options_.joint.callback, timer_, &summary_));
+    if (found.termination == SolveTermination::kInterrupted) {
+      summary_.termination = SolveTermination::kInterrupted;
+    }
+    if (!found.estimate) return;
+    const double cost =
+        Cost(problem_, *found.estimate, options_.norm, context_.num_threads);
+    if (!(cost < cost_)) return;
+    estimate_ = *std::move(found.estimate);
+    cost_ = cost;
+  }
 
   double cost() const { return cost_; }
   bool IsZero() const { return IsZeroUpToRounding(cost_); }
@@ -59,64 +114,6 @@ class Schedule {
   SolveSummary& summary_;
   double cost_;  // of the rows, pixels
 };
-
-void Schedule::Sweeps(ResIntOptions res_int) {
-  res_int.norm = options_.norm;
-  res_int.callback = [this](int, const Sweep& sweep) { AddSweep(sweep.cost); };
-  RunStep(
-      options_.checkpoint, context_,
-      [&] {
-        const ResIntSummary result =
-            SolveResInt(problem_, res_int, context_, &estimate_);
-        summary_.termination = result.termination;
-        cost_ = result.cost_final;
-      },
-      [&](StepValues* values) {
-        NameValues(values, &estimate_);
-        values->Value(&summary_.termination);
-        values->Value(&cost_);
-        values->Values(&summary_.sweeps);
-      });
-}
-
-void Schedule::LeadingSweeps() {
-  ResIntOptions res_int = options_.res_int;
-  res_int.max_sweeps = options_.max_leading_sweeps;
-  res_int.sweep_tolerance = options_.leading_sweep_tolerance;
-  res_int.patience = 1;
-  Sweeps(res_int);
-}
-
-std::optional<Certificate> Schedule::Joint(KnownMultipliers* known) {
-  JointOptions joint = options_.joint;
-  joint.norm = options_.norm;
-  joint.relative_gap *= 0.9;  // the rest is for lenses and the gauge
-  joint.checkpoint = options_.checkpoint;
-  joint.callback = LogIterations(options_.joint.callback, timer_, &summary_);
-  const JointSummary result =
-      SolveJoint(problem_, joint, context_, &estimate_, known);
-  summary_.termination = result.termination;
-  cost_ = result.cost_final;
-  summary_.num_working_observations = result.num_working_observations;
-  return result.certificate;
-}
-
-void Schedule::StartAfresh() {
-  if (!(cost_ > options_.init_max_error)) return;
-  context_.Note("the start is a rough one; looking for a better");
-  FoundStart found = FindFeasibleStart(
-      problem_, options_, context_,
-      LogIterations(options_.joint.callback, timer_, &summary_));
-  if (found.termination == SolveTermination::kInterrupted) {
-    summary_.termination = SolveTermination::kInterrupted;
-  }
-  if (!found.estimate) return;
-  const double cost =
-      Cost(problem_, *found.estimate, options_.norm, context_.num_threads);
-  if (!(cost < cost_)) return;
-  estimate_ = *std::move(found.estimate);
-  cost_ = cost;
-}
 
 }  // namespace
 
