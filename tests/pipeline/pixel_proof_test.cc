@@ -1,4 +1,4 @@
-#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/stages.h"
 
 #include <vector>
 

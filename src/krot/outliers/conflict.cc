@@ -8,7 +8,7 @@
 #include "krot/convert/build_problem.h"
 #include "krot/convert/reprojection.h"
 #include "krot/joint/joint.h"
-#include "krot/pipeline/pixel_proof.h"
+#include "krot/pipeline/stages.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/subset.h"
 #include "krot/proof/certificate.h"

@@ -43,10 +43,6 @@ struct NoiseLimit {
 NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
                           Norm norm, const Context& context);
 
-// The same with the cameras of built.start alone. O(observations).
-NoiseLimit NoiseLimitAtStart(const Model& model, const BuiltProblem& built,
-                             Norm norm, const Context& context);
-
 struct ErrorProfileOptions {
   Norm norm;
   // The largest error of the last level, true pixels; > 0. None: half of the
@@ -111,7 +107,7 @@ struct OutlierFilterOptions {
   // is what noise explains (FindNoiseLimit), provided that it is proved that no
   // estimate brings all errors below that; otherwise nothing is removed, and
   // the model stays as it is. From nothing, without a profile, it is what noise
-  // explains at the start (NoiseLimitAtStart).
+  // explains at the start (FindRemovalStart).
   std::optional<double> max_error;
   // Whether the model's own positions were made from rotations and tracks
   // alone: then weakly tied parts are looked for, too.

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "krot/convert/reprojection.h"
-#include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/rounds.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/gauge.h"

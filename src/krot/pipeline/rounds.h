@@ -13,8 +13,8 @@
 #include "krot/convert/pixel_certificate.h"
 #include "krot/convert/reprojection.h"
 #include "krot/math/norm.h"
-#include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
+#include "krot/pipeline/stages.h"
 #include "krot/problem/known_rotation_problem.h"
 
 namespace krot::internal {

@@ -15,7 +15,6 @@
 #include "krot/convert/reprojection.h"
 #include "krot/model/rigs.h"
 #include "krot/model/validate.h"
-#include "krot/pipeline/pixel_proof.h"
 #include "krot/pipeline/solve_model.h"
 #include "krot/problem/cost.h"
 #include "krot/problem/known_rotation_problem.h"

@@ -159,21 +159,11 @@ const char* FinishName(Finish finish) {
 
 namespace {
 
-RobustLoss LossOf(ErrorLoss::Kind kind) {
-  switch (kind) {
-    case ErrorLoss::Kind::kHuber:
-      return RobustLoss::kHuber;
-    case ErrorLoss::Kind::kCauchy:
-      return RobustLoss::kCauchy;
-    case ErrorLoss::Kind::kTrivial:
-      break;
-  }
-  return RobustLoss::kTrivial;
-}
-
 BundleAdjustmentOptions PolishOptions(Polish polish, const ErrorLoss& loss) {
   BundleAdjustmentOptions options;
-  options.loss = LossOf(loss.kind);
+  options.loss = loss.kind == ErrorLoss::Kind::kHuber    ? RobustLoss::kHuber
+                 : loss.kind == ErrorLoss::Kind::kCauchy ? RobustLoss::kCauchy
+                                                         : RobustLoss::kTrivial;
   options.loss_scale = loss.scale;
   if (polish == Polish::kFull) return options;
   options.constant_rig_from_world_rotation = true;
@@ -199,15 +189,9 @@ PolishSummary PolishModel(Polish polish, const ErrorLoss& loss,
 }
 
 const char* PolishName(Polish polish) {
-  switch (polish) {
-    case Polish::kRotationsFixed:
-      return "rotations_fixed";
-    case Polish::kFull:
-      return "full";
-    case Polish::kNone:
-      break;
-  }
-  return "none";
+  return polish == Polish::kFull             ? "full"
+         : polish == Polish::kRotationsFixed ? "rotations_fixed"
+                                             : "none";
 }
 
 namespace {

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <string>
 #include <utility>
 
 #include "krot/analysis/noise.h"
 #include "krot/base/check.h"
+#include "krot/convert/reprojection.h"
 #include "krot/finish/least_squares.h"
 #include "krot/outliers/packing.h"
 #include "krot/outliers/removal.h"
 #include "krot/outliers/robust_start.h"
+#include "krot/pipeline/stages.h"
 
 namespace krot::internal {
 namespace {
@@ -139,17 +142,93 @@ NoiseLimit FindNoiseLimit(const Model& model, const BuiltProblem& built,
   return is_lower || own.sigma == 0 ? limit : own;
 }
 
-NoiseLimit NoiseLimitAtStart(const Model& model, const BuiltProblem& built,
-                             Norm norm, const Context& context) {
-  return LimitOf(ApplyEstimate(model, built, built.start), norm, context);
-}
-
 ErrorProfile FindErrorProfile(const Model& model, const BuiltProblem& built,
                               const ErrorProfileOptions& options,
                               const Context& context) {
   CheckArgument(!options.max_error || *options.max_error > 0, "max_error",
                 options.max_error.value_or(0), "> 0");
   return Profiler(model, built, options, context).Run();
+}
+
+namespace {
+
+std::string Pixels(double value) {
+  std::ostringstream words;
+  words.precision(3);
+  words << value << " px";
+  return words.str();
+}
+
+// Starts from nothing; errors above `level` count as wrong.
+void PlaceFromTracks(Norm norm, double level, const Context& context,
+                     RemovalStart* start) {
+  start->init = SolveInit::kFeasible;
+  const KnownRotationProblem& problem = start->built.problem;
+  start->built.start = FindRobustStart(problem, norm, level, context);
+  MinimizeRobustly(problem, context, &start->built.start);
+  context.Note("positions from rotations and tracks: the median error is " +
+               Pixels(MedianError(problem, start->built.start, norm)));
+}
+
+// Whether the model has positions at which noise explains half of its errors
+// and none is gross.
+bool FitsItsPositions(const Model& model, const OutlierFilterOptions& options,
+                      const Context& context, double explained) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  const BuiltProblem own = BuildProblem(model, build);
+  const Norm norm = options.solve.norm;
+  return HasOwnStart(own) &&
+         MedianError(own.problem, own.start, norm) <= explained &&
+         Reprojection(model, own)
+                 .TrueCost(own.start, norm, context.num_threads) <=
+             options.solve.init_max_error;
+}
+
+}  // namespace
+
+RemovalStart FindRemovalStart(const Model& model,
+                              const OutlierFilterOptions& options,
+                              const Context& context) {
+  BuildProblemOptions build = options.solve.problem;
+  build.num_threads = context.num_threads;
+  build.ignore_translations = options.solve.init == SolveInit::kFeasible;
+  RemovalStart start;
+  start.max_error = options.max_error.value_or(0);
+  start.built = BuildProblem(model, build);
+  if (!build.ignore_translations && !HasOwnStart(start.built)) {
+    build.ignore_translations = true;
+    start.built = BuildProblem(model, build);
+  }
+  const Norm norm = options.solve.norm;
+  if (build.ignore_translations) {
+    const double level = options.max_error.value_or(kLevelOfStart);
+    PlaceFromTracks(norm, std::min(kLevelOfStart, level), context, &start);
+  }
+  if (start.init == SolveInit::kFeasible && !options.max_error &&
+      !options.make_profile) {
+    const NoiseLimit noise = LimitOf(
+        ApplyEstimate(model, start.built, start.built.start), norm, context);
+    start.max_error = noise.max_error;
+    const double largest =
+        Reprojection(model, start.built)
+            .TrueCost(start.built.start, norm, context.num_threads);
+    // A start's errors are larger than the lowest maximum, so that these do not
+    // show that an observation has to go.
+    start.nearly_fits = largest <= 3 * start.max_error;
+    start.fits_its_positions =
+        !options.has_other_rotations &&
+        FitsItsPositions(model, options, context, start.max_error);
+    if (options.spares_what_fits &&
+        (start.nearly_fits || start.fits_its_positions)) {
+      return start;
+    }
+    context.Note("leaving out what noise of " + Pixels(noise.sigma) +
+                 " per axis does not explain: errors above " +
+                 Pixels(start.max_error));
+  }
+  if (options.has_start_from_nothing) start.init = SolveInit::kFeasible;
+  return start;
 }
 
 }  // namespace krot::internal
